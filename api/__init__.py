@@ -13,13 +13,28 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from epicycle.actors import EpicycleError
     from epicycle.runner import Model, ModelError, Results, Simulation, StudyResults, open_study
-    from epicycle.runner.calls import Comparison, Page, Picture, compare, draw, load, plot, run, save, study, view
+    from epicycle.runner.calls import (
+        Comparison,
+        Explained,
+        Page,
+        Picture,
+        compare,
+        draw,
+        explain,
+        load,
+        plot,
+        run,
+        save,
+        study,
+        view,
+    )
 
     __version__: str
 
 __all__ = [
     "Comparison",
     "EpicycleError",
+    "Explained",
     "Model",
     "ModelError",
     "Page",
@@ -29,6 +44,7 @@ __all__ = [
     "StudyResults",
     "compare",
     "draw",
+    "explain",
     "load",
     "open_study",
     "plot",
@@ -44,7 +60,21 @@ _HOMES = {
     "EpicycleError": "actors",
     **dict.fromkeys(("Model", "ModelError", "Results", "Simulation", "StudyResults", "open_study"), "runner"),
     **dict.fromkeys(
-        ("Comparison", "Page", "Picture", "compare", "draw", "load", "plot", "run", "save", "study", "view"),
+        (
+            "Comparison",
+            "Explained",
+            "Page",
+            "Picture",
+            "compare",
+            "draw",
+            "explain",
+            "load",
+            "plot",
+            "run",
+            "save",
+            "study",
+            "view",
+        ),
         "runner.calls",
     ),
 }

@@ -21,7 +21,7 @@ class Table:
 
     @property
     def more(self) -> str:
-        """What is said of the rows that are not shown."""
+        """The line about the rows that are not shown."""
         return f"... and {len(self.rows) - MAX_ROWS:,} more" if len(self.rows) > MAX_ROWS else ""
 
 
@@ -39,7 +39,7 @@ def as_text(caption: str, tables: Iterable[Table]) -> str:
 
 def as_html(caption: str, tables: Iterable[Table]) -> str:
     """The same for a notebook, in plain HTML that takes on the notebook's own style."""
-    from .html import table, tag  # here, for few runs are shown so
+    from .html import table, tag  # here, because few runs are shown this way
 
     parts = [tag("p", caption)]
     for each in tables:
@@ -66,7 +66,7 @@ class Tabled:
 
 
 def pandas_module() -> Any:
-    """The package pandas; raises ``EpicycleError`` where it is not installed."""
+    """The package pandas; raises ``EpicycleError`` if it is not installed."""
     try:
         return import_module("pandas")
     except ImportError:

@@ -330,12 +330,12 @@ def test_what_is_wrong_with_a_disturbance_of_a_model_that_is_made(tmp_path: Path
         lines = [line.rpartition(here)[2] for line in text.splitlines()]
         return [line.partition("error: ")[2] or line for line in lines if "error:" in line or "help:" in line]
 
-    assert told(leek=0.5) == ["'leek' sets no parameter, did you mean 'leak'?"]
+    assert told(leek=0.5) == ["'leek' matches no parameter, did you mean 'leak'?"]
     assert told(leak=2) == ["leak: 2 is out of bounds, expected a number from 0 to 1"]
     assert told(load=0.5) == ["'load' is a parameter of the model, not of the disturbance leaky"]
     file.write_text(DISTURBANCE.replace("server.input", "server.inptu") + "set: {mean_service: 2}")
     assert told() == [
-        "'mean_service' cannot be set any more: the model is made",
+        "'mean_service' can no longer be set: the model has been built",
         "   help: load the model together with the disturbance: load_model(..., disturb='leaky.yaml')",
     ]
     file.write_text(DISTURBANCE.replace("server.input", "server.inptu"))
@@ -343,4 +343,4 @@ def test_what_is_wrong_with_a_disturbance_of_a_model_that_is_made(tmp_path: Path
     file.write_text(DISTURBANCE)
     model.disturb(file)
     before = list(model.aspects)
-    assert told() == ["there is an aspect 'leaky' already", "   help: unweave it before"]
+    assert told() == ["there is already an aspect 'leaky'", "   help: unweave it first"]

@@ -1,4 +1,4 @@
-"""The expression language: what stands in the `${...}` of a model and in the parameters of actors that compute."""
+"""The expression language: the contents of `${...}` in a model and of parameters of actors that compute."""
 
 from .evaluation import check_names, evaluate, interpolate, names_in
 from .formula import Formula, FormulaParameter, PortFormula, PortFormulaParameter, operand, value_at

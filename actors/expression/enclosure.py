@@ -21,7 +21,7 @@ _RISING: Final = frozenset(
     ("asin", "atan", "ceil", "degrees", "exp", "expm1", "float", "floor", "int", "log", "log1p", "radians", "round",
      "sinh", "sqrt", "tanh")
 )  # fmt: skip
-_FAR: Final = 1e8  # angles beyond are not told apart well enough from the next peak
+_FAR: Final = 1e8  # larger angles cannot be distinguished well enough from the next peak
 
 
 class _UnknownError(Exception):
@@ -29,9 +29,9 @@ class _UnknownError(Exception):
 
 
 def bounds_of(formula: Formula, names: Mapping[str, Bounds]) -> Bounds:
-    """What the value of a formula lies between, to rounding; ``EVERYTHING`` if that cannot be told.
+    """The bounds of the value of a formula, up to rounding; ``EVERYTHING`` if they are unknown.
 
-    A name that has no bounds, a list for example, has no business in ``names``.
+    A name without bounds, such as a list, must not be in ``names``.
     """
     try:
         low, high = _bounds(parse(formula.source), names)
@@ -87,7 +87,7 @@ def _of_corners(function: Callable[[float, float], float], left: Bounds, right: 
 
 
 def _truth(bounds: Bounds) -> bool | None:
-    """Whether a value counts as true; None if that is open."""
+    """Whether a value counts as true; None if that is undecided."""
     if bounds == _FALSE:
         return False
     return None if bounds[0] <= 0.0 <= bounds[1] else True
@@ -167,7 +167,7 @@ def _relation(sign: ast.cmpop, left: Bounds, right: Bounds) -> bool | None:
 
 
 def _either_of(node: ast.BoolOp, names: Mapping[str, Bounds]) -> Bounds:
-    """`and` and `or` give the operand that decides; each that may do so counts."""
+    """`and` and `or` give the operand that decides; every operand that may decide counts."""
     parts = []
     for each in node.values:
         parts.append(_bounds(each, names))
@@ -208,7 +208,7 @@ def _size(value: Bounds) -> Bounds:
 
 
 def _wave(function: Callable[[float], float], angle: Bounds, peak: float) -> Bounds:
-    """A sine or cosine: 1 at ``peak`` and each turn further on, -1 half a turn off."""
+    """A sine or cosine: 1 at ``peak`` and after each full turn, -1 half a turn away."""
     low, high = angle
     if not -_FAR < low <= high < _FAR:
         return -1.0, 1.0

@@ -1,8 +1,7 @@
 """A safe evaluator for expressions: arithmetic, lists, conditions and a few functions.
 
-Python's parser reads the text; what it found is checked against a whitelist as a whole and then interpreted
-here, never by `eval`. Every cost (time, memory, depth, size of numbers) has a limit that is checked before it
-is spent.
+Python's parser reads the text; the whole tree is checked against a whitelist and then interpreted here, never by
+`eval`. Every cost (time, memory, depth, size of numbers) has a limit that is checked before it is spent.
 """
 
 import ast
@@ -49,7 +48,7 @@ def evaluate(source: str, names: Mapping[str, object], budget: Budget | None = N
 def interpolate(text: str, names: Mapping[str, object], budget: Budget | None = None) -> object:
     """Return the text with its `${...}` evaluated; a text that is one `${...}` gives the value as it is.
 
-    In a longer text a quantity counts in the unit that is written behind it, or else in SI units.  `$${` stands for
+    In a longer text, a quantity is written in the unit that follows it, or else in SI units.  `$${` stands for
     `${` itself.
     """
     pieces = _pieces(text)
@@ -71,12 +70,12 @@ def interpolate(text: str, names: Mapping[str, object], budget: Budget | None = 
 
 @lru_cache(maxsize=4096)  # a model asks for the same few texts once per copy of an actor
 def names_in(text: str) -> frozenset[str]:
-    """Return the names that the `${...}` of a text ask for; constants and functions are left out."""
+    """Return the names that the `${...}` of a text use, without constants and functions."""
     return frozenset().union(*(free_names(tree, frozenset()) for _, tree in _trees(text))) - CONSTANTS.keys()
 
 
 def check_names(text: str, known: Collection[str]) -> None:
-    """Raise ``ExpressionError`` if the `${...}` of a text ask for a name that is not known."""
+    """Raise ``ExpressionError`` if the `${...}` of a text use an unknown name."""
     for offset, tree in _trees(text):
         strange = free_names(tree, frozenset()) - set(known) - CONSTANTS.keys() - FUNCTIONS.keys()
         for node in ast.walk(tree):
@@ -94,7 +93,7 @@ def _unknown(name: str, names: Collection[str]) -> str:
 
 # --- finding expressions in a text --------------------------------------------------------------------
 
-_WORD = re.compile(r"\s*([^\s,;.)]+)")  # the unit behind a number, if it is one
+_WORD = re.compile(r"\s*([^\s,;.)]+)")  # the unit after a number, if it is one
 _OPENING = re.compile(r"\$\$\{|\$\{")
 _LEXEME = re.compile(
     r"""'''(?:[^\\]|\\.)*?'''|\"""(?:[^\\]|\\.)*?\"""|'(?:[^'\\]|\\.)*'|"(?:[^"\\]|\\.)*"|[{}]""", re.DOTALL
@@ -151,7 +150,7 @@ def _end_of_expression(text: str, start: int) -> int | None:
 
 @contextlib.contextmanager
 def _shifted(offset: int) -> Iterator[None]:
-    """Let the offsets of errors from within count from the start of the whole text."""
+    """Make the offsets of errors inside count from the start of the whole text."""
     try:
         yield
     except ExpressionError as error:
@@ -159,7 +158,7 @@ def _shifted(offset: int) -> Iterator[None]:
 
 
 def _as_read(value: object, behind: tuple[tuple[int | None, str], ...]) -> object:
-    """The value, counted in the unit that the text has behind it, if it is a quantity and there is one."""
+    """The value, in the unit that follows it in the text, if it is a quantity and there is a unit."""
     if isinstance(value, Quantity) and behind and behind[0][0] is None and (unit := _WORD.match(behind[0][1])):
         with contextlib.suppress(UnitError):
             return value.to(unit[1])
@@ -189,7 +188,7 @@ class _Evaluation:
         return ExpressionError(message, node.col_offset, (node.end_col_offset or 0) - node.col_offset)
 
     def guard(self, node: ast.expr, function: Callable[P, T], *args: P.args, **kwargs: P.kwargs) -> T:
-        """Call the function; whatever Python has against it is the fault of this node."""
+        """Call the function; any Python error is reported for this node."""
         try:
             return function(*args, **kwargs)
         except ZeroDivisionError:
@@ -239,7 +238,7 @@ class _Evaluation:
                 return self._subscript(node)
             case ast.Call(func=ast.Name(id=name)):
                 arguments = [self.value(item) for item in node.args]
-                if name != "len":  # which is known without looking
+                if name != "len":  # whose size is known
                     for item, argument in zip(node.args, arguments, strict=True):
                         self._weighed(item, argument)
                 return self._weighed(node, self.guard(node, FUNCTIONS[name], *arguments))
@@ -251,7 +250,7 @@ class _Evaluation:
                 raise AssertionError(f"{type(node).__name__} passed the check")
 
     def _weighed(self, node: ast.expr, value: T) -> T:
-        """Pay for a value by its size, when it is made or looked through, and see that it is not too large."""
+        """Pay for a value by its size, when it is made or searched, and check that it is not too large."""
         self.guard(node, self._budget.weigh, value)
         return value
 
@@ -278,7 +277,7 @@ class _Evaluation:
             assert key_node is not None  # '**' has been refused
             key = self.value(key_node)
             if not isinstance(key, str):
-                raise self._error(key_node, f"a key must be a text, this one is {kind_of(key)}")
+                raise self._error(key_node, f"a key must be a text, but this one is {kind_of(key)}")
             if key in result:
                 raise self._error(key_node, f"duplicate key '{key}'")
             result[key] = self.value(value_node)
@@ -311,7 +310,7 @@ class _Evaluation:
     def _comprehend(self, node: ast.ListComp, level: int, items: list[object]) -> None:
         if level == len(node.generators):
             if len(items) >= MAX_ELEMENTS:
-                raise self._error(node, f"the list gets more than {MAX_ELEMENTS:,} elements")
+                raise self._error(node, f"the list would have more than {MAX_ELEMENTS:,} elements")
             items.append(self.value(node.elt))
             return
         generator = node.generators[level]

@@ -1,8 +1,8 @@
-"""Expressions as Python functions of floats, which give what the evaluator would, or nothing where it has to look.
+"""Expressions as Python functions of floats, which give what the evaluator would, or nothing where it must decide.
 
-Only a checked tree is translated, node by node, into names and signs of our own.  What the evaluator refuses on its
-way, a number beyond all floats or none at all, is not lost in between: + - * and the sign keep it for the end, and it
-is looked for wherever anything else takes it in.
+Only a checked tree is translated, node by node, into names and signs of our own.  What the evaluator refuses on the
+way, an overflow or NaN, is not lost in between: + - * and the sign keep it until the end, and it is checked wherever
+anything else takes it in.
 """
 
 import ast
@@ -21,20 +21,32 @@ _SIGNS: Final[dict[type[ast.AST], str]] = {
     ast.USub: "-", ast.UAdd: "+", ast.And: " and ", ast.Or: " or ",
     ast.Eq: "==", ast.NotEq: "!=", ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=",
 }  # fmt: skip
-_OF_FLOATS: Final = ("abs", "atan2", "cos", "exp", "hypot", "log", "max", "min", "sin", "sqrt", "tan")  # which give one
+_OF_FLOATS: Final = (
+    "abs",
+    "atan2",
+    "cos",
+    "exp",
+    "hypot",
+    "log",
+    "max",
+    "min",
+    "sin",
+    "sqrt",
+    "tan",
+)  # which give a float
 UNDECIDED: Final = (ArithmeticError, TypeError, ValueError)
 _FLOAT, _NUMBER, _TRUTH = "float", "number", "truth value"  # kinds: what is a float, may be one, is none
 
 
 class _UnfitError(Exception):
-    """What has to be left to the evaluator."""
+    """What must be left to the evaluator."""
 
 
 @functools.lru_cache(maxsize=4096)
 def of_floats(source: str, names: tuple[str, ...]) -> Callable[..., Any] | None:
-    """A function of the values of these names, in their order; None if the expression is not one of numbers alone.
+    """A function of the values of these names, in their order; None if the expression is not purely numeric.
 
-    It gives None, or raises one of ``UNDECIDED``, for what the evaluator has to decide: a value that is not exactly a
+    It gives None, or raises one of ``UNDECIDED``, for what the evaluator must decide: a value that is not exactly a
     float, a result that is not finite.
     """
     writer = _Writer(source, names)
@@ -46,7 +58,7 @@ def of_floats(source: str, names: tuple[str, ...]) -> Callable[..., Any] | None:
     code = f"lambda {', '.join(writer.names.values())}: {text}" + (f" if {exact}float else None" if exact else "")
     try:
         return eval(compile(code, "<expression>", "eval"), KNOWN)  # type: ignore[no-any-return]
-    except (MemoryError, RecursionError, SyntaxError):  # more in each other than Python's compiler takes
+    except (MemoryError, RecursionError, SyntaxError):  # nested more deeply than Python's compiler allows
         return None
 
 
@@ -54,7 +66,7 @@ def _beyond() -> None:
     raise OverflowError
 
 
-# All that a function can name.
+# Everything that a function can name.
 KNOWN: Final[dict[str, Any]] = {
     "__builtins__": {}, "type": type, "float": float, "beyond": _beyond, "power": BINARY[ast.Pow],
     **{name: FUNCTIONS[name] for name in _OF_FLOATS},
@@ -67,15 +79,15 @@ class _Writer:
     def __init__(self, source: str, names: tuple[str, ...]) -> None:
         self.names = {name: f"v{place}" for place, name in enumerate(names)}
         self._source = source
-        self._held = 0  # results that were looked at
+        self._held = 0  # results that were checked
 
     def end(self, written: tuple[str, str]) -> str:
-        """A result as the whole's: nothing if it is not finite."""
+        """The result of the whole expression: None if it is not finite."""
         text, kind = written
         return text if kind == _TRUTH else f"(r if -1e999 < (r := {text}) < 1e999 else None)"
 
     def _finite(self, node: ast.expr) -> tuple[str, str]:
-        """A part whose value may not be seen in the result any more: it has to be finite, but for a name's own."""
+        """A part whose value may not show in the result: it must be finite, unless it is a name."""
         text, kind = self.write(node)
         if kind == _TRUTH or isinstance(node, ast.Name) or not free_names(node, frozenset()):
             return text, kind

@@ -1,6 +1,6 @@
-"""Expressions that are evaluated again and again, and the parameters that hold them.
+"""Expressions that are evaluated repeatedly, and the parameters that hold them.
 
-A ``Formula`` is over names, a ``PortFormula`` over what ports have sent last: ``main.state.position[0] < 20``.
+A ``Formula`` is over names, a ``PortFormula`` over the latest tokens of ports: ``main.state.position[0] < 20``.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from .values import CONSTANTS, FUNCTIONS
 
 T = TypeVar("T")
 
-# Dotted names with an index only where another name follows: a last index is a subscript of the token.
+# Dotted names with an index only if another name follows: a final index is a subscript of the token.
 _REFERENCE = re.compile(
     r"""(?P<text>"[^"]*"|'[^']*')"""
     r"""|(?<![\w.])(?P<path>[A-Za-z_]\w*(?:\[\d+\](?=\.))?(?:\.[A-Za-z_]\w*(?:\[\d+\](?=\.[A-Za-z_]))?)+)""",
@@ -31,11 +31,10 @@ _STAND_IN = re.compile(r"\bport_(\d+)\b", re.ASCII)
 
 
 class Formula:
-    """A checked expression; ``names`` are what it asks for, in the order in which they first appear.
+    """A checked expression; ``names`` are what it uses, in the order in which they first appear.
 
-    ``is_condition`` says whether its value is always true or false.
-
-    Raises ``ExpressionError`` if the text is no expression.
+    ``is_condition`` states whether its value is always true or false.  Raises ``ExpressionError`` if the text is not an
+    expression.
     """
 
     __slots__ = ("function", "is_condition", "names", "source")
@@ -55,14 +54,14 @@ class Formula:
         self.function = of_floats(source, self.names)
 
     def of_floats(self, *values: Any) -> Any:
-        """The value for those of the names, in their order, in less time; None if that takes more than floats."""
+        """A faster function of the values of the names, in their order; None if that takes more than floats."""
         try:
             return None if self.function is None else self.function(*values)
         except UNDECIDED:
             return None
 
     def __call__(self, values: Mapping[str, object]) -> Any:
-        """The value of the expression; raises ``EpicycleError`` telling the values of its names."""
+        """The value of the expression; raises an ``EpicycleError`` with the values of its names."""
         if self.function is not None and CONSTANTS.keys().isdisjoint(values):
             found = self.of_floats(*map(values.get, self.names))
             if found is not None:
@@ -87,7 +86,7 @@ class Formula:
 
 
 def _is_condition(node: ast.expr) -> bool:
-    """Whether the value of an expression is true or false whatever its names stand for."""
+    """Whether the value of an expression is true or false for all values of its names."""
     match node:
         case ast.Compare() | ast.UnaryOp(op=ast.Not()) | ast.Constant(value=bool()):
             return True
@@ -102,12 +101,12 @@ def _is_condition(node: ast.expr) -> bool:
 
 
 class PortFormula:
-    """A checked expression in which dotted names stand for tokens: ``references``, in the order of their appearance.
+    """A checked expression in which dotted names are tokens: ``references``, in the order of their appearance.
 
     A reference is the path of an output port, with the fields that lead to a part of its token: ``main.state`` or
-    ``main.state.position``.  A name in ``given`` stands for itself: its value, of which fields can be named as well,
-    comes with each call; ``given_fields`` are those, as ``("token.speed", ("speed",))``.  Raises ``ExpressionError`` if
-    the text is no such expression.
+    ``main.state.position``.  A name in ``given`` means itself: its value comes with each call, and its fields can be
+    named as well; ``given_fields`` are those, as ``("token.speed", ("speed",))``.  Raises ``ExpressionError`` if the
+    text is not such an expression.
     """
 
     __slots__ = ("_formula", "_given", "_paths", "_ports", "given_fields", "references", "source")
@@ -126,10 +125,10 @@ class PortFormula:
                 names[name] = name
             elif name not in names.values():
                 also = "".join(f", and {each!r} is known" for each in given)
-                raise ExpressionError(f"the name {name!r} is unknown: a port is written 'actor.port'{also}")
+                raise ExpressionError(f"unknown name {name!r}: a port is written 'actor.port'{also}")
         if not names:
             what = " or ".join([*map(repr, given), "a port as 'actor.port'"])
-            raise ExpressionError(f"{'nothing' if given else 'no port'} is named in it: write {what}")
+            raise ExpressionError(f"it names {'nothing' if given else 'no port'}: write {what}")
         self.source = source
         self._ports = {path: name for path, name in names.items() if path.split(".")[0] not in given}
         self._given = {name: path.split(".") for path, name in names.items() if path not in self._ports}
@@ -137,7 +136,7 @@ class PortFormula:
         self.given_fields = tuple((".".join(path), tuple(path[1:])) for path in self._given.values() if path[1:])
 
     def __call__(self, values: Sequence[object], **given: object) -> Any:
-        """The value for those of the references, in their order, and of the given names; raises ``EpicycleError``."""
+        """The value, for those of the references in their order and of the given names; raises ``EpicycleError``."""
         known = dict(zip(self._ports.values(), values, strict=True))
         for name, (root, *fields) in self._given.items():
             known[name] = operand(value_at(given[root], fields))
@@ -152,7 +151,7 @@ class PortFormula:
 
 
 class _ExpressionParameter(Parameter[T]):
-    """A parameter whose value is made of a text; ``words`` say what it is."""
+    """A parameter whose value is made of a text; ``words`` describe it."""
 
     words = "expression"
 
@@ -175,7 +174,7 @@ class _ExpressionParameter(Parameter[T]):
 
 
 class FormulaParameter(_ExpressionParameter[Formula]):
-    """A parameter whose value is an expression: a text, or a number or truth value that stands for itself."""
+    """A parameter whose value is an expression: a text, or a number or truth value that means itself."""
 
     def __init__(self, default: Any = REQUIRED, *, doc: str = "") -> None:
         super().__init__(Formula, default, doc=doc)
@@ -206,7 +205,7 @@ def operand(token: Any) -> Any:
     """A token as the expression language knows it: arrays become lists, dataclasses dicts of their fields."""
     if type(token) in _PLAIN:
         return token
-    if isinstance(token, (np.generic, np.ndarray)):  # one that is a float, too, divides by zero without an error
+    if isinstance(token, (np.generic, np.ndarray)):  # one that is also a float divides by zero without an error
         return token.tolist()
     if isinstance(token, (bool, int, float, str)):
         return token
@@ -220,7 +219,7 @@ def operand(token: Any) -> Any:
 
 
 def value_at(token: Any, fields: Iterable[str]) -> Any:
-    """A part of a token; None where there is no such part."""
+    """A part of a token; None if there is no such part."""
     for name in fields:
         token = token.get(name) if isinstance(token, Mapping) else getattr(token, name, None)
     return token

@@ -11,10 +11,10 @@ from .formula import Formula, operand
 
 
 def of_token(formula: Formula, token: Any, /, **known: Any) -> Any:
-    """What an expression gives whose names are fields of a token.
+    """The value of an expression whose names are fields of a token.
 
-    ``token`` is all of it, and ``known`` are further names, which go before fields.  Raises ``EpicycleError`` for a
-    name that is neither.
+    ``token`` is the whole token, and ``known`` are further names, which win over fields.  Raises ``EpicycleError`` for
+    a name that is neither.
     """
     if not formula.names:
         return formula({})
@@ -40,7 +40,7 @@ def of_token(formula: Formula, token: Any, /, **known: Any) -> Any:
 
 
 def field_of(token: Any, name: str) -> Any:
-    """A field of a token, as it is; raises ``EpicycleError`` if there is none of this name."""
+    """A field of a token, unchanged; raises ``EpicycleError`` if there is none with this name."""
     known = token if isinstance(token, Mapping) else operand(token)
     names = list(known) if isinstance(known, Mapping) else []
     if name not in names:
@@ -50,8 +50,8 @@ def field_of(token: Any, name: str) -> Any:
 
 
 def number_of_token(formula: Formula, what: str, token: Any, /, **known: Any) -> float:
-    """The same, where it has to be a finite number; ``what`` says which one."""
+    """The same for a finite number; ``what`` names it."""
     value = of_token(formula, token, **known)
     if isinstance(value, (int, float)) and math.isfinite(value):
         return value
-    raise EpicycleError(f"{formula} gives {value!r}, but {what} is a finite number")
+    raise EpicycleError(f"{formula} gives {value!r}, but {what} must be a finite number")

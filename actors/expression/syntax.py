@@ -1,4 +1,4 @@
-"""Which expressions are welcome: Python's parser reads the text, a whitelist judges what it found."""
+"""Valid expressions: Python's parser reads the text, and a whitelist decides what is allowed."""
 
 import ast
 import functools
@@ -19,7 +19,7 @@ _ALLOWED: Final = (
 
 
 class ExpressionError(EpicycleError):
-    """An expression that cannot be evaluated; `offset` and `length` say which part is to blame."""
+    """An expression that cannot be evaluated; `offset` and `length` locate the part at fault."""
 
     def __init__(self, message: str, offset: int = 0, length: int = 0) -> None:
         super().__init__(message, offset, length)
@@ -64,12 +64,12 @@ def parse(source: str) -> ast.expr:
         raise ExpressionError(f"the expression is longer than {MAX_SOURCE:,} characters", 0, len(source))
     if not source.strip():
         raise ExpressionError("the expression is empty", 0, len(source))
-    # Within ${...} a line break is just space. Blanks for blanks, so that all offsets stay true.
+    # Within ${...} a line break is a space.  One blank for each, so that all offsets stay valid.
     code = re.sub(r"[\t\n\v\f\r]", " ", source)
     indent = len(code) - len(code.lstrip(" "))
     try:
         with warnings.catch_warnings():
-            warnings.simplefilter("error")  # Python only warns of '\d' and of 1if; here they are mistakes
+            warnings.simplefilter("error")  # Python only warns of '\d' and of 1if; here they are errors
             tree = ast.parse(code[indent:], mode="eval").body
     except SyntaxError as error:
         offset = max(error.offset or 1, 1) - 1 + indent
@@ -94,10 +94,10 @@ def _characters(code: str, count: int) -> int:
 
 
 def _check(tree: ast.expr) -> None:
-    """Refuse whatever is not on the whitelist, before anything is evaluated."""
+    """Refuse everything that is not on the whitelist, before anything is evaluated."""
 
     def refuse(node: Any, message: str) -> NoReturn:
-        # A comprehension's `for` has no place of its own in the tree.
+        # A comprehension's `for` has no position in the tree.
         place: Any = node.target if isinstance(node, ast.comprehension) else node
         raise ExpressionError(message, place.col_offset, place.end_col_offset - place.col_offset)
 
@@ -112,7 +112,7 @@ def _check(tree: ast.expr) -> None:
             refuse(node, f"nested deeper than {MAX_NESTING} levels")
         if problem := _objection(node):
             refuse(node, problem)
-        # What qualifies its parent, such as an operator, is judged with that, and so is the function of a call.
+        # What qualifies its parent, such as an operator, is checked with that, and so is the function of a call.
         children = [child for child in ast.iter_child_nodes(node) if not isinstance(child, _DETAILS)]
         if isinstance(node, ast.Call):
             children.remove(node.func)
@@ -120,7 +120,7 @@ def _check(tree: ast.expr) -> None:
 
 
 def _objection(node: ast.AST) -> str | None:
-    """Return why a node, seen without its children, is refused; None if it is welcome."""
+    """Return why a node, without its children, is refused; None if it is allowed."""
     operators: list[Any] = []
     match node:
         case ast.Attribute(attr=name) | ast.Call(func=ast.Attribute(attr=name)):
@@ -157,7 +157,7 @@ def _objection(node: ast.AST) -> str | None:
 def _objection_to_constant(value: object) -> str | None:
     if isinstance(value, str):
         is_sound = value.isascii() or not any("\ud800" <= character <= "\udfff" for character in value)
-        return None if is_sound else "this text has half a character (a lone surrogate) in it"
+        return None if is_sound else "this text contains half a character (a lone surrogate)"
     if value is None or isinstance(value, bool):
         return None
     if isinstance(value, (int, float)):

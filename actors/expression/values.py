@@ -1,4 +1,4 @@
-"""What expressions compute with: operators, functions and constants, each checked before it is costly."""
+"""What expressions compute with: operators, functions and constants, each checked before it becomes costly."""
 
 from __future__ import annotations
 
@@ -38,11 +38,11 @@ class Budget:
 
     @property
     def is_spent(self) -> bool:
-        """Whether more has been asked for than there was."""
+        """Whether more was requested than was left."""
         return self._left < 0
 
     def spend(self, steps: int) -> None:
-        """Take some steps off, or raise if there are not so many left."""
+        """Deduct some steps, or raise if there are not enough left."""
         if self._whole is not None:
             self._whole.spend(steps)
         self._left -= steps
@@ -100,7 +100,7 @@ def check_result(value: object) -> None:
         if isinstance(item, float) and math.isnan(item):
             raise ValueError("the result is not a number (NaN)")
         if isinstance(item, Quantity):
-            item.si  # noqa: B018  raises what would be raised wherever it counts in SI units
+            item.si  # noqa: B018  raises any error of the conversion to SI units
         elif isinstance(item, int):
             _checked(item)
         elif isinstance(item, (list, tuple, dict)):
@@ -108,7 +108,7 @@ def check_result(value: object) -> None:
 
 
 _KINDS: Final[tuple[tuple[type | tuple[type, ...], str], ...]] = (
-    (bool, "a truth value"),  # before int, which it is, too
+    (bool, "a truth value"),  # before int, because a bool is an int, too
     ((int, float), "a number"),
     (str, "a text"),
     ((list, tuple), "a list"),
@@ -116,7 +116,7 @@ _KINDS: Final[tuple[tuple[type | tuple[type, ...], str], ...]] = (
 )
 
 
-_ORDERED: Final[tuple[Any, ...]] = (NUMBER, str, LIST)  # values of one kind can be put in an order
+_ORDERED: Final[tuple[Any, ...]] = (NUMBER, str, LIST)  # values of one kind can be ordered
 
 
 def kind_of(value: object) -> str:
@@ -130,8 +130,8 @@ def kind_of(value: object) -> str:
 
 
 def text_of(value: object) -> str:
-    """Return a value as it stands in a text: `true`, `null`, `3`, `2.5`, `[1, 'a']`."""
-    _size(value)  # which bounds what is to be written
+    """Return a value as it appears in a text: `true`, `null`, `3`, `2.5`, `[1, 'a']`."""
+    _size(value)  # which bounds what must be written
     text = value if isinstance(value, str) else _written(value)
     _check_text(len(text))
     return text
@@ -144,7 +144,7 @@ def _written(value: object) -> str:
         return "[" + ", ".join(map(_written, value)) + "]"
     if value is None or isinstance(value, bool):
         return {None: "null", True: "true", False: "false"}[value]
-    if isinstance(value, float):  # by its own name, as subclasses show their type
+    if isinstance(value, float):  # by its own name, because subclasses show their type
         return float.__repr__(value.si if isinstance(value, Quantity) else value)
     return repr(value) if isinstance(value, str) else str(value)
 
@@ -269,7 +269,7 @@ def subscript(whole: Any, index: object) -> Any:
     """Return `whole[index]`: an element of a list, a character of a text, or the value of a key."""
     if isinstance(whole, dict):
         if not isinstance(index, str):
-            raise TypeError(f"a dict is asked by a text, not by {kind_of(index)}")
+            raise TypeError(f"a dict is indexed by a text, not by {kind_of(index)}")
         if index not in whole:
             keys = [str(key) for key in whole]
             guess = did_you_mean(index, keys) or ","
@@ -291,7 +291,7 @@ def subscript(whole: Any, index: object) -> Any:
 def _function(
     name: str, function: Callable[..., Any], least: int = 1, most: float = 1, *, of_numbers: bool = True
 ) -> Callable[..., Any]:
-    """A function that explains what it takes; of numbers, it gives a number of reasonable size."""
+    """A function that explains its arguments; given numbers, it returns a number of reasonable size."""
 
     def call(*values: Any) -> Any:
         if not least <= len(values) <= most:
@@ -312,7 +312,7 @@ def _function(
 
 
 def _keeping_unit(function: Callable[..., Any]) -> Callable[..., Any]:
-    """The function, which gives a quantity in the unit of the first number, if it has one."""
+    """The function, which returns a quantity in the unit of the first number, if it has one."""
 
     def call(first: Any, *others: Any) -> Any:
         if not isinstance(first, Quantity):
@@ -334,7 +334,7 @@ def _in_unit(unit: str, function: Callable[..., Any]) -> Callable[..., Any]:
 
 
 def _angle(unit: str, function: Callable[[float], float]) -> Callable[[Any], float]:
-    """``radians`` or ``degrees``: of a plain number, or of an angle, which knows by itself what it counts in."""
+    """``radians`` or ``degrees``: of a plain number, or of an angle, which has a unit."""
     return lambda value: value.to(unit) if isinstance(value, Quantity) else function(value)
 
 
@@ -379,12 +379,12 @@ def _sum(value: Any) -> Any:
     items = _needs_list("sum", value)
     for item in items:
         if not isinstance(item, NUMBER):
-            raise TypeError(f"sum needs a list of numbers, this one has {kind_of(item)} in it")
+            raise TypeError(f"sum needs a list of numbers, but this one contains {kind_of(item)}")
     return _checked(elementary.total(items), *items)
 
 
 def _ordered(name: str, items: list[Any]) -> list[Any]:
-    """Return the items if they can be put in an order."""
+    """Return the items if they can be ordered."""
     if not any(all(isinstance(item, kind) for item in items) for kind in _ORDERED):
         raise TypeError(f"{name} cannot compare {' with '.join(sorted({kind_of(item) for item in items}))}")
     return items
@@ -394,7 +394,7 @@ def _extreme(name: str, function: Callable[[list[Any]], Any]) -> Callable[..., A
     def call(*values: Any) -> Any:
         items = _ordered(name, _needs_list(name, values[0]) if len(values) == 1 else list(values))
         if not items:
-            raise ValueError(f"{name} of an empty list")
+            raise ValueError(f"{name} needs at least one element")
         return function(items)
 
     return call

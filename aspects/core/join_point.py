@@ -116,6 +116,10 @@ class JoinPoint:
             return self._first.random
         return aspect_stream(self._context.seed, self._place, self.aspect)
 
+    def is_at(self, other: JoinPoint) -> bool:
+        """Whether it is the same place of the same aspect: a single token may have a join point of its own."""
+        return self._place == other._place and self.aspect == other.aspect
+
     def share(self, first: JoinPoint) -> None:
         """Engine: the port has another connection, on which ``first`` stands: one stream, one memory."""
         self._first, self.memory, self.counts = first, first.memory, first.counts

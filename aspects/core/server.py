@@ -113,14 +113,14 @@ class Server:
 
     def has_any(self, point: JoinPoint) -> bool:
         """Whether a task from there is not over."""
-        return any(task.point is point for task in (self._served, *self.line.tasks) if task is not None)
+        return any(task.point.is_at(point) for task in (self._served, *self.line.tasks) if task is not None)
 
     def remove(self, point: JoinPoint) -> None:
         """Drop the tasks from there, now: they will never be over."""
         now = point.tag.time
-        self.line.tasks = [task for task in self.line.tasks if task.point is not point]
+        self.line.tasks = [task for task in self.line.tasks if not task.point.is_at(point)]
         heapq.heapify(self.line.tasks)
-        if self._served is not None and self._served.point is point:
+        if self._served is not None and self._served.point.is_at(point):
             self._stop(now)
             self._go_on(now)
 

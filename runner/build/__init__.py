@@ -1,4 +1,4 @@
-"""From declarations, or a program, to a model that is checked and frozen."""
+"""From declarations, or a program, to a checked and frozen model."""
 
 from .composite_class import CompositeClass, load_composite
 from .figures import Complaint, figures_of, made_figure, place_in_figure, tell_of_figure

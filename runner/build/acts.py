@@ -14,7 +14,7 @@ _FEW = 8  # places that a message lists
 
 
 def acts_of(texts: Iterable[ActText], aspects: Iterable[WovenAspect], problems: Problems) -> frozenset[ActName]:
-    """The names of acts; those of aspects and places that are not there are problems."""
+    """The names of acts; unknown aspects and places are problems."""
     places = {woven.name: woven.places for woven in aspects}
     found = set()
     for each in texts:
@@ -25,8 +25,8 @@ def acts_of(texts: Iterable[ActText], aspects: Iterable[WovenAspect], problems: 
         elif place not in places[aspect]:
             known = places[aspect]
             rest = f" and {len(known) - _FEW} more" if len(known) > _FEW else ""
-            message = f"exactly: aspect {aspect} does not stand at {place!r}{did_you_mean(place, known)}"
-            problems.add(message, each.at.position, f"it stands at {', '.join(known[:_FEW])}{rest}")
+            message = f"exactly: aspect {aspect} does not attach to {place!r}{did_you_mean(place, known)}"
+            problems.add(message, each.at.position, f"it attaches to {', '.join(known[:_FEW])}{rest}")
         else:
             found.add(ActName(aspect, place, each.token))
     return frozenset(found)

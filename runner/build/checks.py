@@ -18,7 +18,7 @@ MAX_SHOWN = 10  # names in one message
 
 
 def check(draft: Draft, problems: Problems, *, whole: bool = True) -> None:
-    """Add every problem of wiring: types, missing connections, two writers, loops without delay.
+    """Report every wiring problem: types, missing connections, two writers, loops without delay.
 
     If it is the ``whole`` model and nothing is wrong, warn of actors that can never fire.
     """
@@ -33,7 +33,7 @@ def check(draft: Draft, problems: Problems, *, whole: bool = True) -> None:
 
 
 def check_passages(graph: ModelGraph, problems: Problems) -> bool:
-    """Whether the ways through composite ports end, and are few enough to be followed one by one."""
+    """Check that paths through composite ports end, and are few enough to be followed one by one."""
     ports = graph.ports
     between = {
         path: [hop.destination for hop in graph.outgoing(path) if ports[hop.destination].port is None]
@@ -43,18 +43,18 @@ def check_passages(graph: ModelGraph, problems: Problems) -> bool:
     if cycle := find_loop(between):
         hop = next(hop for hop in graph.outgoing(cycle[-1]) if hop.destination == cycle[0])
         message = f"a loop of composite ports with no actor in it: {' -> '.join([*cycle, cycle[0]])}"
-        hint = "a composite that hands its input straight on to its output cannot be connected to itself"
+        hint = "a composite that passes its input straight to its output cannot be connected to itself"
         problems.add(message, hop.position, hint)
         return False
-    # How many wires lead on from each port, without walking along them: they may be very many.
+    # The number of wires that lead on from each port, without following them: there may be very many.
     onward: dict[str, int] = {}
-    last: dict[str, tuple[int, str]] = {}  # how many composite ports are behind each in a row, and the last of them
+    last: dict[str, tuple[int, str]] = {}  # how many composite ports follow each in a row, and the last of them
     for path in reversed(in_order(between)):
         onward[path] = sum(onward.get(hop.destination, 1) for hop in graph.outgoing(path))
         last[path] = max(((last[far][0] + 1, last[far][1]) for far in between[path]), default=(0, path))
     first = max(last, key=last.__getitem__, default="")
     if first and last[first][0] > MAX_PASSAGE:
-        what = f"a way of more than {MAX_PASSAGE} composite ports in a row"
+        what = f"a path through more than {MAX_PASSAGE} composite ports"
         problems.add(f"{what}, from {first} to {last[first][1]}")
         return False
     wires = 0
@@ -69,7 +69,7 @@ def check_passages(graph: ModelGraph, problems: Problems) -> bool:
 
 
 def check_types(graph: ModelGraph, problems: Problems) -> None:
-    """What each port sends or hands on must be what the next port with a type takes."""
+    """Check that the next port with a type takes what each port sends or passes on."""
     for path in graph.ports:
         given = graph.type_of(path)
         if given is None:
@@ -81,19 +81,19 @@ def check_types(graph: ModelGraph, problems: Problems) -> None:
                 continue
             way = " -> ".join([path, *(hop.destination for hop in hops)])
             first, last = hops[0].position, hops[-1].position
-            verb = "sends" if graph.ports[path].port is not None else "hands on"
+            verb = "sends" if graph.ports[path].port is not None else "passes on"
             problems.add(
                 f"{path} {verb} {type_name(given)}, but {far} takes {type_name(wanted)}",
                 first,
                 *(who for who in (_who(graph, path), _who(graph, far)) if who),
-                *((f"the way: {way}",) if len(hops) > 1 else ()),
+                *((f"the path: {way}",) if len(hops) > 1 else ()),
                 *((f"connected onward at {last}",) if first and last and first != last else ()),
                 about=("types", in_general(path), in_general(far)),
             )
 
 
 def _stretches(graph: ModelGraph, path: str) -> Iterator[tuple[Hop, ...]]:
-    """The ways from a port to the next ports that have a type."""
+    """The paths from a port to the next ports that have a type."""
     for hop in graph.outgoing(path):
         if graph.type_of(hop.destination) is not None:
             yield (hop,)
@@ -103,7 +103,7 @@ def _stretches(graph: ModelGraph, path: str) -> Iterator[tuple[Hop, ...]]:
 
 
 def _who(graph: ModelGraph, port: str) -> str:
-    """Whose port it is, and where that stands."""
+    """Whose port it is, and where that is declared."""
     owner = graph.owner(port)
     if owner in graph.actors:
         what, at = f"{owner} is a {type(graph.actors[owner]).__name__}", graph.positions.get(owner)
@@ -113,7 +113,7 @@ def _who(graph: ModelGraph, port: str) -> str:
 
 
 def check_connections(draft: Draft, problems: Problems) -> None:
-    """Required inputs are connected, and single inputs have one writer."""
+    """Check that required inputs are connected, and that single inputs have one writer."""
     graph = draft.graph
     for actor in graph.actors.values():
         position = graph.positions.get(actor.path)
@@ -121,7 +121,7 @@ def check_connections(draft: Draft, problems: Problems) -> None:
             wires = graph.wires_to(port)
             if not wires and port.required and not _may_be_connected(draft, port.path):
                 problems.add(
-                    f"{port.path} is not connected, and {type(actor).__name__} cannot do without it",
+                    f"{port.path} is not connected, but {type(actor).__name__} needs it",
                     position,
                     *_open_end(graph, port.path),
                     f"it takes {type_name(port.type)}" + (f": {port.doc}" if port.doc else ""),
@@ -138,14 +138,14 @@ def check_connections(draft: Draft, problems: Problems) -> None:
                     f"{port.path} takes one connection, but {what} to it: {writers}",
                     wires[1].hops[-1].position,
                     *((f"the first connection is at {first}",) if first else ()),
-                    "connect one of them, or send through an actor that merges them",
-                    "if all of it is one channel, write {from: [...], to: ..., shared: true}",
+                    "connect only one of them, or send through an actor that merges them",
+                    "if they form one channel, write {from: [...], to: ..., shared: true}",
                     about=("several", in_general(port.path)),
                 )
 
 
 def _may_be_connected(draft: Draft, path: str) -> bool:
-    """Whether a missing connection may be due to another problem: a wrong connection, or an actor not made."""
+    """Whether a missing connection may be due to another problem: a wrong connection, or a missing actor."""
     if not draft.is_wired or not draft.open:
         return not draft.is_wired
     before = [path]
@@ -166,16 +166,17 @@ def _open_end(graph: ModelGraph, path: str) -> tuple[str, ...]:
 
 
 def check_loops(graph: ModelGraph, problems: Problems) -> None:
-    """Every loop needs a delay somewhere, or no order of firing exists within a tag."""
+    """Check that every loop has a delay somewhere; otherwise there is no firing order within a tag."""
     for region in dependencies(graph).values():
         if not find_loop(region):
             continue
-        import networkx as nx  # here, as it takes long and most models have no such loop
+        import networkx as nx  # here, because it takes long and most models have no such loop
 
         declared = {path: place for place, path in enumerate(graph.ports)}
         for component in nx.strongly_connected_components(nx.from_dict_of_lists(region, nx.DiGraph)):
             if len(component) > 1:
-                # A graph in the order of declaration: a view would follow that of a set, which varies between runs.
+                # A graph in the order of declaration: a view would follow the order of a set, which varies between
+                # runs.
                 inner = nx.DiGraph()
                 for path in sorted(component, key=declared.__getitem__):
                     inner.add_edges_from((path, far) for far in region[path] if far in component)
@@ -183,7 +184,7 @@ def check_loops(graph: ModelGraph, problems: Problems) -> None:
 
 
 def _shortest_loop(graph: ModelGraph, inner: Any, region: Region) -> list[list[Hop]]:
-    """The ways from actor to actor around a loop, from the first actor of a strongly connected graph back to it."""
+    """The paths from actor to actor around a loop, from the first actor of a strongly connected graph back to it."""
     import networkx as nx
 
     start = next(path for path in inner if graph.is_end(path))
@@ -202,21 +203,21 @@ def _add_loop(graph: ModelGraph, ways: list[list[Hop]], problems: Problems) -> N
     actors = [graph.owner(way[0].source) for way in ways]
     blamed: Hop | None = next((hop for way in ways for hop in way if isinstance(hop, Detour)), None)
     if isinstance(blamed, Detour):
-        fewer = "let it stand at fewer of them, or give that model a delay"
+        fewer = "attach it to fewer of them, or give that model a delay"
         hints = [f"the aspect {blamed.aspect} sends the tokens of all its ports through one model: {fewer}"]
     else:
-        # It begins with the actor that is declared first, so its last way is the one that leads back.  Of that way,
-        # the delay belongs to the outermost connection: a composite may be right where it is used otherwise.
+        # The loop begins with the actor that is declared first, so its last path is the one that leads back.  On that
+        # path, the delay belongs to the outermost connection: a composite may be right where it is used elsewhere.
         blamed = min(ways[-1], key=lambda hop: (_scope(graph, hop).count("."), hop.order))
         hints = [
             f"{path} has a director like Ptolemy's: all its outputs depend on all its inputs"
             if graph.rules[path].are_ptolemys
-            else f"{path} has a director of its own: it fires as one actor, when all that acts within the tag is there"
+            else f"{path} has its own director: it fires as one actor, when all inputs that act in the tag have come"
             for path in dict.fromkeys(actors)
             if path in graph.clocks
         ]
         best = _with_delay(graph, blamed)
-        hints.append(f"give one of these connections a delay, best the one that leads back: {best}")
+        hints.append(f"give one of these connections a delay, preferably the one that leads back: {best}")
     loop = " -> ".join([*actors, actors[0]])
     about = ("loop", *map(in_general, actors))
     problems.add(f"a loop without delay: {loop}", blamed.position, *map(_step, ways), *hints, about=about)
@@ -231,7 +232,7 @@ def _step(way: list[Hop]) -> str:
 def _scope(graph: ModelGraph, hop: Hop) -> str:
     """The path of the composite inside which a connection is made, with a dot after each name."""
     owner = hop.source.rpartition(".")[0]
-    # What comes from an input comes from the composite's own port, else from a port of one of its actors.
+    # Tokens from an input come from the composite's own port, others from a port of one of its actors.
     scope = owner if graph.direction(hop.source) == "input" else owner.rpartition(".")[0]
     return f"{scope}." if scope else ""
 
@@ -244,7 +245,7 @@ def _with_delay(graph: ModelGraph, hop: Hop) -> str:
 
 
 def check_reach(graph: ModelGraph, problems: Problems) -> None:
-    """Warn of actors that can never fire, because no source is before them."""
+    """Warn of actors that can never fire because no source leads to them."""
     alive: set[str] = set()
     detours: dict[str, list[str]] = {}
     for detour in graph.detours:
@@ -277,15 +278,15 @@ def check_reach(graph: ModelGraph, problems: Problems) -> None:
     order = {path: place for place, path in enumerate(idle)}
     for group in groups:
         if groups.in_degree(group):
-            continue  # told with what is before it
+            continue  # reported with what precedes it
         first, *others = sorted(groups.nodes[group]["members"], key=order.__getitem__)
         behind = {path for after in nx.descendants(groups, group) for path in groups.nodes[after]["members"]}
         in_loop = others or idle.has_edge(first, first)
         why = f"only the loop {_some([first, *others])} feeds it" if in_loop else "nothing feeds it"
         problems.warn(
-            f"{first} can never fire: it is no source, and {why}",
+            f"{first} can never fire: it is not a source, and {why}",
             graph.positions.get(first),
-            *((f"nor can what it feeds: {_some(sorted(behind, key=order.__getitem__))}",) if behind else ()),
+            *((f"nor can the actors that it feeds: {_some(sorted(behind, key=order.__getitem__))}",) if behind else ()),
             about=("idle", in_general(first)),
         )
 

@@ -1,8 +1,8 @@
-"""Aspects that are models: a composite class that is woven around ports, and stands beside them in the graph.
+"""Aspects that are models: a composite class that is woven around ports and becomes part of the graph.
 
-Tokens come in by a *request port*, an input of the composite, and go on when they leave by its *response port*: the
-output ``response``, or its only output.  Which of several inputs takes the tokens of a pointcut is said there
-(``request: in2``); else it is the input ``request``, or the only input.
+Tokens come in by a *request port*, an input of the composite, and continue when they leave by its *response port*: the
+output ``response``, or its only output.  If there are several inputs, a pointcut may name the one that takes its tokens
+(``request: in2``); the default is the input ``request``, or the only input.
 """
 
 from __future__ import annotations
@@ -21,12 +21,12 @@ from .looks import without_port
 from .settle import place_of
 from .weave import Weaving
 
-BY_PLACE = "or say where the tokens come in: {at: ..., request: ...}"
-OWN = frozenset(declared_parameters(CompositeAspect))  # when it acts: not the composite's matter
+BY_PLACE = "or name the input that takes the tokens: {at: ..., request: ...}"
+OWN = frozenset(declared_parameters(CompositeAspect))  # when it acts: these are not parameters of the composite
 
 
 def as_actor(part: PartText) -> PartText:
-    """The composite of an aspect's declaration, as it would be declared among the actors."""
+    """The composite in an aspect's declaration, as it would be declared among the actors."""
     values = {name: entry for name, entry in part.values.items() if name not in OWN}
     priority = values.pop("priority").value if "priority" in values else None
     return replace(part, values=values, priority=priority)
@@ -40,7 +40,7 @@ class ModelWeaving(Weaving):
     position: Position
     _response: str = field(default="", init=False)
     _asked: dict[str, str] = field(default_factory=dict, init=False)  # the request port of each place
-    # With "" for one that is not known, which has been told.
+    # With "" for one that is unknown, which has been reported.
     _request_ports: dict[str, None] = field(default_factory=dict, init=False)
     _times: dict[str, FiringTime] = field(default_factory=dict, init=False)
     _is_misplaced: bool = field(default=False, init=False)
@@ -53,26 +53,26 @@ class ModelWeaving(Weaving):
         return self.graph.composites[self.path]
 
     def check(self, woven: WovenAspect) -> None:
-        """Find the ports by which tokens come in and leave, and see whether the composite can stand where it is to."""
+        """Find the ports by which tokens come in and leave, and check that the composite can attach to its places."""
         self._response = self._only(self.outputs, "response", "output", self.position)
         if not self._request_ports:
             self._request(PointcutText("", self.position))
         for port in filter(None, self._request_ports):
             for hop in self.graph.incoming(port):
-                message = f"{port} is for the tokens of this aspect, and nothing else can be connected to it"
-                self._problem(message, hop.position, "add another input for what else the composite needs")
+                message = f"{port} takes the tokens of this aspect, so nothing else can be connected to it"
+                self._problem(message, hop.position, "add another input for other tokens")
             if isinstance(self.graph.ports[port].port, OutputPort):
-                hint = "let that one stand here, too, or add another composite"
-                self._problem(f"{self.path} is the model of another aspect already", self.position, hint)
+                hint = "attach that aspect here, too, or add another composite"
+                self._problem(f"{self.path} is already the model of another aspect", self.position, hint)
         self._check_types()
         self._check_directors(woven)
 
     def connect(self, woven: WovenAspect) -> WovenAspect:
-        """Let the tokens of all places come in, and go on when they are answered."""
+        """Let the tokens of all places come in, and continue when they are answered."""
         if "" in self._request_ports:
             self.draft.leave_open(self.path)
         for port in filter(None, self._request_ports):
-            for hop in list(self.graph.incoming(port)):  # a problem, and told as such
+            for hop in list(self.graph.incoming(port)):  # a problem that has been reported
                 self.graph.disconnect(hop)
             self.graph.open_requests(port)
         if self._response:
@@ -84,7 +84,7 @@ class ModelWeaving(Weaving):
     def select(self, pointcuts: Sequence[PointcutText]) -> tuple[list[str], list[tuple[str, str]], dict[str, str]]:
         ports, connections, actors = super().select(pointcuts)
         actors = {actor: unit for actor, unit in actors.items() if not self._is_inside(actor)}
-        # What was aimed at may be left out again, and of actors it is the composite around them.
+        # Exclusions may remove what a pointcut selects; a pointcut for actors may name the composite around them.
         aimed = {place: place for place in (*ports, *(_place(*ends) for ends in connections))} | actors
         asked, times = self._asked, self._times
         self._asked = {place: asked[unit] for place, unit in aimed.items() if unit in asked}
@@ -117,11 +117,11 @@ class ModelWeaving(Weaving):
         return outside
 
     def _ask(self, pointcut: PointcutText, places: list[str], found: list[str]) -> None:
-        """Note by which port the tokens of the places come in; of several pointcuts the last counts."""
+        """Note by which port the tokens of the places come in; if several pointcuts select a place, the last counts."""
         if pointcut.exclude:
             return
         if found and not places:
-            self._problem(f"it cannot stand inside of itself, at {found[0]}", pointcut)
+            self._problem(f"it cannot attach to its own inside, at {found[0]}", pointcut)
         if request := self._request(pointcut):
             self._asked.update(dict.fromkeys(places, request))
 
@@ -154,17 +154,17 @@ class ModelWeaving(Weaving):
         return ""
 
     def _check_types(self) -> None:
-        """Whether the ports, if they declare types, take and give requests."""
+        """Check that the ports take and give requests, if they declare types."""
         for port in filter(None, (*self._request_ports, self._response)):
             node = self.graph.ports[port]
             wanted = node.type
             if wanted is not None and not accepts(wanted, Request):
-                what = f"{port.rpartition('.')[2]} of {self.kind} is for {type_name(wanted)}"
-                hint = "leave out its type: the actors inside get requests, which hold the tokens"
-                self._problem(f"{what}, but through an aspect go requests", node.declared, hint)
+                what = f"{port.rpartition('.')[2]} of {self.kind} has the type {type_name(wanted)}"
+                hint = "leave out its type: the actors inside receive requests, which contain the tokens"
+                self._problem(f"{what}, but aspects pass requests", node.declared, hint)
 
     def _check_directors(self, woven: WovenAspect) -> None:
-        """Whether all places stand under the composite's own director, which has one order and one time for them."""
+        """Check that all places are under the composite's own director, which has one order and one time for them."""
         graph, own = self.graph, self.graph.director_of(self.path)
         found = {port: graph.director_of(graph.owner(port)) for port in woven.ports}
         found |= {actor: graph.director_of(actor) for actor in woven.actors}
@@ -173,11 +173,11 @@ class ModelWeaving(Weaving):
             found[_place(source, destination)] = graph.director_over(hop)
         for place, director in found.items():
             if director != own:
-                where, hint = f"outside of {own}", f"declare it outside of {own}"
+                where, hint = f"outside {own}", f"declare it outside {own}"
                 if director:
-                    where = f"inside of {director}"
-                    hint = f"declare it inside of {director}, or let it stand at the ports of {director}"
-                self._problem(f"{place} is {where}, which has a director of its own", self.position, hint)
+                    where = f"inside {director}"
+                    hint = f"declare it inside {director}, or attach it to the ports of {director}"
+                self._problem(f"{place} is {where}, which has its own director", self.position, hint)
                 self._is_misplaced = True
                 return
 
@@ -186,10 +186,10 @@ class ModelWeaving(Weaving):
 
 
 def detours(graph: ModelGraph, aspects: Iterable[WovenAspect]) -> list[Detour]:
-    """The ways of tokens through aspects that are models, as far as they may be gone within the tag.
+    """The paths of tokens through aspects that are models, as far as tokens may follow them within the tag.
 
-    Where an aspect stands, tokens may also pass it by, when it is not active: its detours come beside the connections,
-    which they never replace.  So a model that is right with such an aspect is right without it.
+    When an aspect is inactive, tokens bypass it: its detours are added to the connections and never replace them.  So a
+    model that is valid with such an aspect is valid without it.
     """
     at: dict[str, list[tuple[WovenAspect, AspectModel]]] = {}
     responses: dict[str, WovenAspect] = {}
@@ -215,7 +215,7 @@ def detours(graph: ModelGraph, aspects: Iterable[WovenAspect]) -> list[Detour]:
         waits = woven.model is not None and graph.refires(woven.model.path)
         found.setdefault(key, Detour(source, destination, None, position, order, woven.name, waits))
 
-    for place in (place for place in at if place in graph.actors):  # what it asks for comes in after its turn
+    for place in (place for place in at if place in graph.actors):  # what it requests comes in after its turn
         actor = graph.actors[place]
         for woven, model in at[place]:
             for port in (*actor.inputs.values(), *actor.outputs.values()):
@@ -223,7 +223,7 @@ def detours(graph: ModelGraph, aspects: Iterable[WovenAspect]) -> list[Detour]:
     senders: dict[str, list[str]] = {}
     for path in graph.ports if at else ():
         if graph.direction(path) == "output" and graph.is_end(path):
-            senders[path] = lead([path], path)  # an aspect at an output stands before the send
+            senders[path] = lead([path], path)  # an aspect at an output acts before the send
     for hop in chain.from_iterable(map(graph.outgoing, graph.ports)) if at else ():
         sources = senders.get(hop.source, [hop.source]) if hop.delay is None else []
         sources = lead(sources, _place(hop.source, hop.destination))
@@ -236,7 +236,7 @@ def detours(graph: ModelGraph, aspects: Iterable[WovenAspect]) -> list[Detour]:
 
 
 def check_nesting(aspects: Iterable[WovenAspect], graph: ModelGraph, problems: Problems) -> bool:
-    """Whether no aspect stands in another that stands in it, or the tokens of both would never come out."""
+    """Check that no two aspects attach inside each other: the tokens of both would never leave."""
     models = [(woven, woven.model.path) for woven in aspects if woven.model is not None]
     inside: dict[str, list[str]] = {}
     for woven, _ in models:
@@ -249,8 +249,8 @@ def check_nesting(aspects: Iterable[WovenAspect], graph: ModelGraph, problems: P
     loop = find_loop(inside)
     if loop:
         first, second, *_ = loop
-        message = f"aspect {first}: it stands inside of {second}, and {second} inside of it"
-        hint = f"a token would never come out: let one of them stand elsewhere, or leave it out: '!{second}.**'"
+        message = f"aspect {first}: it attaches inside {second}, and {second} inside it"
+        hint = f"a token would never leave: attach one of them elsewhere, or exclude it: '!{second}.**'"
         problems.add(message, graph.positions.get(f"aspect {first}"), hint)
     return not loop
 

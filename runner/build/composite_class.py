@@ -18,7 +18,7 @@ from .weave_all import weave_all
 
 
 class CompositeClass:
-    """A composite class; called with a name and values for its parameters, it gives what ``add`` takes."""
+    """A composite class; called with a name and values for its parameters, it returns what ``add`` takes."""
 
     def __init__(self, name: str, composites: dict[str, CompositeText], catalogue: Catalogue) -> None:
         self.name = name
@@ -33,7 +33,7 @@ class CompositeClass:
 
 
 class CompositeInstance:
-    """An instance that is yet to be added to a model."""
+    """An instance that has not been added to a model yet."""
 
     def __init__(self, composite: CompositeClass, path: str, parameters: dict[str, object]) -> None:
         self.composite = composite
@@ -41,10 +41,10 @@ class CompositeInstance:
         self.parameters = parameters
 
     def unfold(self, path: str, draft: Draft, position: Position) -> tuple[Draft, list[WovenAspect]]:
-        """What it is as a part of a draft, with the aspects that come with it; raises ``ModelError``."""
+        """Its parts in a draft, with the aspects that come with it; raises ``ModelError``."""
         cls, problems = self.composite, Problems()
         part = PartText(self.path, position, Text(cls.name, position), entries_of(self.parameters, position))
-        if "priority" in part.values:  # which stands beside the parameters, as in a model file
+        if "priority" in part.values:  # which is given like a parameter, as in a model file
             part = replace(part, priority=part.values.pop("priority").value)
         settler = Settler(Settings(limits=draft.graph.limits), problems)
         inside = draft.inside(draft.graph.director_of(path))
@@ -63,7 +63,7 @@ class CompositeInstance:
 
 
 def load_composite(file: str | Path, name: str, *, types: Iterable[type] = ()) -> CompositeClass:
-    """Read a composite class from a YAML file (a packaged one such as ``robots/mobile_robot.yaml``, too).
+    """Read a composite class from a YAML file (or a packaged one such as ``robots/mobile_robot.yaml``).
 
     ``types`` are actor and aspect classes of your own that it may name.  Raises ``ModelError``.
 

@@ -1,4 +1,4 @@
-"""Connections: from the names that stand in a composite's ``connections`` to edges between ports."""
+"""Connections: from the names in a composite's ``connections`` to edges between ports."""
 
 from __future__ import annotations
 
@@ -21,15 +21,15 @@ MAX_INDICES = 1_000_000
 
 
 class BadIndexError(Exception):
-    """Text that names no instances; the message says why, ``is_misshapen`` that it is no index at all."""
+    """Text that names no instances, with the reason as its message; ``is_malformed`` means that it is not an index."""
 
-    def __init__(self, message: str, *, is_misshapen: bool = False) -> None:
+    def __init__(self, message: str, *, is_malformed: bool = False) -> None:
         super().__init__(message)
-        self.is_misshapen = is_misshapen
+        self.is_malformed = is_malformed
 
 
 def indices_of(text: str, array: str, count: int, value: Callable[[str], object]) -> tuple[list[int], bool]:
-    """The indices that a text stands for in an array of that name and ``count``, and whether it may be several.
+    """The indices that a text selects in an array of that name and ``count``, and whether it may select several.
 
     ``*`` is all, ``2`` one, ``-1`` the last, ``0..3`` a range with both ends, ``1..`` and ``..-2`` ranges up to an end
     of the array, ``1.., 0`` several in that order, and ``${...}`` a number, or a list of numbers, that ``value`` finds.
@@ -60,7 +60,7 @@ def indices_of(text: str, array: str, count: int, value: Callable[[str], object]
 
 
 def _range(left: str, right: str, item: str, array: str, count: int, value: Callable[[str], object]) -> range:
-    """Both ends included; one that is left out or counted from the end goes no further than the array."""
+    """Both ends included; an end that is omitted or counted from the end stays within the array."""
     start, end = (_whole(_number(each, value), item) if each else default for each, default in ((left, 0), (right, -1)))
     from_end = [not each or bool(_NUMBER.fullmatch(each) and each.startswith("-")) for each in (left, right)]
     if not count:
@@ -81,7 +81,7 @@ def _range(left: str, right: str, item: str, array: str, count: int, value: Call
 
 
 def _missing(array: str, index: int, count: int) -> str:
-    return f"there is no {array}[{index}]: the array has {count}, the last is {array}[{count - 1}]"
+    return f"there is no {array}[{index}]: the array has {counted(count, 'instance')}, up to {array}[{count - 1}]"
 
 
 def _number(text: str, value: Callable[[str], object]) -> object:
@@ -89,7 +89,7 @@ def _number(text: str, value: Callable[[str], object]) -> object:
         return int(text)
     if _EXPRESSION.fullmatch(text):
         return value(text)
-    raise BadIndexError(f"{text!r} is no index of an array", is_misshapen=True)
+    raise BadIndexError(f"{text!r} is not an array index", is_malformed=True)
 
 
 def _whole(value: object, item: str) -> int:
@@ -103,17 +103,17 @@ _ENDPOINT = re.compile(r"(?:([A-Za-z_]\w*)(?:\[([^\[].*|)\])?\.)?([A-Za-z_]\w*)\
 
 @dataclass(frozen=True)
 class End:
-    """The ports behind one end of a connection, and how they are spoken of."""
+    """The ports behind one end of a connection, and the text that names them."""
 
     text: Text
     ports: list[str]
-    several: bool = False  # whether it may stand for any number of ports
+    several: bool = False  # whether it may select any number of ports
     own: bool = False  # whether it is a port of the composite itself
 
 
 @dataclass
 class Child:
-    """A name inside a composite: the instances behind it; ``count`` is None if how many is not known."""
+    """A name inside a composite: the instances behind it; ``count`` is None if their number is unknown."""
 
     kind: str  # the name of its type
     paths: list[str]
@@ -121,7 +121,7 @@ class Child:
     count: int | None
     inputs: list[str] = field(default_factory=list)
     outputs: list[str] = field(default_factory=list)
-    is_known: bool = True  # whether there are no other ports: an instance that could not be made may have had some
+    is_known: bool = True  # whether it has no other ports: an instance that could not be made may have had some
 
     def ports(self, direction: str) -> list[str]:
         return self.inputs if direction == "input" else self.outputs
@@ -158,7 +158,7 @@ class Inside:
 
 @dataclass(frozen=True)
 class Link:
-    """A connection that is yet to be made."""
+    """A connection that has not been made yet."""
 
     source: str
     destination: str
@@ -169,13 +169,13 @@ class Link:
 
 @dataclass(frozen=True)
 class Links:
-    """What a connection stands for; ``is_whole`` is false if a part of it could not be understood."""
+    """The links of a connection; ``is_whole`` is false if a part of it could not be understood."""
 
     found: list[Link]
     is_whole: bool
 
     def make(self, draft: Draft) -> None:
-        first = draft.graph.next_order  # which tells the connection apart from all others
+        first = draft.graph.next_order  # which distinguishes the connection from all others
         for link in self.found:
             shared = first if link.shared else None
             draft.graph.connect(link.source, link.destination, link.delay, link.position, shared)
@@ -183,7 +183,7 @@ class Links:
 
 
 class Wiring:
-    """Finds the ports that a connection inside of one composite means."""
+    """Finds the ports that a connection inside a composite names."""
 
     def __init__(self, inside: Inside, graph: ModelGraph, values: Values, problems: Problems) -> None:
         self.inside = inside
@@ -193,7 +193,7 @@ class Wiring:
         self.problems = problems
 
     def resolve(self, connection: ConnectionText, names: dict[str, object]) -> Links:
-        """Every source to every destination; where both stand for several, the first to the first and so on."""
+        """Every source to every destination; if both select several, the first to the first and so on."""
         delay = self._delay(connection, names)
         sources = [self._endpoint(text, "output", names) for text in connection.sources]
         targets = [self._endpoint(text, "input", names) for text in connection.destinations]
@@ -210,14 +210,14 @@ class Wiring:
                 is_whole = False
                 one, other = self._label(source.text), self._label(target.text)
                 self._problem(
-                    f"{one} stands for {_ports(source)}, {other} for {_ports(target)}",
+                    f"{one} selects {_ports(source)}, but {other} selects {_ports(target)}",
                     target.text,
-                    "with several on both sides, '->' connects the first to the first and so on, so both need as many",
+                    "'->' connects the first port to the first and so on, so both sides need the same number of ports",
                     "to connect all to all, write '=>'",
                 )
                 continue
             pairs = zip(source.ports, target.ports, strict=True) if in_pairs else product(source.ports, target.ports)
-            # What all of a group say to all is not for themselves; '->' still connects each to itself.
+            # '=>' within a group does not connect an actor to itself; '->' still does.
             spare_self = connection.to_all and not source.own and not target.own
             for one, other in pairs:
                 if not (spare_self and one.rpartition(".")[0] == other.rpartition(".")[0]):
@@ -241,8 +241,8 @@ class Wiring:
         """The port paths behind one end of a connection, as seen from inside the composite."""
         match = _ENDPOINT.match(text.text)
         if match is None:
-            hint = "write 'actor.port', 'array[*].port', 'array[0].port', 'array[1..3].port' or the name of an own port"
-            self._problem(f"{text.text!r} is not a port that can be connected here", text, hint)
+            forms = "'actor.port', 'array[*].port', 'array[0].port', 'array[1..3].port' or a port of this composite"
+            self._problem(f"{text.text!r} is not a port that can be connected here", text, f"write {forms}")
             return None
         name, index, port = match.groups()
         if name is None:
@@ -251,7 +251,7 @@ class Wiring:
         inside = self.inside
         child = inside.children.get(name)
         if child is None:
-            if name not in inside.names:  # otherwise its own problem is told already
+            if name not in inside.names:  # otherwise its own problem has been reported
                 gone = None if inside.text is None else inside.text.removed.get(name)
                 message = f"{inside.name} has no actor {name!r}{did_you_mean(name, inside.names)}"
                 hint = f"valid actors: {', '.join(inside.names) or 'none'}"
@@ -264,23 +264,23 @@ class Wiring:
         paths, several = found
         ports = [f"{instance}.{port}" for instance in paths]
         if missing := [path for path in ports if path not in self.graph.ports]:
-            if child.is_known:  # instances of one entry may differ in the ports of their own
-                self._problem(f"{child.kind} has no {wanted} port {missing[0]}, but others of its array have", text)
+            if child.is_known:  # instances of one entry may differ in their own ports
+                self._problem(f"{child.kind} has no {wanted} port {missing[0]}, unlike others in its array", text)
             return None
         return End(text, ports, several)
 
     def _own(self, port: str, wanted: str, text: Text) -> list[str] | None:
-        # Seen from inside, an own input is where tokens come from, an own output where they go.
+        # Seen from inside, tokens come from an own input and go to an own output.
         inputs, outputs = self.inside.inputs, self.inside.outputs
         own, other = (inputs, outputs) if wanted == "output" else (outputs, inputs)
         if port in own and self.path:
             return [f"{self.path}.{port}"]
         where = self.inside.name
         kind, ends = ("input", "from") if wanted == "output" else ("output", "to")
-        hints = [f"own {kind} ports: {', '.join(own) or 'none'}"]
+        hints = [f"its own {kind} ports: {', '.join(own) or 'none'}"]
         if port in other:
-            message = f"{port!r} is an {'output' if kind == 'input' else 'input'} of {where}: inside of it, tokens "
-            message += "go there, none come from it" if ends == "from" else "come from it, none go there"
+            message = f"{port!r} is an {'output' if kind == 'input' else 'input'} of {where}: inside it, tokens "
+            message += "go to it and cannot come from it" if ends == "from" else "come from it and cannot go to it"
         elif port in self.inside.children:
             child = self.inside.children[port]
             message = f"{self._label(text)} is an actor, not a port"
@@ -300,15 +300,15 @@ class Wiring:
         if not child.array:
             if index is None:
                 return child.paths, False
-            self._problem(f"{label} is a single actor, it has no [{index}]", text, f"write {name}.{port}")
+            self._problem(f"{label} is a single actor, so it has no [{index}]", text, f"write {name}.{port}")
             return None
         if child.count is None:
-            return None  # the count is wrong, and told so
+            return None  # the count is wrong, which has been reported
         if index == "*":
             return child.paths, True
         if index is None:
             hint = f"write {name}[*].{port} for all, or {name}[0].{port} for the first"
-            self._problem(f"{label} is an array of {child.count}: say which", text, hint)
+            self._problem(f"{label} is an array of {child.count}: give an index", text, hint)
             return None
 
         def value(expression: str) -> object:
@@ -324,33 +324,33 @@ class Wiring:
             return None
         except BadIndexError as error:
             forms = ", ".join(f"{name}[{each}]" for each in ("*", "0", "-1", "1..3", "1..", "0, 2", "${...}"))
-            self._problem(str(error), text, *((f"valid are {forms}",) if error.is_misshapen else ()))
+            self._problem(str(error), text, *((f"valid forms: {forms}",) if error.is_malformed else ()))
             return None
         return [child.paths[each] for each in indices], several
 
     def _has_port(self, name: str, child: Child, port: str, wanted: str, text: Text) -> bool:
-        """Whether the child's type has the port, in the direction that the connection needs."""
+        """Check that the child's type has the port, in the direction that the connection needs."""
         path = f"{self.path}.{name}" if self.path else name
         valid = child.ports(wanted)
         if port in valid:
             return True
         if not child.is_known:
-            return child.count == 0  # or else why it could not be made is told
+            return child.count == 0  # otherwise the reason why it could not be made is reported
         if port in child.ports("input" if wanted == "output" else "output"):
             direction, ends = ("an input", "come from it") if wanted == "output" else ("an output", "go to it")
-            message = f"{path}.{port} is {direction} of {child.kind}, nothing can {ends}"
+            message = f"{path}.{port} is {direction} of {child.kind}, so nothing can {ends}"
         else:
             message = f"{path}: {child.kind} has no {wanted} port {port!r}{did_you_mean(port, valid)}"
         hints = [f"valid {wanted} ports: {', '.join(valid) or 'none'}"]
         if self.inside.text is not None and self.inside.text.extends is not None:
             at = self.inside.text.actors[name].type.position  # which may be far from the connection
-            hints.append(f"{path} is a {child.kind} since {at}")
+            hints.append(f"{path} is declared as a {child.kind} at {at}")
         self._problem(message, text, *hints)
         return False
 
 
 class _ToldError(Exception):
-    """An expression that could not be evaluated, for a reason that has been told."""
+    """An expression that could not be evaluated, for a reason that has been reported."""
 
 
 def _ports(end: End) -> str:

@@ -1,4 +1,4 @@
-"""Disturbances that are woven around a model that is made."""
+"""Disturbances that are woven around a finished model."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from .weave_all import weave_all
 def disturb(
     model: Building, name: str, values: AnyMapping[str, object], types: Iterable[type], position: Position
 ) -> tuple[Draft, list[WovenAspect], frozenset[ActName] | None]:
-    """The model's draft with the aspects of a disturbance, these, and the only acts; raises ``ModelError``."""
+    """The model's draft with the aspects of a disturbance, these aspects, and the only acts; raises ``ModelError``."""
     problems = Problems()
     disturbance = load_disturbance(name, problems)
     problems.raise_if_any()
@@ -39,13 +39,13 @@ def disturb(
     root = CompositeText(model.name, position, parameters=parameters, aspects=disturbance.text.aspects)
     for setting in disturbance.settings:
         hint = f"load the model together with the disturbance: load_model(..., disturb={name!r})"
-        problems.add(f"{setting.path!r} cannot be set any more: the model is made", setting.position, hint)
+        problems.add(f"{setting.path!r} can no longer be set: the model has been built", setting.position, hint)
     for key in sorted(values.keys() & model.parameters.keys() - disturbance.text.parameters.keys()):
         problems.add(f"{key!r} is a parameter of the model, not of the disturbance {disturbance.text.name}", position)
     taken = {woven.name for woven in model.aspects}
     for part in disturbance.text.aspects.values():
         if part.name in taken:
-            problems.add(f"there is an aspect {part.name!r} already", part.position, "unweave it before")
+            problems.add(f"there is already an aspect {part.name!r}", part.position, "unweave it first")
     problems.raise_if_any()
     node = node_of(values, position)
     settler = Settler(Settings(settings_in(node, problems) if isinstance(node, Mapping) else []), problems)

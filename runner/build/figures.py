@@ -1,4 +1,4 @@
-"""The figures that a file declares, and all that is wrong with them."""
+"""The figures that a file declares, and everything that is wrong with them."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ T = TypeVar("T", bound=Configurable)
 
 @dataclass(frozen=True)
 class Complaint:
-    """What is wrong with a figure: a parameter (any, if empty) and the ``key`` in it, what is said, and what to do."""
+    """A problem of a figure: the parameter (any, if empty) and the ``key`` in it, the message, and what to do."""
 
     parameter: str
     message: str
@@ -29,13 +29,13 @@ class Complaint:
 
 
 def tell_of_figure(complaint: Complaint, name: str, written: Mapping, problems: Problems) -> None:
-    """Add a complaint to the problems, at the place of what it is about."""
+    """Add a complaint to the problems, at the place that it concerns."""
     message = f"figure {name}: {complaint.message}"
     problems.add(message, place_in_figure(complaint, written), *([complaint.help] if complaint.help else []))
 
 
 def place_in_figure(complaint: Complaint, written: Mapping) -> Position:
-    """Where the value stands, or the one name in it."""
+    """The position of the value, or of the one name in it."""
     entry = written.entries.get(complaint.parameter)
     for each in [entry] if entry is not None else [] if complaint.parameter else written.entries.values():
         if isinstance(each.value, Mapping) and complaint.key in each.value.entries:
@@ -49,7 +49,7 @@ def place_in_figure(complaint: Complaint, written: Mapping) -> Position:
 def made_figure(
     name: str, known: AnyMapping[str, type[T]], declared: DeclaredFigure, problems: Problems, *, of_study: bool = False
 ) -> T | None:
-    """The figure that is declared by a type, values, and the same as written; None, and problems, if it cannot be."""
+    """The figure declared by a type, values, and the same as written; None, and problems, if it cannot be made."""
     type_name, values, written = declared
     before = len(problems)
     try:
@@ -94,7 +94,7 @@ def _blamed(name: str, written: Mapping, problems: Problems) -> Iterator[None]:
         problems.add(f"figure {name}: {error}", place_of(written, error.keys, of_key=error.of_key))
     except PatternError as error:
         problems.add(f"figure {name}: {error}", written.position)
-    except Exception as error:  # of a user's
+    except Exception as error:  # of a user's class
         problems.add(f"figure {name}: {describe(error)}", written.position, raised=raised_at(error), cause=error)
 
 
@@ -103,7 +103,7 @@ def figures_of(model: Model, problems: Problems, recorded: Collection[str] | Non
 
     ``recorded``: the ports of which a run keeps the signals, if not those that the model names.
     """
-    # If something else is wrong, a signal may not be recorded because of that.
+    # If something else is wrong, that may be why a signal is not recorded.
     kept = None if len(problems) else model.recorded if recorded is None else recorded
     known = figure_types()
     found: dict[str, Figure] = {}
@@ -118,7 +118,7 @@ def figures_of(model: Model, problems: Problems, recorded: Collection[str] | Non
 
 
 def _unrecorded(figure: Figure, recorded: Collection[str] | None) -> Iterator[Complaint]:
-    """Complaints about the signals that are not there; a pattern over an array may rightly select nothing."""
+    """Complaints about missing signals; a pattern over an array may select nothing."""
     for pattern in figure.signal_patterns():
         if recorded is not None and not select(pattern, recorded) and "*" not in pattern:
             message = f"{pattern!r} is not recorded{did_you_mean(pattern, list(recorded))}"

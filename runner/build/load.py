@@ -53,21 +53,21 @@ def load_model(
     types: Iterable[type] = (),
     max_actors: int = NORMAL.actors,
 ) -> Model:
-    """Read, change and check a model; raises ``ModelError`` with all that is wrong.
+    """Read, change and check a model; raises ``ModelError`` with everything that is wrong.
 
     ``set`` gives parameters their values, as texts like ``"observer[*].sensor.range=5 m"`` or as a mapping
-    ``{"observer[*].sensor.range": 5}``; ``overrides`` names a YAML file of such settings, or several; of all that fit
-    a parameter the last one wins, and ``set`` wins over files.  ``disturb`` names packaged disturbances, or files of
-    aspects, which are added to the model's one after the other; ``without_aspects`` and ``aspects`` count after that,
-    and all settings win over what a disturbance sets.  ``types`` are actor and aspect classes of your own that the
-    model may name beside the installed ones.  ``max_actors`` is how many actors and composites are not taken for a
-    mistake, and a fifth of how many connections.  What is odd but not wrong is in ``Model.warnings``.
+    ``{"observer[*].sensor.range": 5}``; ``overrides`` names a YAML file of such settings, or several; of several that
+    match a parameter, the last one wins, and ``set`` wins over files.  ``disturb`` names packaged disturbances, or
+    files of aspects, which are added to the model's aspects one after the other; ``without_aspects`` and ``aspects``
+    apply after that, and all settings win over what a disturbance sets.  ``types`` are your own actor and aspect
+    classes, which the model may name besides the installed ones. ``max_actors`` is the limit for actors and composites,
+    and a fifth of the limit for connections.  ``Model.warnings`` holds what is odd but not wrong.
     """
     problems, limits = Problems(), Limits(max_actors)
     settings = [each for file in _several(overrides) for each in read_overrides(Path(file), problems)]
     settings += _settings(set, problems)
     with without_collection():
-        # What the files say.
+        # What the files declare.
         text, declared = read_model(str(name), problems)
         catalogue = installed().with_types(types)
         disturbances = load_disturbances(map(str, _several(disturb)), problems)
@@ -75,14 +75,14 @@ def load_model(
             declared = joined(declared, disturbance.composites, COMPOSITE_THERE, problems)
         composites, broken = inherit(declared, catalogue.actors, problems, limits)
         check_usage(text, declared, composites, catalogue.actors, problems)
-        # What is changed from outside; what disturbances set comes first, for the last one wins.
+        # What is changed from outside; settings of disturbances come first, because the last one wins.
         text, set_by_them = add_disturbances(text, disturbances, problems)
         settings = set_by_them + settings
         for change in without_aspects:
             text = without(text, change, problems)
         for change in aspects:
             text = change_aspect(text, change, problems)
-        # What comes of it.
+        # What results.
         known = Known(composites, catalogue, broken)
         settler = Settler(Settings(settings, limits), problems)
         model = build(text, known, settler, limits)
@@ -95,16 +95,14 @@ def load_model(
 
 
 def build(text: ModelText, known: Known, settler: Settler, limits: Limits) -> Model:
-    """The model that declarations stand for, in passes; it is good only if there are no problems then."""
+    """The model that declarations describe, built in passes; it is valid only if there are no problems afterwards."""
     problems, values, root = settler.problems, settler.values, text.root
     model = Model(root.name, doc=root.doc)
-    # Without a composite nobody needs to know what all packages offer.
+    # Without a composite, nothing needs the types of all packages.
     for name in sorted(known.composites.keys() & known.catalogue.actors.keys() if known.composites else ()):
         at = known.composites[name].position
-        # It is no error: a model stays as good as it was when a later version brings an actor of that name.
-        problems.warn(
-            f"composite {name!r} hides the actor type of that name", at, "give it another name if both are wanted"
-        )
+        # Not an error: a model stays valid when a later version adds an actor with that name.
+        problems.warn(f"composite {name!r} hides the actor type with the same name", at, "rename it if you need both")
     values.of_model = root.parameters
     names = settler.parameters("", root, {}, {}, None)
     made = Unfolding(known, settler, Draft(ModelGraph(limits)))
@@ -121,7 +119,7 @@ def build(text: ModelText, known: Known, settler: Settler, limits: Limits) -> Mo
         if text.exactly is not None:
             model.exactly = acts_of(text.exactly, woven, problems)
         model.adopt(made.draft, woven, Watching(made.draft, values, problems).read(text, names))
-        # Numbers are plain ones, in the units that the model declares.
+        # Numbers without units are in the units that the model declares.
         model.parameters = {
             name: plain(value) if root.parameters[name].unit else counted_in_si(value) for name, value in names.items()
         }
@@ -132,7 +130,7 @@ def build(text: ModelText, known: Known, settler: Settler, limits: Limits) -> Mo
 
 
 def _figures(text: ModelText, values: Values, names: dict[str, object]) -> dict[str, DeclaredFigure]:
-    """The type of each figure, its values, and these as they are written."""
+    """The type of each figure, its values, and the values as written."""
     found = {}
     for name, part in text.figures.items():
         given = {key: values.of(entry.value, names, f"figure {name}.{key}") for key, entry in part.values.items()}

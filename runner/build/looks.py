@@ -1,4 +1,4 @@
-"""What an aspect looks at: the ports and fields that its expressions name, and what its patterns select."""
+"""What an aspect reads: the ports and fields that its expressions name, and what its patterns select."""
 
 from __future__ import annotations
 
@@ -24,18 +24,18 @@ from ..graph import ModelGraph, WovenAspect
 from ..text import PatternError, Position, did_you_mean
 from .paths import View
 
-Found = tuple[str, tuple[str, ...], str]  # what is wrong, the keys that lead there, and advice
+Found = tuple[str, tuple[str, ...], str]  # the message, the keys that lead to the place, and advice
 
 
 class Looks(View):
-    """Finds what one aspect looks at."""
+    """Finds what one aspect reads."""
 
     def of(
         self, aspect: Aspect, ports: list[str], position_of: Callable[..., Position | None]
     ) -> tuple[dict[PortFormula, list[Reading]], dict[str, Selection], list[str]]:
-        """What its expressions ask for, what its patterns select, and the ports that it looks at otherwise.
+        """What its expressions ask for, what its patterns select, and the other ports that it reads.
 
-        ``ports`` are those at which it stands; ``position_of`` tells where a parameter is set in the model file.
+        ``ports`` are those that it attaches to; ``position_of`` returns where a parameter is set in the model file.
         """
         readings: dict[PortFormula, list[Reading]] = {}
         selections: dict[str, Selection] = {}
@@ -65,7 +65,7 @@ class Looks(View):
         try:
             found = paths.select(self._full(pattern))
         except PatternError as error:
-            self._problem(f"{name}: {pattern!r} is no pattern: {error}", position)
+            self._problem(f"{name}: {pattern!r} is not a pattern: {error}", position)
             return []
         fitting = [path for path in found if not of_ports or self._sends(path)]
         if found and not fitting:
@@ -87,7 +87,7 @@ class Looks(View):
                 self._check_fields(name, reference, port, fields, position)
                 return port, fields
         if self.draft.excuses(self._full(reference)):
-            return reference, ()  # nothing can send there now, and the condition never holds
+            return reference, ()  # nothing can send there now, so the condition never holds
         if self._full(reference) in self.ports:
             self._problem(f"{name}: {reference} is an input port, but an output port is needed", position)
         else:
@@ -98,7 +98,7 @@ class Looks(View):
     def _check_given(
         self, name: str, reference: str, fields: tuple[str, ...], ports: list[str], position: Position | None
     ) -> None:
-        """Whether the tokens that pass the aspect have the field; of ports that lack it, the first is reported."""
+        """Check that the tokens that pass the aspect have the field; the first port that lacks it is reported."""
         for port in ports:
             if not self._check_fields(name, f"{reference} at {port}", port, fields, position):
                 return
@@ -106,7 +106,7 @@ class Looks(View):
     def _check_fields(
         self, name: str, reference: str, port: str, fields: tuple[str, ...], position: Position | None
     ) -> bool:
-        """Whether the tokens of a port have the field, where their type tells; if not, that is a problem."""
+        """Check that the tokens of a port have the field, if their type is known."""
         for source in self.graph.source_of(port) if fields else ():
             if isinstance(source.type, type) and dataclasses.is_dataclass(source.type):
                 names = [each.name for each in dataclasses.fields(source.type)]
@@ -122,7 +122,7 @@ class Looks(View):
 
 
 def unknown_inputs(woven: WovenAspect, graph: ModelGraph) -> Iterator[Found]:
-    """Ports that an aspect's parameters name, and no actor has that these are for."""
+    """Ports that an aspect's parameters name but that no actor has to which they apply."""
     for name, parameter in declared_parameters(type(woven.aspect)).items():
         value = getattr(woven.aspect, name)
         if isinstance(parameter, FiringTimeParameter):
@@ -140,5 +140,5 @@ def without_port(keys: tuple[str, ...], times: FiringTime, actors: Iterable[str]
     for port in times if isinstance(times, Mapping) and inputs else ():
         if port not in inputs:
             near = did_you_mean(port, inputs)
-            message = f"{': '.join(keys)}: no actor that this is for has an input {port!r}{near}"
+            message = f"{': '.join(keys)}: no actor that this applies to has an input {port!r}{near}"
             yield message, (*keys, port), f"their inputs: {', '.join(inputs)}"

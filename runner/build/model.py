@@ -58,11 +58,11 @@ class Model(Scope, Tabled):
     {'ticks': 15}
 
     ``stop`` is in seconds or a text with a unit.  Ports are named by their paths, those of composites included.
-    ``ties="posted"`` and ``like="ptolemy"`` are what its director goes by, and the actors that are added then.
-    A model that was loaded can be changed in the same way.  Its ``parameters`` are a record of how it was made:
-    actors took their values from them then, so they are set with ``load_model(..., set=...)``, not here.
+    ``ties="posted"`` and ``like="ptolemy"`` are the rules of its director, and of the actors that are added afterwards.
+    A model that was loaded can be changed in the same way.  Its ``parameters`` record how it was made: actors have
+    already taken their values from them, so set them with ``load_model(..., set=...)``, not here.
 
-    What is run is frozen: a change makes another graph, which counts for later simulations.
+    A simulation freezes the graph: a later change makes another graph, for later simulations.
     """
 
     def __init__(
@@ -84,7 +84,7 @@ class Model(Scope, Tabled):
             rules = director_of(name, {"ties": ties, "like": like}, call_site(), problems)
         self.draft.graph.rules[""] = Rules().inside(rules.get("ties"), rules.get("like"))
         self.parameters: dict[str, object] = dict(parameters or {})
-        self.declared: dict[str, ParameterText] = {}  # what its file says of the parameters
+        self.declared: dict[str, ParameterText] = {}  # what its file declares of the parameters
         self.aspects: list[WovenAspect] = []
         self.stop_time: int | None = None  # ns
         self.stop_ports: list[str] = []
@@ -95,7 +95,7 @@ class Model(Scope, Tabled):
         self.monitors: list[Monitor] = []
         self.exactly: frozenset[ActName] | None = None  # the only acts of aspects that happen
         self.figures: dict[str, DeclaredFigure] = {}
-        self.warnings: tuple[Problem, ...] = ()  # what is odd about it, but not wrong
+        self.warnings: tuple[Problem, ...] = ()  # what is odd but not wrong
         self.is_checked = False  # since the last change
         self._scopes: dict[str, Composite] = {}
         self._order: tuple[dict[str, int], Postings | None] | None = None  # worked out since then
@@ -108,7 +108,10 @@ class Model(Scope, Tabled):
 
     @property
     def stop(self) -> float | None:
-        """When the run ends, in seconds; None if only an empty agenda or a port ends it.  ``"500 ms"`` may be set."""
+        """When the run ends, in seconds; None if only an empty agenda or a port ends it.
+
+        It can be set as ``"500 ms"``.
+        """
         return None if self.stop_time is None else self.stop_time / 1e9
 
     @stop.setter
@@ -117,14 +120,14 @@ class Model(Scope, Tabled):
 
     @property
     def endless(self) -> str:
-        """Why a run goes on for ever unless somebody ends it, in words; empty if that is not known."""
+        """Why a run never ends unless it is interrupted, in words; empty if that is unknown."""
         if self.stop_time is not None or self.stop_ports:
             return ""
         actors = self.graph.actors.values()
         clock = next((actor.path for actor in actors if actor.is_endless), "")
         if not clock or any(isinstance(actor, Stop) for actor in actors):
             return ""
-        return f"{self.name} has no end: {clock} ticks for ever, and the model says neither stop nor stop_when"
+        return f"{self.name} never ends: {clock} ticks for ever, and the model sets neither stop nor stop_when"
 
     def local_tag(self, actor: str, tag: Tag) -> Tag:
         """A tag of the event log, as the actor or composite of that path sees it: in its director's time."""
@@ -141,9 +144,9 @@ class Model(Scope, Tabled):
     ) -> list[WovenAspect]:
         """Weave the aspects of a packaged disturbance, or of a YAML file, around the model.
 
-        ``set`` gives the disturbance's own parameters their values; ``types`` are aspect classes of your own that it
-        may name.  A disturbance that sets parameters of the model must be loaded together with it:
-        ``load_model(..., disturb=...)``.  Raises ``ModelError``.
+        ``set`` gives the disturbance's own parameters their values; ``types`` are your own aspect classes that it may
+        name.  A disturbance that sets parameters of the model must be loaded together with it: ``load_model(...,
+        disturb=...)``.  Raises ``ModelError``.
         """
         from .disturbance import disturb
 
@@ -156,15 +159,15 @@ class Model(Scope, Tabled):
     # -- what is watched ------------------------------------------------------------------------------------------
 
     def record(self, *ports: str | Port) -> None:
-        """Keep what output ports send, given as such or as patterns over the ports that are there now."""
+        """Record what output ports send; give ports, or patterns over the ports that exist now."""
         self._watch(ports, lambda watching, text: watching.record(text))
 
     def stop_when(self, *ports: str | Port) -> None:
-        """End the run, after the tag in question, when one of these output ports sends something true."""
+        """End the run, after the current tag, when one of these output ports sends something true."""
         self._watch(ports, lambda watching, text: watching.stop_when(text))
 
     def metric(self, name: str, *, of: str | Port, take: TakeName = "last", **options: Unpack[MetricOptions]) -> None:
-        """A number in the results; what can be taken, and with which options, is in docs/language.md.
+        """A number in the results; docs/language.md lists what can be taken, and the options.
 
         >>> model.metric("in_queue", of="server.size", take="time_mean", initial=0, after="100 s", interval=0.95)
         """
@@ -173,7 +176,7 @@ class Model(Scope, Tabled):
         if not NAME.match(name):
             problems.add(f"{name!r} is not a name", position, NAMES_HAVE)
         if any(metric.name == name for metric in self.metrics):
-            problems.add(f"there is a metric {name!r} already", position, "give this another name")
+            problems.add(f"there is already a metric {name!r}", position, "give this another name")
         if problem := take_problem(name, take):
             problems.add(problem[0], position, problem[1])
         problems.raise_if_any()
@@ -181,7 +184,7 @@ class Model(Scope, Tabled):
         self._watch([of], lambda watching, text: watching.metric(name, text, values, position))
 
     def monitor(self, name: str, property: str, **options: Unpack[RequirementOptions]) -> None:
-        """A property that every run is to have; docs/language.md says how one is written.
+        """A property that every run must have; docs/language.md describes how to write one.
 
         >>> model.monitor("safe", "always clearance.distance >= 2 m", stop=True)
         """
@@ -192,7 +195,7 @@ class Model(Scope, Tabled):
             watching = Watching(self.draft, Values(problems), problems)
             for metric in (name, f"{name}_robustness"):
                 if any(each.name == metric for each in self.metrics):
-                    problems.add(f"there is a metric {metric!r} already", position, "give the monitor another name")
+                    problems.add(f"there is already a metric {metric!r}", position, "give the monitor another name")
             watching.monitor(name, {"property": property, **options}, position)
         self._add(watching.found)
 
@@ -201,7 +204,7 @@ class Model(Scope, Tabled):
         return Watching(self.draft, Values(problems), problems).select(Text(pattern, position), what)
 
     def _watch(self, ports: Iterable[str | Port], ask: Callable[[Watching, Text], None]) -> None:
-        """Find out what is to be watched as for a model file."""
+        """Add what is to be watched, with the rules of a model file."""
         position = call_site()
         with raising() as problems:
             watching = Watching(self.draft, Values(problems), problems, self.recorded)
@@ -213,7 +216,10 @@ class Model(Scope, Tabled):
     # -- the whole ------------------------------------------------------------------------------------------------
 
     def check(self) -> None:
-        """Check the model as a whole; raises ``ModelError`` with all that is wrong.  A ``Simulation`` does so first."""
+        """Check the model as a whole; raises ``ModelError`` with everything that is wrong.
+
+        A ``Simulation`` does this first.
+        """
         if not self.is_checked:
             problems = Problems()
             if check_nesting(self.aspects, self.graph, problems):
@@ -226,7 +232,7 @@ class Model(Scope, Tabled):
         self.graph.freeze()
 
     def order(self) -> dict[str, int]:
-        """Engine: the firing order of a model that has been checked; the same for all its runs."""
+        """Engine: the firing order of a checked model; the same for all its runs."""
         return self._ordered()[0]
 
     def postings(self) -> Postings | None:
@@ -239,10 +245,10 @@ class Model(Scope, Tabled):
                 self._order = firing_order(self.graph), postings(self.graph)
         return self._order
 
-    # -- changes: what is called here has been found to be right --------------------------------------------------
+    # -- changes: their arguments have been checked --------------------------------------------------
 
     def edit(self) -> Draft:
-        """The draft, which is then changed: what was checked before may no longer hold."""
+        """The draft, for changes: what was checked before may no longer hold."""
         if self.graph.is_frozen:
             self.draft = self.draft.copy()
         self.is_checked = False
@@ -250,7 +256,7 @@ class Model(Scope, Tabled):
         return self.draft
 
     def adopt(self, draft: Draft, aspects: Iterable[WovenAspect], watched: Watched | None = None) -> None:
-        """Continue with a draft that came of the present one, with further aspects."""
+        """Continue with a draft made from the present one, with further aspects."""
         self.draft = draft
         self.edit()
         self.enlist(aspects)
@@ -259,7 +265,7 @@ class Model(Scope, Tabled):
             self._add(watched)
 
     def enlist(self, aspects: Iterable[WovenAspect]) -> None:
-        """These aspects stand in the model from now on."""
+        """Add these aspects to the model."""
         self.aspects = arranged([*self.aspects, *aspects], self.graph)
 
     def _add(self, watched: Watched) -> None:
@@ -273,7 +279,7 @@ class Model(Scope, Tabled):
         return self._scopes.setdefault(path, Composite(self, path))
 
     def forget(self, path: str) -> None:
-        """Take out an actor or composite, and whatever stands at it or watches it."""
+        """Remove an actor or composite, and everything that attaches to it or watches it."""
         self.edit().graph.remove(path)
         self.aspects = [
             woven.without(path)
@@ -293,16 +299,16 @@ class Model(Scope, Tabled):
 
     @property
     def extent(self) -> str:
-        """How large it is, in words."""
+        """Its size in words."""
         graph = self.graph
         parts = [(len(graph.actors), "actor"), (graph.connections, "connection"), (len(self.aspects), "aspect")]
         return ", ".join(counted(number, noun) for number, noun in parts)
 
     def _repr_html_(self) -> str:
-        """The drawing of the model, and all that is in it; drawing is looked up, as it stands above models."""
+        """The drawing of the model and its contents; drawing is looked up, because it is a layer above models."""
         try:
             picture = import_module("...calls", __name__).draw(self)._repr_html_()
-        except EpicycleError:  # it may be half built
+        except EpicycleError:  # it may be incomplete
             return super()._repr_html_()
         summary = f"<summary>{escape(visible(self._caption()))}</summary>"
         return f"{picture}<details>{summary}{super()._repr_html_()}</details>"
@@ -315,7 +321,7 @@ class Model(Scope, Tabled):
         for path, actor in self.graph.actors.items():
             declared = declared_parameters(type(actor)).items()
             values = [(name, getattr(actor, name), parameter) for name, parameter in declared]
-            # What is there to be as in Ptolemy is worth a word where it is.
+            # Actors that exist for Ptolemy's sake are mentioned only if there are any.
             plain = {name for name, value, each in values if each.differs and short(value) == short(each.default_value)}
             given = (f"{name}={short(value)}" for name, value, _ in values if value is not None and name not in plain)
             actors.append((path, type(actor).__name__, ", ".join(given)))

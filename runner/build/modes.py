@@ -12,19 +12,19 @@ from .draft import Draft
 def connect_modes(
     path: str, composite: CompositeText, classes: Mapping[str, CompositeText], draft: Draft, problems: Problems
 ) -> None:
-    """Connect what has the same name, and tell what has nothing to be connected to.
+    """Connect what has the same name, and report what cannot be connected.
 
-    An input of the composite leads to the machine and to all refinements that have it; an output comes from whichever
-    has it.  The machine's guards know what refinements send.  An input of a refinement that is called as a variable
+    An input of the composite leads to the machine and to all refinements that have it; an output comes from the part
+    that has it.  The machine's guards know what refinements send.  An input of a refinement with the name of a variable
     gets its value whenever a mode is entered.
     """
-    from epicycle.actors import StateMachine  # with all that solves differential equations, which takes a while
+    from epicycle.actors import StateMachine  # it imports the solvers of differential equations, which takes a while
 
     graph, name = draft.graph, composite.name
     assert composite.machine is not None
     part = composite.machine
     machine = graph.actors.get(f"{path}.{part.name}")
-    if not isinstance(machine, StateMachine):  # which has been told
+    if not isinstance(machine, StateMachine):  # which has been reported
         draft.leave_open(path)
         draft.unknown.add(path)
         return
@@ -51,8 +51,8 @@ def connect_modes(
                     join(f"{mode}.{port}", f"{part.name}.{port}")
         elif port != "trigger":
             known = [*composite.inputs, *heard]
-            what = f"which is no input of {name}, no variable, and nothing that a refinement sends"
-            tell(f"its transitions ask for {port!r}, {what}{did_you_mean(port, known)}", f"known: {', '.join(known)}")
+            what = f"which is neither an input of {name}, nor a variable, nor an output of a refinement"
+            tell(f"its transitions use {port!r}, {what}{did_you_mean(port, known)}", f"known: {', '.join(known)}")
         read.add(port)
     for port in machine.outputs:
         if port in composite.outputs:
@@ -60,7 +60,7 @@ def connect_modes(
         elif port not in machine.variables:
             near = did_you_mean(port, composite.outputs)
             valid = ", ".join(composite.outputs)
-            tell(f"its transitions send from {port!r}, which is no output of {name}{near}", f"outputs: {valid}")
+            tell(f"its transitions send from {port!r}, which is not an output of {name}{near}", f"outputs: {valid}")
     for mode, each in refinements.items():
         for port in each.inputs:
             if port in composite.inputs:
@@ -83,4 +83,4 @@ def connect_modes(
     machine.handed = tuple(dict.fromkeys(handed))
     for port, said in composite.inputs.items():
         if port not in read:
-            problems.warn(f"{path}: the input {port!r} of {name} is read in no mode", said.position)
+            problems.warn(f"{path}: no mode reads the input {port!r} of {name}", said.position)

@@ -1,4 +1,4 @@
-"""Monitors of a model: their properties, and the ports that these ask for."""
+"""Monitors of a model: their properties, and the ports that these use."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def monitor_of(
 ) -> Monitor | None:
     """A monitor with these values of a ``Requirement``; None if something is wrong with it.
 
-    ``places`` are where the values stand, ``at`` where the monitor does.
+    ``places`` are the positions of the values, ``at`` that of the monitor.
     """
     what = f"monitor {name}"
     before = len(problems)
@@ -50,7 +50,7 @@ def monitor_of(
         found = property_of(source)
     except PropertyError as error:
         wrong = source[error.offset : error.offset + error.length]
-        # The part that is wrong, where the text stands in the file as it is.
+        # The part that is wrong, if the text is in the file unchanged.
         whole = within(Text(source, place), source)
         part = whole if whole.length != len(source) or "\n" in source else _part(whole, error.offset, len(wrong))
         problems.add(f"{what}: {error}", part, *([error.hint] if error.hint else []))
@@ -65,7 +65,7 @@ def _part(whole: Position, offset: int, length: int) -> Position:
 
 
 def _readings(looks: Looks, condition: Condition | Sends, place: Position) -> list[Reading]:
-    """What a condition asks for."""
+    """What a condition reads."""
     if isinstance(condition, Sends):
         port, fields = looks.reading("property", condition.port, within(Text("", place), condition.port))
         if fields:

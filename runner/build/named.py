@@ -1,4 +1,4 @@
-"""What a program names when it builds a model, given as objects or as text, turned into what a file would say."""
+"""What a program names when it builds a model, as objects or text, converted to what a file would declare."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ Places: TypeAlias = "Place | Iterable[Place]"
 
 @runtime_checkable
 class Holder(Protocol):
-    """A composite: there are parts in it."""
+    """A composite: it has parts."""
 
     path: str
 
@@ -51,7 +51,7 @@ def raising() -> Iterator[Problems]:
 
 
 def director_of(path: str, said: Mapping[str, object], position: Position, problems: Problems) -> dict[str, Any]:
-    """What is said of a director, ``None`` for nothing; what is wrong is reported and left out."""
+    """The rules given for a director, ``None`` for those not given; wrong ones are reported and left out."""
     found: dict[str, Any] = {}
     for key, value in said.items():
         try:
@@ -63,16 +63,16 @@ def director_of(path: str, said: Mapping[str, object], position: Position, probl
 
 
 def check_aspect(aspect: object, kinds: tuple[type, ...], position: Position, problems: Problems) -> None:
-    """See that what is to be woven is an object of one of the kinds."""
+    """Check that what is to be woven is an object of one of the kinds."""
     if isinstance(aspect, type) or not isinstance(aspect, kinds):
         shown = aspect.__name__ if isinstance(aspect, type) else repr(aspect)
-        problems.add(f"{shown} is no aspect", position, "give an object, such as PacketLoss(probability=0.1)")
+        problems.add(f"{shown} is not an aspect", position, "give an object, such as PacketLoss(probability=0.1)")
 
 
 def firing_time_of(time: object, aspect: object, position: Position, problems: Problems) -> FiringTime | None:
-    """How long firings take; None: the aspect does not stand at actors, or not as a model."""
+    """How long firings take; None if the aspect does not attach to actors, or not as a model."""
     if time is not None and isinstance(aspect, Aspect):
-        problems.add(f"{type(aspect).__name__} is no composite, so 'time' is not for weave() to say", position)
+        problems.add(f"{type(aspect).__name__} is not a composite, so weave() takes no 'time' for it", position)
     try:
         return None if time is None else FiringTimeParameter().convert(time)
     except ParameterError as error:
@@ -81,7 +81,7 @@ def firing_time_of(time: object, aspect: object, position: Position, problems: P
 
 
 def each_of(ends: object) -> list[Any]:
-    """One or several ends as a list; what is no end is found out later."""
+    """One or several ends as a list, which are checked later."""
     return list(ends) if isinstance(ends, Iterable) and not isinstance(ends, str) else [ends]
 
 
@@ -90,7 +90,7 @@ def mistake(message: str, position: Position, *hints: str) -> ModelError:
 
 
 class Named:
-    """Finds in a graph what a program names inside of a scope; what is wrong is reported at the program's line."""
+    """Finds in a graph what a program names inside a scope; problems are reported at the program's line."""
 
     def __init__(self, graph: ModelGraph, scope: str, position: Position, problems: Problems) -> None:
         self._graph = graph
@@ -102,7 +102,7 @@ class Named:
     def connection(
         self, source: Ends, destination: Ends | None, delay: float | str | None, inside: str
     ) -> ConnectionText | None:
-        """A connection as a model file would declare it; ``inside`` is what the scope is called."""
+        """A connection as a model file would declare it; ``inside`` is the name of the scope."""
         if destination is not None:
             sources, destinations = self._ends(source, inside), self._ends(destination, inside)
             made: ConnectionText | None = ConnectionText(sources, destinations, self._position)
@@ -111,7 +111,7 @@ class Named:
         else:
             self._tell("the connection has no destination", "write connect(a.output, b.input)")
             return None
-        # A list that is empty connects nothing: there may be no robots.
+        # An empty list connects nothing: there may be no robots.
         if made is None or not (made.sources and made.destinations):
             return None
         return made if delay is None else replace(made, delay=node_of(delay, self._position))
@@ -139,7 +139,7 @@ class Named:
         return tuple(self._text(name) for name in names if name is not None)
 
     def _seen_from_inside(self, port: object, inside: str) -> str | None:
-        """The name of a port inside of the scope."""
+        """The name of a port inside the scope."""
         path = self._port(port)
         if path is None:
             return None
@@ -155,7 +155,7 @@ class Named:
         return None
 
     def _place(self, place: object, cls: type[Aspect]) -> str | None:
-        """The path of a port, or of an actor or composite for an aspect that stands at such."""
+        """The path of a port, or of an actor or composite if the aspect attaches to these."""
         if cls.at_ports or not isinstance(place, (Actor, Holder)):
             return self._port(place)
         if isinstance(place, Actor) and self._graph.actors.get(place.path) is not place:

@@ -1,4 +1,4 @@
-"""What aspects choose their places from, and how one of them sees it."""
+"""What aspects select their places from, and how one of them sees it."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from .draft import Draft
 
 
 class Paths:
-    """What the pointcuts of a model's aspects choose from, found out once for all of them; of ``ports``, or of all."""
+    """What the pointcuts of a model's aspects select from, determined once for all of them; of ``ports``, or of all."""
 
     def __init__(self, draft: Draft, ports: Iterable[str] | None = None) -> None:
         self._draft, self._graph = draft, draft.graph
@@ -33,7 +33,7 @@ class Paths:
 
     @cached_property
     def owners(self) -> PathIndex:
-        """All composites and actors, those that could not be made included."""
+        """All composites and actors, including those that could not be made."""
         unmade = sorted(set(map(self._graph.owner, self._draft.open)))
         return self._index(dict.fromkeys((*self._graph.composites, *self._graph.actors, *unmade)))
 

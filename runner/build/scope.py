@@ -1,8 +1,8 @@
-"""Building a model in Python: what can be done inside of a model or a composite.
+"""Building a model in Python: what can be done inside a model or a composite.
 
-A program makes and changes the same graph as a model file does, through the same rules: names, connections, pointcuts
-and metrics go to the classes that read them from YAML, and a mistake raises ``ModelError`` that points at the line of
-the program.  Each call first finds out what it comes to, which raises or changes nothing, and then does it.
+A program makes and changes the same graph as a model file, by the same rules: the classes that read YAML take names,
+connections, pointcuts and metrics, and a mistake raises a ``ModelError`` that points at the line of the program. Each
+call first works out the result, which may raise an error but changes nothing, and then applies it.
 """
 
 from __future__ import annotations
@@ -39,13 +39,13 @@ from .weave_all import weave_decorations
 
 _INSTANCE = re.compile(r"([A-Za-z_][A-Za-z0-9_]*)(?:\[(\d{1,9})\])?\Z")
 
-OF_NO_CLASS = "Composite"  # what stands for the class of a composite that Python builds
+OF_NO_CLASS = "Composite"  # the class name of a composite that Python builds
 
 A = TypeVar("A", bound=Actor)
 
 
 class _Children(Mapping[str, Child]):
-    """What is inside of a composite of a graph, looked up when it is asked for: a program connects in many calls."""
+    """The contents of a composite of a graph, looked up on demand: a program connects in many calls."""
 
     def __init__(self, graph: ModelGraph, path: str) -> None:
         self._graph = graph
@@ -67,7 +67,7 @@ class _Children(Mapping[str, Child]):
 
 
 class Building(Protocol):
-    """A ``Model`` in the making: what scopes read of it, and how they change it once they know what is right."""
+    """A ``Model`` under construction: what scopes read of it, and how they change it once a change has been checked."""
 
     name: str
     draft: Draft
@@ -84,7 +84,7 @@ class Building(Protocol):
 
 
 class Scope:
-    """The inside of a model or of a composite: where actors are added and connected."""
+    """The inside of a model or a composite, where actors are added and connected."""
 
     def __init__(self, model: Building, path: str) -> None:
         self.path = path
@@ -107,13 +107,13 @@ class Scope:
     def add(self, part: Actor | CompositeInstance, *, priority: int | None = None) -> Actor | Composite:
         """Add an actor, or an instance of a composite class, and return it.
 
-        Elements of an array are called ``robot[0]``, ``robot[1]`` and so on, in this order.  Of actors of one depth,
-        those of lower ``priority`` fire first, then those that were added first.  Raises ``ModelError``.
+        Elements of an array are called ``robot[0]``, ``robot[1]`` and so on, in this order.  At equal depth, actors
+        with lower ``priority`` fire first, then those that were added first.  Raises ``ModelError``.
         """
         position = call_site()
         if isinstance(part, Actor) and part.is_part:
-            message = f"{part.path} is part of a model already, and an actor belongs to one model"
-            raise mistake(message, position, f"make another one: {type(part).__name__}(...)")
+            message = f"{part.path} is already part of a model, and an actor belongs to only one"
+            raise mistake(message, position, f"create another one: {type(part).__name__}(...)")
         with raising() as problems:
             full = self._free(part.path, position, problems)
         made, aspects = self._made(part, full, position)
@@ -125,7 +125,7 @@ class Scope:
         return part if isinstance(part, Actor) else self._model.scope(full)
 
     def _made(self, part: Actor | CompositeInstance, full: str, position: Position) -> tuple[Draft, list[WovenAspect]]:
-        """A part that is yet to be merged, and the aspects that come with it."""
+        """A part to be merged, and the aspects that come with it."""
         draft = self._model.draft
         if not isinstance(part, Actor):
             return part.unfold(full, draft, position)
@@ -152,11 +152,11 @@ class Scope:
         ties: Ties | None = None,
         like: Like | None = None,
     ) -> Composite:
-        """Add an empty composite, a scope for actors of its own, with ports through which it is connected.
+        """Add an empty composite, a scope for its own actors, with ports through which it is connected.
 
-        With ``director`` it has a director of its own and fires as one actor; local time then begins at ``start`` s
-        (default: as around it) and goes ``drift`` times as fast.  ``ties`` and ``like`` are what this director goes by
-        (default: as that around it).  Raises ``ModelError``.
+        With ``director``, it has its own director and fires as one actor; local time then begins at ``start`` s
+        (default: the time outside) and runs ``drift`` times as fast.  ``ties`` and ``like`` are the rules of this
+        director (default: those of the director outside).  Raises ``ModelError``.
         """
         position = call_site()
         made, ports = Composite(self._model, self._full(name)), [("input", each) for each in inputs]
@@ -167,8 +167,8 @@ class Scope:
             given = director_of(full, said, position, problems)
             if not director and (ties or like):
                 key = "ties" if ties else "like"
-                message = f"{full}: {key!r} is for a director of its own, and {full} has none"
-                problems.add(message, position, "write director=True, or say it of the model")
+                message = f"{full}: {key!r} belongs to a director, and {full} has none of its own"
+                problems.add(message, position, "write director=True, or set it for the model")
         for number, (_, port) in enumerate(ports):
             made.check_port(port, [each for _, each in ports[:number]], position)
         graph = self._model.edit().graph
@@ -181,7 +181,7 @@ class Scope:
         return self._model.scope(full)
 
     def remove(self, name: str) -> None:
-        """Take out an actor or a composite with all that is connected to it, stands at it and watches it."""
+        """Remove an actor or a composite with all connections, aspects and recordings at it."""
         position = call_site()
         full, parts = self._full(name), self._model.graph.parts(self.path)
         instances = parts.get(name.partition("[")[0], [])
@@ -214,24 +214,24 @@ class Scope:
         full = self._full(name)
         if match is None:
             hint = f"{NAMES_HAVE}; an element of an array is called 'name[0]'"
-            inside = ("what is inside of a composite is added to the composite",) if "." in name else ()
+            inside = ("add parts of a composite to the composite",) if "." in name else ()
             problems.add(f"{name!r} is not a name", position, hint, *inside)
             return full
         base, index = match.groups()
         graph = self._model.graph
         instances = graph.parts(self.path).get(base, [])
         if self._full(base) in graph.ports:
-            problems.add(f"{self.path}.{base} is a port already", position, "give the actor another name")
+            problems.add(f"{self.path}.{base} is already a port", position, "give the actor another name")
         elif not instances:
             if index is not None and int(index) != 0:
                 problems.add(f"{full} cannot be the first of its array", position, f"begin with {base}[0]")
         elif full in instances:
             at = graph.positions.get(full)
             where = (f"the first was added at {at.file}:{at.line}",) if at is not None else ()
-            problems.add(f"there is a {full} already", position, *where, "give it another name")
+            problems.add(f"there is already a {full}", position, *where, "give it another name")
         elif (is_array := instances[0].endswith("]")) != (index is not None):
             kind = "an array" if is_array else "a single actor"
-            problems.add(f"{self._full(base)} is {kind} already", position, "give it another name")
+            problems.add(f"{self._full(base)} is already {kind}", position, "give it another name")
         elif index is not None and int(index) != len(instances):
             problems.add(
                 f"{full} is not the next of its array", position, f"the next is {self._full(base)}[{len(instances)}]"
@@ -244,11 +244,11 @@ class Scope:
     # -- connections ----------------------------------------------------------------------------------------------
 
     def connect(self, source: Ends, destination: Ends | None = None, *, delay: float | str | None = None) -> None:
-        """Connect ports, given as such or as text: ``connect(a.output, b.input)``, ``connect("a.output -> b.input")``.
+        """Connect ports, given as objects or text: ``connect(a.output, b.input)``, ``connect("a.output -> b.input")``.
 
-        Every source is connected to every destination; in texts, ``[*]`` stands for all of an array, and on both
-        sides connects equal indices.  ``delay`` is in seconds or a text with a unit; without it, tokens arrive
-        within the tag in which they are sent.  Raises ``ModelError``.
+        Every source is connected to every destination; in texts, ``[*]`` means all of an array, and on both sides
+        connects equal indices.  ``delay`` is in seconds or a text with a unit; without it, tokens arrive within the tag
+        in which they are sent.  Raises ``ModelError``.
         """
         position = call_site()
         with raising() as problems:
@@ -257,7 +257,7 @@ class Scope:
         links.make(self._model.edit())
 
     def disconnect(self, source: Ends, destination: Ends | None = None) -> None:
-        """Take out the connections between ports, which are given as to ``connect``; there must be some."""
+        """Remove the connections between ports, given as for ``connect``; there must be at least one."""
         position, graph = call_site(), self._model.graph
         with raising() as problems:
             links = self._links(source, destination, None, position, problems)
@@ -286,7 +286,7 @@ class Scope:
         return Wiring(inside, self._model.graph, Values(problems), problems).resolve(connection, {})
 
     def _judge(self, links: Links, problems: Problems) -> None:
-        """What can be said of new connections at once; the rest is said when the model is whole."""
+        """Check what can be checked of new connections now; the rest is checked when the model is complete."""
         graph, new = self._model.graph, dict[str, Link]()
         for link in links.found:
             source, target = (graph.ports[path].port for path in (link.source, link.destination))
@@ -299,7 +299,7 @@ class Scope:
             if before is not None:
                 at = before.position
                 where = f", at {at.file}:{at.line}" if at is not None else ""
-                message = f"{target.path} takes one connection, and {before.source} is connected to it already{where}"
+                message = f"{target.path} takes one connection, and {before.source} is already connected to it{where}"
                 problems.add(message, link.position, "disconnect that one, or send through an actor that merges them")
             new.setdefault(link.destination, link)
 
@@ -313,13 +313,13 @@ class Scope:
         at: Places | Mapping[str, Places],
         time: FiringTime | str | None = None,
     ) -> WovenAspect:
-        """Let an aspect stand at ports or actors, given as such or as patterns over those that are there now.
+        """Attach an aspect to ports or actors, given as objects or as patterns over those that exist now.
 
         Aspects at one port or actor apply in the order in which they are woven.  An aspect may be a model: a composite
         of this model, or an instance of a composite class, which is added.  If it has several request ports, ``at``
-        says what comes in by each: ``at={"in1": a.input, "in2": b.input}``.  With a ``time`` (s, a text with a
-        unit, a distribution, or these by input port) such an aspect stands at actors, whose firings take so long.
-        Raises ``ModelError``.
+        gives what comes in by each: ``at={"in1": a.input, "in2": b.input}``.  With a ``time`` (s, a text with a unit, a
+        distribution, or these by input port), such an aspect attaches to actors, whose firings take that long.  Raises
+        ``ModelError``.
         """
         position = call_site()
         full = self._full(name)
@@ -327,7 +327,7 @@ class Scope:
             if not NAME.match(name):
                 problems.add(f"{name!r} is not a name", position, NAMES_HAVE)
             if any(woven.name == full for woven in self._model.aspects):
-                problems.add(f"there is an aspect {full!r} already", position, "unweave it, or give this another name")
+                problems.add(f"there is already an aspect {full!r}", position, "unweave it, or give this another name")
             check_aspect(aspect, (Aspect, Composite, CompositeInstance), position, problems)
             firing_time = firing_time_of(time, aspect, position, problems)
         model = self._model
@@ -362,22 +362,22 @@ class Scope:
         return woven
 
     def unweave(self, name: str) -> None:
-        """Take an aspect out, with its composite if it is a model."""
+        """Remove an aspect, with its composite if it is a model."""
         full, model = self._full(name), self._model
         known = [woven.name for woven in model.aspects]
         if full not in known:
             hint = f"its aspects: {', '.join(known) or 'none'}"
             raise mistake(f"the model has no aspect {full!r}{did_you_mean(full, known)}", call_site(), hint)
         woven = model.aspects[known.index(full)]
-        if woven.model is not None:  # its composite is of no use without it
+        if woven.model is not None:  # its composite has no other use
             model.forget(woven.model.path)
         model.aspects = [each for each in model.aspects if each.name != full]
 
 
 class Composite(Scope):
-    """A composite of a model: a scope for actors of its own, and ports through which it is connected.
+    """A composite of a model: a scope for its own actors, and ports through which it is connected.
 
-    Inside, ``connect`` takes its own ports by their names alone: ``connect("trigger -> sensor.trigger")``.
+    Inside it, ``connect`` takes its ports by their names alone: ``connect("trigger -> sensor.trigger")``.
     """
 
     def input(self, name: str) -> CompositePort:
@@ -396,7 +396,7 @@ class Composite(Scope):
         return CompositePort(full, direction)
 
     def check_port(self, name: str, others: Collection[str], position: Position) -> None:
-        """Raise ``ModelError`` if there can be no such port, beside what there is and some others."""
+        """Raise ``ModelError`` if there cannot be such a port besides the existing ones and ``others``."""
         full, graph = self._full(name), self._model.graph
         with raising() as problems:
             if not NAME.match(name):
@@ -404,7 +404,7 @@ class Composite(Scope):
             elif full in graph.ports or name in others:
                 problems.add(f"port {full!r} is declared twice", position)
             elif name in graph.parts(self.path):
-                problems.add(f"{full!r} is the name of an actor and of a port", position, "rename one")
+                problems.add(f"{full!r} is the name of both an actor and a port", position, "rename one")
 
     def __repr__(self) -> str:
         inputs, outputs = (", ".join(_names(ports)) or "none" for ports in self._model.graph.borders(self.path))
@@ -412,7 +412,7 @@ class Composite(Scope):
 
 
 def _label(graph: ModelGraph, composite: str) -> str:
-    """How messages call a composite: by its class, if it has one."""
+    """The name of a composite in messages: its class, if it has one."""
     kind = graph.composites[composite]
     return composite if kind == OF_NO_CLASS else kind
 

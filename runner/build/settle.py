@@ -1,4 +1,4 @@
-"""Settling parameters: what is set from outside goes before what is given, and this before the default."""
+"""Settling parameters: a setting from outside wins over a given value, and that over the default."""
 
 from __future__ import annotations
 
@@ -40,19 +40,19 @@ from ..text import (
 from .draft import Draft
 
 _INDEX = re.compile(r"\[(\d+|\*)\]")
-# What people may try to set, and how it is done.
+# What users may try to set, and how to do it.
 _NO_PARAMETERS = {
-    "seed": "the seed of a run is the option --seed",
-    "stop": "a single run is ended by --until, or let the model have a parameter for it: 'stop: ${end}'",
-    "count": "let the model have a parameter for it: 'count: ${n}'",
-    "priority": "let the model have a parameter for it: 'priority: ${p}'",
-    "enabled": "an aspect is taken out by --without, or let the model have a parameter for it: 'enabled: ${on}'",
-    "at": "an aspect is aimed anew by --aspect name=Type,at=...",
+    "seed": "set the seed of a run with --seed",
+    "stop": "set the end of a single run with --until, or give the model a parameter for it: 'stop: ${end}'",
+    "count": "give the model a parameter for it: 'count: ${n}'",
+    "priority": "give the model a parameter for it: 'priority: ${p}'",
+    "enabled": "remove an aspect with --without, or give the model a parameter for it: 'enabled: ${on}'",
+    "at": "attach an aspect elsewhere with --aspect name=Type,at=...",
 }
 
 
 class Settler:
-    """Finds the values of all parameters of a model, and what is wrong with them."""
+    """Finds the values of all parameters of a model, and reports wrong ones."""
 
     def __init__(self, settings: Settings, problems: Problems, values: Values | None = None) -> None:
         self.settings = settings
@@ -97,7 +97,7 @@ class Settler:
     def _as_meant(
         self, given: dict[str, Entry], valid: Collection[str], path: str, unknown: Callable[[str], str]
     ) -> dict[str, Entry]:
-        """The values with wrong names told and put right, or else they would seem to be missing as well."""
+        """The values, with wrong names reported and corrected; otherwise they would seem to be missing as well."""
         result = {name: entry for name, entry in given.items() if name in valid}
         for name in (each for each in given if each not in valid):
             hint = f"valid parameters: {', '.join(valid) or 'none'}"
@@ -111,7 +111,7 @@ class Settler:
         self.problems.add(f"{who} needs a value for {name!r}", position, *hints, scope=path)
 
     def _setting(self, full: str) -> Setting | None:
-        """The setting for a parameter, if there is one; errors in it are reported for one instance of an array."""
+        """The setting for a parameter, if there is one; its errors are reported for one instance of an array."""
         self._settable[full] = None
         try:
             found = self.settings.find(full)
@@ -122,7 +122,7 @@ class Settler:
             self.problems.stop(f"{full}: {error}", self.settings.position, RAISE_IT)
 
     def set_from_outside(self, path: str, part: Configurable) -> dict[str, object]:
-        """The parameters of something that is made already which are set from outside, with their new values."""
+        """The new values of the parameters that are set from outside, of a part that already exists."""
         changed: dict[str, object] = {}
         for name, parameter in declared_parameters(type(part)).items():
             setting = self._setting(f"{path}.{name}")
@@ -170,13 +170,13 @@ class Settler:
             except ParameterError as error:
                 place = place_of(node, error.keys, of_key=error.of_key)
                 self.problems.add(f"{label}.{name}: {error}", place, scope=scope)
-            except Exception as error:  # of a class of a user's
+            except Exception as error:  # of a user's class
                 self.blame(f"{label}.{name}", error, node.position, scope)
         self._wrong |= {(at, in_general(f"{path}.{name}")) for name, at in outside.items() if name not in result}
         return result if complete and len(self.problems) == before else None
 
     def is_enabled(self, name: str, scope: str, part: PartText, names: dict[str, object]) -> bool:
-        """Whether an aspect is to act; one of which that is not known is."""
+        """Whether an aspect is active; it is if that is unknown."""
         if part.enabled is None:
             return True
         convert = Parameter(bool).convert
@@ -184,7 +184,7 @@ class Settler:
         return found is self.values.missing or bool(found)
 
     def place_in(self, given: dict[str, Entry], error: Exception, position: Position) -> Position:
-        """Where in the values of a part something is that does not go with the others, if that is known."""
+        """The place, if known, of a value of a part that does not fit the others."""
         if not isinstance(error, ParameterError) or not error.keys or str(error.keys[0]) not in given:
             return position
         entry = given[str(error.keys[0])]
@@ -193,7 +193,7 @@ class Settler:
         )
 
     def blame(self, label: str, error: Exception, position: Position, scope: str) -> None:
-        """Tell what the code of a class has against its values, or how it failed."""
+        """Report why the code of a class rejects its values, or how it failed."""
         if isinstance(error, EpicycleError):
             self.problems.add(f"{label}: {error}", position, scope=scope)
             return
@@ -203,7 +203,7 @@ class Settler:
         )
 
     def check_unused(self, draft: Draft) -> None:
-        """Add a problem for every setting that no parameter took, unless it is meant for an array that is empty now."""
+        """Add a problem for every setting that no parameter took, unless it is for an array that is empty now."""
         for setting in self.settings.unused():
             if not draft.excuses(setting.path):
                 self._add_unused(setting)
@@ -213,9 +213,9 @@ class Settler:
         owner, _, last = setting.path.rpartition(".")
         beside = [path.rpartition(".")[2] for path in known if path.rpartition(".")[0] == owner]
         if last in _NO_PARAMETERS and last not in beside:
-            self.problems.add(f"{setting.path!r} sets no parameter", setting.position, _NO_PARAMETERS[last])
+            self.problems.add(f"{setting.path!r} matches no parameter", setting.position, _NO_PARAMETERS[last])
             return
-        # One that differs in indices alone, or the nearest one of the same owner, or else the nearest of all.
+        # One that differs only in indices, else the nearest one of the same owner, else the nearest of all.
         alike = [path for path in known if _INDEX.sub("", path) == _INDEX.sub("", setting.path)]
         meant, name = nearest(setting.path, alike), nearest(last, beside)
         if meant is None and name is not None:
@@ -223,11 +223,11 @@ class Settler:
         meant = meant or nearest(setting.path, known)
         near = "" if meant is None else f", did you mean {meant!r}?"
         valid = (f"valid parameters {f'of {owner}' if owner else 'here'}: {', '.join(beside)}",) if beside else ()
-        self.problems.add(f"{setting.path!r} sets no parameter{near}", setting.position, *(() if near else valid))
+        self.problems.add(f"{setting.path!r} matches no parameter{near}", setting.position, *(() if near else valid))
 
 
 def _in_terms_of(pattern: str, path: str) -> str:
-    """The path with ``[*]`` where the pattern has it, or leaves an index out: ``a[*].b[0]`` for ``a[2].b[0]``."""
+    """The path with ``[*]`` where the pattern has it or omits an index: ``a[*].b[0]`` for ``a[2].b[0]``."""
     asked, parts = pattern.split("."), path.split(".")
     for place, (wanted, part) in enumerate(zip(asked, parts, strict=False)):
         name, bracket, _ = part.partition("[")
@@ -252,7 +252,7 @@ def drift(value: object) -> float:
     return 1.0 if found is None else float(found)
 
 
-# What may be said of a director, and how it is taken.
+# What may be given for a director, and how it is converted.
 OF_DIRECTORS: dict[str, Callable[[Any], Any]] = {
     "start": lambda start: None if start is None else local_nanoseconds(start),
     "drift": drift,
@@ -264,7 +264,7 @@ OF_DIRECTORS: dict[str, Callable[[Any], Any]] = {
 def converted(
     values: Values, node: Node, names: dict[str, object], label: str, scope: str, convert: Callable[[Any], Any]
 ) -> Any:
-    """A value as ``convert`` makes it; ``missing``, and a problem, if that cannot be."""
+    """A value as ``convert`` makes it; ``missing``, and a problem, if that fails."""
     value = values.of(node, names, label, scope)
     if value is not values.missing:
         try:
@@ -278,7 +278,7 @@ def converted(
 
 
 def place_of(node: Node, keys: tuple[str | int, ...], *, of_key: bool) -> Position:
-    """Where in a value, as far as it is written out, ``keys`` lead; ``of_key``: to the last of them itself."""
+    """Where ``keys`` lead in a value, as far as it is written out; with ``of_key``, the last key itself."""
     for number, key in enumerate(keys, start=1):
         if isinstance(node, Sequence) and isinstance(key, int):
             node = node.items[key]

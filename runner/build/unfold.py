@@ -1,7 +1,7 @@
 """Unfolding: from declarations to a draft with all actors, composites and ports, connected.
 
-What is wrong is reported and worked around, so that one load tells it all: a wrong value becomes ``missing`` and what
-is computed from it is not judged; a part that cannot be made is a gap in the draft.
+Problems are reported and worked around, so that one load reports all of them: a wrong value becomes ``missing``, and
+what is computed from it is not checked; a part that cannot be made is a gap in the draft.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from .settle import OF_DIRECTORS, Settler, converted
 
 MAX_DEPTH = 50
 MAX_SHOWN = 12  # types in one message
-OF_YOUR_OWN = "one of your own is known after '--types FILE.py'; in Python, give its class as types=[...]"
+OF_YOUR_OWN = "for your own types, add '--types FILE.py'; in Python, pass the classes as types=[...]"
 
 Names = dict[str, object]
 
@@ -37,14 +37,14 @@ class TooLargeError(Exception):
 
 @dataclass(frozen=True)
 class Known:
-    """What parts may be of: the composite classes of a model, and the types that are installed."""
+    """The possible types of parts: the composite classes of a model, and the installed types."""
 
     composites: Mapping[str, CompositeText]
     catalogue: Catalogue
-    broken: Collection[str] = ()  # composites that are there, but lack what they extend
+    broken: Collection[str] = ()  # composites whose base is missing
 
     def valid_types(self, kind: str, asked: str) -> tuple[str, ...]:
-        """Which types there are: their names, or how to see them if they are too many; and how there can be more."""
+        """The valid types: their names, or how to list them if there are too many, and how to add more."""
         is_actor = kind == "actor"
         types: Collection[str] = self.catalogue.actors if is_actor else self.catalogue.aspects
         others: Collection[str] = self.catalogue.aspects if is_actor else self.catalogue.actors
@@ -61,9 +61,9 @@ class Known:
 
 
 class Unfolding:
-    """What is made of declarations: parts in a draft, and the aspects that are yet to be woven around them.
+    """What is made from declarations: parts in a draft, and the aspects that are to be woven around them.
 
-    ``trial``: parts are made to see what is wrong with them, and no more than so many; more is not told.
+    ``trial``: parts are made only to find problems in them, up to that number; exceeding it is not reported.
     """
 
     def __init__(self, known: Known, settler: Settler, draft: Draft, trial: int | None = None) -> None:
@@ -76,7 +76,7 @@ class Unfolding:
         self.actors: list[Actor] = []
         self.classes: set[str] = set()  # the composites of which there are instances
         self.cost = 0  # actors and composites
-        self.places = 0  # at which aspects stand
+        self.places = 0  # that aspects attach to
         self._trial = trial
         self._port_types: dict[str, Any] = {}
         self._tokens = cache(partial(token_types, known.catalogue))
@@ -120,8 +120,8 @@ class Unfolding:
                 self.instances(full, part, names, within, is_refinement=True)
                 made[mode] = full
             elif kind is not None:
-                message = f"{full}: {part.type.text} is an actor, and a refinement is a composite"
-                self._tell(message, part.type.position, path, "write a composite class with that actor in it")
+                message = f"{full}: {part.type.text} is an actor, but a refinement must be a composite"
+                self._tell(message, part.type.position, path, "write a composite class that contains that actor")
         if made:
             graph.modal[path] = Modal(machine, made)
         connect_modes(path, composite, self.known.composites, self.draft, self.problems)
@@ -160,7 +160,7 @@ class Unfolding:
     # -- one entry of ``actors`` ----------------------------------------------------------------------------------
 
     def _type(self, path: str, part: PartText, within: tuple[str, ...]) -> CompositeText | type[Actor] | None:
-        """What a part is; None, and told, if it cannot be that."""
+        """The type of a part; None, and a problem, if it cannot have that type."""
         known, wanted = self.known, part.type.text
         inner = known.composites.get(wanted)
         try:
@@ -187,7 +187,7 @@ class Unfolding:
         self.problems.add(message, position, *hints, scope=scope)
 
     def _count(self, path: str, part: PartText, names: Names) -> int | None:
-        """How many instances there are; None if that is not known."""
+        """The number of instances; None if it is unknown."""
         if part.count is None:
             return 1
         count = Parameter(int, min=0, max=self.draft.graph.limits.actors)
@@ -205,7 +205,7 @@ class Unfolding:
             raise TooLargeError
 
     def _kinds(self, part: PartText) -> set[str]:
-        """The types and tags that an instance of this part and what is in it would have."""
+        """The types and tags that an instance of this part, and the parts in it, would have."""
         found: set[str] = set()
         waiting, seen = [part], set[str]()
         while waiting:
@@ -221,8 +221,8 @@ class Unfolding:
         if part.priority is None:
             return
         if isinstance(kind, CompositeText) and kind.director is None:
-            message = f"{path}: {kind.name} has no priority, for its actors fire one by one"
-            hint = f"give the actors inside a priority, or give {kind.name} a director of its own: 'director: {{}}'"
+            message = f"{path}: {kind.name} has no priority, because its actors fire one by one"
+            hint = f"give the actors inside a priority, or give {kind.name} its own director: 'director: {{}}'"
             self._tell(message, part.priority.position, path, hint)
             return
         found = converted(self.values, part.priority, names, f"{path}: priority", path, Parameter(int).convert)
@@ -238,7 +238,7 @@ class Unfolding:
                 self.draft.graph.add_actor(actor, part.position)
                 self.actors.append(actor)
                 return
-            except Exception as error:  # whatever an actor's own __init__ does
+            except Exception as error:  # an actor's __init__ may raise anything
                 place = self.settler.place_in(part.values, error, part.position)
                 self.settler.blame(path, error, place, path)
         self.draft.leave_out(path, actor_type)
@@ -255,7 +255,7 @@ class Unfolding:
         *,
         is_refinement: bool = False,
     ) -> None:
-        """One instance of a composite, its ports and all that is in it; ``inside`` are its parameters."""
+        """One instance of a composite, its ports and its parts; ``inside`` are its parameters."""
         graph = self.draft.graph
         self.classes.add(composite.name)
         graph.add_composite(path, composite.name)
@@ -272,12 +272,12 @@ class Unfolding:
         self.body(path, composite, inside, (*within, composite.name))
 
     def rules(self, model: CompositeText, names: Names) -> None:
-        """What the director of the model goes by."""
+        """The rules of the model's director."""
         given = self._director(model.name, "", model.director or {}, names)
         self.draft.graph.rules[""] = self.draft.graph.rules[""].inside(given.get("ties"), given.get("like"))
 
     def _director(self, what: str, path: str, given: Mapping[str, Entry], names: Names) -> dict[str, Any]:
-        """What is said of a director; what is wrong is left out."""
+        """The settings of a director; wrong ones are left out."""
         found = {
             key: converted(self.values, entry.value, names, f"{what}: director.{key}", path, OF_DIRECTORS[key])
             for key, entry in given.items()
@@ -285,7 +285,7 @@ class Unfolding:
         return {key: value for key, value in found.items() if value is not self.values.missing}
 
     def _port_type(self, composite: CompositeText, port: PortText) -> Any:
-        """The type that a composite declares for a port; None if it says none, or none that there is."""
+        """The type that a composite declares for a port; None if it declares none, or an unknown one."""
         if port.type is None:
             return None
         text = port.type.text
@@ -306,13 +306,13 @@ class Unfolding:
     def _aspect_model(
         self, path: str, composite: CompositeText, part: PartText, names: Names, within: tuple[str, ...]
     ) -> Child | None:
-        """Make the composite that an aspect is; one that is not enabled is made for trial alone."""
+        """Make the composite of an aspect; if it is not enabled, only to check it."""
         full, graph = f"{path}.{part.name}" if path else part.name, self.draft.graph
         is_port = part.name in composite.inputs or part.name in composite.outputs
         if is_port or part.name in composite.actors or full in graph.actors or full in graph.composites:
             clash = "a port" if is_port else "an actor"
             self._tell(
-                f"{full!r} is the name of {clash} and of an aspect that is a model", part.position, "", "rename one"
+                f"{full!r} is the name of both {clash} and an aspect that is a model", part.position, "", "rename one"
             )
             return None
         if self.settler.is_enabled(full, path, part, names):

@@ -1,4 +1,4 @@
-"""Composite classes that a model does not use: unfolded for trial, with parameters whose values are not known."""
+"""Composite classes that a model does not use: unfolded on trial, with parameters of unknown value."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ from .settle import Settler
 from .unfold import Known, TooLargeError, Unfolding
 from .weave_all import weave_all
 
-_OVERHEAD = 3  # what a class takes beside what is in it, as many actors
+_OVERHEAD = 3  # the cost of a class besides its contents, in actors
 
 
 def try_classes(known: Known, used: Collection[str], values: Values, limits: Limits, problems: Problems) -> None:
-    """Check what can be checked of every class of which the model has no instance.
+    """Check what can be checked of every class without an instance in the model.
 
-    All trials together may cost as much as a model of half the largest size; a warning tells what is left over.
+    All trials together may cost as much as a model of half the maximum size; a warning names what remains.
     """
     tried = set(used)
     inner = {
@@ -31,7 +31,7 @@ def try_classes(known: Known, used: Collection[str], values: Values, limits: Lim
     }
     most = left = limits.actors // 2
     untried: list[str] = []
-    # Those that stand in no other come first, for the others are then tried as their parts.
+    # Classes that no other contains come first; the others are then tried as their parts.
     for name in sorted(known.composites, key=lambda name: name in inner):
         if name in tried:
             continue
@@ -48,13 +48,13 @@ def try_classes(known: Known, used: Collection[str], values: Values, limits: Lim
         names = (
             f"{untried[0]} is" if len(untried) == 1 else f"{untried[0]} and {counted(len(untried) - 1, 'other')} are"
         )
-        why = f"to try all that it has none of takes more than {most:,} actors and composites"
-        message = f"{names} not checked in full: the model has no instance of such a class, and {why}"
+        why = f"checking all such classes takes more than {most:,} actors and composites"
+        message = f"{names} not fully checked: the model has no instance of such a class, and {why}"
         problems.warn(message, known.composites[untried[0]].position, RAISE_IT)
 
 
 def _try(composite: CompositeText, made: Unfolding) -> bool:
-    """Unfold one instance of a class, called as it is, with nothing around it; whether all of it was looked at."""
+    """Unfold one instance of a class, with its name and nothing around it; returns whether all of it was checked."""
     path, values, draft = composite.name, made.values, made.draft
     names: dict[str, object] = {}
     for name, declared in composite.parameters.items():
@@ -62,7 +62,7 @@ def _try(composite: CompositeText, made: Unfolding) -> bool:
             so_far = {**names, "index": values.missing}
             value = values.of(declared.value, so_far, f"{path}.{name}", path, list(composite.parameters))
             values.declared(f"{path}.{name}", declared, value, declared.value.position, path)
-        # The default is one value of many: what is computed from it is not judged.
+        # The default is one value of many: what is computed from it is not checked.
         names[name] = values.missing
     names.setdefault("index", values.missing)
     try:

@@ -29,11 +29,11 @@ from .draft import Draft
 from .monitors import monitor_of
 from .settle import converted, nanoseconds
 
-# Larger seeds could not be told apart in the int64 columns of result files.
+# Larger seeds would not fit the int64 columns of result files.
 
 
 class Watching:
-    """Finds what is to be watched: ``read`` what a file says, the others what a program asks for."""
+    """Finds what is to be watched: ``read`` for what a file declares, the others for what a program asks for."""
 
     def __init__(self, draft: Draft, values: Values, problems: Problems, recorded: Collection[str] = ()) -> None:
         self.found = Watched()
@@ -47,7 +47,7 @@ class Watching:
         self._watched = 0
 
     def read(self, text: ModelText, names: dict[str, object]) -> Watched:
-        """Everything that the model file says about it."""
+        """Everything that the model file declares about it."""
         reader = NodeReader(self.problems)
         for key, entry in text.run.items():
             if key in ("record", "stop_when"):
@@ -71,7 +71,7 @@ class Watching:
     def _read_metric(self, text: MetricText, names: dict[str, object]) -> None:
         values: dict[str, object] = {}
         for key, entry in text.values.items():
-            # What is only read by people holds no expressions.
+            # Text for people holds no expressions.
             if key in ("take", "unit", "to", "doc", "label"):
                 values[key] = _words(entry.value)
             else:
@@ -89,7 +89,7 @@ class Watching:
             self.monitor(text.name, values, text.position, places)
 
     def record(self, text: Text) -> None:
-        """Keep what the ports behind a pattern send."""
+        """Record what the ports behind a pattern send."""
         found = [path for path in self.select(text, "record") if path not in self._recorded]
         self._recorded.update(found)
         self.found.recorded += found
@@ -102,7 +102,7 @@ class Watching:
             for port in self.graph.source_of(path):
                 if not accepts(float | bool, port.type):
                     message = f"stop_when: {path} sends {type_name(port.type)}, which is neither true nor false"
-                    hint = "name a port that sends bool or numbers; the run ends when it sends true, or not 0"
+                    hint = "name a port that sends bool or numbers; the run ends at true, or a number other than 0"
                     self.problems.add(message, text.position, hint)
                     return
 
@@ -114,7 +114,7 @@ class Watching:
         position: Position,
         places: Mapping[str, Position] | None = None,
     ) -> None:
-        """Take one number from what the ports behind a pattern send; ``places``: where its options stand."""
+        """Take one number from what the ports behind a pattern send; ``places``: where its options are written."""
         what = f"metric {name}"
         measure = self._measure(what, options, position, places or {})
         if measure is None:
@@ -131,21 +131,23 @@ class Watching:
         for path in paths:
             for port in self.graph.source_of(path):
                 if port.type in (Any, object) or not accepts(wanted, port.type):
-                    message = f"{what}: {path} sends {type_name(port.type)}, of which there is no {measure.take!r}"
+                    message = (
+                        f"{what}: {path} sends {type_name(port.type)}, from which {measure.take!r} cannot be taken"
+                    )
                     self.problems.add(message, of.position, "name a port that sends numbers, or take 'count'")
                     return
 
     def monitor(
         self, name: str, values: Mapping[str, object], position: Position, places: Mapping[str, Position] | None = None
     ) -> None:
-        """Judge the runs by a property; ``places``: where what is said of it stands."""
+        """Judge the runs by a property; ``places``: where its options are written."""
         found = monitor_of(self.draft, name, values, places or {}, position, self.problems)
         if found is None:
             return
         self._watched += len(found.ports)
         for metric in found.metrics:
             if any(each.name == metric.name for each in self.found.metrics):
-                message = f"monitor {name}: there is a metric {metric.name!r}, as which its results would be known"
+                message = f"monitor {name}: its result needs the name {metric.name!r}, which a metric has"
                 self.problems.add(message, position, "rename one of the two")
         self.found.monitors.append(found)
         self.found.metrics += found.metrics
@@ -172,11 +174,11 @@ class Watching:
         return measure
 
     def select(self, text: Text, what: str) -> list[str]:
-        """The output ports that a pattern selects, composites' included."""
+        """The output ports that a pattern selects, including those of composites."""
         try:
             found = self._outputs.select(text.text)
         except PatternError as error:
-            self.problems.add(f"{what}: {text.text!r} is no pattern: {error}", text.position)
+            self.problems.add(f"{what}: {text.text!r} is not a pattern: {error}", text.position)
             return []
         except TooManyError as error:
             self.problems.stop(f"{what}: {error}", text.position, RAISE_IT)

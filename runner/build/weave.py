@@ -1,9 +1,9 @@
-"""From aspect declarations to aspects that stand at ports and connections.
+"""From aspect declarations to aspects attached to ports and connections.
 
-A pointcut is a pattern of ports (``observer[*].plan_in``), of a connection (``a.out -> b.in``), or a choice by the
-type of an actor or composite, or by a tag that the model's author put on it, with the name of a port.  What a pattern
-with a ``!`` before it selects is left out again.  An aspect that stands at actors is aimed at these by their paths, or
-at a composite for all the actors in it.
+A pointcut is a pattern of ports (``observer[*].plan_in``), of a connection (``a.out -> b.in``), or a selection by the
+type of an actor or composite, or by a tag that the model's author gave it, with the name of a port.  A pattern after
+``!`` excludes what it selects.  An aspect that attaches to actors selects these by their paths, or a composite for all
+actors in it.
 """
 
 from __future__ import annotations
@@ -23,12 +23,12 @@ from .paths import View
 
 @dataclass
 class Weaving(View):
-    """Finds the places of one aspect, which is of the class ``cls``."""
+    """Finds the places of one aspect of the class ``cls``."""
 
     cls: type[Aspect]
-    _parameters: dict[str, bool] = field(default_factory=dict, init=False)  # selected ones, and whether left out again
-    _left_out: set[str] = field(default_factory=set, init=False)  # ports, which counts for the connections to them, too
-    _is_excused: bool = field(default=False, init=False)  # whether a pointcut selects nothing as there is nothing now
+    _parameters: dict[str, bool] = field(default_factory=dict, init=False)  # selected ones, and whether excluded
+    _left_out: set[str] = field(default_factory=set, init=False)  # excluded ports, and the connections to them
+    _is_excused: bool = field(default=False, init=False)  # whether a pointcut rightly selects nothing
 
     @property
     def kind(self) -> str:
@@ -37,9 +37,9 @@ class Weaving(View):
     def weave(
         self, aspect: Aspect, pointcuts: Sequence[PointcutText], position_of: Callable[..., Position | None]
     ) -> WovenAspect:
-        """The aspect with its places and everything it looks at; a pointcut that selects nothing is a problem.
+        """The aspect with its places and everything it reads; a pointcut that selects nothing is a problem.
 
-        ``position_of`` tells where a parameter, or a key in it, is set in the model file.
+        ``position_of`` returns where a parameter, or a key in it, is set in the model file.
         """
         before = len(self.problems)
         ports, connections, actors = self.select(pointcuts)
@@ -47,7 +47,7 @@ class Weaving(View):
         is_somewhere = ports or connections or actors or parameters
         if pointcuts and not is_somewhere and not self._is_excused and len(self.problems) == before:
             only_out = all(pointcut.exclude for pointcut in pointcuts)
-            nowhere = "'at' says only where it does not stand" if only_out else "all that 'at' selects is left out"
+            nowhere = "'at' has only exclusions" if only_out else "'at' excludes everything that it selects"
             self._problem(nowhere, pointcuts[0])
         looks = Looks(self.draft, self.paths, self.name, self.scope, self.problems)
         readings, selections, reads = looks.of(aspect, ports, position_of)
@@ -58,7 +58,7 @@ class Weaving(View):
         return woven
 
     def check_times(self, woven: WovenAspect, position_of: Callable[..., Position | None]) -> None:
-        """See that execution times by input port name ports that the actors have."""
+        """Check that execution times by input port name ports that the actors have."""
         for message, keys, advice in unknown_inputs(woven, self.graph):
             self._problem(message, position_of(*keys), advice)
 
@@ -72,7 +72,7 @@ class Weaving(View):
         return self.ports.in_order(chosen - self._left_out), self._select_connections(pointcuts), {}
 
     def _of(self, pointcut: PointcutText) -> list[str]:
-        """The ports at which the aspect can stand, of those that one pointcut selects."""
+        """The ports that the aspect can attach to, of those that one pointcut selects."""
         if self._stands_at_parameters(pointcut):
             return []
         found: list[str] | None = None
@@ -81,18 +81,18 @@ class Weaving(View):
         elif pointcut.type is not None or pointcut.tag is not None:
             found = self._chosen(pointcut)
         else:
-            self._is_excused = self._is_excused or not pointcut.exclude  # it is misshapen, and has been told so
+            self._is_excused = self._is_excused or not pointcut.exclude  # it is malformed, which has been reported
         if found is None:
             return []
         fitting = [port for port in found if self._fits(port)]
         if found and not fitting:
             where = " or ".join(sorted(self.cls.stands_at))
             other = f"{found[0]} is an {self.graph.direction(found[0])} port"
-            self._problem(f"{self.kind} stands at {where} ports, but {other}", pointcut)
+            self._problem(f"{self.kind} attaches to {where} ports, but {other}", pointcut)
         return fitting
 
     def _stands_at_parameters(self, pointcut: PointcutText) -> bool:
-        """Whether a pointcut is aimed at parameters of actors: it says so, or fits no port where it could stand.
+        """Whether a pointcut selects parameters of actors: because it says so, or because it matches no suitable port.
 
         A pattern must name the parameter in full: ``sensor.*`` are ports.
         """
@@ -113,7 +113,7 @@ class Weaving(View):
                     return False
                 actors = self.paths.actors.select(owner)
             except PatternError:
-                return False  # which is told of it as a pattern of ports
+                return False  # which is reported of it as a pattern of ports
         having = [path for path in actors or () if name in declared_parameters(type(self.graph.actors[path]))]
         if said is not None and actors is not None and not having:
             names = sorted({each for path in actors for each in declared_parameters(type(self.graph.actors[path]))})
@@ -124,7 +124,7 @@ class Weaving(View):
         return bool(having) or said is not None
 
     def _parameter_meant(self, pattern: str) -> tuple[str, ...]:
-        """The parameter of an actor that a pattern nearly names, as advice."""
+        """Advice: the parameter of an actor that a pattern nearly names."""
         owner, _, name = pattern.rpartition(".")
         if not self.cls.alters_parameters or owner not in self.graph.actors:
             return ()
@@ -132,7 +132,7 @@ class Weaving(View):
         return () if meant is None else (f"{owner} has a parameter {meant!r}",)
 
     def _enter_parameter(self, actor: str, name: str, pointcut: PointcutText) -> None:
-        """Take a parameter of an actor, if it holds what the aspect alters and nothing else does."""
+        """Add a parameter of an actor, if it holds what the aspect alters and nothing else sets it."""
         path, parameter = f"{actor}.{name}", declared_parameters(type(self.graph.actors[actor]))[name]
         about = ("altered", in_general(path))
         if pointcut.exclude:
@@ -145,7 +145,7 @@ class Weaving(View):
             self._problem(f"{self.kind} alters numbers, but {path} has no value", pointcut, about=about)
         elif path in self.graph.ports and self.graph.incoming(path):
             sender = self.graph.incoming(path)[0].source
-            hint = f"let the aspect stand at {sender!r}, where they come from"
+            hint = f"attach the aspect to {sender!r}, where they come from"
             self._problem(f"{path} gets its values over a connection", pointcut, hint, about=about)
         else:
             self._parameters.setdefault(path, False)
@@ -156,7 +156,7 @@ class Weaving(View):
             found = self.ports.select(full)
         except PatternError as error:
             several = ("for several pointcuts, write a list: [a.in, b.in]",) if "," in pointcut.text else ()
-            self._problem(f"{pointcut.text!r} is no pointcut: {error}", pointcut, *several)
+            self._problem(f"{pointcut.text!r} is not a pointcut: {error}", pointcut, *several)
             return None
         if not found and not self._excuses(full):
             near = self.ports.did_you_mean(pointcut.text, self.scope, self._fits)
@@ -176,7 +176,7 @@ class Weaving(View):
             if not found and not any(path in self.draft.unknown for path in owners):
                 wanting = " or ".join(sorted(self.cls.stands_at))
                 where = pointcut.type or pointcut.tag
-                self._problem(f"{self.kind} stands at {wanting} ports, but no {_asked(pointcut)} has one", where)
+                self._problem(f"{self.kind} attaches to {wanting} ports, but no {_asked(pointcut)} has one", where)
             return found
         found = [path for path in ports if path.rpartition(".")[2] == pointcut.port.text]
         if not found:
@@ -209,18 +209,18 @@ class Weaving(View):
         if not owners:
             what = "types" if pointcut.type is not None else "tags"
             message = f"there is no {_asked(pointcut)}{did_you_mean(wanted.text, sorted(known | self.draft.kinds))}"
-            self._problem(message, wanted, f"{what} in it: {', '.join(sorted(known)) or 'none'}")
+            self._problem(message, wanted, f"{what} here: {', '.join(sorted(known)) or 'none'}")
             return None
         return owners
 
     def _select_actors(self, pointcuts: Sequence[PointcutText]) -> dict[str, str]:
-        """The actors that the pointcuts select, as such or with a composite around them, and what was aimed at."""
+        """The actors that the pointcuts select, singly or with a composite around them, and what the pointcuts name."""
         index = self.paths.owners
         aimed = {path for pointcut in pointcuts if not pointcut.exclude for path in self._aimed_at(pointcut, index)}
         spared = {path for pointcut in pointcuts if pointcut.exclude for path in self._aimed_at(pointcut, index)}
         known = self.paths.holders
         if any(each not in known for unit in aimed for each in (unit, *index.inside(unit))):
-            self._is_excused = True  # there is an actor that could not be made, which has been told
+            self._is_excused = True  # there is an actor that could not be made, which has been reported
         found = {}
         actors = self.paths.actors
         chosen = {each for unit in aimed for each in (unit, *actors.inside(unit)) if each in actors}
@@ -236,29 +236,31 @@ class Weaving(View):
         """The actors and composites that one pointcut selects."""
         name, text = self.kind, pointcut.text
         if pointcut.port is not None:
-            self._problem(f"{name} stands at actors, not at their ports", pointcut.port, "leave 'port' out")
+            self._problem(f"{name} attaches to actors, not to their ports", pointcut.port, "leave 'port' out")
         if not text:
             if pointcut.type is None and pointcut.tag is None:
-                self._is_excused = self._is_excused or not pointcut.exclude  # it is misshapen, and has been told so
+                self._is_excused = self._is_excused or not pointcut.exclude  # it is malformed, which has been reported
                 return ()
             return self._chosen_owners(pointcut) or ()
         if "->" in text:
             receiver = text.rpartition("->")[2].strip().rpartition(".")[0]
-            hint = f"write {receiver!r} for the one that receives"
-            self._problem(f"{name} stands at actors, not on connections", pointcut, hint)
+            hint = f"write {receiver!r} for the receiving actor"
+            self._problem(f"{name} attaches to actors, not to connections", pointcut, hint)
             return ()
         full = self._full(text)
         try:
             found, ports = index.select(full), self.ports.select(full)
         except PatternError as error:
             several = ("for several pointcuts, write a list: [a, b]",) if "," in text else ()
-            self._problem(f"{text!r} is no pointcut: {error}", pointcut, *several)
+            self._problem(f"{text!r} is not a pointcut: {error}", pointcut, *several)
             return ()
         if not found and not self._excuses(f"{full}.*"):
             if ports and "." in text:
                 owner = text.rpartition(".")[0]
                 self._problem(
-                    f"{name} stands at actors, but {ports[0]} is a port", pointcut, f"write {owner!r}, without the port"
+                    f"{name} attaches to actors, but {ports[0]} is a port",
+                    pointcut,
+                    f"write {owner!r}, without the port",
                 )
             else:
                 inside = (path.removeprefix(self._full("")) for path in index.inside(self.scope))
@@ -277,8 +279,8 @@ class Weaving(View):
             if not pointcut.exclude:
                 chosen |= dict.fromkeys(found)
             elif found and not chosen.keys() & found:
-                hint = "ports are left out of ports, connections of connections: select some, as in '*.out -> b.in'"
-                self._problem(f"'!{pointcut.text}' leaves out no connection that is selected", pointcut, hint)
+                hint = "exclude ports from ports and connections from connections: select some, as in '*.out -> b.in'"
+                self._problem(f"'!{pointcut.text}' excludes no selected connection", pointcut, hint)
             else:
                 chosen = {each: None for each in chosen if each not in found}
         return [each for each in chosen if each[1] not in self._left_out]
@@ -286,7 +288,7 @@ class Weaving(View):
     def _connections_of(self, pointcut: PointcutText) -> list[tuple[str, str]]:
         """The connections that one pointcut selects."""
         if "input" not in self.cls.stands_at:
-            self._problem(f"{self.kind} stands at output ports, not on connections", pointcut)
+            self._problem(f"{self.kind} attaches to output ports, not to connections", pointcut)
             return []
         left, _, right = (part.strip() for part in pointcut.text.partition("->"))
         try:
@@ -298,7 +300,7 @@ class Weaving(View):
                 if hop.destination in ends
             ]
         except PatternError as error:
-            self._problem(f"{pointcut.text!r} is no pointcut: {error}", pointcut)
+            self._problem(f"{pointcut.text!r} is not a pointcut: {error}", pointcut)
             return []
         if not found and not (self._excuses(self._full(left)) or self._excuses(self._full(right))):
             known = [f"{hop.source} -> {hop.destination}" for hop in self.graph.hops]
@@ -307,18 +309,18 @@ class Weaving(View):
         return found
 
     def _excuses(self, pattern: str) -> bool:
-        """Whether a pattern that matches nothing is right."""
+        """Whether a pattern may match nothing."""
         is_excused = self.draft.excuses(pattern)
         self._is_excused = self._is_excused or is_excused
         return is_excused
 
     def _fits(self, port: str) -> bool:
-        """Whether the aspect can stand there."""
+        """Whether the aspect can attach to a port."""
         return self.graph.direction(port) in self.cls.stands_at
 
 
 def _asked(pointcut: PointcutText) -> str:
-    """What a pointcut asks for that chooses by type or tag."""
+    """What a pointcut by type or tag asks for."""
     if pointcut.type is not None:
         return f"actor of type {pointcut.type.text!r}"
     return f"actor with the tag {pointcut.tag.text if pointcut.tag is not None else ''!r}"

@@ -1,4 +1,4 @@
-"""From the declarations of aspects to aspects that stand in a model: those of the model, its classes and its actors."""
+"""From declarations of aspects to the aspects of a model: those of the model itself, its classes and its actors."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from .weave import Weaving
 
 
 def weave_all(made: Unfolding) -> list[WovenAspect]:
-    """Let all aspects stand where they are to, now that all ports exist, in the order in which tokens meet them."""
+    """Attach all aspects, now that all ports exist, in the order in which tokens meet them."""
     weaver, graph, problems = _Weaver(made), made.draft.graph, made.problems
     for scope, part, names in made.aspects:
         name = f"{scope}.{part.name}" if scope else part.name
@@ -51,7 +51,7 @@ def weave_all(made: Unfolding) -> list[WovenAspect]:
 
 
 class _Weaver:
-    """Weaves what is declared, one after the other."""
+    """Weaves the declared aspects one after the other."""
 
     def __init__(self, made: Unfolding) -> None:
         self.made = made
@@ -73,7 +73,7 @@ class _Weaver:
         values = self.settler.configuration(f"aspect {name}", cls, given, names, part.position, name, rules)
         if not part.at:
             hint = "add 'at:' with ports or patterns"
-            self.problems.add(f"aspect {name} does not say where it stands", part.position, hint, scope=scope)
+            self.problems.add(f"aspect {name} has no 'at'", part.position, hint, scope=scope)
         self.graph.positions[f"aspect {name}"] = part.position
         weaving = Weaving(self.draft, self.paths, name, scope, self.problems, cls)
         if is_model and name in self.graph.composites:
@@ -82,11 +82,11 @@ class _Weaver:
         is_enabled = name in self.graph.composites if is_model else self.settler.is_enabled(name, scope, part, names)
         try:
             aspect = None if values is None else cls(**values)
-        except Exception as error:  # whatever an aspect's own __init__ does
+        except Exception as error:  # an aspect's __init__ may raise anything
             self.settler.blame(f"aspect {name}", error, part.position, scope)
             aspect = None
         if aspect is None:
-            weaving.select(part.at)  # for what is wrong with it
+            weaving.select(part.at)  # to report its problems
             if isinstance(weaving, ModelWeaving):
                 self.draft.leave_open(name)
             return
@@ -97,12 +97,12 @@ class _Weaver:
         self.made.places += len(woven.places)
         limit = self.graph.limits.places
         if self.made.places > limit:
-            self.problems.stop(f"aspect {name}: aspects stand at more than {limit:,} places", part.position, RAISE_IT)
+            self.problems.stop(f"aspect {name}: aspects attach to more than {limit:,} places", part.position, RAISE_IT)
         if is_enabled:
             self.found.append(woven)
 
     def _type(self, name: str, scope: str, part: PartText) -> type[Aspect] | None:
-        """What an aspect is; None, and told, if it cannot be that."""
+        """The type of an aspect; None, and a problem, if it cannot have that type."""
         known, wanted = self.known, part.type.text
         if wanted in known.broken:
             return None
@@ -121,21 +121,21 @@ class _Weaver:
         for pointcut in part.at:
             for key, said in (("request", pointcut.request), ("time", pointcut.time)):
                 if said is not None:
-                    message = f"aspect {name}: {wanted} is no composite, so a pointcut of it has no {key!r}"
+                    message = f"aspect {name}: {wanted} is not a composite, so its pointcuts have no {key!r}"
                     self.problems.add(message, said.position, scope=scope)
         return cls
 
     def _model_type(self, name: str, scope: str, part: PartText, namesake: type[Aspect] | None) -> type[Aspect] | None:
-        """Whether an aspect that is a composite stands at ports or at actors."""
+        """Whether an aspect that is a composite attaches to ports or to actors."""
         if namesake is not None:
-            message = f"aspect {name}: {part.type.text} is an aspect type and a composite"
+            message = f"aspect {name}: {part.type.text} is both an aspect type and a composite"
             self.problems.add(message, part.type.position, "give the composite another name", scope=scope)
             return None
         aimed = [pointcut for pointcut in part.at if not pointcut.exclude]
         at_ports = [pointcut for pointcut in aimed if pointcut.time is None]
         if at_ports and len(at_ports) < len(aimed):
-            message = f"aspect {name}: it stands at ports here, and elsewhere at actors"
-            hint = "give every place a time, or none: actors have one, the execution time of their firings"
+            message = f"aspect {name}: it attaches to ports here, but to actors elsewhere"
+            hint = "give every place a time, or none: at actors it is the execution time of their firings"
             self.problems.add(message, at_ports[0].position, hint, scope=scope)
             self.draft.leave_open(name)
             return None
@@ -160,7 +160,7 @@ Change = Callable[[str, Aspect], Mapping[str, object]]
 def weave_decorations(
     actor: Actor, draft: Draft, problems: Problems, position: Position, change: Change | None = None
 ) -> list[WovenAspect]:
-    """The aspects that come with an actor; ``change`` tells the parameters that are set from outside."""
+    """The aspects that come with an actor; ``change`` returns the parameters that are set from outside."""
     before: list[WovenAspect] = []
     behind: list[WovenAspect] = []
     for each in decorations(actor):
@@ -208,8 +208,8 @@ def _weave(
 def arranged(aspects: list[WovenAspect], graph: ModelGraph) -> list[WovenAspect]:
     """The aspects in the order in which tokens meet them.
 
-    Those that come with an actor are a part of it: at its outputs they stand before the others, the one that was given
-    first nearest to the actor; at its inputs and firings behind them.
+    Those that come with an actor are a part of it: at its outputs they act before the others, the first one given
+    nearest to the actor; at its inputs and firings, after them.
     """
     return sorted(aspects, key=lambda each: (1, -1)[_is_at_outputs(each, graph)] if each.comes_with_actor else 0)
 

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from .comparing import Comparison, Difference, compare
+    from .explaining import Explained, explain, explained
     from .picturing import Picture, Pictures, draw, plot, save
-    from .running import Changes, Done, load, perform, run, seconds, watched
+    from .running import Changes, Done, as_command, load, perform, run, seconds, watched
     from .studying import study
     from .viewing import Page, recorded, view
 
@@ -20,11 +21,15 @@ __all__ = [
     "Comparison",
     "Difference",
     "Done",
+    "Explained",
     "Page",
     "Picture",
     "Pictures",
+    "as_command",
     "compare",
     "draw",
+    "explain",
+    "explained",
     "load",
     "perform",
     "plot",
@@ -39,8 +44,9 @@ __all__ = [
 
 _HOMES = {
     "comparing": ("Comparison", "Difference", "compare"),
+    "explaining": ("Explained", "explain", "explained"),
     "picturing": ("Picture", "Pictures", "draw", "plot", "save"),
-    "running": ("Changes", "Done", "load", "perform", "run", "seconds", "watched"),
+    "running": ("Changes", "Done", "as_command", "load", "perform", "run", "seconds", "watched"),
     "studying": ("study",),
     "viewing": ("Page", "recorded", "view"),
 }

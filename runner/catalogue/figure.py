@@ -1,4 +1,4 @@
-"""What a figure of a run declares; how one is drawn, only its class knows."""
+"""What a figure of a run declares; its class knows how to draw it."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class Figure(Configurable):
         return ()
 
     def marks(self, results: Any) -> Iterable[Mark]:
-        """What of a run's ``Results`` stands in space."""
+        """What in a run's ``Results`` has a place in space."""
         return ()
 
     def draw(self, results: Any, path: Path) -> None:

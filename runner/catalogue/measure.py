@@ -1,4 +1,4 @@
-"""What a metric takes from what a port sends, declared once: for the reader, its messages, the schema and the docs."""
+"""What a metric computes from what a port sends, declared once for reader, messages, schema and docs."""
 
 from __future__ import annotations
 
@@ -15,21 +15,21 @@ TOKENS, TIME = "tokens", "time"  # over what something is taken
 
 @dataclass(frozen=True)
 class Take:
-    """A kind of metric: whether tokens count or the time that each stands, and what else may be said of it.
+    """A kind of metric: whether it counts tokens or the time that each lasts, and its options.
 
-    ``unit`` is what it counts in, if that does not depend on the tokens.
+    ``unit`` is its unit, if that does not depend on the tokens.
     """
 
     over: str
     doc: str
     of: str = "numbers"  # or "any" tokens, or "single" values: numbers and texts
-    options: tuple[str, ...] = ()  # beside 'after', 'to' and what is said of all metrics
-    needs: str = ""  # an option without which it says nothing
+    options: tuple[str, ...] = ()  # besides 'after', 'to' and the options of all metrics
+    needs: str = ""  # an option that it requires
     unit: str = ""
-    settles: bool = True  # whether MSER-5 can tell when it has settled
+    settles: bool = True  # whether MSER-5 can detect when it has settled
 
 
-# The keys of TAKES, and what a Measure declares beside 'take', as type checkers know them.
+# The keys of TAKES, and what a Measure declares besides 'take', as type checkers know them.
 TakeName: TypeAlias = Literal[
     "last", "first", "count", "min", "max", "sum", "mean", "std", "quantile", "rate", "time_mean", "time_std",
     "time_quantile", "share",
@@ -37,7 +37,7 @@ TakeName: TypeAlias = Literal[
 
 
 class MetricOptions(TypedDict, total=False):
-    """What may be said of a metric in Python beside its name, the port and what is taken."""
+    """The options of a metric in Python, besides its name, the port and what is taken."""
 
     p: float | str
     when: str | Formula
@@ -57,7 +57,7 @@ TAKES = {
     "min": Take(TOKENS, "the least"),
     "max": Take(TOKENS, "the greatest"),
     "sum": Take(TOKENS, "their sum"),
-    "mean": Take(TOKENS, "their mean: each token counts the same, however long it stands", options=("interval",)),
+    "mean": Take(TOKENS, "their mean: each token counts the same, however long it lasts", options=("interval",)),
     "std": Take(TOKENS, "their standard deviation, sqrt(sum((x - mean)^2) / (n - 1))"),
     "quantile": Take(
         TOKENS,
@@ -67,7 +67,7 @@ TAKES = {
     ),
     "rate": Take(TIME, "how many there are per second of model time", of="any", options=("interval",), unit="1/s"),
     "time_mean": Take(
-        TIME, "the mean over time: each value counts as long as it stands", options=("initial", "interval")
+        TIME, "the mean over time: each value counts for as long as it lasts", options=("initial", "interval")
     ),
     "time_std": Take(TIME, "the standard deviation over time, sqrt(mean of (x - time_mean)^2)", options=("initial",)),
     "time_quantile": Take(
@@ -109,7 +109,7 @@ class WarmUpParameter(Parameter[float | str]):
 
 
 class Measure(Configurable):
-    """What is said of a metric beside its name and the ports that it is of."""
+    """The options of a metric, besides its name and ports."""
 
     take = Parameter(str, "last", choices=tuple(TAKES), doc="what is taken from the tokens")
     p: Parameter[float | None] = Parameter(
@@ -119,16 +119,16 @@ class Measure(Configurable):
         None, doc="a condition on 'value', such as value > 0 or value == 'busy'"
     )
     initial: Parameter[object] = Parameter(
-        object, None, doc="what holds before the first token; if left out, time counts from that token on"
+        object, None, doc="the value before the first token; without it, time counts from that token on"
     )
-    after = WarmUpParameter(0.0, doc="the warm-up, which does not count: how long it is, or mser5, which finds out")
+    after = WarmUpParameter(0.0, doc="the warm-up, which does not count: its length, or mser5 to detect it")
     interval: Parameter[float | None] = Parameter(
         float, None, unit="1", min=0.5, max=0.9999, doc="level of a confidence interval, by batch means"
     )
-    unit = Parameter(str, "", doc="what the tokens count in")
+    unit = Parameter(str, "", doc="the unit of the tokens")
     to = Parameter(str, "", doc="the unit in which the metric is given (default: that of the tokens)")
     doc = Parameter(str, "", doc="what it is")
-    label = Parameter(str, "", doc="what it is called in figures and reports (default: its name)")
+    label = Parameter(str, "", doc="its label in figures and reports (default: its name)")
 
     @property
     def kind(self) -> Take:
@@ -136,47 +136,51 @@ class Measure(Configurable):
 
     @property
     def own_unit(self) -> str:
-        """What it counts in before it is converted."""
+        """Its unit before conversion."""
         return self.kind.unit or self.unit
 
     def misfits(self) -> Iterator[tuple[str, str, str]]:
-        """What does not go together: the option, what is wrong, and what to do."""
+        """Options that do not fit: the option, what is wrong, and what to do."""
         kind = self.kind
         for option in ("p", "when", "initial", "interval"):
             if getattr(self, option) is not None and option not in kind.options:
                 others = ", ".join(name for name, each in TAKES.items() if option in each.options)
-                yield option, f"{option!r} does not go with {self.take!r}", f"it goes with {others}"
+                yield option, f"{option!r} cannot be used with {self.take!r}", f"it can be used with {others}"
         if kind.needs and getattr(self, kind.needs) is None:
             example = "p: 0.9" if kind.needs == "p" else "when: value > 0"
-            yield "take", f"{self.take!r} needs {kind.needs!r}", f"add '{example}' or the like"
+            yield "take", f"{self.take!r} needs {kind.needs!r}", f"for example, add '{example}'"
         if self.when is not None and self.when.names != ("value",):
-            yield "when", f"{self.when.source!r} is no condition on 'value'", "write 'value > 0' or the like"
+            yield (
+                "when",
+                f"{self.when.source!r} is not a condition on 'value'",
+                "write a comparison such as 'value > 0'",
+            )
         if self.after == MSER5 and not kind.settles:
-            yield "after", f"{MSER5} cannot tell when {self.take!r} has settled", "give the warm-up as a time"
+            yield "after", f"{MSER5} cannot detect when {self.take!r} has settled", "give the warm-up as a time"
         is_number = isinstance(self.initial, (bool, int, float))
         if self.initial is not None and kind.of == "numbers" and not is_number:
             yield "initial", f"initial: {self.initial!r} is not a number", ""
         if kind.unit and self.unit not in ("", kind.unit):
-            yield "unit", f"{self.take!r} counts in {kind.unit}", f"write 'to: {self.unit}'"
+            yield "unit", f"the unit of {self.take!r} is {kind.unit}", f"write 'to: {self.unit}'"
         elif problem := conversion_problem(self.own_unit, self.to):
             yield "to", *problem
 
 
 def take_problem(metric: str, take: str) -> tuple[str, str] | None:
-    """What is wrong with a kind of metric that there is not, and what to do; None if there is one."""
+    """The message about an unknown kind of metric, and what to do; None if the kind is known."""
     if take in TAKES:
         return None
     return f"metric {metric!r} cannot take {take!r}{did_you_mean(take, TAKES)}", f"valid: {', '.join(TAKES)}"
 
 
 def conversion_problem(unit: str, to: str) -> tuple[str, str] | None:
-    """Why numbers in one unit cannot be given in another, and what to do; None if they can."""
+    """Why numbers cannot be converted from one unit to another, and what to do; None if they can."""
     if not to:
         return None
     if not unit:
-        return f"there is no unit that could be converted to {to}", "add 'unit: ...', what it counts in before"
+        return f"without a unit, it cannot be converted to {to}", "add 'unit: ...', the unit of the tokens"
     try:
-        parse_unit(to)  # a unit that is not known is told as such
+        parse_unit(to)  # an unknown unit is reported as such
         Quantity(1.0, unit).to(to)
     except UnitError as error:
         return str(error), ""

@@ -1,4 +1,4 @@
-"""What comes with Epicycle in YAML: models, disturbances to be added to them, and studies of them."""
+"""The YAML files of Epicycle: models, disturbances to add to them, and studies of them."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ packaged_studies = partial(packaged_files, "study")
 
 
 def is_path(name: str) -> bool:
-    """Whether the name of a model, disturbance or study is a path, and not that of a packaged one."""
+    """Whether the name of a model, disturbance or study is a path, not the name of a packaged one."""
     return name.endswith((".yaml", ".yml")) or "/" in name or "\\" in name
 
 
@@ -47,13 +47,13 @@ def unreadable(path: Path | None) -> str | None:
 
 
 def packaged_ones(kind: str) -> str:
-    """What could be named in place of a model, disturbance or study that there is not."""
+    """What could be named instead of a model, disturbance or study that does not exist."""
     kinds = "studies" if kind == "study" else f"{kind}s"
     return f"packaged {kinds}: {', '.join(packaged_files(kind)) or 'none'}; a path to a file ends in .yaml"
 
 
 def find(name: str, kind: str, problems: Problems, position: Position | None = None) -> Path | None:
-    """The file that a name means: a path if it looks like one, otherwise what is packaged under it."""
+    """The file that a name means: a path if it looks like one, otherwise the packaged file with that name."""
     if is_path(name):
         return Path(name)
     known = packaged_files(kind)

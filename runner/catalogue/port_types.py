@@ -1,4 +1,4 @@
-"""The types of composite ports as a model writes them: ``float``, ``int | str``, ``array[n, 2]``, ``Measurement``."""
+"""The types of composite ports as written in a model: ``float``, ``int | str``, ``array[n, 2]``, ``Measurement``."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ _TYPE = re.compile(r"([A-Za-z_]\w*)\s*(?:\[(.*)\])?\Z", re.ASCII | re.DOTALL)
 
 
 class PortTypeError(Exception):
-    """Text that is no type; ``help`` says what would be one."""
+    """Text that is not a type; ``help`` describes a valid one."""
 
     def __init__(self, message: str, help: str = "") -> None:
         super().__init__(message, help)
@@ -43,7 +43,7 @@ class PortTypeError(Exception):
 
 
 def read_type(text: str, tokens: Callable[[], Mapping[str, type]]) -> Any:
-    """The type that a text names; ``tokens`` tells the token classes by name.  Raises ``PortTypeError``."""
+    """The type that a text names; ``tokens`` gives the token classes by name.  Raises ``PortTypeError``."""
     if len(text) > MAX_TEXT:
         raise PortTypeError(f"a type has at most {MAX_TEXT} characters")
     choices = [_one(text[start:end].strip(), tokens) for start, end in split(text, "|")]
@@ -53,7 +53,7 @@ def read_type(text: str, tokens: Callable[[], Mapping[str, type]]) -> Any:
 def _one(text: str, tokens: Callable[[], Mapping[str, type]]) -> Any:
     match = _TYPE.match(text)
     if match is None:
-        raise PortTypeError(f"{text!r} is no type", "write a name such as float, 'float | int' or array[2]")
+        raise PortTypeError(f"{text!r} is not a type", "write a name such as float, 'float | int' or array[2]")
     name, inside = match.groups()
     if name not in BUILT_IN and name not in tokens():
         known = [*BUILT_IN, *sorted(tokens())]
@@ -66,7 +66,7 @@ def _one(text: str, tokens: Callable[[], Mapping[str, type]]) -> Any:
         return shaped(np.ndarray, tuple(_size(part) for part in parts))
     if len(parts) != {"list": 1, "dict": 2}.get(name, len(parts) if name == "tuple" else 0):
         raise PortTypeError(
-            f"{text!r} is no type", "array[...], list[...], dict[..., ...] and tuple[...] take brackets"
+            f"{text!r} is not a type", "array[...], list[...], dict[..., ...] and tuple[...] take brackets"
         )
     arguments = tuple(read_type(part, tokens) for part in parts)
     return found[arguments if len(arguments) > 1 else arguments[0]]
@@ -77,11 +77,11 @@ def _size(text: str) -> int | None:
         return None
     if re.fullmatch(r"\d{1,9}", text, re.ASCII):
         return int(text)
-    raise PortTypeError(f"{text!r} is no size of an array", "write a number, or n for any")
+    raise PortTypeError(f"{text!r} is not an array size", "write a number, or n for any")
 
 
 def token_types(catalogue: Catalogue) -> dict[str, type]:
-    """The classes that the ports of all actors speak of, and what passes through aspects that are models, by name."""
+    """The classes in the port types of all actors, and what passes through aspects that are models, by name."""
     found: dict[str, type] = {Request.__name__: Request}
     for actor in catalogue.loaded()[0].actors.values():
         for port in declared_ports(actor).values():

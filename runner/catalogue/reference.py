@@ -28,10 +28,9 @@ from epicycle.aspects import Aspect
 
 @dataclass(frozen=True)
 class PortReference:
-    """A port of an actor type; ``depends_on`` is for outputs, None where it is all inputs.
+    """A port of an actor type; ``depends_on`` is for outputs; None means all inputs.
 
-    ``ptolemy`` is what is else under a director that is like Ptolemy's, by the names of these attributes and as they
-    have it.
+    ``ptolemy`` holds what differs under a director like Ptolemy's, by the names of these attributes.
     """
 
     name: str
@@ -41,17 +40,17 @@ class PortReference:
     required: bool
     depends_on: tuple[str, ...] | None
     doc: str
-    triggers: bool = True  # of an input: whether a token there makes the actor do its work
+    triggers: bool = True  # of an input: whether a token there triggers the actor
     keep: bool = False  # of an input: whether tokens stay until they are taken out
     ptolemy: Mapping[str, object] | None = None
 
 
 @dataclass(frozen=True)
 class ParameterReference:
-    """A parameter of a type; ``type`` is in words, ``default`` as it would stand in a model file.
+    """A parameter of a type; ``type`` is in words, ``default`` as it would be written in a model file.
 
     ``part`` is the base of the types that its value may have, if it is a mapping with a type.  ``ptolemy`` is the
-    default under a director that is like Ptolemy's, if ``differs``.
+    default under a director like Ptolemy's, if ``differs``.
     """
 
     name: str
@@ -172,7 +171,7 @@ def is_part(parameter: Parameter[object]) -> bool:
 
 
 def as_written(value: object) -> object:
-    """A default as it would stand in a model file."""
+    """A default as it would be written in a model file."""
     if isinstance(value, Configurable):
         declared = declared_parameters(type(value))
         given = {name: getattr(value, name) for name in declared}
@@ -206,33 +205,33 @@ def shown(value: object) -> str:
     return f"{value:.6g}" if isinstance(value, float) else str(value)
 
 
-# What one looks for, in the order in which it is listed, and the modules of actors and aspects that are about it.
+# Topics in the order in which they are listed, and the modules of actors and aspects that belong to them.
 TOPICS: Final[dict[str, tuple[str, tuple[str, ...]]]] = {
-    "sources": ("Where tokens begin", ("sources", "triggered", "replay")),
+    "sources": ("Where tokens come from", ("sources", "triggered", "replay")),
     "computing": (
         "Arithmetic, logic, expressions, sums, statistics",
         ("accumulation", "arithmetic", "blocks", "functions", "logic", "statistics", "texts"),
     ),
-    "flow": ("Where tokens go, what passes, and what is kept", ("flow", "passing", "variables")),
+    "flow": ("Routing, merging, filtering and storing tokens", ("flow", "passing", "variables")),
     "time": ("Delays and timers", ("timing",)),
-    "queues and resources": ("What waits, and what it waits for", ("queues", "resources")),
+    "queues and resources": ("Queues, servers and resources with units", ("queues", "resources")),
     "entities": ("Tokens with fields, and lists of tokens", ("entities",)),
     "networks": ("Links, switches, repeats", ("links",)),
     "modes": ("State machines", ("modes",)),
     "control": ("Continuous state, linear systems, filters, controllers, limits", ("continuous", "control")),
-    "vehicles": ("Vehicles on the ground, their sensors, and how they are guided", ("vehicles",)),
+    "vehicles": ("Ground vehicles, their sensors and guidance", ("vehicles",)),
     "robotics": ("Robots that observe and avoid a moving obstacle, as in the paper", ("robotics",)),
     "sinks": ("Where tokens end", ("sinks",)),
     "communication": ("At input ports: whether, when and how a message arrives", ("communication", "media")),
     "measurement": ("At output ports: what a sensor seems to have measured", ("measurement",)),
     "situation": ("What depends on where bodies are: distance, range, line of sight, partition", ("situation",)),
     "execution": ("At actors: firings that take time or do not happen, crashes, clocks", ("clock", "execution")),
-    "observation": ("At any port: what looks, and changes nothing", ("observation",)),
+    "observation": ("At any port: observers that change nothing", ("observation",)),
 }
 
 
 def topic_order(reference: TypeReference) -> tuple[int, str, str]:
-    """Where a type stands in a list: by its topic, those of other packages at the end, then by its name."""
+    """The place of a type in a list: by its topic, those of other packages last, then by its name."""
     order = list(TOPICS)
     place = order.index(reference.group) if reference.group in order else len(order)
     return place, reference.group, reference.name.casefold()
@@ -255,7 +254,7 @@ def first_sentence(doc: str) -> str:
 
 
 def _group(cls: type) -> tuple[str, str]:
-    """The topic under which a type is listed, and what is said of it; for a package's own, its name and doc."""
+    """The topic under which a type is listed, and its description; for a package's own types, its name and doc."""
     parts = cls.__module__.split(".")
     # epicycle.actors.robotics.world is about robotics; acme_robots.lidar is of acme_robots.
     depth = 3 if parts[0] == "epicycle" else 1

@@ -3,8 +3,8 @@
 A package offers types as entry points (``Name = "package.module:Name"``) of the groups ``epicycle.actors``,
 ``epicycle.aspects``, ``epicycle.figures`` and ``epicycle.study_figures``.
 
-They are known by name and imported when a model names them.  Epicycle's own names always mean Epicycle's types; where
-a name is taken, or two packages offer it, ``package.Name`` says which one is meant.
+They are known by name and imported when a model names them. Epicycle's own names always mean Epicycle's types; if a
+name is taken, or two packages offer it, ``package.Name`` selects one.
 """
 
 from __future__ import annotations
@@ -37,12 +37,12 @@ T = TypeVar("T", bound=Configurable)
 
 
 def _words(base: type) -> str:
-    """What a kind of types is called in a sentence."""
+    """The name of a kind of types in a sentence."""
     return re.sub(r"(?<=[a-z])(?=[A-Z])", " ", base.__name__).lower()
 
 
 class CatalogueError(EpicycleError):
-    """A type that cannot be had, or a name that means two; ``help`` says what to do."""
+    """A type that is not available, or an ambiguous name; ``help`` says what to do."""
 
     def __init__(self, message: str, *help: str) -> None:
         self.message = message
@@ -71,29 +71,29 @@ class _Offer:
         return f"{re.sub(r'[-_.]+', '_', self.distribution).lower()}.{self.point.name}"
 
     def load(self) -> type:
-        """Import it; raises ``CatalogueError`` naming the package for whatever goes wrong."""
+        """Import it; raises a ``CatalogueError`` that names the package if anything goes wrong."""
         if not _ENTRY.match(self.point.value):
             raise self._error("its entry point is not of the form package.module:Class")
         try:
             found = self.point.load()
-        except (Exception, SystemExit) as error:  # whatever a module of somebody else's does while it is imported
+        except (Exception, SystemExit) as error:  # a package's module may raise anything while it is imported
             raise self._error(f"{type(error).__name__}: {error}") from error
         if not (isinstance(found, type) and issubclass(found, self.base)) or isabstract(found):
             raise self._error(f"{self.point.value} is not a complete subclass of {self.base.__name__}")
         if found.__name__ != self.point.name:
-            raise self._error(f"the class is called {found.__name__}, and its entry point must be, too")
+            raise self._error(f"the class is called {found.__name__}, and its entry point must have the same name")
         return found
 
     def _error(self, reason: str) -> CatalogueError:
         return CatalogueError(
             f"{_words(self.base)} {self.point.name!r} of the package {self.distribution!r} cannot be loaded: {reason}",
             f"its entry point in the group {self.point.group} is {self.point.name} = {self.point.value}",
-            f"mend or uninstall {self.distribution!r}",
+            f"fix or uninstall {self.distribution!r}",
         )
 
 
 class _Offers:
-    """What the installed packages offer of a kind; they are searched when it is asked for, which takes a while."""
+    """What the installed packages offer of a kind; they are searched on first use, which takes a while."""
 
     def __init__(self, base: type, group: str) -> None:
         self._base = base
@@ -111,7 +111,7 @@ class _Offers:
 
     @cached_property
     def by_name(self) -> dict[str, list[str]]:
-        """What is called so, qualified."""
+        """The qualified names for a name."""
         found: dict[str, list[str]] = {}
         for qualified, offer in self.qualified.items():
             found.setdefault(offer.point.name, []).append(qualified)
@@ -119,7 +119,7 @@ class _Offers:
 
 
 class Types(Mapping[str, type[T]], Generic[T]):
-    """Types by name; to look one up may import it, which raises ``CatalogueError`` if that fails."""
+    """Types by name; looking one up may import it, and raises ``CatalogueError`` if that fails."""
 
     def __init__(self, base: type[T], own: Mapping[str, type[T]], group: str) -> None:
         self._own = own
@@ -167,7 +167,7 @@ class Types(Mapping[str, type[T]], Generic[T]):
         return [each for each in self._offers.loaded.values() if isinstance(each, type)]
 
     def with_types(self, own: Mapping[str, type[T]]) -> Types[T]:
-        """The same with further types, which go before others of their name."""
+        """The same with further types, which win over others with their name."""
         result = Types.__new__(Types)
         result.__dict__.update(self.__dict__, _own={**self._own, **own} if own else self._own)
         return result
@@ -181,7 +181,7 @@ class Catalogue:
     aspects: Mapping[str, type[Aspect]]
 
     def with_types(self, types: Iterable[type]) -> Catalogue:
-        """The catalogue with further types, by the names of their classes; of two with one name, the last counts."""
+        """The catalogue with further types, by the names of their classes; the last one with a name counts."""
         actors: dict[str, type[Actor]] = {}
         aspects: dict[str, type[Aspect]] = {}
         for each in types:
@@ -194,13 +194,13 @@ class Catalogue:
         return Catalogue(_with(self.actors, actors), _with(self.aspects, aspects))
 
     def loaded(self) -> tuple[Catalogue, list[CatalogueError]]:
-        """The catalogue with every type imported, and what is wrong with those that are left out."""
+        """The catalogue with every type imported, and the problems of those that are left out."""
         (actors, wrong), (aspects, wrong_too) = load_all(self.actors), load_all(self.aspects)
         return Catalogue(actors, aspects), [*wrong, *wrong_too]
 
 
 class _Public(Mapping[str, type[T]], Generic[T]):
-    """The types of a public face, some of which it imports when they are asked for; without ``bases``."""
+    """The types of a public module, some of which it imports on demand; without ``bases``."""
 
     def __init__(self, face: ModuleType, base: type[T], *bases: type) -> None:
         self._face = face
@@ -224,7 +224,7 @@ class _Public(Mapping[str, type[T]], Generic[T]):
 
 @cache
 def built_in() -> Catalogue:
-    """What Epicycle's public faces offer; bases that define no behaviour are left out."""
+    """What Epicycle's public modules offer, without bases that define no behaviour."""
     bases = (JoinPointAspect, CompositeAspect, CompositeExecutionAspect)  # types of the last two are composites
     return Catalogue(_Public(epicycle.actors, Actor, Process), _Public(epicycle.aspects, Aspect, *bases))
 
@@ -238,19 +238,19 @@ def installed() -> Catalogue:
 
 @cache
 def _offered(base: Any, group: str) -> Types[Any]:
-    """What installed packages offer of a kind whose own types are known once they are defined."""
+    """What installed packages offer of a kind whose own types are registered when they are defined."""
     return Types(base, {}, group)
 
 
 def with_offered(base: type[T], group: str, own: Mapping[str, type[T]]) -> Mapping[str, type[T]]:
-    """Types by name, and those that installed packages offer; what these define has its name from the entry point."""
+    """Types by name, and those that installed packages offer, which are named by their entry points."""
     kind: Any = base
     offered = _offered(kind, group)
     return offered.with_types({name: cls for name, cls in own.items() if cls not in offered.loaded})
 
 
 def figure_types() -> Mapping[str, type[Figure]]:
-    """The figures that a model may ask for, by name."""
+    """The figures that a model may use, by name."""
     return with_offered(Figure, "epicycle.figures", own_figures())
 
 
@@ -259,7 +259,7 @@ def _with(types: Mapping[str, type[T]], more: dict[str, type[T]]) -> Mapping[str
 
 
 def load_all(types: Mapping[str, type[T]]) -> tuple[dict[str, type[T]], list[CatalogueError]]:
-    """All types that can be imported, and what is wrong with the others."""
+    """All types that can be imported, and the problems of the others."""
     found, errors = {}, []
     for name in types:
         try:
@@ -270,11 +270,11 @@ def load_all(types: Mapping[str, type[T]]) -> tuple[dict[str, type[T]], list[Cat
 
 
 class TypesError(EpicycleError):
-    """A file that gives no types."""
+    """A file that provides no types."""
 
 
 def types_of_file(path: Path) -> list[type]:
-    """The actors and aspects that a Python file defines; its code is run, as ``import`` would.
+    """The actors and aspects that a Python file defines; its code is run, as by ``import``.
 
     Raises ``TypesError``.
     """
@@ -310,12 +310,12 @@ def _imported(path: Path) -> ModuleType:
     assert spec is not None
     assert spec.loader is not None
     module = module_from_spec(spec)
-    # What stands beside the file can be imported from it, as when Python runs a script.
+    # The file can import its neighbours, as when Python runs a script.
     sys.path.insert(0, str(file.parent))
     sys.modules[name] = module
     try:
         spec.loader.exec_module(module)
-    except BaseException as error:  # whatever the user's module does
+    except BaseException as error:  # the user's module may raise anything
         sys.modules.pop(name, None)
         if type(error) is KeyboardInterrupt:  # Ctrl-C
             raise
@@ -327,7 +327,7 @@ def _imported(path: Path) -> ModuleType:
 
 
 def _line(error: BaseException, file: Path) -> str:
-    """Where in the file it went wrong; a syntax error says so itself."""
+    """Where in the file it went wrong; a syntax error already contains that."""
     lines = []
     trace = error.__traceback__
     while trace is not None:

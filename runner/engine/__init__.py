@@ -15,6 +15,7 @@ from ..results import (
     plain,
     write_log,
 )
+from .acts import Acts
 from .copies import CopyError
 from .director import Director
 from .errors import ActorError, LoopError
@@ -26,6 +27,7 @@ from .trace import Arrival, Firing, Tracer
 __all__ = [
     "SLOWEST",
     "ActorError",
+    "Acts",
     "Arrival",
     "CopyError",
     "Director",

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Container
+from dataclasses import replace
 from typing import Any
 
 from epicycle.actors import Tag, Way
@@ -36,11 +37,10 @@ class Acts:
         number = self._passed[aspect, place] = self._passed.get((aspect, place), 0) + 1
         return ActName(aspect, place, number)
 
-    def note(self, name: ActName, source: str, time: int, event: str) -> None:
-        """An act has left something in the event log."""
-        before = self._noted.get(name)
-        events = (event,) if before is None else (*before.events, event)
-        self._noted[name] = Act(name, source, time if before is None else before.time, events)
+    def note(self, name: ActName, source: str, time: int, *events: str) -> None:
+        """An act has happened, or left something in the event log."""
+        before = self._noted.get(name, Act(name, source, time, ()))
+        self._noted[name] = replace(before, events=(*before.events, *events))
 
 
 class Named(Way):
@@ -55,17 +55,45 @@ class Named(Way):
 
     def go(self, token: Any) -> None:
         name, point = self.acts.next(*self.key), self.guarded.point
-        happens = self.acts.exactly is None or name in self.acts.exactly
-        seen = copy.copy(point)  # what the aspect keeps of this token, it keeps with it
-        seen._context = _Noting(point._context, self.acts, name, point.source) if happens else _Silent(point._context)
-        if not happens:
-            point.random  # noqa: B018 (or the copy would have a stream of its own)
-            seen.counts = {}
-            seen._forward = seen.enter = _lose
-        guarded = self.guarded
-        Guarded(guarded.act, guarded.doing, seen, guarded.holds, guarded.pass_by, guarded.tell).go(token)
-        if not happens:
+        point.random  # noqa: B018 (or a copy would have a stream of its own)
+        if self.acts.exactly is None or name in self.acts.exactly:
+            passing = _Passing(token, point._forward)
+            context = _Noting(point._context, self.acts, name, point.source)
+            self._act(token, context, passing, point.enter, point.counts)
+            if not passing.is_untouched:  # so far there may be nothing in the log
+                context.note_it()
+        else:
+            self._act(token, _Silent(point._context), _lose, _lose, {})
             point._forward(token)
+
+    def _act(
+        self,
+        token: Any,
+        context: AspectContext,
+        forward: Callable[[Any], None],
+        enter: Callable[[Any], None],
+        counts: dict[str, int],
+    ) -> None:
+        """Let the aspect act; what it keeps of this token, it keeps with a join point that is this token's."""
+        guarded = self.guarded
+        seen = copy.copy(guarded.point)
+        seen._context, seen._forward, seen.enter, seen.counts = context, forward, enter, counts
+        Guarded(guarded.act, guarded.doing, seen, guarded.holds, guarded.pass_by, guarded.tell).go(token)
+
+
+class _Passing:
+    """Lets a token go on, and sees whether that is all."""
+
+    __slots__ = ("_forward", "_token", "is_untouched")
+
+    def __init__(self, token: Any, forward: Callable[[Any], None]) -> None:
+        self._token = token
+        self._forward = forward
+        self.is_untouched = False
+
+    def __call__(self, token: Any) -> None:
+        self.is_untouched = token is self._token and not self.is_untouched
+        self._forward(token)
 
 
 def _lose(token: Any) -> None:
@@ -114,8 +142,11 @@ class _Noting(_Context):
         self._name = name
         self._source = source
 
+    def note_it(self, *events: str) -> None:
+        self._acts.note(self._name, self._source, self._context.tag.time, *events)
+
     def note(self, aspect: str, owner: str, port: str, event: str, token: Any) -> None:
-        self._acts.note(self._name, self._source, self._context.tag.time, event)
+        self.note_it(event)
         self._context.note(aspect, owner, port, event, token)
 
 

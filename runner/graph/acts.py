@@ -19,7 +19,7 @@ class ActName(NamedTuple):
 
 @dataclass(frozen=True)
 class Act:
-    """An act as it happened: the port that the token comes from, when (ns), and what is in the event log of it."""
+    """An act as it happened: the port that the token comes from, the time (ns), and its entry in the event log."""
 
     name: ActName
     source: str

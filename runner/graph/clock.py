@@ -1,4 +1,4 @@
-"""Clock: how the local time of a composite with a director of its own follows from the time of the model."""
+"""Clock: the local time of a composite with its own director, computed from the time of the model."""
 
 from __future__ import annotations
 
@@ -11,18 +11,18 @@ from epicycle.actors import Tag
 
 @dataclass(frozen=True)
 class Clock:
-    """Local time is ``start`` when the run begins, and goes on ``rate`` times as fast as the time of the model.
+    """Local time is ``start`` when the run begins, and runs ``rate`` times as fast as the time of the model.
 
     Both times are whole nanoseconds, and local time is rounded down; so a clock that is slower than the model's shows
-    each of its nanoseconds once or several times, and a faster one leaves some out.
+    each of its nanoseconds once or several times, and a faster one skips some.
     """
 
     start: int = 0  # ns
     rate: Fraction = Fraction(1)
 
     def inside(self, start: int | None, drift: float) -> Clock:
-        """The clock of a composite within: it starts with this one unless told otherwise, and is ``drift`` as fast."""
-        # The decimal as it was written: 0.1 is a tenth here, and not the nearest binary fraction.
+        """The clock of a composite inside: it starts with this one by default, and runs ``drift`` times as fast."""
+        # The decimal as written: 0.1 is a tenth here, not the nearest binary fraction.
         return Clock(self.start if start is None else start, self.rate * Fraction(repr(drift)))
 
     @property
@@ -35,7 +35,7 @@ class Clock:
         return self.start + math.floor(self.rate * time)
 
     def outer(self, time: int) -> int:
-        """The time of the model at which this clock first shows ``time``, or more (ns)."""
+        """The time of the model at which this clock first shows ``time`` or more (ns)."""
         return math.ceil((time - self.start) / self.rate)
 
     def span(self, now: int, delay: int) -> int:

@@ -1,6 +1,6 @@
-"""Directed graphs as far as each model needs them: of every node, those right behind it.
+"""Directed graphs as far as each model needs them: the successors of every node.
 
-What is drawn, and what is wrong, is looked at with networkx; it takes a fifth of a small run's time to import.
+Drawing and diagnosis use networkx, whose import takes a fifth of a small run's time.
 """
 
 from __future__ import annotations
@@ -13,12 +13,12 @@ Digraph: TypeAlias = Mapping[str, Collection[str]]
 
 
 def in_order(graph: Digraph) -> list[str]:
-    """All nodes, each before those behind it; raises ``graphlib.CycleError`` if there is a loop."""
-    return [*TopologicalSorter(graph).static_order()][::-1]  # which asks for those before each
+    """All nodes, each before its successors; raises ``graphlib.CycleError`` if there is a loop."""
+    return [*TopologicalSorter(graph).static_order()][::-1]  # which takes the predecessors of each
 
 
 def find_loop(graph: Digraph) -> list[str]:
-    """The nodes of a loop, from the first of them in the graph on; empty if there is none."""
+    """The nodes of a loop, starting with the first of them in the graph; empty if there is none."""
     try:
         TopologicalSorter(graph).prepare()
     except CycleError as error:

@@ -1,6 +1,6 @@
 """The model graph: every port of every actor and composite as a node, every connection as an edge.
 
-Validation, scheduling, weaving and drawing read it.  A *wire* is a way through it from an actor's output port, through
+Validation, scheduling, weaving and drawing read it.  A *wire* is a path through it from an actor's output port, through
 any composite ports, to an actor's input port.
 """
 
@@ -36,7 +36,7 @@ class Hop:
 
 @dataclass(frozen=True)
 class Wire:
-    """A way from an output port to an input port."""
+    """A path from an output port to an input port."""
 
     source: OutputPort[Any]
     destination: InputPort[Any]
@@ -45,10 +45,10 @@ class Wire:
 
 @dataclass(frozen=True, eq=False)
 class Detour(Hop):
-    """A part of the way that tokens take through an aspect that is a model, within the tag: it orders firings.
+    """A part of the path of tokens through an aspect that is a model, within the tag: it orders firings.
 
-    Tokens go from where they are sent to the composite's request port, and from its response port to where they were
-    going.  Where it ``waits`` for the composite's turn, it orders nothing.
+    Tokens go from their sender to the composite's request port, and from its response port to their destination.  If it
+    ``waits`` for the composite's turn, it orders nothing.
     """
 
     aspect: str
@@ -76,23 +76,23 @@ class PortNode:
 class ModelGraph:
     """The flattened graph of one model, which is built and then frozen: to change it again, change a ``copy``.
 
-    A part of a model is a graph, too, until it is merged; ``inside`` is then the graph that it will be a part of, and
-    ``director`` the one under which it will stand.
+    A part of a model is a graph, too, until it is merged; ``inside`` is then the graph that it will join, and
+    ``director`` the director that it will be under.
     """
 
     def __init__(self, limits: Limits = NORMAL, inside: ModelGraph | None = None, director: str = "") -> None:
         self.ports: dict[str, PortNode] = {}
         self.actors: dict[str, Actor] = {}
         self.composites: dict[str, str] = {}  # the class of each composite, outer ones first
-        # The composites with a director of their own, which are actors to the graph around them; "" is the model.
+        # The composites with their own director, which are actors in the graph around them; "" is the model.
         self.clocks: dict[str, Clock] = {"": Clock() if inside is None else inside.clocks[director]}
-        # What each of these directors goes by.
+        # The rules of each of these directors.
         self.rules: dict[str, Rules] = {"": Rules() if inside is None else inside.rules[director]}
         self.members: dict[str, list[str]] = {"": []}  # what each director fires, in the order of declaration
         self.modal: dict[str, Modal] = {}  # composites with modes, by their path
         self.priorities: dict[str, int] = {}
         self.positions: dict[str, Position] = {}  # also of "aspect NAME"
-        self.tags: dict[str, tuple[str, ...]] = {}  # what the model's author put on actors and composites
+        self.tags: dict[str, tuple[str, ...]] = {}  # the tags that the model's author gave to actors and composites
         self.detours: list[Detour] = []  # found when the model is checked, see ``detours``
         self.limits: Limits = limits if inside is None else inside.limits
         self.is_frozen = False
@@ -104,15 +104,15 @@ class ModelGraph:
         self._order: int = 0 if inside is None else inside._order
 
     def freeze(self) -> None:
-        """Nothing changes it any more: it may be run."""
+        """Freeze it for running: nothing may change it afterwards."""
         self.is_frozen = True
 
     def _check_open(self) -> None:
         if self.is_frozen:
-            raise RuntimeError("a graph that is frozen is not changed: change a copy")
+            raise RuntimeError("a frozen graph cannot be changed: change a copy")
 
     def copy(self) -> ModelGraph:
-        """One that can be changed, of the same actors."""
+        """A copy that can be changed, with the same actors."""
         made = ModelGraph(self.limits)
         for name, value in vars(self).items():
             setattr(made, name, copy(value))
@@ -135,7 +135,7 @@ class ModelGraph:
         part._parts = {path: each for path, each in parts.items() if path not in self._parts}
         for known, new in zip(self._by_path(), part._by_path(), strict=True):
             known |= new
-        for path in parts.keys() - part._parts.keys():  # the one in which it stands
+        for path in parts.keys() - part._parts.keys():  # the one that it is in
             for name, instances in parts[path].items():
                 self._parts[path].setdefault(name, []).extend(instances)
         for hop in part._hops.values():
@@ -177,7 +177,7 @@ class ModelGraph:
         ties: str | None = None,
         like: str | None = None,
     ) -> None:
-        """Give a composite a director of its own, with this clock (``start`` in ns) and these rules if given."""
+        """Give a composite its own director, with this clock (``start`` in ns) and these rules if given."""
         self._check_open()
         outer = self.director_of(path)
         self.members[outer].append(path)
@@ -186,7 +186,7 @@ class ModelGraph:
         self.rules[path] = self.rules[outer].inside(ties, like)
 
     def rules_at(self, path: str) -> Rules:
-        """What the director goes by that an actor or composite stands under."""
+        """The rules of the director of an actor or composite."""
         return self.rules[self.director_of(path)]
 
     def refires(self, director: str) -> bool:
@@ -196,18 +196,18 @@ class ModelGraph:
         return self.rules[director].are_ptolemys
 
     def end_of(self, director: str) -> str:
-        """Where a composite that fires again has the turn for it; one with modes begins at its own path."""
+        """Where a composite that fires again has its turn to do so; one with modes begins at its own path."""
         return f"{director}.(end)" if director in self.modal else director
 
     def add_refinement(self, path: str) -> None:
-        """Give a composite a director of its own, whose time goes on in one mode alone; clocks in it count by that."""
+        """Give a composite its own director, whose time advances in only one mode; clocks in it count that time."""
         self.add_director(path)
         self.clocks[path] = Clock()
 
     def add_composite_port(
         self, path: str, direction: str, position: Position | None, type: Any = None, declared: Position | None = None
     ) -> None:
-        """Add a port of a composite; tokens only pass through it, which are of the ``type`` if there is one."""
+        """Add a port of a composite; tokens only pass through it, and have the ``type`` if there is one."""
         self._check_open()
         self.ports[path] = PortNode(None, direction, type, declared)
         self._borders.setdefault(self.owner(path), ([], []))[direction == "output"].append(path)
@@ -215,7 +215,7 @@ class ModelGraph:
             self.positions[path] = position
 
     def open_requests(self, path: str) -> None:
-        """Make an input of a composite the place where an aspect's requests come in: tokens begin their way there."""
+        """Make an input of a composite the place where an aspect's requests come in: tokens start there."""
         self._check_open()
         port = OutputPort(Request, multi=True)
         port.name, port.path = path.rpartition(".")[2], path
@@ -250,18 +250,18 @@ class ModelGraph:
 
     @property
     def next_order(self) -> int:
-        """Where the next connection will stand."""
+        """The number of the next connection."""
         return self._order
 
     def _by_path(self) -> tuple[dict[str, Any], ...]:
-        """What is known of parts, the actors first."""
+        """The properties of parts, actors first."""
         return (
             self.actors, self.composites, self.positions, self.priorities, self.tags, self.clocks, self.members,
             self._borders, self._parts, self.modal, self.rules,
         )  # fmt: skip
 
     def remove(self, path: str) -> None:
-        """Take out an actor, or a composite and all within, with their connections."""
+        """Remove an actor, or a composite and its contents, with their connections."""
         self._check_open()
         for port in [each for each in self.ports if is_within(each, path)]:
             for hop in {*self.incoming(port), *self.outgoing(port)}:
@@ -285,7 +285,7 @@ class ModelGraph:
         return self.ports[path].direction
 
     def type_of(self, path: str) -> Any:
-        """The declared type of a port; None if a composite says nothing of it."""
+        """The declared type of a port; None if a composite declares none."""
         node = self.ports[path]
         return node.type if node.port is None else node.port.type
 
@@ -294,7 +294,7 @@ class ModelGraph:
         return port.rpartition(".")[0]
 
     def director_of(self, path: str) -> str:
-        """The innermost composite with a director that an actor or composite stands in; "" is the model itself."""
+        """The innermost composite with a director that contains an actor or composite; "" is the model itself."""
         around = path.rpartition(".")[0]
         while around not in self.clocks:
             around = around.rpartition(".")[0]
@@ -310,9 +310,9 @@ class ModelGraph:
         return path
 
     def director_over(self, hop: Hop) -> str:
-        """The director in whose time a connection stands: of the composite that declares it."""
+        """The director whose time applies to a connection: that of the composite that declares it."""
         owner = self.owner(hop.source)
-        # A connection from a composite's own input is declared inside of that composite.
+        # A connection from a composite's own input is declared inside that composite.
         inside = owner in self.clocks and self.direction(hop.source) == "input"
         return owner if inside else self.director_of(owner)
 
@@ -357,7 +357,7 @@ class ModelGraph:
         return list(found.values())
 
     def channel_of(self, hops: tuple[Hop, ...], hop: Hop) -> object:
-        """What tells the channels of a port apart: the wire, or the connection at the port if that is one channel.
+        """What distinguishes the channels of a port: the wire, or the connection at the port if that is one channel.
 
         As in Ptolemy, what leaves a composite with modes is one channel, whichever refinement has sent it.
         """
@@ -371,7 +371,7 @@ class ModelGraph:
         return hops
 
     def _ways(self, path: str, *, forward: bool) -> Iterator[tuple[Hop, ...]]:
-        """The ways from a port to actors' ports; ``check_passages`` has seen to it that they end."""
+        """The paths from a port to actors' ports; ``check_passages`` has made sure that they end."""
         for hop in self.outgoing(path) if forward else self.incoming(path):
             far = hop.destination if forward else hop.source
             if self.ports[far].port is not None:
@@ -402,5 +402,5 @@ class ModelGraph:
 
 
 def is_within(path: str, outer: str) -> bool:
-    """Whether a path is that of a part, or of something in it."""
+    """Whether a path is that of a part or of something in it."""
     return path == outer or path.startswith(f"{outer}.")

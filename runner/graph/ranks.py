@@ -1,9 +1,9 @@
-"""The firing order: depth in the graph of what must be known first, one director at a time.
+"""The firing order: depth in the graph of dependencies within a tag, one director at a time.
 
-A composite with a director of its own is one actor of the graph around it.  Its ports are the ends of two graphs: of
-the one outside, in which it fires as a whole when all is there that it needs within the tag, and of the one inside,
-which has an order of its own.  So the order of a model is that of the outermost director, with the order of each such
-composite put in its place.
+A composite with its own director is one actor of the graph around it.  Its ports are the ends of two graphs: the one
+outside, in which it fires as a whole when everything that it needs within the tag is there, and the one inside, which
+has its own order.  The order of a model is that of the outermost director, with the order of each such composite
+inserted at its place.
 """
 
 from __future__ import annotations
@@ -18,8 +18,8 @@ from epicycle.actors import Place
 from .digraph import in_order
 from .model_graph import Hop, ModelGraph
 
-# What must be known first within a tag, of one director: of each port those right behind it.  There is a connection
-# without delay between them (``Hop``), or within an actor the second depends on the first within the tag.
+# The dependencies within a tag, of one director: the successors of each port.  There is a connection without delay
+# between them (``Hop``), or they are in one actor and the second depends on the first within the tag.
 Region: TypeAlias = dict[str, dict[str, Hop | None]]
 
 
@@ -36,9 +36,9 @@ def firing_order(graph: ModelGraph) -> dict[str, int]:
 
 @dataclass(frozen=True)
 class Postings:
-    """Where ties are as they were posted: the place of each rank, and the actors that take all that waits.
+    """Where ties are resolved as posted: the place of each rank, and the actors that take all waiting tokens.
 
-    Of these it says whether they also fire when what they were to fire for has been taken.
+    For these, whether they also fire when the tokens for their firing have already been taken.
     """
 
     places: tuple[Place, ...]
@@ -46,7 +46,7 @@ class Postings:
 
 
 def postings(graph: ModelGraph) -> Postings | None:
-    """What can be known of posts, if ties are posted anywhere."""
+    """The ``Postings``, if ties are posted anywhere."""
     if not any(rules.are_posted for rules in graph.rules.values()):
         return None
     rules = {path: graph.rules_at(path) for path in graph.actors}
@@ -88,7 +88,7 @@ def _unfolded(graph: ModelGraph) -> list[tuple[list[str], Place]]:
 
 
 def dependencies(graph: ModelGraph) -> dict[str, Region]:
-    """What must be known first under each director."""
+    """The dependencies within a tag under each director."""
     hops: dict[str, list[Hop]] = {director: [] for director in graph.clocks}
     for hop in graph.hops:
         if hop.delay is None:
@@ -130,11 +130,10 @@ def ports_of(graph: ModelGraph, member: str) -> tuple[list[str], list[str]]:
 
 
 def _acts(graph: ModelGraph, director: str, region: Region, port: str) -> bool:
-    """Whether what enters a composite by a port makes a difference within the tag.
+    """Whether a token at an input of a composite has an effect within the tag.
 
-    If so, the composite can do nothing before it is there, or some of the actors inside would fire with a part of
-    their tokens; so everything it sends depends on it.  If not, it only goes to actors that send it, or a result of it,
-    later.
+    If so, the composite must wait for it, or some of the actors inside would fire with only a part of their tokens; so
+    everything it sends depends on it.  If not, the token only reaches actors that send it, or a result of it, later.
     """
     _, borders = graph.borders(director)
     waiting, seen = [port], {port}
@@ -153,13 +152,13 @@ def depths(graph: ModelGraph, director: str, region: Region) -> dict[str, int]:
 
     An output is as deep as the inputs that it depends on within the tag, and an input one deeper than the outputs that
     reach it; an actor is as deep as its shallowest output, or its deepest input if it has no outputs.  Tokens of an
-    input are taken at the depth of the first output that depends on it, so that all that belongs to them is there;
-    those of the inputs on which no output depends at once are taken together, at the depth of the deepest.
+    input are taken at the depth of the first output that depends on it, so that everything that belongs to them is
+    there; those of the inputs on which no output depends at once are taken together, at the depth of the deepest.
     """
     own, _ = graph.borders(director)
     depth: dict[str, int] = {}
     for path in in_order(region):
-        # Ports of composites without a director are no place to stop at: tokens only pass through them.
+        # Ports of composites without a director have no depth: tokens only pass through them.
         if path in depth and graph.is_end(path) and graph.direction(path) == "input" and path not in own:
             depth[path] += 1
         deep = depth.setdefault(path, 0)
@@ -179,8 +178,8 @@ def depths(graph: ModelGraph, director: str, region: Region) -> dict[str, int]:
 def _turns(graph: ModelGraph, director: str, depth: dict[str, int]) -> Iterator[tuple[list[str], bool]]:
     """The firings within a tag in their order: each a composite, or an actor and those of its inputs that go with it.
 
-    If an actor takes the tokens of some inputs later than it answers wake-ups, these inputs are a turn of their own.
-    With each goes whether it is tied with the one before.
+    If an actor takes the tokens of some inputs later than it answers wake-ups, these inputs are a separate turn.  Each
+    turn states whether it is tied with the one before.
     """
     turns: list[tuple[int, int, list[str]]] = []
     modal = graph.modal.get(director)

@@ -1,4 +1,4 @@
-"""Rules: what a director goes by where there is a choice."""
+"""Rules: the choices of a director."""
 
 from __future__ import annotations
 
@@ -14,27 +14,27 @@ TIES: Parameter[str | None] = Parameter(
     str,
     None,
     choices=get_args(Ties),
-    doc="in which order actors of one tag, depth and priority fire: as they are declared, or as what they fire for was "
-    "posted",
+    doc="the order in which actors with the same tag, depth and priority fire: as they are declared, or as their "
+    "tokens and wake-ups were posted",
 )
 LIKE: Parameter[str | None] = Parameter(
     str,
     None,
     choices=get_args(Like),
-    doc="whose rules and defaults count inside; ptolemy: ties are posted, the outputs of a composite with a director "
+    doc="whose rules and defaults apply inside; ptolemy: ties are posted, the outputs of a composite with a director "
     "depend on all its inputs, and parameters and ports are as in Ptolemy II unless given",
 )
 
 
 @dataclass(frozen=True)
 class Rules:
-    """In which order actors fire that could fire in any, and whose rules and defaults count else."""
+    """The order of actors that could fire in any order, and whose rules and defaults apply."""
 
     ties: str = "declared"
     like: str = "epicycle"
 
     def inside(self, ties: str | None, like: str | None) -> Rules:
-        """The rules of a director within, which are these unless it overrides them; ``like`` says which ties go."""
+        """The rules of a director within, which are these unless it overrides them; ``like`` determines the ties."""
         if ties is None:
             ties = self.ties if like is None else POSTED if like == PTOLEMY else "declared"
         return Rules(ties, like or self.like)
@@ -46,5 +46,5 @@ class Rules:
 
     @property
     def are_ptolemys(self) -> bool:
-        """Whether all is as in Ptolemy."""
+        """Whether Ptolemy's rules apply."""
         return self.like == PTOLEMY

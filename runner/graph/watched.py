@@ -14,26 +14,26 @@ from .model_graph import is_within
 
 @dataclass(frozen=True)
 class Metric:
-    """A number taken from what some ports send together."""
+    """A number computed from what some ports send together."""
 
     name: str
     ports: list[str]
     measure: Measure
-    monitor: str = ""  # whose verdict it is, or whose robustness
+    monitor: str = ""  # the monitor whose verdict or robustness it is
 
     def without(self, path: str) -> Metric:
-        """The metric when a part of the model is taken out that it watched, too."""
+        """The metric after the removal of a part of the model that it may have watched."""
         return replace(self, ports=[port for port in self.ports if not is_within(port, path)])
 
     @property
     def unit(self) -> str:
-        """What it counts in."""
+        """Its unit."""
         return self.measure.to or self.measure.own_unit
 
 
 @dataclass(frozen=True)
 class Monitor:
-    """A property that a run is to have; ``readings`` are what each of its conditions asks for: ports, and fields."""
+    """A property that a run must have; ``readings`` are what each of its conditions reads: ports, and fields."""
 
     name: str
     requirement: Requirement
@@ -42,12 +42,12 @@ class Monitor:
 
     @property
     def ports(self) -> list[str]:
-        """The ports that it listens to."""
+        """The ports that it observes."""
         return list(dict.fromkeys(port for condition in self.readings for port, _ in condition))
 
     @property
     def metrics(self) -> list[Metric]:
-        """What a run leaves of it beside other numbers: whether the property holds, and its robustness."""
+        """Its results among the metrics of a run: whether the property holds, and its robustness."""
         said = self.requirement
         label = said.label or self.name
         verdict = Measure(doc=said.doc or said.property, label=said.label, unit="1")
@@ -60,7 +60,7 @@ class Monitor:
 
 @dataclass
 class Watched:
-    """What is said about a run of a model: when it ends, and what is kept of it."""
+    """What a model declares about a run: when it ends, and what is kept of it."""
 
     stop_time: int | None = None  # ns
     seed: int = 0
@@ -68,4 +68,4 @@ class Watched:
     stop_ports: list[str] = field(default_factory=list)
     metrics: list[Metric] = field(default_factory=list)
     monitors: list[Monitor] = field(default_factory=list)
-    stop_position: Position | None = None  # of what was said of ``stop_ports`` last
+    stop_position: Position | None = None  # where ``stop_ports`` were last declared

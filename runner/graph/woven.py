@@ -1,4 +1,4 @@
-"""Woven aspects: what stands where in a model."""
+"""Woven aspects: what attaches where in a model."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from .model_graph import ModelGraph, is_within
 
 @dataclass(frozen=True)
 class AspectModel:
-    """The composite that an aspect is, the port from which it answers, and the port by which each place asks it."""
+    """The composite of an aspect, the port from which it answers, and the port by which each place asks it."""
 
     path: str
     kind: str
@@ -24,7 +24,7 @@ class AspectModel:
     times: dict[str, FiringTime] = field(default_factory=dict)  # how long the firings of an actor take
 
     def at(self, place: str) -> dict[str, object]:
-        """What a model file would say of a place: the request port, if there are several, and the time."""
+        """What a model file would declare for a place: the request port, if there are several, and the time."""
         said: dict[str, object] = {}
         if len(set(self.requests.values())) > 1:
             said["request"] = self.requests[place].rpartition(".")[2]
@@ -35,12 +35,13 @@ class AspectModel:
 
 @dataclass(frozen=True, eq=False)
 class WovenAspect:
-    """An aspect of a model, the ports at which it stands, in the graph's order, and the single connections.
+    """An aspect of a model, the ports that it attaches to, in the graph's order, and the single connections.
 
-    ``actors`` are those at which it stands, and what was aimed at: the actor, or a composite around it; ``parameters``
-    those of actors that it alters.  ``model`` is its composite if it is a model itself, ``comes_with_actor`` tells that
-    the actor's class or instance was decorated.  ``readings`` are what its expressions over ports ask for,
-    ``selections`` what its parameters with patterns select, ``reads`` the ports that it looks at otherwise.
+    ``actors`` are those that it attaches to, with what the pointcut named: the actor, or a composite around it;
+    ``parameters`` are those of actors that it alters.  ``model`` is its composite if it is a model itself,
+    ``comes_with_actor`` means that the actor's class or instance was decorated.  ``readings`` are what its expressions
+    over ports ask for, ``selections`` what its parameters with patterns select, ``reads`` the other ports that it
+    reads.
     """
 
     name: str
@@ -62,12 +63,12 @@ class WovenAspect:
 
     @property
     def places(self) -> list[str]:
-        """Where it stands, in words."""
+        """Its places in words."""
         connections = (f"{source} -> {destination}" for source, destination in self.connections)
         return [*self.ports, *connections, *self.actors, *self.parameters]
 
     def without(self, path: str) -> WovenAspect:
-        """The aspect when a part of the model is taken out at which it stood, too."""
+        """The aspect after the removal of a part of the model that it may have been attached to."""
         return replace(
             self,
             ports=[port for port in self.ports if not is_within(port, path)],
@@ -78,12 +79,12 @@ class WovenAspect:
 
     @property
     def looks_at(self) -> list[str]:
-        """All ports whose latest tokens it needs to know."""
+        """All ports whose latest tokens it needs."""
         return [*self.reads, *(port for readings in self.readings.values() for port, _ in readings)]
 
 
 def extent(aspects: Iterable[WovenAspect]) -> str:
-    """At how many ports and actors some aspects stand, in words."""
+    """The number of ports and actors that some aspects attach to, in words."""
     kinds = [
         "parameter" if place in woven.parameters else "actor" if place in woven.actors else "port"
         for woven in aspects
@@ -95,14 +96,14 @@ def extent(aspects: Iterable[WovenAspect]) -> str:
 
 
 def check_processors(aspects: Iterable[WovenAspect], graph: ModelGraph, problems: Problems) -> None:
-    """An actor runs on one processor at most."""
+    """Check that an actor runs on at most one processor."""
     taken: dict[str, str] = {}
     for woven in aspects:
         aspect = woven.aspect
         if not (isinstance(aspect, ExecutionAspect) and aspect.is_processor):
             continue
         if twice := [actor for actor in woven.actors if actor in taken]:
-            message = f"aspect {woven.name}: {twice[0]} runs on the processor {taken[twice[0]]!r} already"
-            hint = f"an actor has one processor: leave it out here, with '!{twice[0]}', or there"
+            message = f"aspect {woven.name}: {twice[0]} already runs on the processor {taken[twice[0]]!r}"
+            hint = f"an actor has one processor: exclude it here, with '!{twice[0]}', or there"
             problems.add(message, graph.positions.get(f"aspect {woven.name}"), hint)
         taken.update(dict.fromkeys(woven.actors, woven.name))

@@ -1,4 +1,4 @@
-"""What a file says: models, composites, disturbances, studies and what is set from outside, as declared constructs."""
+"""What files declare: models, composites, disturbances, studies and settings from outside, as constructs."""
 
 from .claims import ALWAYS, FALLS, GREATER, RISES, Claim, Guideline, Selection
 from .declarations import (

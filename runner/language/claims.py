@@ -22,9 +22,9 @@ Selection = dict[str, tuple[Factor, ...]]  # levels by factor
 
 @dataclass(frozen=True)
 class Claim:
-    """One hypothesis on the results of a study; see docs/studies.md for what each form says.
+    """One hypothesis on the results of a study; see docs/studies.md for what each form means.
 
-    ``form`` is a key of ``FORMS``.  ``metrics`` are the names that it is about; for ``always``, those of ``condition``.
+    ``form`` is a key of ``FORMS``.  ``metrics`` are the names that it concerns; for ``always``, those of ``condition``.
     """
 
     name: str
@@ -64,7 +64,8 @@ class Claim:
 class Guideline:
     """Which level of ``choose`` makes ``metric`` least (or ``greatest``), at every combination of the other factors.
 
-    A level is sufficient if it is not significantly worse than the best, or its mean is no more than ``tolerance`` off.
+    A level is sufficient if it is not significantly worse than the best, or its mean is within ``tolerance`` of the
+    best.
     """
 
     choose: str
@@ -75,7 +76,7 @@ class Guideline:
 
 @dataclass(frozen=True)
 class Questions:
-    """All that a study asks; ``apart`` are the factors for each level of which the claims are judged again."""
+    """Everything that a study asks; the claims are judged separately at each level of the factors in ``apart``."""
 
     claims: tuple[Claim, ...] = ()
     guideline: Guideline | None = None
@@ -83,7 +84,7 @@ class Questions:
     lender: tuple[str, str] | None = None  # file and text of the study whose claims these are
 
     def check(self, metrics: Iterable[str], problems: Problems) -> None:
-        """Note metrics that the study has not."""
+        """Report metrics that the study does not have."""
         known = list(metrics)
         asked = [(f"claim {claim.name}", metric) for claim in self.claims for metric in claim.metrics]
         if self.guideline is not None:

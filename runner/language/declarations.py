@@ -1,4 +1,4 @@
-"""What a file says, as objects: models, composite classes and their parts, each with its place in the text."""
+"""The declarations of a file as objects: models, composite classes and their parts, each with its place in the text."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ class ParameterText:
     max: float | None = None
     choices: tuple[str, ...] = ()
     doc: str = ""
-    spoilt: bool = False  # the declaration is wrong and has been told so: values are not checked against it
+    spoilt: bool = False  # the declaration is wrong, which has been reported: values are not checked against it
     given: tuple[str, ...] = ("value",)  # the keys of the declaration, which change those of an inherited one
 
 
 @dataclass(frozen=True)
 class PortText:
-    """A port that a composite declares; without a type it is as the ports that are connected to it."""
+    """A port that a composite declares; without a type it takes that of the ports connected to it."""
 
     name: str
     position: Position
@@ -37,11 +37,11 @@ class PortText:
 
 @dataclass(frozen=True)
 class PointcutText:
-    """Where an aspect stands: a pattern, or a type or tag and perhaps a port; ``exclude``: where it does not.
+    """Where an aspect attaches: a pattern, or a type or tag and perhaps a port; ``exclude``: where it does not.
 
-    For an aspect that is a model, ``request`` is the port by which tokens or firings come in, ``time`` says that it
-    stands at actors and how long their firings take; ``firing_time`` is its value.
-    One that holds neither pattern, type nor tag is misshapen, and has been told so.
+    For an aspect that is a model, ``request`` is the port by which tokens or firings come in, ``time`` makes it attach
+    to actors and gives the time of their firings; ``firing_time`` is its value.  One without pattern, type and tag is
+    malformed, which has been reported.
     """
 
     text: str
@@ -57,7 +57,7 @@ class PointcutText:
 
     @classmethod
     def of(cls, text: Text) -> PointcutText:
-        """``pattern``, or ``!pattern`` for where an aspect does not stand."""
+        """``pattern``, or ``!pattern`` for where an aspect does not attach."""
         pattern = text.text.strip()
         exclude = pattern.startswith("!")
         return cls(pattern[1:].strip() if exclude else pattern, text.position, exclude)
@@ -78,13 +78,13 @@ class PartText:
     at: tuple[PointcutText, ...] = ()
     enabled: Node | None = None
     priority: Node | None = None
-    removes: bool = False  # it takes the inherited part of that name away
+    removes: bool = False  # it removes the inherited part with that name
     tags: tuple[Text, ...] = ()
 
 
 @dataclass(frozen=True)
 class ConnectionText:
-    """One entry of ``connections``; with ``to_all``, of several on both sides each goes to all, else in pairs.
+    """One entry of ``connections``; with ``to_all``, each source leads to all destinations, otherwise they are paired.
 
     If it is ``shared``, it is one channel at each port.
     """
@@ -95,12 +95,12 @@ class ConnectionText:
     delay: Node | None = None
     to_all: bool = False
     shared: bool = False
-    removes: Position | None = None  # where it is said that these are taken away from the inherited ones
+    removes: Position | None = None  # where the file removes these from the inherited ones
 
 
 @dataclass(frozen=True)
 class MetricText:
-    """A number taken from what a port sends; ``values`` are those of a ``Measure``."""
+    """A number computed from what a port sends; ``values`` are those of a ``Measure``."""
 
     name: str
     port: Text
@@ -110,7 +110,7 @@ class MetricText:
 
 @dataclass(frozen=True)
 class MonitorText:
-    """A property that a run is to have; ``values`` are those of a ``Requirement``."""
+    """A property that a run must have; ``values`` are those of a ``Requirement``."""
 
     name: str
     values: dict[str, Entry]
@@ -119,7 +119,7 @@ class MonitorText:
 
 @dataclass(frozen=True)
 class ActText:
-    """A single act of an aspect: at which token, counted from 1, that passes it at a place."""
+    """A single act of an aspect: its place, and the number of the token there, counted from 1."""
 
     aspect: Text
     at: Text
@@ -129,7 +129,7 @@ class ActText:
 
 @dataclass(frozen=True)
 class CompositeText:
-    """A composite class, or the model itself, which is the outermost one."""
+    """A composite class, or the model itself, which is the outermost composite."""
 
     name: str
     position: Position
@@ -138,15 +138,15 @@ class CompositeText:
     parameters: dict[str, ParameterText] = field(default_factory=dict)
     inputs: dict[str, PortText] = field(default_factory=dict)
     outputs: dict[str, PortText] = field(default_factory=dict)
-    director: dict[str, Entry] | None = None  # what is said of its own one
+    director: dict[str, Entry] | None = None  # what it declares about its own director
     machine: PartText | None = None  # of its modes
     refinements: dict[str, PartText] = field(default_factory=dict)  # by the mode
     actors: dict[str, PartText] = field(default_factory=dict)
     connections: tuple[ConnectionText, ...] = ()
     is_wired: bool = True  # whether all its connections could be read
     aspects: dict[str, PartText] = field(default_factory=dict)
-    removed: dict[str, Position] = field(default_factory=dict)  # inherited actors that it does without
-    spoilt: bool = False  # it could not be read as a whole, or made from its base: what is missing is no news
+    removed: dict[str, Position] = field(default_factory=dict)  # inherited actors that it removes
+    spoilt: bool = False  # it could not be read as a whole, or made from its base: missing parts are not reported
 
     def ports(self, direction: str) -> dict[str, PortText]:
         return self.inputs if direction == "input" else self.outputs

@@ -1,4 +1,4 @@
-"""What a study varies, each a row of levels of which one is taken at a time; and how its file says it."""
+"""What a study varies: dimensions, each a list of levels of which a run takes one, and their form in a file."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ _NUMBER = re.compile(r"\s*([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]{1,
 
 @dataclass(frozen=True)
 class Level:
-    """What one level sets and adds to the model, and what it puts into the columns of the table."""
+    """What one level sets in the model and adds to it, and its values in the columns of the table."""
 
     settings: tuple[Setting, ...] = ()
     values: dict[str, Factor] = field(default_factory=dict)
@@ -33,7 +33,7 @@ class Level:
 
 
 class Dimension(ABC):
-    """Levels by their number; ``columns`` are those of the table that it fills, with what they hold (see ``KINDS``)."""
+    """Levels by their number; ``columns`` are the table's columns that it fills, and what they hold (``KINDS``)."""
 
     def __init__(self, name: str, position: Position, columns: dict[str, str]) -> None:
         self.name = name
@@ -43,7 +43,7 @@ class Dimension(ABC):
     @property
     @abstractmethod
     def size(self) -> int:
-        """The number of levels; more than ``len`` could hold, perhaps."""
+        """The number of levels, which may be too large for ``len``."""
 
     @abstractmethod
     def level(self, index: int) -> Level:
@@ -74,7 +74,7 @@ class Listed(Dimension):
 
 
 class Ranged(Dimension):
-    """Numbers at equal distances, calculated in decimal so that 0.1, 0.2, 0.3 are what they look like."""
+    """Numbers at equal distances, calculated in decimal so that 0.1, 0.2, 0.3 are exactly these."""
 
     def __init__(
         self, path: str, position: Position, start: Decimal, step: Decimal, size: int, unit: str, at: Position
@@ -94,7 +94,7 @@ class Ranged(Dimension):
         return Level((Setting(self.name, node, self.position),), {self.name: in_si(value, self._unit)})
 
     def is_distinct(self) -> bool:
-        """Whether no two levels are the same number: those are nearest to it, at the ends, that are far from zero."""
+        """Whether no two levels are equal as floats: the ends, far from zero, are the likeliest to be."""
         ends = {0, max(0, self._size - 2)} if self._size > 1 else set()
         return all(self.level(at).values != self.level(at + 1).values for at in ends)
 
@@ -115,12 +115,12 @@ def number_node(value: float, unit: str, position: Position) -> Scalar:
 
 
 def in_si(value: float, unit: str) -> float:
-    """A number as the table holds it: in SI units, or as it is without a unit."""
+    """A number as the table holds it: in SI units, or unchanged if it has no unit."""
     return Quantity(value, unit).si if unit else value
 
 
 def split_number(node: Node) -> tuple[Decimal, str] | None:
-    """A number and the text of its unit; None if it is no number."""
+    """A number and the text of its unit; None if it is not a number."""
     if not isinstance(node, Scalar) or isinstance(node.value, bool) or node.value is None:
         return None
     found = _NUMBER.fullmatch(node.text)
@@ -128,7 +128,7 @@ def split_number(node: Node) -> tuple[Decimal, str] | None:
 
 
 def kind_of(nodes: Iterable[Node]) -> str:
-    """What a column holds that is filled with these values."""
+    """What a column filled with these values holds."""
     nodes = list(nodes)
     values = [node.value if isinstance(node, Scalar) else node for node in nodes]
     if all(isinstance(value, bool) for value in values):
@@ -156,7 +156,7 @@ def as_factor(node: Node, kind: str) -> Factor:
 
 
 def _quantity(node: Node) -> float | None:
-    """A number with its unit in SI units; None if it is none."""
+    """A number with its unit in SI units; None for anything else."""
     parts = split_number(node)
     if parts is None or not parts[1]:
         return None
@@ -167,11 +167,11 @@ def _quantity(node: Node) -> float | None:
 
 
 MAX_LEVELS = 10**12  # of a range
-MAX_SAMPLES = 100_000  # of a Latin hypercube, which is made as a whole
+MAX_SAMPLES = 100_000  # of a Latin hypercube, whose points are made together
 
 
 class DimensionReader(NodeReader):
-    """Reads what stands below ``vary``; whatever is misshapen is added to ``problems`` and left out."""
+    """Reads the entries of ``vary``; anything malformed is added to ``problems`` and left out."""
 
     def vary(self, node: Node, what: str) -> tuple[Dimension, ...]:
         """An ordered mapping of dimensions."""
@@ -195,12 +195,12 @@ class DimensionReader(NodeReader):
                     return reader(name, position, node.entries[form].value)
             if keys & RANGE.keys.keys():
                 return self.ranged(name, position, node)
-        hint = "write a list, {from, to, step}, {zip: ...}, {cases: ...} or {latin_hypercube: ...}"
-        self.problems.add(f"{name!r} does not say what values it takes", node.position, hint)
+        hint = "give a list, {from, to, step}, {zip: ...}, {cases: ...} or {latin_hypercube: ...}"
+        self.problems.add(f"{name!r} has no values", node.position, hint)
         return None
 
     def listed(self, name: str, position: Position, lists: dict[str, Entry]) -> Dimension | None:
-        """One list for each path, all of one length."""
+        """One list for each path, all of the same length."""
         before = len(self.problems)
         items = {path: entry.value.items for path, entry in lists.items() if isinstance(entry.value, Sequence)}
         keys = {path: entry.key.position for path, entry in lists.items()}
@@ -208,7 +208,7 @@ class DimensionReader(NodeReader):
             is_pattern(path, key, self.problems)
         sizes = {len(each) for each in items.values()}
         if 0 in sizes:
-            self.problems.add(f"{name!r} takes no value at all", position, "give at least one")
+            self.problems.add(f"{name!r} has an empty list", position, "give at least one value")
         elif len(sizes) > 1:
             shown = ", ".join(f"{path}: {len(each)}" for path, each in items.items())
             self.problems.add(f"the lists of {name!r} differ in length", position, shown)
@@ -228,9 +228,9 @@ class DimensionReader(NodeReader):
         return Listed(name, position, kinds, levels)
 
     def zipped(self, name: str, position: Position, node: Node) -> Dimension | None:
-        """Parameters that go together: the first values of all lists, the second ones, and so on."""
+        """Parameters that vary together: the first values of all lists, then the second ones, and so on."""
         if not isinstance(node, Mapping) or not node.entries:
-            self.problems.add(f"zip of {name!r} is not a mapping from parameters to lists", node.position)
+            self.problems.add(f"the zip of {name!r} is not a mapping from parameters to lists", node.position)
             return None
         wrong = {path: each for path, each in node.entries.items() if not isinstance(each.value, Sequence)}
         for path, entry in wrong.items():
@@ -240,7 +240,7 @@ class DimensionReader(NodeReader):
     def cases(self, name: str, position: Position, node: Node) -> Dimension | None:
         """Named sets of values; the column holds the names."""
         if not isinstance(node, Mapping) or not node.entries:
-            self.problems.add(f"cases of {name!r} is not a mapping from names to settings", node.position)
+            self.problems.add(f"the cases of {name!r} are not a mapping from names to settings", node.position)
             return None
         levels = []
         for case, entry in node.entries.items():
@@ -270,10 +270,12 @@ class DimensionReader(NodeReader):
         start, end, step = (numbers[key] for key in RANGE.keys)
         at = entries["step"].value.position
         if len(units) > 1:
-            self.problems.add(f"the range of {name!r} has more than one unit", node.position, "write the same for all")
+            self.problems.add(
+                f"the range of {name!r} has more than one unit", node.position, "use the same unit for all"
+            )
             return None
         if step == 0 or (end - start) / step < 0:
-            self.problems.add(f"the range of {name!r} never gets from {start} to {end} in steps of {step}", at)
+            self.problems.add(f"the range of {name!r} never reaches {end} from {start} in steps of {step}", at)
             return None
         size = int((end - start) / step) + 1
         if size > MAX_LEVELS:
@@ -306,7 +308,7 @@ class DimensionReader(NodeReader):
         return found
 
     def hypercube(self, name: str, position: Position, node: Node) -> Dimension | None:
-        """Points that fill a box evenly: of ``size`` slices of each range, each is met by one point."""
+        """Points that fill a box evenly: each of the ``size`` slices of each range contains one point."""
         before = len(self.problems)
         entries = HYPERCUBE.entries(self, node, f"latin_hypercube of {name!r}") or {}
         if "size" not in entries or "ranges" not in entries:
@@ -317,7 +319,7 @@ class DimensionReader(NodeReader):
         size, seed = said.get("size", 1), said.get("seed", 0)
         box = entries["ranges"].value
         if not isinstance(box, Mapping) or not box.entries:
-            self.problems.add(f"ranges of {name!r} is not a mapping from parameters to [low, high]", box.position)
+            self.problems.add(f"the ranges of {name!r} are not a mapping from parameters to [low, high]", box.position)
             return None
         bounds: dict[str, tuple[float, float, str, Position]] = {}
         for path, entry in box.entries.items():
@@ -325,7 +327,7 @@ class DimensionReader(NodeReader):
             items = entry.value.items if isinstance(entry.value, Sequence) else ()
             ends = [end for item in items if (end := self.quantity(item, f"a bound of {path!r}")) is not None]
             if len(items) == 2 and len(ends) < 2:
-                continue  # which has been told
+                continue  # which has been reported
             if len(ends) != 2 or ends[0][1] != ends[1][1] or not ends[0][0] < ends[1][0]:
                 self.problems.add(f"{path!r} is not [low, high] in one unit", entry.value.position)
             else:
@@ -362,7 +364,7 @@ HYPERCUBE = Construct(
     "",
     {
         "size": Key(number(int, 1, MAX_SAMPLES), "The number of points."),
-        "seed": Key(number(int, 0, MAX_SEED), "What the points are drawn from (default: 0)."),
+        "seed": Key(number(int, 0, MAX_SEED), "The seed that the points are drawn with (default: 0)."),
         "ranges": Key(
             node_as(
                 {
@@ -382,16 +384,16 @@ DIMENSIONS = Shape(
 
 
 def dimension_schema() -> Schema:
-    """What editors know of one of the forms in which a study says what values something takes."""
+    """The schema of one form in which a study gives the values of a factor."""
     lists: Schema = {"type": "object", "minProperties": 1, "additionalProperties": {"type": "array", "minItems": 1}}
     sets: Schema = {**lists, "additionalProperties": {"type": ["object", "null"]}}
     forms = {
-        "zip": Key(node_as(lists), "Parameters that go together: 'path: [value, ...]', all of one length."),
+        "zip": Key(node_as(lists), "Parameters that vary together: 'path: [value, ...]', all of the same length."),
         "cases": Key(node_as(sets), "Named sets of values: 'name: {path: value}'."),
         "latin_hypercube": Key(node_as(HYPERCUBE.schema), "Points that fill a box evenly."),
     }
     single = (Construct("", {key: each}, type="object", required=[key]).schema for key, each in forms.items())
     return {
-        "description": "The values of a parameter, or of several that go together.",
+        "description": "The values of a parameter, or of several that vary together.",
         "anyOf": [{"type": "array", "minItems": 1}, RANGE.schema, *single],
     }

@@ -1,4 +1,4 @@
-"""Disturbances: aspects in files of their own, which are added to a model from outside."""
+"""Disturbances: aspects in separate files, which are added to a model from outside."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ class Disturbance:
 
 
 T = TypeVar("T", CompositeText, ParameterText)
-PARAMETER_THERE, COMPOSITE_THERE = "the model has a parameter {!r} already", "there is a composite {!r} already"
+PARAMETER_THERE, COMPOSITE_THERE = "the model already has a parameter {!r}", "there is already a composite {!r}"
 
 ACT = Construct(
     "A single act of an aspect.",
@@ -34,13 +34,13 @@ ACT = Construct(
         "aspect": Key(AT, "The name of the aspect.", missing=("an act names no aspect", "add 'aspect: NAME'")),
         "at": Key(
             AT,
-            "Where it stands: a port, a connection or an actor.",
+            "Its place: a port, a connection or an actor.",
             missing=("an act names no place", "add 'at: PATH'"),
         ),
         "token": Key(
             number(int, 1),
-            "Which of the tokens, or firings, that pass it there: 1 is the first.",
-            missing=("an act does not say which token it concerns", "add 'token: 1' for the first"),
+            "The number of the token, or firing, that passes it there: 1 is the first.",
+            missing=("an act names no token", "add 'token: 1' for the first"),
         ),
     },
     type="object",
@@ -57,9 +57,9 @@ def _acts(reader: NodeReader, node: Node, what: str) -> tuple[ActText, ...]:
     return tuple(found)
 
 
-# Its aspects may take over the ports of those whose places they take.
+# Its aspects may take over the ports of the aspects that they replace.
 DISTURBANCE = Construct(
-    "Aspects in a file of their own, to be added to a model.",
+    "Aspects in a separate file, to be added to a model.",
     {
         "disturbance": Key(
             NAMED,
@@ -92,7 +92,7 @@ def load_disturbance(name: str, problems: Problems) -> Disturbance | None:
 
 
 def _declared(node: Node, problems: Problems) -> Disturbance | None:
-    """What a file declares; whatever is misshapen is a problem and left out."""
+    """What a file declares; anything malformed is reported and left out."""
     if isinstance(node, Mapping) and "model" in node.entries and "disturbance" not in node.entries:
         hint = "a disturbance begins with a line like 'disturbance: my_disturbance'"
         problems.add(f"{node.position.file} is a model, not a disturbance", node.entries["model"].key.position, hint)
@@ -124,10 +124,10 @@ def load_disturbances(names: Iterable[str], problems: Problems) -> list[Disturba
 def add_disturbances(
     text: ModelText, disturbances: Iterable[Disturbance], problems: Problems
 ) -> tuple[ModelText, list[Setting]]:
-    """A model with what disturbances hold, and what they set of the model's own parameters.
+    """A model with the contents of disturbances, and the values that they set for the model's parameters.
 
-    Their parameters join the model's, so that ``--set`` and expressions know them by their names.  Their aspects come
-    after the model's own, but one that has the name of another stands in its place.
+    Their parameters join the model's, so that ``--set`` and expressions can use their names.  Their aspects come after
+    the model's own, but an aspect with the name of another replaces it.
     """
     settings: list[Setting] = []
     for disturbance in disturbances:
@@ -142,7 +142,7 @@ def add_disturbances(
 
 
 def joined(known: dict[str, T], more: dict[str, T], message: str, problems: Problems) -> dict[str, T]:
-    """What two files declare; of two things of one name the first one counts, and the second is a problem."""
+    """What two files declare; if both declare a name, the first counts and the second is a problem."""
     for name, second in more.items():
         if (first := known.get(name)) is not None:
             hint = f"it is declared at {first.position.file}:{first.position.line}; give this one another name"

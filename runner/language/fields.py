@@ -1,7 +1,7 @@
-"""What the language is declared with: shapes, keys and constructs.
+"""How the language is declared: shapes, keys and constructs.
 
-A key of the language is declared once.  From it come what reads its value, what is told of a wrong, unknown or missing
-one, and what the JSON Schema says of it.
+A key of the language is declared once.  The reading of its value, the messages about a wrong, unknown or missing one,
+and the JSON Schema follow from that.
 """
 
 from __future__ import annotations
@@ -29,12 +29,12 @@ QUANTITY = rf"^\s*{NUMBER}\s*([A-Za-z%°µμ1(].*)?$"
 
 
 def ref(name: str) -> Schema:
-    """What ``$defs`` says under a name."""
+    """A reference to a name in ``$defs``."""
     return {"$ref": f"#/$defs/{name}"}
 
 
 def looks_like(pattern: str, message: str) -> Schema:
-    """What a text must look like; the message is what editors show, which would be the pattern otherwise."""
+    """What a text must look like; editors show the message instead of the pattern."""
     return {"pattern": pattern, "patternErrorMessage": message}
 
 
@@ -44,7 +44,7 @@ def one_or_more(item: Schema) -> Schema:
 
 
 def names_of(item: Schema) -> Schema:
-    """A mapping from names; nothing at all counts as empty."""
+    """A mapping from names; no value counts as empty."""
     return {"type": ["object", "null"], "propertyNames": ref("name"), "additionalProperties": item}
 
 
@@ -66,10 +66,10 @@ def computed(kind: str, low: float | None = None, high: float | None = None, uni
 
 @dataclass(frozen=True)
 class Shape:
-    """What may stand somewhere.
+    """What a value may be.
 
-    ``read`` takes a reader, a node and what messages call it; it gives the value, or None if there is none or what is
-    wrong with it has been told.
+    ``read`` takes a reader, a node and its name in messages; it returns the value, or None if there is none or its
+    problem has been reported.
     """
 
     schema: Schema
@@ -135,11 +135,11 @@ FLAG = Shape({"type": "boolean"}, _flag)
 
 @dataclass(frozen=True)
 class Key:
-    """A key of a construct: what stands there, and what it means.
+    """A key of a construct: the shape of its value, and what it means.
 
-    In ``called``, which is how messages call the value, and in ``missing``, which is what they say and advise if there
-    is none, ``{what}`` is the construct and ``{key}`` the key.  ``name`` is the attribute of the object that is made,
-    if that is not called as the key.
+    ``called`` is the name of the value in messages, and ``missing`` the message and advice if there is none; in both,
+    ``{what}`` is the construct and ``{key}`` the key.  ``name`` is the attribute of the resulting object, if it differs
+    from the key.
     """
 
     shape: Shape
@@ -154,7 +154,7 @@ class Key:
 
 
 class Construct:
-    """A mapping with these keys and no others; ``rules`` are what else its schema says."""
+    """A mapping with these keys and no others; ``rules`` are further conditions in its schema."""
 
     def __init__(self, doc: str, keys: Mapping[str, Key], **rules: Any) -> None:
         self.doc = doc
@@ -168,11 +168,11 @@ class Construct:
         return {**({"description": self.doc} if self.doc else {}), **found, **self.rules}
 
     def entries(self, reader: NodeReader, node: Node, what: str) -> dict[str, Entry] | None:
-        """What is written under its keys, unknown ones told; None if it is no mapping."""
+        """The entries under its keys, unknown keys reported; None if it is not a mapping."""
         return reader.entries(node, what, tuple(self.keys))
 
     def values(self, reader: NodeReader, entries: Mapping[str, Entry], what: str, at: Position) -> dict[str, Any]:
-        """What its keys say, by attribute; missing ones are reported ``at`` a place, unreadable ones left out."""
+        """The values of its keys, by attribute; missing ones are reported ``at`` a place, unreadable ones left out."""
         found = {}
         for key, each in self.keys.items():
             if key in entries and not (each.missing and is_empty(entries[key].value)):
@@ -185,7 +185,7 @@ class Construct:
         return found
 
     def read(self, reader: NodeReader, node: Node, what: str, at: Position | None = None) -> dict[str, Any] | None:
-        """What a node says, by attribute; None if it is no mapping."""
+        """The values in a node, by attribute; None if it is not a mapping."""
         entries = self.entries(reader, node, what)
         return None if entries is None else self.values(reader, entries, what, at or node.position)
 
@@ -194,7 +194,7 @@ COMPUTED_FLAG: Schema = {"type": ["boolean", "string"], **looks_like(EXPRESSION,
 
 
 def part_name(base: type) -> str:
-    """What a base of parts is called in the schema."""
+    """The name of a base of parts in the schema."""
     return base.__name__ if base.__module__.startswith("epicycle.") else f"{base.__module__}.{base.__name__}"
 
 
@@ -215,7 +215,7 @@ def _plain_value(parameter: Parameter[Any]) -> Schema:
         found = {"type": ["object", "string"], "additionalProperties": _plain_value(parameter.item)}
         return found | looks_like(EXPRESSION, f"expected a {parameter.describe_type()}")
     if type(parameter).convert is not Parameter.convert:
-        return {}  # what a parameter with a conversion of its own takes, only the conversion knows
+        return {}  # only the conversion knows what a parameter with its own conversion takes
     if is_part(parameter):
         found = ref(part_name(parameter.type))
         return {"anyOf": [found, {"type": "null"}]} if parameter.optional else found
@@ -243,7 +243,7 @@ def _array(parameter: Parameter[Any], shape: tuple[int | None, ...]) -> Schema:
     if not shape:
         return _scalar(parameter)
     found: Schema = {"type": ["array", "string"], "items": _array(parameter, shape[1:])}
-    if parameter.type is not str:  # a single text will do for a list of texts
+    if parameter.type is not str:  # a single text may replace a list of texts
         found |= looks_like(EXPRESSION, f"expected a {parameter.describe_type()}")
     if shape[0] is not None:
         found["minItems"] = found["maxItems"] = shape[0]

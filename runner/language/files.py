@@ -1,4 +1,4 @@
-"""Finding and reading the files of models, and those that they include."""
+"""Finding and reading model files and the files that they include."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ MAX_INCLUDES = 200
 
 
 def named_file(said: Text, folder: Path, kind: str, problems: Problems, who: str = "") -> Path | None:
-    """The file that a name in a file means: as seen from its folder, or packaged; None, and a problem, if it cannot be.
+    """The file that a name in a file means: relative to its folder, or packaged; None, and a problem, if there is none.
 
     ``who`` begins the message.
     """
@@ -47,7 +47,7 @@ def read_model(name: str, problems: Problems) -> tuple[ModelText, dict[str, Comp
 
 
 def read_library(file: str | Path, problems: Problems) -> dict[str, CompositeText]:
-    """The composite classes of a file, as given or else among the packaged ones, and of everything it includes."""
+    """The composite classes of a file, at its path or among the packaged ones, and of everything it includes."""
     path = Path(file)
     candidates = (path, *(folder / path for folder in model_folders()))
     path = next((each for each in candidates if each.is_file()), path)
@@ -59,7 +59,7 @@ def read_library(file: str | Path, problems: Problems) -> dict[str, CompositeTex
 
 
 def _composites(text: ModelText, path: Path, problems: Problems) -> dict[str, CompositeText]:
-    # Included files must lie in or below the model's folder: a model cannot make us read other files.
+    # Included files must lie in or below the model's folder: a model cannot read other files.
     root = path.parent.resolve()
     composites: dict[str, CompositeText] = {}
     seen: dict[Path, None] = {path.resolve(): None}
@@ -105,6 +105,6 @@ def _composites(text: ModelText, path: Path, problems: Problems) -> dict[str, Co
 
 
 def _beside(target: Path, where: Path) -> list[Path]:
-    """The YAML files of the folder in which an included file was to be."""
+    """The YAML files in the folder where an included file was expected."""
     folder = where.parent / target.parent.relative_to(where.parent.resolve())
     return sorted(folder.glob("*.yaml")) if folder.is_dir() else []

@@ -1,12 +1,12 @@
-"""``extends``: a composite class that takes another one over and changes it.
+"""``extends``: a composite class that inherits from another one and changes it.
 
-What a class says comes on top of what its base says, name by name:
+The declarations of a class change those of its base, name by name:
 
-- a parameter or port of the base's stays; the keys that are given again (a default, a bound, a type) replace the old;
-- an actor or aspect with the same ``type``, or none, keeps its values but for those given again; another ``type`` drops
-  the old values and keeps its place: ``count``, ``priority``, ``at``, ``enabled``, ``tags``; ``name: null`` takes it
-  away, with the base's connections to it and the pointcuts at it;
-- connections are added; ``remove: a.out -> b.in`` takes one of the base's away.
+- a parameter or port of the base stays; keys that the class gives again (a default, a bound, a type) replace the old;
+- an actor or aspect with the same ``type``, or none, keeps its values except those given again; another ``type`` drops
+the old values but keeps ``count``, ``priority``, ``at``, ``enabled`` and ``tags``; ``name: null`` removes it, with the
+base's connections and pointcuts to it;
+- connections are added; ``remove: a.out -> b.in`` removes one of the base's.
 """
 
 from __future__ import annotations
@@ -23,13 +23,13 @@ MAX_BASES = 50
 def inherit(
     composites: dict[str, CompositeText], actor_types: Collection[str], problems: Problems, limits: Limits = NORMAL
 ) -> tuple[dict[str, CompositeText], set[str]]:
-    """The classes with what they inherit, and the names of those that cannot be made for lack of a base."""
+    """The classes with what they inherit, and the names of those that cannot be made because a base is missing."""
     whole = {name: text for name, text in composites.items() if text.extends is None}
     broken: set[str] = set()
     inherited = 0
     for each in composites:
         name = each
-        # From the class up to the first base that is done with, then back down: no recursion, however long the way.
+        # From the class up to the first finished base, then back down: no recursion, however long the chain.
         way: list[tuple[CompositeText, Text]] = []
         while name not in whole and name not in broken:
             base = composites[name].extends
@@ -46,13 +46,13 @@ def inherit(
                 inherited += _size(whole[base.text])
                 if inherited > limits.inherited:
                     most = f"{limits.inherited:,} actors, aspects, connections, ports and parameters"
-                    problems.stop(f"{text.name}: the classes take over more than {most}", base.position, RAISE_IT)
+                    problems.stop(f"{text.name}: the classes inherit more than {most}", base.position, RAISE_IT)
                 whole[text.name] = _Heir(whole[base.text], text, problems).composite()
     return {name: whole[name] for name in composites if name in whole}, broken
 
 
 def _size(text: CompositeText) -> int:
-    """How much there is to be taken over from a class."""
+    """How much can be inherited from a class."""
     parts = (text.actors, text.aspects, text.connections, text.inputs, text.outputs, text.parameters)
     return sum(map(len, parts))
 
@@ -63,11 +63,11 @@ def _is_sound(
     actor_types: Collection[str],
     problems: Problems,
 ) -> bool:
-    """Whether the last class of the way extends one that is there and not on the way already."""
+    """Whether the last class of the chain extends one that exists and is not already in the chain."""
     last, base = way[-1]
     names = [text.name for text, _ in way]
     if not base.text:
-        return False  # told when it was read
+        return False  # reported when it was read
     if base.text not in composites:
         known = [name for name in composites if name != last.name]
         message = f"there is no composite {base.text!r} to extend{did_you_mean(base.text, known)}"
@@ -83,7 +83,7 @@ def _is_sound(
             *(f"{text.name} extends {extended.text} at {extended.position}" for text, extended in loop),
         )
     elif len(way) > MAX_BASES:
-        problems.add(f"{names[0]} has more than {MAX_BASES} bases, one upon the other", base.position)
+        problems.add(f"{names[0]} has a chain of more than {MAX_BASES} bases", base.position)
     else:
         return True
     return False
@@ -124,9 +124,9 @@ class _Heir:
         )
         for name, part in result.actors.items():
             is_port = name in result.inputs or name in result.outputs
-            # If both are new, it was told when the class was read.
+            # If both are new, it was reported when the class was read.
             if is_port and (name in text.actors) != (name in text.inputs or name in text.outputs):
-                self._problem(f"{name!r} is the name of an actor and of a port", part.position, "rename one")
+                self._problem(f"{name!r} is the name of both an actor and a port", part.position, "rename one")
         self._check_removals()
         return result
 
@@ -189,7 +189,7 @@ class _Heir:
         return aspects
 
     def _kept(self, connection: ConnectionText, removed: Collection[str]) -> list[ConnectionText]:
-        """What is left of a connection of the base's, in parts if only some of its pairs are taken away."""
+        """What is left of a connection of the base, in parts if only some of its pairs are removed."""
         cut = {pair for each in self.text.connections if each.removes for pair in _pairs(each)}
         left = [
             replace(connection, sources=(source,), destinations=destinations)
@@ -205,7 +205,7 @@ class _Heir:
         return [connection] if sum(map(len, map(_pairs, left))) == len(_pairs(connection)) else left
 
     def _check_removals(self) -> None:
-        """A connection that is to be removed must be there."""
+        """Report removals of connections that do not exist."""
         known = {pair for each in self.base.connections for pair in _pairs(each)}
         written = [f"{source} -> {end}" for source, end in sorted(known)]
         for connection in self.text.connections:

@@ -1,4 +1,4 @@
-"""Model files, and files of composite classes: the keys of all that they declare, and what reads them."""
+"""Model files and files of composite classes: the keys of everything that they declare, and how they are read."""
 
 from __future__ import annotations
 
@@ -62,7 +62,7 @@ PORT = Construct(
     {
         "type": Key(
             AT,
-            "What travels through it, such as float, 'float | int', array[2] or a token class.",
+            "What passes through it, such as float, 'float | int', array[2] or a token class.",
             called="the type of {what}",
         ),
         "doc": Key(TEXT, "What it is."),
@@ -111,7 +111,7 @@ def _choices(reader: NodeReader, node: Node, what: str) -> tuple[str, ...]:
     before = len(reader.problems)
     found = tuple(text.text for text in reader.texts(node, "choices"))
     if not found and len(reader.problems) == before:
-        reader.problems.add(f"{what} has no choices to choose from", node.position)
+        reader.problems.add(f"{what} has an empty list of choices", node.position)
     return found
 
 
@@ -120,9 +120,9 @@ PARAMETER = Construct(
     "",
     {
         "value": Key(node_as({}), "The default; without one, a value must be given."),
-        "unit": Key(Shape(ref("text"), _unit), "What numbers count in, such as m/s; 1 for a pure number.", "{what}"),
+        "unit": Key(Shape(ref("text"), _unit), "The unit of numbers, such as m/s; 1 for a pure number.", "{what}"),
         "min": Key(number(float), "The smallest value.", _OF_PARAMETER),
-        "max": Key(number(float), "The greatest value.", _OF_PARAMETER),
+        "max": Key(number(float), "The largest value.", _OF_PARAMETER),
         "choices": Key(Shape(one_or_more(LABEL), _choices), "The texts to choose from.", "{what}"),
         "doc": Key(TEXT, "What it is.", _OF_PARAMETER),
     },
@@ -133,7 +133,7 @@ PARAMETER = Construct(
 def _parameter(reader: NodeReader, name: str, entry: Entry) -> ParameterText:
     """``name: value`` or ``name: {value: ..., unit: ..., min: ..., max: ..., choices: ..., doc: ...}``."""
     if name in _NO_PARAMETERS or iskeyword(name):
-        meaning = "which instance of an array it is" if name == "index" else "something else"
+        meaning = "the index of an instance in its array" if name == "index" else "something else"
         message = f"a parameter cannot be called {name!r}: in expressions, that name means {meaning}"
         reader.problems.add(message, entry.key.position, "give it another name")
     if not isinstance(entry.value, Mapping):
@@ -153,27 +153,28 @@ _NO_PARAMETERS = {"index", *CONSTANTS, *FUNCTIONS}
 
 # -- actors, aspects and figures ----------------------------------------------------------------------------------
 
-# What stands beside the parameters of an actor or aspect.
+# The keys besides the parameters of an actor or aspect.
 BESIDE = {
     "count": Key(
-        node_as(computed("integer", 0, NORMAL.actors)), "How many instances, name[0] to name[count - 1]; see 'index'."
+        node_as(computed("integer", 0, NORMAL.actors)),
+        "The number of instances, name[0] to name[count - 1]; see 'index'.",
     ),
     "priority": Key(
         node_as(computed("integer")),
-        "Of two actors that could fire at the same tag and depth, the smaller one is first.",
+        "Of two actors at the same tag and depth, the one with the smaller priority fires first.",
     ),
     "at": Key(
         POINTCUTS,
-        "Where it stands: patterns of ports or actors, 'a.out -> b.in', {type, port} or {tag, port}; not at !pattern.",
+        "Where it attaches: patterns of ports or actors, 'a.out -> b.in', {type, port}, {tag, port}; not at !pattern.",
     ),
-    "tags": Key(TEXTS.described(one_or_more(ref("text"))), "Names by which aspects can choose it: 'at: {tag: ...}'."),
-    "enabled": Key(node_as(COMPUTED_FLAG), "Whether it does anything (default: true)."),
+    "tags": Key(TEXTS.described(one_or_more(ref("text"))), "Names by which aspects can select it: 'at: {tag: ...}'."),
+    "enabled": Key(node_as(COMPUTED_FLAG), "Whether it is active (default: true)."),
 }
 RESERVED = {"actor": Actor.reserved, "aspect": Aspect.reserved, "figure": frozenset({"type"})}
 
 
 def part(reader: NodeReader, name: str, entry: Entry, kind: str, *, derived: bool = False) -> PartText | None:
-    """``name: {type: ..., ...}``; in a class that extends another also without type, and ``name: null``."""
+    """``name: {type: ..., ...}``; in a class that extends another, ``type`` may be missing, or ``name: null``."""
     problems = reader.problems
     if derived and is_empty(entry.value):
         return PartText(name, entry.key.position, Text("", entry.key.position), removes=True)
@@ -210,7 +211,7 @@ def parts(kind: str, definition: str = "", *, derived: bool = False) -> Shape:
 
 
 def _rules(**defaults: str) -> dict[str, Key]:
-    """What a director goes by."""
+    """The rules of a director."""
     said = {"ties": TIES, "like": LIKE}
     return {
         key: Key(node_as(schema_of(each)), f"{each.doc[:1].upper()}{each.doc[1:]} (default: {defaults[key]}).")
@@ -219,17 +220,19 @@ def _rules(**defaults: str) -> dict[str, Key]:
 
 
 MODEL_DIRECTOR = Construct(
-    "What the director of the model goes by, and those inside that say nothing else.",
+    "The rules of the model's director, and of the directors inside that do not override them.",
     _rules(ties="declared", like="epicycle"),
 )
 DIRECTOR = Construct(
-    "A director of its own, with a local clock.",
+    "A separate director, with a local clock.",
     {
         "start": Key(
-            node_as(computed("number", unit="s")), "The local time when the run begins (default: as around it)."
+            node_as(computed("number", unit="s")), "The local time when the run begins (default: the time outside)."
         ),
-        "drift": Key(node_as(computed("number", unit="1")), "How fast local time goes, 1 being as fast as around it."),
-        **_rules(ties="as around it", like="as around it"),
+        "drift": Key(
+            node_as(computed("number", unit="1")), "The rate of local time; 1 is as fast as the time outside."
+        ),
+        **_rules(ties="as outside", like="as outside"),
     },
 )
 DOC = Key(TEXT, "What it shows or does.")
@@ -247,21 +250,23 @@ PARAMETERS = Key(
 _PORTS = Shape({"anyOf": [one_or_more(ref("name")), names_of(ref("port_declaration"))]}, _ports)
 _SAID_OF_PORTS = "a list of names, or 'name: type' or 'name: {type, doc}'."
 ACTORS = Key(parts("actor"), "The actors of the graph: 'name: {type, count, <parameter>: <value>, ...}'.")
-ASPECTS = Key(parts("aspect"), "What is woven around ports: 'name: {type, at, enabled, <parameter>: <value>}'.")
+ASPECTS = Key(
+    parts("aspect"), "Aspects that attach to ports and actors: 'name: {type, at, enabled, <parameter>: <value>}'."
+)
 
 
 def _base(reader: NodeReader, node: Node, what: str) -> Text:
-    """The name of a class; an empty one if it is none, which has been told."""
+    """The name of a class; empty if the node is not a name, which has been reported."""
     return Text(reader.name(node, what) or "", node.position)
 
 
 COMPOSITE = Construct(
-    "A composite class: a graph with ports of its own.",
+    "A composite class: a graph with its own ports.",
     {
         "doc": DOC,
         "extends": Key(
             Shape(ref("name"), _base),
-            "The composite class that this one takes over and changes.",
+            "The composite class that this one inherits from and changes.",
             "the class to extend",
         ),
         "parameters": PARAMETERS,
@@ -269,13 +274,13 @@ COMPOSITE = Construct(
         "outputs": Key(_PORTS, f"The output ports: {_SAID_OF_PORTS}"),
         "director": Key(
             Shape(ref("director"), lambda reader, node, what: DIRECTOR.entries(reader, node, what) or {}),
-            "A director of its own: the composite fires as one actor, in local time.",
+            "Its own director: the composite fires as one actor, in local time.",
             "the director of {what}",
         ),
         "actors": ACTORS,
         "connections": Key(
             CONNECTIONS,
-            "Wires: 'actor.port -> actor.port, actor.port', '=>' for all to all; or {from, to, all, delay}.",
+            "Connections: 'actor.port -> actor.port, actor.port', '=>' for all to all; or {from, to, all, delay}.",
         ),
         "aspects": ASPECTS,
         **OF_MODES,
@@ -290,7 +295,7 @@ HEIR = Construct(COMPOSITE.doc, {**COMPOSITE.keys, **_CHANGES})
 
 
 def composite_schema() -> Schema:
-    """What editors know of a composite class, which may extend another."""
+    """The schema of a composite class, which may extend another."""
     found = COMPOSITE.schema
     for key, changes in _CHANGES.items():
         found["properties"][key] = {"description": changes.doc}
@@ -315,7 +320,9 @@ def composite(reader: NodeReader, name: str, entries: dict[str, Entry], position
     said = (HEIR if derived else COMPOSITE).values(reader, entries, repr(name), position)
     machine = {key: entries[key] for key in OF_MODES if said.pop(key, None) is not None and key in entries}
     if machine:
-        said.setdefault("outputs", {}).setdefault("mode", PortText("mode", position, doc="the mode it has come to"))
+        said.setdefault("outputs", {}).setdefault(
+            "mode", PortText("mode", position, doc="the mode that it has entered")
+        )
         said |= machine_of(reader, name, machine, entries, position)
     inputs, outputs = said.get("inputs", {}), said.get("outputs", {})
     for port in outputs.values():
@@ -323,12 +330,12 @@ def composite(reader: NodeReader, name: str, entries: dict[str, Entry], position
             problems.add(f"port {port.name!r} is declared twice", port.position)
     for actor in said.get("actors", {}).values():
         if actor.name in inputs or actor.name in outputs:
-            problems.add(f"{actor.name!r} is the name of an actor and of a port", actor.position, "rename one")
+            problems.add(f"{actor.name!r} is the name of both an actor and a port", actor.position, "rename one")
     written: tuple[ConnectionText | None, ...] = said.pop("connections", (None,) if "connections" in entries else ())
     connections = [each for each in written if each is not None]
     for each in connections:
         if each.removes is not None and not derived:
-            problems.add(f"{name} extends no class whose connections it could remove", each.removes)
+            problems.add(f"{name} extends no class, so it has no connection to remove", each.removes)
     return CompositeText(
         name,
         position,
@@ -344,12 +351,12 @@ COMPOSITES = Key(named(ref("composite"), _composite), "Composite classes, for th
 # -- whole files --------------------------------------------------------------------------------------------------
 
 RUN = Construct(
-    "How long a run takes, and what it records.",
+    "When a run ends, and what it records.",
     {
         "stop": Key(node_as(computed("number", 0.0, unit="s")), "Time at which a run ends, such as 30 s."),
         "stop_when": Key(PATTERNS, "Output ports that end the run when they send true or a number other than 0."),
         "seed": Key(node_as(computed("integer", 0, MAX_SEED)), "Seed of all random streams."),
-        "record": Key(PATTERNS, "Output ports whose tokens are kept, as patterns."),
+        "record": Key(PATTERNS, "Output ports whose tokens are recorded, as patterns."),
     },
 )
 
@@ -362,12 +369,12 @@ def _of_metric(key: str, parameter: Parameter[Any]) -> Key:
 
 
 METRIC = Construct(
-    "A number taken from what a port sends.",
+    "A number computed from what a port sends.",
     {
         "of": Key(
             node_as(PATTERN_SCHEMA),
             "The output port (or a pattern for several).",
-            missing=("{what} does not say of what", "add 'of: actor.port'"),
+            missing=("{what} has no port", "add 'of: actor.port'"),
         ),
         **{key: _of_metric(key, each) for key, each in declared_parameters(Measure).items()},
     },
@@ -392,14 +399,14 @@ def _metric(reader: NodeReader, name: str, entry: Entry) -> MetricText | None:
 
 
 def _model_director(reader: NodeReader, node: Node, what: str) -> dict[str, Entry]:
-    """What is said of the model's own director."""
+    """What a file declares about the model's director."""
     if isinstance(node, Scalar) and node.value == PTOLEMY:
         reader.problems.add(f"{what} is not a mapping", node.position, f"write 'director: {{like: {PTOLEMY}}}'")
         return {}
     if isinstance(node, Mapping):
         for key in [key for key in ("start", "drift") if key in node.entries]:
-            message = f"{what} has no {key!r}: the time of a run begins at 0 and goes on as it does"
-            hint = "give it to the director of a composite, whose local time may be another one"
+            message = f"{what} has no {key!r}: the time of a run begins at 0 and has no drift"
+            hint = "give it to the director of a composite, which has local time"
             reader.problems.add(message, node.entries[key].key.position, hint)
         node = replace(node, entries={key: each for key, each in node.entries.items() if key not in ("start", "drift")})
     return MODEL_DIRECTOR.entries(reader, node, what) or {}
@@ -428,21 +435,21 @@ MODEL = Construct(
         "run": Key(Shape(ref("run"), RUN.entries), RUN.doc),
         "metrics": Key(
             Shape(METRICS.schema, lambda reader, node, what: tuple(METRICS.read(reader, node, what).values())),
-            "Numbers taken from what ports send: 'name: {of, take, after, unit, ...}'.",
+            "Numbers computed from what ports send: 'name: {of, take, after, unit, ...}'.",
         ),
         "monitors": Key(
             Shape(MONITORS.schema, lambda reader, node, what: tuple(MONITORS.read(reader, node, what).values())),
-            "Properties that a run is to have: 'name: always port >= 2 m', or 'name: {property, between, stop, ...}'.",
+            "Properties that a run must have: 'name: always port >= 2 m', or 'name: {property, between, stop, ...}'.",
         ),
-        "figures": Key(parts("figure"), "Pictures of a run: 'name: {type, ...}'."),
+        "figures": Key(parts("figure"), "Figures of a run: 'name: {type, ...}'."),
     },
 )
-_OF_ROOT = {key for key, each in MODEL.keys.items() if COMPOSITE.keys.get(key) is each}  # as of other composites
+_OF_ROOT = {key for key, each in MODEL.keys.items() if COMPOSITE.keys.get(key) is each}  # as in other composites
 _OF_FILE = Construct("", {key: each for key, each in MODEL.keys.items() if key not in _OF_ROOT})
 
 
 def model_of(node: Node, problems: Problems) -> ModelText | None:
-    """What a file says that is a model: it has the key ``model``."""
+    """The declarations of a model file: one with the key ``model``."""
     reader = NodeReader(problems)
     entries = MODEL.entries(reader, node, "the model")
     if entries is None:
@@ -455,6 +462,6 @@ def model_of(node: Node, problems: Problems) -> ModelText | None:
 
 
 def library_of(node: Node, problems: Problems) -> ModelText | None:
-    """What a file of composite classes says."""
+    """The declarations of a file of composite classes."""
     said = LIBRARY.read(NodeReader(problems), node, "an included file")
     return None if said is None else ModelText(CompositeText("", node.position, said.pop("doc", "")), **said)

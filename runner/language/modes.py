@@ -1,4 +1,4 @@
-"""Composites with modes: what they say of their machine, and of the refinements of its modes."""
+"""Composites with modes: their machine, and the refinements of its modes."""
 
 from __future__ import annotations
 
@@ -13,24 +13,22 @@ from .fields import AT, Key, Schema, names_of, node_as, one_or_more, ref
 
 _VALUES: Schema = {"type": ["object", "string"]}
 _MODE: Schema = {"type": ["object", "null"], "properties": {"refinement": {"type": ["string", "object"]}}}
-# What a composite class says of its machine, if it has one: parameters of StateMachine, beside refinements.
+# What a composite class declares about its machine, if it has one: parameters of StateMachine, and refinements.
 OF_MODES = {
     "modes": Key(
         node_as({"anyOf": [one_or_more(ref("name")), names_of(_MODE)]}),
-        "The modes of a composite that has no actors but these: a list of names, or 'name: {refinement, flow, entry, "
+        "The modes of a composite without other actors: a list of names, or 'name: {refinement, flow, entry, "
         "exit, final}'.",
     ),
     "transitions": Key(
         node_as({"type": "array", "items": {"type": ["string", "object"]}}),
         "Its transitions, such as 'a -> b on port after 3 s when x > 2 do y = x; n = n + 1', or {from, to, when, ...}.",
     ),
-    "initial": Key(node_as({"type": "string"}), "The mode in which it begins (default: the first)."),
+    "initial": Key(node_as({"type": "string"}), "The initial mode (default: the first)."),
     "variables": Key(
-        node_as({"type": ["object", "string"]}), "What its guards and actions know: 'name: value at the start'."
+        node_as({"type": ["object", "string"]}), "Variables of its guards and actions: 'name: initial value'."
     ),
-    "held": Key(
-        node_as({"type": ["object", "string"]}), "Inputs that keep their latest token: 'name: value before it'."
-    ),
+    "held": Key(node_as({"type": ["object", "string"]}), "Inputs that keep their latest token: 'name: initial value'."),
 }
 
 
@@ -40,8 +38,8 @@ def machine_of(
     """The machine of a composite with modes, and their refinements."""
     for key in ("actors", "connections"):
         if key in entries:
-            hint = "put them into the refinement of a mode, or into a composite around this one"
-            reader.problems.add(f"{name} has modes, and no {key} beside them", entries[key].key.position, hint)
+            hint = "move them into the refinement of a mode, or into a composite around this one"
+            reader.problems.add(f"{name} has modes, so it cannot have {key}", entries[key].key.position, hint)
     refinements: dict[str, PartText] = {}
     modes = machine.get("modes")
     if modes is not None and isinstance(modes.value, Mapping):
@@ -62,7 +60,7 @@ def machine_of(
 
 
 def _mode() -> type:
-    from epicycle.actors import Mode  # with all that solves differential equations, which takes a while
+    from epicycle.actors import Mode  # it imports the solvers of differential equations, which takes a while
 
     return Mode
 

@@ -1,4 +1,4 @@
-"""Monitors: what a model file says of the properties that its runs are to have."""
+"""Monitors: the properties that a model file requires of its runs."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def _of_monitor(key: str, parameter: Parameter[Any]) -> Key:
 
 
 MONITOR = Construct(
-    "A property that a run is to have: its text, or this.",
+    "A property that a run must have: its text, or this.",
     {key: _of_monitor(key, each) for key, each in declared_parameters(Requirement).items()},
     type=["object", "string"],
     required=["property"],

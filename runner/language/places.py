@@ -1,4 +1,4 @@
-"""How a model file says where: connections from port to port, and pointcuts at which aspects stand."""
+"""Places in a model file: connections between ports, and the pointcuts of aspects."""
 
 from __future__ import annotations
 
@@ -36,7 +36,8 @@ POINTCUT_TEXT = rf"^\s*!?\s*{_PATH}(\s*->\s*{_PATH})?\s*$"
 PORT_SCHEMA: Schema = {
     "type": "string",
     **looks_like(
-        f"^{_ENDPOINT}$", "expected actor.port, array[*].port, array[0].port, array[1..3].port or an own port"
+        f"^{_ENDPOINT}$",
+        "expected actor.port, array[*].port, array[0].port, array[1..3].port or a port of this composite",
     ),
 }
 PORTS_SCHEMA: Schema = {"anyOf": [ref("port"), {"type": "array", "items": ref("port"), "minItems": 1}]}
@@ -49,7 +50,7 @@ PATTERN_SCHEMA: Schema = {
 _POINTCUT_SCHEMA: Schema = {
     "type": "string",
     **looks_like(
-        POINTCUT_TEXT, "expected ports or actors as a pattern, a connection 'a.out -> b.in', or one of these after a !"
+        POINTCUT_TEXT, "expected ports or actors as a pattern, a connection 'a.out -> b.in', or one of these after '!'"
     ),
 }
 
@@ -64,13 +65,13 @@ CONNECTION = Construct(
         "to": Key(_ENDS, "The receiving ports.", name="destinations"),
         "all": Key(
             FLAG,
-            "Each to all, as with '=>'; otherwise several and several are connected in pairs.",
+            "Connect each to all, as '=>' does; otherwise several on both sides are connected in pairs.",
             called="'all' of a connection",
             name="to_all",
         ),
         "shared": Key(
             FLAG,
-            "All that it joins is one channel at each port, as a relation is in Ptolemy; else each of its ways is one.",
+            "Make it one channel at each port, like a relation in Ptolemy; otherwise each pair is one.",
             called="'shared' of a connection",
         ),
         "delay": Key(
@@ -133,9 +134,9 @@ def _endpoints(node: Scalar, text: str, start: int, end: int) -> tuple[Text, ...
 
 
 def connection_schema() -> Schema:
-    """What editors know of one entry of ``connections``."""
+    """The schema of one entry of ``connections``."""
     declared = CONNECTION.schema
-    removal = {"description": "A connection of the extended class to do without.", "$ref": "#/$defs/connection"}
+    removal = {"description": "A connection of the extended class to remove.", "$ref": "#/$defs/connection"}
     return {
         **declared,
         "properties": {**declared["properties"], "remove": removal},
@@ -156,11 +157,15 @@ POINTCUT = Construct(
         "at": Key(
             AT.described(_POINTCUT_SCHEMA), "Ports or actors, as a pattern, or a connection.", called=_OF_POINTCUT
         ),
-        "type": Key(AT, "The type of the actors and composites at which, or at whose ports, it stands.", _OF_POINTCUT),
-        "tag": Key(AT, "A tag of the actors and composites at which, or at whose ports, it stands.", _OF_POINTCUT),
-        "port": Key(AT, "The name of the port; none: all ports where it can stand.", _OF_POINTCUT),
+        "type": Key(
+            AT, "The type of the actors and composites that it attaches to, directly or at their ports.", _OF_POINTCUT
+        ),
+        "tag": Key(
+            AT, "A tag of the actors and composites that it attaches to, directly or at their ports.", _OF_POINTCUT
+        ),
+        "port": Key(AT, "The name of the port (default: all ports that it can attach to).", _OF_POINTCUT),
         "parameter": Key(AT, "The name of a parameter of the actors, for an aspect that alters numbers.", _OF_POINTCUT),
-        "request": Key(AT, "For an aspect that is a composite: the input by which these tokens come in.", _OF_POINTCUT),
+        "request": Key(AT, "For an aspect that is a composite: the input that receives these tokens.", _OF_POINTCUT),
         "time": Key(node_as(ref("firing_time")), "For a composite at actors: how long their firings take."),
     },
     type="object",
@@ -180,7 +185,7 @@ def pointcuts(reader: NodeReader, node: Node, what: str) -> tuple[PointcutText, 
         where = PointcutText("", item.position) if at is None else PointcutText.of(at)
         if sum(key in entries for key in ("at", "type", "tag")) != 1 or (at is not None and "port" in said):
             hint = "write {at: ...}, {type: ..., port: ...} or {tag: ...}"
-            reader.problems.add("a pointcut chooses by pattern, by type or by tag", item.position, hint)
+            reader.problems.add("a pointcut selects by pattern, type or tag", item.position, hint)
             said = {}
         found.append(replace(where, **said))
     return tuple(found)

@@ -1,4 +1,4 @@
-"""The keys of claims and of a guideline, and what reads them, and checks them against the study."""
+"""The keys of claims and of a guideline; how they are read and checked against the study."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from .dimensions import Dimension, Factor, as_factor
 from .fields import AT, LABEL, TEXT, TEXTS, Construct, Key, Schema, Shape, names_of, node_as, number, ref
 from .files import named_file
 
-MAX_CONDITIONS = 10_000  # of a study with claims or a guideline, which look at all of them
+MAX_CONDITIONS = 10_000  # of a study with claims or a guideline, which evaluate all of them
 
 
 def without(node: Node, *keys: str) -> Node:
@@ -37,10 +37,10 @@ def levels_of(dimensions: Iterable[Dimension], factor: str) -> list[Factor]:
 
 
 class QuestionReader(NodeReader):
-    """Reads ``claims`` and ``guideline`` of a study; what is misshapen or not in the study is reported and left out.
+    """Reads ``claims`` and ``guideline`` of a study; anything malformed or not in the study is reported and left out.
 
-    ``kinds`` are the factors and what they hold, ``folder`` that of the study's file; ``factors_of`` says what another
-    study varies, from its text's node and file.
+    ``kinds`` are the factors and what they hold, ``folder`` that of the study's file; ``factors_of`` returns what
+    another study varies, given the node of its text and its file.
     """
 
     def __init__(
@@ -58,11 +58,11 @@ class QuestionReader(NodeReader):
         self.factors_of = factors_of
 
     def questions(self, entries: Mapping[str, Entry], lender: tuple[str, str] | None = None) -> Questions:
-        """All that is asked; ``lender``: file and text of the study whose claims these are, if they are known."""
+        """Everything that is asked; ``lender``: file and text of the study that owns the claims, if they are known."""
         asked = [entries[key] for key in ("claims", "guideline") if key in entries]
         if asked and prod(dimension.size for dimension in self.dimensions) > MAX_CONDITIONS:
             self.problems.add(
-                f"a study of more than {MAX_CONDITIONS:,} conditions can have no claims and no guideline",
+                f"a study of more than {MAX_CONDITIONS:,} conditions cannot have claims or a guideline",
                 asked[0].key.position,
             )
             return Questions()
@@ -81,13 +81,13 @@ class QuestionReader(NodeReader):
         claims = QuestionReader(misfits, self.dimensions, self.kinds, self.folder, self.factors_of).claims(tree)
         if first := next(iter(misfits.found), None):
             more = f", and {len(misfits) - 1} more" if len(misfits) > 1 else ""
-            message = f"claims: those of {node.text!r} do not fit this study: {first.message}{more}"
+            message = f"claims: the claims of {node.text!r} do not fit this study: {first.message}{more}"
             self.problems.add(message, node.position, *first.help)
         apart = tuple(name for name in self.kinds if name not in factors)
         return Questions(claims, guideline, apart, lender)
 
     def lender(self, node: Scalar) -> tuple[str, str] | None:
-        """File and text of the study that is named in the place of claims."""
+        """File and text of the study that is named instead of claims."""
         said = Text(node.text, node.position)
         path = named_file(said, self.folder, "study", self.problems, "claims: ")
         return None if path is None else (str(path), path.read_text(encoding="utf-8", errors="replace"))
@@ -124,18 +124,18 @@ class QuestionReader(NodeReader):
             return None
         forms = [form for form in FORMS if form in entries]
         if len(forms) != 1:
-            reason = f"says {' and '.join(forms)} at once" if forms else "claims nothing"
+            reason = f"has more than one form: {', '.join(forms)}" if forms else "claims nothing"
             self.problems.add(f"{what} {reason}", position, f"give one of {', '.join(FORMS)}")
             return None
         form = forms[0]
         for key in entries.keys() - {"doc", form, *FORMS[form]}:
             takes = ", ".join(FORMS[form])
             self.problems.add(
-                f"{what}: {key!r} does not go with {form!r}", entries[key].key.position, f"what does: {takes}"
+                f"{what}: {key!r} cannot be used with {form!r}", entries[key].key.position, f"{form!r} takes: {takes}"
             )
         for key in {"at", "over"} & set(FORMS[form]) - entries.keys():
             example = "at: {load: 0.5}" if key == "at" else "over: load"
-            self.problems.add(f"{what} has no {key!r}", position, f"add {example!r} or the like")
+            self.problems.add(f"{what} has no {key!r}", position, f"for example, add {example!r}")
         if len(self.problems) > before:
             return None
         said = CLAIM.values(self, entries, what, position)
@@ -144,7 +144,7 @@ class QuestionReader(NodeReader):
             self.problems.add(f"{what} names no metric", entries[form].value.position)
         at, than = said.get("at", {}), said.get("than")
         if than is not None and than.keys() != at.keys() and len(self.problems) == before:
-            message = f"{what}: 'at' and 'than' give levels of other factors"
+            message = f"{what}: 'at' and 'than' name different factors"
             hint = f"at: {', '.join(at)}; than: {', '.join(than) or 'none'}"
             self.problems.add(message, entries["than"].key.position, hint)
         if len(self.problems) > before:
@@ -166,7 +166,9 @@ class QuestionReader(NodeReader):
             return "", []
         if not formula.is_condition or not formula.names:
             self.problems.add(
-                f"{what}: {text!r} is no condition on metrics", node.position, "write 'longest_wait < 30' or the like"
+                f"{what}: {text!r} is not a condition on metrics",
+                node.position,
+                "write a comparison such as 'longest_wait < 30'",
             )
         return text, [Text(name, inside(node, text, max(text.find(name), 0), name)) for name in formula.names]
 
@@ -181,13 +183,13 @@ class QuestionReader(NodeReader):
             if self.is_factor(factor, entry.key.position, what):
                 items = entry.value.items if isinstance(entry.value, Sequence) else (entry.value,)
                 if not items:
-                    self.problems.add(f"{what}: {key!r} gives no level of {factor}", entry.value.position)
+                    self.problems.add(f"{what}: {key!r} lists no level of {factor}", entry.value.position)
                 levels = (self.level(factor, item, what) for item in items)
                 found[factor] = tuple(dict.fromkeys(level[0] for level in levels if level is not None))
         return found
 
     def level(self, factor: str, node: Node, what: str) -> tuple[Factor] | None:
-        """The level that is meant, as the table holds it."""
+        """The level that a node names, as the table holds it."""
         known = levels_of(self.dimensions, factor)
         value = as_factor(node, self.kinds[factor]) if isinstance(node, (Scalar, Sequence)) else ""
         is_number = self.kinds[factor] == "float" and isinstance(value, (int, float)) and not isinstance(value, bool)
@@ -197,7 +199,7 @@ class QuestionReader(NodeReader):
         for each in known:  # 70 % need not be 0.7 in the last digit
             if is_number and math.isclose(float(each or 0), float(value or 0), rel_tol=1e-9):
                 return (each,)
-        shown = node.text if isinstance(node, Scalar) else "what stands here"
+        shown = node.text if isinstance(node, Scalar) else "[...]" if isinstance(node, Sequence) else "{...}"
         texts = [shown_level(each) for each in known]
         guess = did_you_mean(shown, texts) if self.kinds[factor] == "text" else ""
         hint = f"its levels: {', '.join(texts[:20])}{', ...' if len(texts) > 20 else ''}"
@@ -208,24 +210,26 @@ class QuestionReader(NodeReader):
         """Whether the study varies it; a problem otherwise."""
         if name in self.kinds:
             return True
-        message = f"{what}: {name!r} is nothing that the study varies{did_you_mean(name, self.kinds)}"
-        self.problems.add(message, position, f"what it varies: {', '.join(self.kinds) or 'nothing'}")
+        message = f"{what}: the study does not vary {name!r}{did_you_mean(name, self.kinds)}"
+        self.problems.add(message, position, f"it varies: {', '.join(self.kinds) or 'nothing'}")
         return False
 
     def trend(self, node: Node, what: str, key: str) -> str:
-        """A factor in whose order something happens; for ``per`` it is one of numbers."""
+        """A factor whose levels have an order; for ``per`` they must be numbers."""
         name = self.text(node, what)
         if name is None or not self.is_factor(name, node.position, what):
             return ""
         if key == "per" and self.kinds[name] not in ("int", "float"):
-            self.problems.add(f"{what}: the levels of {name} are no numbers: there is no slope over it", node.position)
+            self.problems.add(
+                f"{what}: the levels of {name} are not numbers, so there is no slope over it", node.position
+            )
         size = next(dimension.size for dimension in self.dimensions if name in dimension.columns)
         if len(levels_of(self.dimensions, name)) < size:
-            self.problems.add(f"{what}: {name} takes a value more than once, so that it has no order", node.position)
+            self.problems.add(f"{what}: {name} takes a value more than once, so it has no order", node.position)
         return name
 
     def compares(self, claim: Claim) -> None:
-        """A claim is about something: there is more than one level to compare."""
+        """Check that a claim has more than one level to compare."""
         what, position = f"claim {claim.name}", claim.position
         if claim.form in (RISES, FALLS):
             homes = [
@@ -234,16 +238,16 @@ class QuestionReader(NodeReader):
                 if name
             ]
             if len(homes) == 2 and homes[0] is homes[1]:
-                self.problems.add(f"{what}: {claim.over} and {claim.per} do not vary one without the other", position)
+                self.problems.add(f"{what}: {claim.over} and {claim.per} always vary together", position)
             names = (claim.over, claim.per) if claim.per else (claim.over,)
             for name in names:
                 if len(set(claim.where.get(name, levels_of(self.dimensions, name)))) < 2:
-                    self.problems.add(f"{what}: there is one level of {name} alone, and nothing to compare", position)
+                    self.problems.add(f"{what}: {name} has only one level, so there is nothing to compare", position)
         elif claim.form in (LESS, GREATER):
             for key, selection in (("at", claim.at), ("than", claim.than or {})):
                 for name, levels in selection.items():
                     if not set(levels) <= set(claim.where.get(name, levels)):
-                        self.problems.add(f"{what}: 'where' leaves out a level of {name} that {key!r} names", position)
+                        self.problems.add(f"{what}: 'where' excludes a level of {name} that {key!r} names", position)
             if claim.than is None and all(
                 set(levels) >= set(claim.where.get(name, levels_of(self.dimensions, name)))
                 for name, levels in claim.at.items()
@@ -262,13 +266,13 @@ class QuestionReader(NodeReader):
             return None
         aims = [key for key in ("least", "greatest") if key in entries]
         if "choose" not in entries or len(aims) != 1:
-            message = "guideline does not say which factor to choose, and what is to be least or greatest"
+            message = "guideline needs 'choose' and either 'least' or 'greatest'"
             self.problems.add(message, entry.key.position, "write {choose: servers, least: mean_wait}")
             return None
         said = GUIDELINE.values(self, entries, "guideline", entry.key.position)
         name, at = said.get("choose"), entries["choose"].value.position
         if name and self.is_factor(name, at, "guideline") and len(levels_of(self.dimensions, name)) < 2:
-            self.problems.add(f"guideline: there is one level of {name} alone, and nothing to choose", at)
+            self.problems.add(f"guideline: {name} has only one level, so there is nothing to choose", at)
         if len(self.problems) > before:
             return None
         return Guideline(said["choose"], said[aims[0]], aims[0] == "greatest", said.get("tolerance", 0.0))
@@ -295,7 +299,7 @@ _TREND = "Metrics whose mean, or slope per unit of another factor, {} over the l
 CLAIM = Construct(
     "A hypothesis on the results.",
     {
-        "doc": Key(TEXT, "What is claimed, in words."),
+        "doc": Key(TEXT, "The claim in words."),
         LESS: Key(_METRICS, "Metrics whose mean is less at some levels than at others.", "{what}"),
         GREATER: Key(_METRICS, "Metrics whose mean is greater at some levels than at others.", "{what}"),
         RISES: Key(_METRICS, _TREND.format(RISES), "{what}"),
@@ -307,10 +311,10 @@ CLAIM = Construct(
         "than": _levels("than", "What they are compared with (default: all other levels, so that these are the best)."),
         "over": _trend("over", "The factor over which something rises or falls."),
         "per": _trend("per", "What rises or falls is the slope over this factor."),
-        "where": _levels("where", "The levels to which the claim is confined (default: all)."),
+        "where": _levels("where", "The levels to which the claim is restricted (default: all)."),
         "share": Key(
             number(float, 0.5, 1.0),
-            "In how many of the comparisons, or runs, it is to hold (default: 1, in all).",
+            "The share of the comparisons, or runs, in which it must hold (default: 1, all).",
             "{what}: share",
         ),
     },
@@ -322,12 +326,14 @@ GUIDELINE = Construct(
     {
         "choose": Key(
             TEXT.described(_TEXT),
-            "The factor whose best level is wanted, for every combination of the others.",
+            "The factor whose best level is to be found, for every combination of the others.",
         ),
-        "least": Key(AT.described(ref("name")), "The metric that is to be least."),
-        "greatest": Key(AT.described(ref("name")), "The metric that is to be greatest."),
+        "least": Key(AT.described(ref("name")), "The metric to minimise."),
+        "greatest": Key(AT.described(ref("name")), "The metric to maximise."),
         "tolerance": Key(
-            number(float, 0.0), "How much worse than the best is good enough (default: 0).", "guideline: tolerance"
+            number(float, 0.0),
+            "How much worse than the best is still good enough (default: 0).",
+            "guideline: tolerance",
         ),
     },
     type="object",

@@ -1,8 +1,8 @@
-"""A JSON Schema of model files, disturbances and studies, made from what is declared: the language's keys and types.
+"""A JSON Schema of model files, disturbances and studies, made from the declared keys and types of the language.
 
-An editor's YAML language server completes, explains and checks with it while somebody types.  It knows one file at a
-time: what it refuses, ``epicycle validate`` refuses too, but not the other way round.  Wherever a value may be
-computed, a text with ``${...}`` in it passes.  Regular expressions keep to what Python and ECMAScript understand alike.
+An editor's YAML language server uses it to complete, explain and check while you type.  It sees one file at a time:
+``epicycle validate`` refuses everything that it refuses, and more.  Wherever a value may be computed, a text with
+``${...}`` in it passes.  Regular expressions mean the same in Python and ECMAScript.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ from .questions import CLAIM, GUIDELINE
 from .study import METRIC as METRIC_OF_STUDY
 from .study import STUDY, UNTIL
 
-# What has keys of its own, for a reference.
+# The constructs with keys of their own, for a reference.
 CONSTRUCTS = {
     "A model": MODEL,
     "A file of composite classes": LIBRARY,
@@ -60,7 +60,7 @@ CONSTRUCTS = {
     "The director of the model": MODEL_DIRECTOR,
     "A connection": CONNECTION,
     "A pointcut": POINTCUT,
-    "Beside the parameters of an actor or aspect": Construct("", BESIDE),
+    "Besides the parameters of an actor or aspect": Construct("", BESIDE),
     "A run": RUN,
     "A monitor": MONITOR,
     "A disturbance": DISTURBANCE,
@@ -88,7 +88,10 @@ def json_schema(
     }
     parts = parts_of([cls for known in types.values() for cls in known.values()])
     definitions: Schema = {
-        "name": {"type": "string", **looks_like(f"^{NAME}$", "a name has letters, digits and _, no digit first")},
+        "name": {
+            "type": "string",
+            **looks_like(f"^{NAME}$", "a name has letters, digits and _, and does not start with a digit"),
+        },
         "text": LABEL,
         "texts": one_or_more({"type": "string"}),
         "expression": {"type": "string", "pattern": EXPRESSION},
@@ -138,7 +141,7 @@ def json_schema(
             "then": DISTURBANCE.schema,
             "else": {
                 **MODEL.schema,
-                # Without a name it is a file to be included, which has composites only.
+                # Without a name, it is a file to be included, which has only composites.
                 "dependentRequired": {key: ["model"] for key in model_only if key != "model"},
             },
         },
@@ -151,15 +154,15 @@ def schema_text(schema: Schema) -> str:
 
 
 def _beside(kind: str) -> Schema:
-    """What stands beside the parameters of an actor, aspect or figure."""
+    """The keys besides the parameters of an actor, aspect or figure."""
     return {key: BESIDE[key].schema for key in sorted(RESERVED[kind.removeprefix("study_")] - {"type"})}
 
 
 def _changed(kind: str) -> Schema:
-    """What may stand for an actor or aspect in a class that extends another."""
+    """The schema of an actor or aspect in a class that extends another."""
     return {
         "type": ["object", "null"],
-        "description": f"A new {kind}, what is to change of an inherited one, or null to do without it.",
+        "description": f"A new {kind}, changes to an inherited one, or null to remove it.",
         "properties": {"type": {"type": "string"}, **_beside(kind)},
     }
 
@@ -169,7 +172,7 @@ def _choice(types: Mapping[str, type]) -> Schema:
 
 
 def _by_type(types: Mapping[str, type], prefix: str) -> list[Schema]:
-    """What else holds, depending on the type."""
+    """The conditions that depend on the type."""
     return [
         {"if": {"properties": {"type": {"const": name}}, "required": ["type"]}, "then": ref(f"{prefix}.{name}")}
         for name in types
@@ -211,7 +214,7 @@ def _type(name: str, cls: type, kind: str) -> Schema:
         "description": doc_of(cls),
         "properties": {
             "type": {"const": name},
-            **dict.fromkeys(_beside(kind), True),  # whose rules stand where the type does
+            **dict.fromkeys(_beside(kind), True),  # whose rules are where the type is
             **{key: {**schema_of(parameter), "description": about(parameter)} for key, parameter in declared.items()},
         },
         "required": [key for key, parameter in declared.items() if parameter.required and not parameter.differs],

@@ -1,6 +1,4 @@
-"""What is said about a model from outside: ``--set path=value``, ``--overrides file``, ``--aspect name=Type,...``,
-``--without name``.
-"""
+"""Settings from outside: ``--set path=value``, ``--overrides file``, ``--aspect name=Type,...``, ``--without name``."""
 
 from __future__ import annotations
 
@@ -48,13 +46,13 @@ class Setting:
 
 
 class Settings:
-    """All that is set from outside, in the order in which it counts: the last one that fits a parameter wins."""
+    """All settings from outside, in order of precedence: the last one that matches a parameter wins."""
 
     def __init__(self, settings: Iterable[Setting] = (), limits: Limits = NORMAL) -> None:
         self._all = list(settings)
         self._used: set[int] = set()
-        # An overrides file may name thousands of paths: only patterns are tried one after the other, and of these only
-        # those that ask for a name that the path has, the one that fewest paths will have.
+        # An overrides file may name thousands of paths.  Only patterns are tried one by one, and only if the path has
+        # the name in the pattern that the fewest paths are likely to have.
         self._exact: dict[str, list[int]] = {}
         self._patterns: dict[str, list[int]] = {}
         self._comparisons = Comparisons(limits.comparisons)
@@ -67,7 +65,7 @@ class Settings:
                 self._exact.setdefault(setting.path, []).append(number)
 
     def find(self, full: str) -> Setting | None:
-        """The setting for the parameter at this path; all that fit are marked as used.  Raises ``TooManyError``."""
+        """The setting for the parameter at this path; all that match are marked as used.  Raises ``TooManyError``."""
         found = self._exact.get(full, [])
         if self._patterns:
             likely = [number for name in ("", *names_of(full)) for number in self._patterns.get(name, ())]
@@ -78,12 +76,12 @@ class Settings:
 
     @property
     def position(self) -> Position | None:
-        """Where the first of the patterns stands."""
+        """Where the first of the patterns is."""
         numbers = [number for each in self._patterns.values() for number in each]
         return self._all[min(numbers)].position if numbers else None
 
     def unused(self) -> list[Setting]:
-        """Those that no parameter has taken."""
+        """The settings that no parameter has taken."""
         return [setting for number, setting in enumerate(self._all) if number not in self._used]
 
 
@@ -100,7 +98,7 @@ def read_overrides(path: Path, problems: Problems) -> list[Setting]:
 
 
 def settings_like(example: str) -> Shape:
-    """A mapping from paths or patterns to values; an example of a line is for those who write something else."""
+    """A mapping from paths or patterns to values; for anything else, ``example`` is the advice."""
 
     def read_settings(reader: NodeReader, node: Node, what: str) -> tuple[Setting, ...]:
         if isinstance(node, Mapping):
@@ -123,11 +121,11 @@ def settings_in(node: Mapping, problems: Problems) -> list[Setting]:
 
 
 def is_pattern(path: str, position: Position, problems: Problems) -> bool:
-    """Whether a text names parameters, alone or by a pattern; if not, that is noted."""
+    """Whether a text names parameters, singly or by a pattern; if not, that is reported."""
     try:
         check_pattern(path)
     except PatternError as error:
-        problems.add(f"{path!r} is no parameter path: {error}", position)
+        problems.add(f"{path!r} is not a parameter path: {error}", position)
         return False
     return True
 
@@ -148,15 +146,15 @@ def parse_setting(text: str, problems: Problems) -> Setting | None:
 
 
 def _in_option(option: str, start: int, length: int | None = None) -> Position:
-    """A place on the command line: what stands in an option from ``start`` on."""
+    """A place on the command line: the part of an option from ``start`` on."""
     return Position(COMMAND_LINE, 1, start + 1, max(1, len(option) - start if length is None else length), option)
 
 
 def _value(text: str, option: str, offset: int, problems: Problems) -> Node | None:
-    """The YAML value that stands in an option from ``offset`` on."""
+    """The YAML value in an option from ``offset`` on."""
     if not text.strip():
         return Scalar(None, "", True, _in_option(option, 0))
-    if len(option.splitlines()) > 1:  # lines and columns are those of the value, then
+    if len(option.splitlines()) > 1:  # lines and columns then count within the value
         return parse(text, COMMAND_LINE, problems)
     return parse(" " * offset + text, COMMAND_LINE, problems, option)
 
@@ -171,9 +169,9 @@ def without(text: ModelText, name: str, problems: Problems) -> ModelText:
 
 
 def change_aspect(text: ModelText, change: str, problems: Problems) -> ModelText:
-    """``name=Type,key=value,...``: the model with one more aspect, or another in the place of one that is there.
+    """``name=Type,key=value,...``: the model with a new aspect, or with an existing one replaced.
 
-    What an aspect that is replaced leaves to the new one, ``put_aspect`` says.
+    ``put_aspect`` documents what a replaced aspect leaves to the new one.
     """
     option = f"--aspect {change}"
     position = _in_option(option, 9)
@@ -208,9 +206,9 @@ def change_aspect(text: ModelText, change: str, problems: Problems) -> ModelText
 
 
 def put_aspect(text: ModelText, part: PartText) -> ModelText:
-    """The model with one more aspect, or with another in the place of the one of its name.
+    """The model with a new aspect, which replaces the one with its name.
 
-    The one that goes leaves its ports unless the new one has its own, and its parameters if the type stays the same.
+    The replaced aspect leaves its ports unless the new one has its own, and its parameters if the type stays the same.
     """
     old = text.root.aspects.get(part.name)
     if old is not None:
@@ -220,7 +218,7 @@ def put_aspect(text: ModelText, part: PartText) -> ModelText:
 
 
 def _pointcuts(value: str, option: str, offset: int) -> tuple[PointcutText, ...]:
-    """``port`` or ``[port, port]``, read without YAML, to which ``[observer[*].plan]`` would be a broken list."""
+    """``port`` or ``[port, port]``, read without YAML, where ``[observer[*].plan]`` is a broken list."""
     if value.startswith("[") and value.endswith("]"):
         value, offset = value[1:-1], offset + 1
     found = []

@@ -1,4 +1,4 @@
-"""What a study file says: the keys of a study, and what reads them, all that is misshapen told at once."""
+"""Study files: the keys of a study, and how they are read; everything malformed is reported at once."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ RESERVED = ("run", "condition", "replication", "seed", "status", "events", "dige
 
 @dataclass(frozen=True)
 class Until:
-    """Replications go on, ``batch`` by batch, until the 95 % interval of a metric's mean is narrow enough."""
+    """Replications continue, ``batch`` by batch, until the 95 % interval of a metric's mean is narrow enough."""
 
     metric: str
     position: Position
@@ -38,7 +38,7 @@ class Until:
 
 @dataclass(frozen=True)
 class Study:
-    """A model, the conditions under which it is run, and what is kept of each run; as its file says, not yet tried."""
+    """A model, the conditions under which it is run, and what is kept of each run, as its file declares it."""
 
     name: str
     path: Path
@@ -59,14 +59,14 @@ class Study:
 
     @property
     def factors(self) -> dict[str, str]:
-        """The columns of the table that say what was varied, and what they hold."""
+        """The columns of the table that show what was varied, and what they hold."""
         return {name: kind for dimension in self.dimensions for name, kind in dimension.columns.items()}
 
 
 def is_study(path: Path) -> bool:
-    """Whether a file says that it is a study."""
+    """Whether a file declares a study."""
     with suppress(OSError):
-        # A large model need not be read twice; what is no file, or too large, is told when it is read.
+        # A large model need not be read twice; a missing or oversized file is reported when it is read.
         if path.is_file() and path.stat().st_size <= LARGE and b"study" not in path.read_bytes():
             return False
     node = read(path, Problems())
@@ -81,7 +81,7 @@ def read_study(
     replications: int | None = None,
     seed: int | None = None,
 ) -> Study:
-    """The study of a file; raises ``ModelError`` with all that is wrong with what it says."""
+    """The study of a file; raises ``ModelError`` with everything that is wrong with its contents."""
     problems = Problems()
     path = find(str(name), "study", problems)
     node = None if path is None else read(path, problems)
@@ -101,7 +101,7 @@ def study_of_text(
     seed: int | None = None,
     lender: tuple[str, str] | None = None,
 ) -> Study:
-    """The study that a text says, which once was read from ``path``; the files that it names may be gone.
+    """The study in a text that was once read from ``path``; the files that it names may no longer exist.
 
     ``lender``: file and text of the study that its claims are from.
     """
@@ -114,14 +114,14 @@ def study_of_text(
 
 
 class _StudyReader(NodeReader):
-    """Reads one study file; whatever is misshapen is added to ``problems`` and left out."""
+    """Reads one study file; anything malformed is added to ``problems`` and left out."""
 
     def __init__(
         self, problems: Problems, path: Path, lender: tuple[str, str] | None = None, *, asks_for_files: bool = True
     ) -> None:
         super().__init__(problems)
         self.path = path
-        self.asks_for_files = asks_for_files  # whether what is named has to be there
+        self.asks_for_files = asks_for_files  # whether what is named must exist
         self.lender = lender  # file and text of the study whose claims are judged here, if they are known
 
     def changed(
@@ -133,12 +133,12 @@ class _StudyReader(NodeReader):
         replications: int | None,
         seed: int | None,
     ) -> Study:
-        """The whole file, with what is said from outside; raises ``ModelError``."""
+        """The whole file, with the settings from outside; raises ``ModelError``."""
         study, changes = self.problems.whole(self.study(node, text)), tuple(set)
         settings = [each for change in changes if (each := parse_setting(change, self.problems)) is not None]
         for each in settings:
             if each.path in study.factors:
-                message = f"{each.position.source}: {each.path} is what the study varies"
+                message = f"{each.position.source}: the study varies {each.path}"
                 self.problems.add(message, None, "change it in the study")
         self.problems.raise_if_any()
         return replace(
@@ -157,14 +157,14 @@ class _StudyReader(NodeReader):
             and node.entries.keys() & {"actors", "disturbance"}
         ):
             self.problems.add(
-                f"{self.path} is no study", node.position, "a study begins with a line like 'study: my_study'"
+                f"{self.path} is not a study", node.position, "a study begins with a line like 'study: my_study'"
             )
             return None
         entries = STUDY.entries(self, node, "the study")
         if entries is None:
             return None
         said = STUDY.values(self, entries, "the study", node.position)
-        said.pop("claims", None), said.pop("guideline", None)  # which are read when all else is known
+        said.pop("claims", None), said.pop("guideline", None)  # which are read when everything else is known
         said["dimensions"] = (*said.get("dimensions", ()), *said.pop("disturb", ()))
         study = Study(said.pop("name", "study"), self.path, text, said.pop("model", ""), **said)
         before = len(self.problems)
@@ -175,7 +175,7 @@ class _StudyReader(NodeReader):
         return replace(study, questions=reader.questions(entries, self.lender))
 
     def factors_of(self, node: Node, path: Path, problems: Problems) -> dict[str, str]:
-        """What another study varies, whose claims this one judges."""
+        """What another study varies; this study judges its claims."""
         reader = _StudyReader(problems, path, asks_for_files=self.asks_for_files)
         found = reader.study(without(node, "claims", "guideline"), "")
         return {} if found is None else found.factors
@@ -183,7 +183,7 @@ class _StudyReader(NodeReader):
     # -- values ---------------------------------------------------------------------------------------------------
 
     def model(self, node: Node, what: str) -> str:
-        """A packaged model's name, or a file's name as seen from the study's folder."""
+        """A packaged model's name, or a file's name relative to the study's folder."""
         name = self.text(node, what) or ""
         if is_path(name):
             file = self.path.parent / name
@@ -199,7 +199,7 @@ class _StudyReader(NodeReader):
         return name
 
     def disturb(self, node: Node, what: str) -> list[Dimension]:
-        """Variants by name, ``{none: [], wifi: wifi_burst}``, or a list in which each is a variant of its own."""
+        """Variants by name, ``{none: [], wifi: wifi_burst}``, or a list in which each entry is a variant."""
         if isinstance(node, Mapping):
             variants = {name: self.texts(each.value, "a disturbance") for name, each in node.entries.items()}
         else:
@@ -252,24 +252,26 @@ class _StudyReader(NodeReader):
             return None
         least = said.get("batch", 10)
         at_most = None
-        if (given := said.pop("at_most", None)) is not None:  # no less than a batch
+        if (given := said.pop("at_most", None)) is not None:  # at least one batch
             at_most = number(int, least, MAX_REPLICATIONS).read(self, given, "at_most")
         metric, at = said.pop("metric", ""), entries["metric"].value.position
         return Until(metric, at, **said, at_most=at_most or max(1000, least))
 
     def columns(self, study: Study) -> None:
-        """Every column of the table has a name of its own."""
+        """Check that every column of the table has a unique name."""
         seen: dict[str, Position] = {}
         for dimension in study.dimensions:
             for name in dimension.columns:
                 if name in RESERVED or name in seen:
-                    reason = "the table has a column of that name" if name in RESERVED else "it is varied twice"
+                    reason = (
+                        "the table already has a column with that name" if name in RESERVED else "it is varied twice"
+                    )
                     self.problems.add(f"{name!r} cannot be varied: {reason}", dimension.position)
                 seen[name] = dimension.position
         for metric in study.metrics or ():
             assert metric.node is not None
             if metric.name in RESERVED or metric.name in seen:
-                message = f"a metric cannot be called {metric.name!r}: the table has such a column already"
+                message = f"a metric cannot be called {metric.name!r}: the table already has a column with that name"
                 self.problems.add(message, metric.node.position, "give it another name: metrics: {name: expression}")
             seen[metric.name] = metric.node.position
 
@@ -278,30 +280,31 @@ _HAS_NO = ("{what} has no {key!r}", "write {{metric: mean_wait, half_width: 0.1,
 UNTIL = Construct(
     "",
     {
-        "metric": Key(TEXT.described(ref("name")), "The metric whose mean is wanted.", missing=_HAS_NO),
+        "metric": Key(TEXT.described(ref("name")), "The metric whose mean is estimated.", missing=_HAS_NO),
         "half_width": Key(
-            number(float, 0.0), "Half the width of its 95 % interval that is narrow enough.", missing=_HAS_NO
+            number(float, 0.0), "Half the width of its 95 % interval at which replications stop.", missing=_HAS_NO
         ),
-        "batch": Key(number(int, 2, MAX_REPLICATIONS), "How many replications are made at a time (default: 10)."),
+        "batch": Key(number(int, 2, MAX_REPLICATIONS), "The number of replications made at a time (default: 10)."),
         "at_most": Key(
-            node_as(number(int, 2, MAX_REPLICATIONS).schema), "The most replications of a condition (default: 1000)."
+            node_as(number(int, 2, MAX_REPLICATIONS).schema),
+            "The maximum number of replications of a condition (default: 1000).",
         ),
     },
     type="object",
     required=["metric", "half_width"],
 )
 METRIC = Construct(
-    "A number that is kept of each run.",
+    "A number that is kept for each run.",
     {
         "value": Key(
             node_as(LABEL),
-            "The expression, over metrics of the model and what else a run tells.",
+            "The expression, over metrics of the model and other results of a run.",
             missing=("{what} has no value", "add 'value: ...', an expression"),
         ),
-        "unit": Key(TEXT, "What it counts in; a metric of the model has its own."),
-        "to": Key(TEXT, "The unit in which the table holds it (default: the same)."),
+        "unit": Key(TEXT, "Its unit; a metric of the model has its own."),
+        "to": Key(TEXT, "Its unit in the table (default: the same)."),
         "doc": Key(TEXT, "What it is."),
-        "label": Key(TEXT, "What it is called in figures and reports (default: what the model says, or its name)."),
+        "label": Key(TEXT, "Its label in figures and reports (default: the model's label, or its name)."),
     },
     type="object",
     required=["value"],
@@ -318,12 +321,12 @@ STUDY = Construct(
             missing=("the study has no name", "add a line like 'study: my_study'"),
             name="name",
         ),
-        "doc": Key(TEXT, "What it is to find out."),
+        "doc": Key(TEXT, "The question that it answers."),
         "model": Key(
             Shape({"type": "string"}, _StudyReader.model),
-            "A packaged model, or the path of a file as seen from this one.",
+            "A packaged model, or the path of a file relative to this one.",
             "the model",
-            missing=("the study does not say which model it runs", "add a line like 'model: mm1'"),
+            missing=("the study has no model", "add a line like 'model: mm1'"),
         ),
         "set": Key(
             settings_like("observer[*].sensor.range: 5 m"),
@@ -331,22 +334,22 @@ STUDY = Construct(
             name="fixed",
         ),
         "vary": Key(
-            DIMENSIONS, "What is varied; every value goes together with every one of the others.", name="dimensions"
+            DIMENSIONS, "What is varied; every value is combined with every value of the others.", name="dimensions"
         ),
         "disturb": Key(
             Shape(_DISTURB, _StudyReader.disturb),
-            "Disturbances as one more dimension: 'name: [disturbance, ...]', or a list of single ones.",
+            "Disturbances as another dimension: 'name: [disturbance, ...]', or a list of single ones.",
         ),
-        "replications": Key(number(int, 1, MAX_REPLICATIONS), "How many runs each condition has (default: 1)."),
+        "replications": Key(number(int, 1, MAX_REPLICATIONS), "The number of runs of each condition (default: 1)."),
         "seed": Key(number(int, 0, MAX_STUDY_SEED), "The seed of the first replication (default: 0)."),
         "paired": Key(FLAG, "Whether a replication has the same seed in all conditions (default: true)."),
         "until": Key(
             Shape(UNTIL.schema, _StudyReader.until),
-            "How many replications each condition gets, in place of a fixed number.",
+            "When the replications of each condition stop, instead of a fixed number of them.",
         ),
         "metrics": Key(
             Shape(_METRICS, _StudyReader.metrics),
-            "What is kept of each run: names of the model's metrics, or 'name: expression', or "
+            "What is kept for each run: names of the model's metrics, or 'name: expression', or "
             "'name: {value, unit, ...}'.",
         ),
         "claims": Key(CLAIMS, "Hypotheses on the results, by name; or the study whose claims are judged here, too."),

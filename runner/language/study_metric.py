@@ -1,4 +1,4 @@
-"""What a study keeps of each run: metrics of the model, and expressions over them, aspects' figures and signals."""
+"""What a study keeps for each run: metrics of the model, and expressions over them, aspects' figures and signals."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from epicycle.actors.expression import ExpressionError, Formula
 from ..text import Position, Problems, Scalar, inside
 
 ASPECTS, SIGNALS = "aspects", "signals"
-NUMBERS = ("end", "events", "firings")  # what else of the results an expression knows
+NUMBERS = ("end", "events", "firings")  # the other results that an expression knows
 
 
 @dataclass(frozen=True)
 class StudyMetric:
-    """A column of the table, filled by an expression; the name of a metric of the model is one already.
+    """A column of the table, filled by an expression, such as the name of a metric of the model.
 
     In an expression, ``aspects['packet_loss']['dropped']`` is what an aspect reports, and ``signals['server.size']`` a
     recorded signal as ``{'time': [...], 'value': [...]}``; ``end``, ``events`` and ``firings`` are those of the run.
@@ -25,9 +25,9 @@ class StudyMetric:
 
     name: str
     source: str
-    node: Scalar | None = None  # where it stands; none if the study takes all metrics of its model
-    unit: str = ""  # what the expression counts in; a metric of the model has its own
-    to: str = ""  # the unit in which the table holds it, if that is another one
+    node: Scalar | None = None  # where it is declared; None if the study takes all metrics of its model
+    unit: str = ""  # the unit of the expression; a metric of the model has its own
+    to: str = ""  # its unit in the table, if that is different
     doc: str = ""
     label: str = ""
     places: dict[str, Position] = field(default_factory=dict, compare=False)  # of the unit and what follows
@@ -80,7 +80,7 @@ def checked_metric(
     said: Mapping[str, str] = MappingProxyType({}),
     places: Mapping[str, Position] = MappingProxyType({}),
 ) -> StudyMetric | None:
-    """A metric as a study file gives it; ``said`` are its unit and the like."""
+    """A metric as a study file declares it; ``said`` holds its unit and other options."""
     source = node.text
     try:
         return StudyMetric(name, source, node, **said, places=dict(places))

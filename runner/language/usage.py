@@ -1,4 +1,4 @@
-"""Parameters that are declared and never used: most often a name that is misspelled somewhere."""
+"""Parameters that are declared but never used: usually a name is misspelled somewhere."""
 
 from __future__ import annotations
 
@@ -25,13 +25,13 @@ def check_usage(
     actor_types: Mapping[str, type[Actor]],
     problems: Problems,
 ) -> None:
-    """Add a problem for every parameter of the model or of a class that no expression asks for.
+    """Add a problem for every parameter of the model or of a class that no expression uses.
 
     ``declared`` are the classes as written, ``composites`` with what they inherit.  What a base declares may be used
     by the classes that extend it.
     """
     used = {name: _names(_nodes(composite)) for name, composite in composites.items()}
-    # In the order of inheritance upwards: what a class uses counts for its base, and for the base's base.
+    # Up the order of inheritance: what a class uses counts for its base, and for the base of that.
     for name in composites:
         base = composites[name].extends
         while base is not None and base.text in composites:
@@ -46,7 +46,7 @@ def check_usage(
 
 
 def check_own_usage(composite: CompositeText, problems: Problems) -> None:
-    """Add a problem for every parameter that nothing in the same text asks for."""
+    """Add a problem for every parameter that nothing in the same text uses."""
     _add_unused(composite, composite.parameters, _names(_nodes(composite)), {}, {}, problems)
 
 
@@ -60,7 +60,7 @@ def _add_unused(
 ) -> None:
     unused = [name for name in parameters if name not in used]
     strange = sorted(used - composite.parameters.keys())[:_MAX_STRANGE]
-    misspelled = {nearest(each, unused) for each in strange}  # which is told where they stand
+    misspelled = {nearest(each, unused) for each in strange}  # which is reported where they are
     for name in unused:
         if name in misspelled:
             continue
@@ -73,7 +73,7 @@ def _add_unused(
         problems.add(
             f"{composite.name}: nothing uses the parameter {name!r}",
             composite.parameters[name].position,
-            *(hints or [f"write ${{{name}}} where it is meant, or leave it out"]),
+            *(hints or [f"write ${{{name}}} where its value belongs, or remove it"]),
         )
 
 
@@ -89,7 +89,7 @@ def _parameters(
 
 
 def _nodes(part: object) -> Iterator[Node]:
-    """Every node in which an expression may stand, of what has been declared."""
+    """Every node of the declarations that may contain an expression."""
     waiting = [part]
     while waiting:  # by class, not by pattern: a model may have a hundred thousand parts
         each: Any = waiting.pop()
@@ -110,7 +110,7 @@ def _nodes(part: object) -> Iterator[Node]:
 
 
 def _names(nodes: Iterable[Node]) -> frozenset[str]:
-    """The names that expressions ask for, at any depth; what is wrong with an expression is reported elsewhere."""
+    """The names that expressions use, at any depth; what is wrong with an expression is reported elsewhere."""
     found: set[str] = set()
     waiting = list(nodes)
     while waiting:
@@ -120,7 +120,7 @@ def _names(nodes: Iterable[Node]) -> frozenset[str]:
                 try:
                     found |= names_in(node.value)
                 except ExpressionError:
-                    found |= set(_WORD.findall(node.value))  # what it would ask for, were it right
+                    found |= set(_WORD.findall(node.value))  # what it would use if it were right
         else:
             waiting += node.items if isinstance(node, Sequence) else (each.value for each in node.entries.values())
     return frozenset(found)

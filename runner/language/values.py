@@ -15,7 +15,7 @@ MAX_STEPS = 500_000
 
 
 class _Missing:
-    """Stands for a value whose problem has been told already; expressions that use it are not evaluated."""
+    """Replaces a value whose problem has already been reported; expressions that use it are not evaluated."""
 
 
 class Values:
@@ -26,14 +26,14 @@ class Values:
     def __init__(self, problems: Problems, budget: Budget | None = None) -> None:
         self.problems = problems
         self.budget = budget or Budget(MAX_STEPS, "the values of the model take")
-        self.outside: dict[str, object] = {}  # the names that a value knows which is set from outside: none
-        self.of_model: Container[str] = ()  # the model's own parameters, which composites do not see
+        self.outside: dict[str, object] = {}  # the names known to a value that is set from outside: none
+        self.of_model: Container[str] = ()  # the model's parameters, which composites do not see
 
     def of(self, node: Node, names: dict[str, object], label: str, scope: str = "", later: Collection[str] = ()) -> Any:
         """The value of a node, or ``missing``.
 
-        ``label`` is whose value it is, ``scope`` the composite in which it stands; ``later`` are the names that are
-        declared but have no value yet.
+        ``label`` names its owner, ``scope`` the composite that contains it; ``later`` are the names that are declared
+        but have no value yet.
         """
         value = self._of(node, names, label, scope, later)
         if not isinstance(node, Scalar) and is_too_deep(value):
@@ -57,9 +57,9 @@ class Values:
             if any(name not in names and name not in later for name in asked):
                 check_names(node.value, {*names, *(name for name in asked if name in later)})
             if any(names.get(name) is self.missing for name in asked):
-                return self.missing  # what is wrong with that name has been told
+                return self.missing  # the problem of that name has been reported
             if early := sorted(name for name in asked if name in later and name not in names):
-                message = f"{label}: {early[0]!r} has no value yet: a default may use the parameters above it only"
+                message = f"{label}: {early[0]!r} has no value yet: a default may use only the parameters above it"
                 self.problems.add(message, node.position, f"declare {early[0]!r} further up", scope=scope)
                 return self.missing
             value = interpolate(node.value, {name: names[name] for name in asked if name in names}, self.budget)
@@ -75,14 +75,14 @@ class Values:
         return value
 
     def _pay(self, node: Node, steps: int, label: str, scope: str) -> None:
-        """Take steps off what all values may cost together; when that is spent, there is no going on."""
+        """Deduct steps from what all values may cost together; once that is spent, loading stops."""
         try:
             self.budget.spend(steps)
         except BudgetError as error:
             self.problems.stop(f"{label}: {error}", node.position, scope=scope)
 
     def _unseen(self, text: str, names: Container[str]) -> tuple[str, ...]:
-        """What to do about a name of the model's that is not known inside a composite, or outside of the model."""
+        """What to do about a name of the model that is not known inside a composite, or outside the model."""
         try:
             unseen = sorted(name for name in names_in(text) if name not in names and name in self.of_model)
         except ExpressionError:
@@ -90,8 +90,8 @@ class Values:
         if not unseen:
             return ()
         if names is self.outside:
-            return ("what is set from outside knows no names of the model: write out its value",)
-        return (f"a composite knows its own parameters only: declare {unseen[0]!r} there, and hand it down",)
+            return ("a value set from outside cannot use names of the model: write the value itself",)
+        return (f"a composite knows only its own parameters: declare {unseen[0]!r} there and pass its value",)
 
     def declared(self, full: str, parameter: ParameterText, value: Any, position: Position, scope: str = "") -> Any:
         """A value for a parameter that a model or composite declares, converted to its unit and checked."""
@@ -119,7 +119,7 @@ class Values:
         return _each(self._reader(parameter, literal), value)
 
     def _reader(self, parameter: ParameterText, default: object) -> Callable[[Any], Any]:
-        """What makes a value, or each one in a list, what the parameter holds."""
+        """The conversion of a value, or of each one in a list, to what the parameter holds."""
         if parameter.choices:
             return Parameter(str, choices=parameter.choices).convert
         bounds: dict[str, Any] = {"min": parameter.min, "max": parameter.max}
@@ -149,7 +149,7 @@ def _quantity(number: float | None, unit: str) -> Quantity | None:
     if number is None:
         return None
     made = Quantity(number, unit)
-    made.si  # noqa: B018  raises what would be raised wherever it counts in SI units
+    made.si  # noqa: B018  raises any error of the conversion to SI units
     return made
 
 

@@ -1,6 +1,6 @@
 """Properties over time: their text, and whether signals have them.
 
-``property_of`` reads one.  A ``Judge`` is given the signals of its conditions; it says as soon as it can whether it holds.
+``property_of`` reads one.  A ``Judge`` is given the signals of its conditions, and says whether it holds once it can.
 """
 
 from .judge import Finding, Judge

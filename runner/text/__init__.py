@@ -1,4 +1,4 @@
-"""Positioned text: YAML as nodes that know where they stand, problems with places, and limits; it knows no language."""
+"""Positioned text: YAML as nodes with positions, problems with places, and limits; it does not know the language."""
 
 from epicycle.actors import did_you_mean, nearest
 

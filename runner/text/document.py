@@ -1,8 +1,7 @@
-"""YAML text -> nodes that know where they stand: the first step from a model file to a graph.
+"""YAML text -> nodes with positions: the first step from a model file to a graph.
 
-The language is YAML 1.2 with the core schema and nothing that surprises: no tags that build objects, no merge
-keys, no duplicate keys, only text as keys. Everything that is wrong is noted, not raised, so that one run
-shows it all.
+The language is YAML 1.2 with the core schema and no surprises: no tags that build objects, no merge keys, no duplicate
+keys, only text as keys.  Problems are noted, not raised, so that one run shows all of them.
 """
 
 import dataclasses
@@ -30,14 +29,14 @@ from .problems import Position, Problems
 from .scalars import SCALAR_TAGS, TAG_PREFIX, Value, resolve, short
 
 MAX_BYTES = 10_000_000
-MAX_NODES = 200_000  # with each alias counted as often as it is used
+MAX_NODES = 200_000  # counting each alias as often as it is used
 
 _LOADER: type[yaml.CSafeLoader] | type[yaml.SafeLoader] = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 
 @dataclass(frozen=True, slots=True)
 class Scalar:
-    """A single value; `text` is as written, without quotes, and `plain` says that there were none."""
+    """A single value; `text` is as written, without quotes, and `plain` means that it had none."""
 
     value: Value
     text: str
@@ -71,7 +70,7 @@ Node: TypeAlias = Scalar | Sequence | Mapping
 
 
 def read(path: Path, problems: Problems, shown_as: str | None = None) -> Node | None:
-    """Read a YAML file; None if nothing can be made of it. `shown_as` is its name in messages."""
+    """Read a YAML file; None if it cannot be parsed. `shown_as` is its name in messages."""
     name = str(path) if shown_as is None else shown_as
     try:
         if not path.exists():
@@ -98,9 +97,9 @@ def read(path: Path, problems: Problems, shown_as: str | None = None) -> Node | 
 
 
 def parse(text: str, name: str, problems: Problems, shown_as: str | None = None) -> Node | None:
-    """Turn YAML text into nodes; None if nothing can be made of it.
+    """Turn YAML text into nodes; None if it cannot be parsed.
 
-    `name` is the file in messages, `shown_as` the line in which a text of one line stands.
+    `name` is the file in messages, `shown_as` the line that contains a text of one line.
     """
     if len(text) > MAX_BYTES:
         problems.add(_too_large(name))
@@ -157,8 +156,8 @@ _HELP_FOR_SYNTAX: Final = (
     ("did not find expected ',' or", "a bracket is not closed, or a comma is missing"),
     ("found unexpected end of stream", "a quote is not closed"),
     ("did not find expected key", "check the indentation, and that brackets and quotes are closed"),
-    ("did not find expected alphabetic", "quote a text that has [*] or * in it"),
-    ("did not find expected '-' indicator", "check the indentation: all '-' of a list stand in one column"),
+    ("did not find expected alphabetic", "quote a text that contains [*] or *"),
+    ("did not find expected '-' indicator", "check the indentation: align all '-' of a list in one column"),
     ("could not find expected ':'", "each key needs a ':' and a space after it"),
     ("did not find expected node content", "a bracket is not closed, or a value is missing"),
 )
@@ -197,7 +196,7 @@ class _Builder:
         self._nodes = 0
 
     def build(self) -> Node | None:
-        # Few texts need the second, which takes long to compile.
+        # Few texts need the second, which is slow to compile.
         if found := (_CONTROL.search(self._text) if self._text.isascii() else re.search(_UNPRINTABLE, self._text)):
             before = _LINE_BREAK.split(self._text[: found.start()])
             at = self._at(len(before) - 1, len(before[-1]))
@@ -238,7 +237,7 @@ class _Builder:
     # --- nodes
 
     def _add(self, node: Node, weight: int, height: int, anchor: str | None = None) -> None:
-        """Hang a finished node into the list or mapping that is open."""
+        """Add a finished node to the open list or mapping."""
         if anchor is not None:
             self._anchors[anchor] = (node, weight, height)
         if not self._stack:
@@ -289,12 +288,12 @@ class _Builder:
             self._stop(f"there is no anchor &{name} before this alias{guess}", position)
         known = self._anchors[name]
         if known is None:
-            self._stop(f"the alias *{name} stands within &{name} itself", position)
+            self._stop(f"the alias *{name} is inside &{name} itself", position)
         node, weight, height = known
         self._count(weight, position)
         if len(self._stack) + height > MAX_DEPTH:
             self._stop(f"nested deeper than {MAX_DEPTH} levels by the alias *{name}", position)
-        # The node itself is reported where it is used, what is inside it where it is written.
+        # Problems of the node itself are reported where it is used, those inside it where it is written.
         self._add(dataclasses.replace(node, position=position), weight, height)
 
     def _scalar(self, event: ScalarEvent) -> Scalar:
@@ -325,16 +324,16 @@ class _Builder:
         return float(value) if kind == "float" and isinstance(value, int) else value
 
     def _checked_key(self, frame: _Frame, key: Node) -> Scalar | None:
-        """Return the key if it is one we take; else note why not."""
+        """Return the key if it is valid; otherwise report why not."""
         at = key.position
         if not isinstance(key, Scalar):
             kind = "mapping" if isinstance(key, Mapping) else "list"
             hint = "quote a text that starts with '{' or '['"
-            self._problems.add(f"a key must be text, this one is a {kind}", at, hint)
+            self._problems.add(f"a key must be text, but this one is a {kind}", at, hint)
         elif not isinstance(key.value, str):
             shown = short(key.text)
-            kind = f"{shown}, which is not text" if key.text else "empty"
-            self._problems.add(f"a key must be text, this one is {kind}", at, f"quote it: '{shown}'")
+            kind = shown if key.text else "empty"
+            self._problems.add(f"a key must be text, but this one is {kind}", at, f"quote it: '{shown}'")
         elif key.value == "<<" and key.plain:
             hint = "write the entries out, or use a composite class"
             self._problems.add("YAML 1.2 has no merge keys (<<)", at, hint)
@@ -353,7 +352,7 @@ class _Builder:
         return Position(self._name, line + 1, column + 1, max(length, 1), source)
 
     def _span(self, event: Event, *, with_properties: bool = False) -> Position:
-        """Return where an event stands: its first line only, and without anchor and tag unless asked."""
+        """Return the position of an event: its first line only, and without anchor and tag unless asked."""
         start, end = event.start_mark, event.end_mark
         assert start is not None
         assert end is not None
@@ -369,7 +368,7 @@ class _Builder:
         return Position(self._name, line + 1, column + 1, max(stop - column, 1), source)
 
     def _collection_position(self, frame: _Frame, end: CollectionEndEvent) -> Position:
-        """Return where a whole list or mapping stands: its brackets, or else its first key or dash."""
+        """Return the position of a whole list or mapping: its brackets, or else its first key or dash."""
         at = frame.position
         if not frame.event.flow_style:
             first = next(iter(frame.entries.values())).key.position if frame.entries else None
@@ -404,14 +403,14 @@ class _Builder:
         context = error.context_mark
         mark = error.problem_mark or context
         if context is not None and mark is not None and not "".join(self._lines[mark.line :]).strip():
-            mark = context  # what is missing at the end of the file is found where it was begun
+            mark = context  # what is missing at the end of the file is reported where it begins
         position = None if mark is None else self._at(mark.line, mark.column)
         if position is not None and message.startswith("did not find expected ','") and "${" in position.source:
             hints = ['within { } and [ ], quote an expression: "${...}"']
         elif position is not None and hints and _ARROW.match(position.source, position.column - 1):
             hints = ["write the ports on the left without brackets, or quote the whole connection"]
         elif position is not None and hints and _INDEXED.search(position.source):
-            hints.append('within { } and [ ], quote a text that has an index: "a[0].port"')
+            hints.append('within { } and [ ], quote a text with an index: "a[0].port"')
         if position is not None and message.startswith("found character"):
             character = position.source[position.column - 1 : position.column]
             quote = f"quote a text that starts with {character!r}"

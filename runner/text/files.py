@@ -1,4 +1,4 @@
-"""Files that a model names: found from where the name is written, and never outside of it; and what was read."""
+"""Files that a model names: relative to where the name is written, and never outside that folder; and what was read."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _noted: ContextVar[Noted | None] = ContextVar("noted", default=None)
 
 @contextmanager
 def noting() -> Iterator[Noted]:
-    """What loading models reads, filled as it goes."""
+    """What loading models reads, filled while it reads."""
     found = Noted()
     token = _noted.set(found)
     try:
@@ -49,18 +49,18 @@ def note_package(name: str, version: str) -> None:
 
 
 def data_file(name: Path, position: Position) -> Path:
-    """The file of that name; raises ``ParameterError`` if there is none, or if the model may not read it.
+    """The file with that name; raises ``ParameterError`` if there is none, or if the model may not read it.
 
     A name in a YAML file means a file in or below the folder of that YAML file, so that a model can be moved with its
-    data and cannot make us read anything else.  A name on the command line is the user's own word: it is taken from
-    the working directory and may lead anywhere.
+    data and cannot read anything else.  A name on the command line comes from the user: it is relative to the working
+    directory and may lead anywhere.
     """
     folder = Path(position.file).parent
     target = name if position.file == COMMAND_LINE else folder / name
     try:
         if position.file != COMMAND_LINE and not target.resolve().is_relative_to(folder.resolve()):
             raise ParameterError(
-                f"{str(name)!r} cannot be read: a file named in a model lies in or below the folder of its YAML file"
+                f"{str(name)!r} cannot be read: a file named in a model must be in or below the folder of its YAML file"
             )
         if target.is_file():
             if _noted.get() is not None:

@@ -1,4 +1,4 @@
-"""How large a model may be before it counts as a mistake."""
+"""The size at which a model counts as a mistake."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ MAX_SEED = 2**63 - 1
 
 
 class _ForEachActor:
-    """A limit of so many for each actor that there may be."""
+    """A limit proportional to the limit of actors."""
 
     def __init__(self, number: int) -> None:
         self.number = number
@@ -21,23 +21,21 @@ class _ForEachActor:
 class Limits:
     """``actors`` counts composites as well.
 
-    A model as large as this loads in seconds and takes about 200 MB.  A slip of the pen that asks for a million is
-    refused before it has filled the memory; who wants a million says so.
+    A model as large as this loads in seconds and takes about 200 MB.  A typing error that asks for a million is refused
+    before it fills the memory; a million must be requested explicitly.
     """
 
     actors: int = 20_000
 
     connections = _ForEachActor(5)
-    wires = _ForEachActor(10)  # ways from actor to actor, through composites
+    wires = _ForEachActor(10)  # paths from actor to actor, through composites
     watched = _ForEachActor(10)  # ports from which metrics take their numbers, a port counted for each metric
-    comparisons = _ForEachActor(250)  # of patterns with paths, once these have been chosen by the names in them
-    inherited = _ForEachActor(
-        5
-    )  # actors, aspects, connections, ports and parameters that classes take over from others
-    places = _ForEachActor(5)  # ports and actors at which aspects stand
+    comparisons = _ForEachActor(250)  # of patterns with paths, after a preselection by the names in them
+    inherited = _ForEachActor(5)  # actors, aspects, connections, ports and parameters that classes inherit
+    places = _ForEachActor(5)  # ports and actors that aspects attach to
     tokens = _ForEachActor(10)  # and acts of aspects at one tag of a run
-    times = _ForEachActor(50)  # at which something is still to come in a run
+    times = _ForEachActor(50)  # times at which something is pending in a run
 
 
 NORMAL = Limits()
-RAISE_IT = "if it is to be so large, say so: --max-actors N, or load_model(..., max_actors=N)"
+RAISE_IT = "if this is intended, raise the limit: --max-actors N, or load_model(..., max_actors=N)"

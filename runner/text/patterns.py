@@ -1,7 +1,6 @@
 """Dotted patterns over paths: ``observer[*].sensor.range``, ``*.peer_plan``, ``**.measurement``.
 
-``*`` stands for one whole segment of a path, ``name[*]`` for every instance of an array, ``**`` for any number of
-segments.
+``*`` matches one whole segment of a path, ``name[*]`` every instance of an array, ``**`` any number of segments.
 """
 
 from __future__ import annotations
@@ -18,17 +17,17 @@ _SEGMENT = re.compile(r"(\*\*|(\*|[A-Za-z_][A-Za-z0-9_]*)(\[(\*|\d{1,9})\])?)\Z"
 
 _INDEX = re.compile(r"\[\d+\]")
 MAX_PATTERN = 1_000
-_FEW = 30  # paths for which to compile a pattern does not pay
-_MANY = 5  # how often all paths are gone through before they are sorted by their names
+_FEW = 30  # paths for which compiling a pattern does not pay
+_MANY = 5  # how often all paths are scanned before they are indexed by their names
 MAX_SHOWN = 12  # names in a message
 
 
 class PatternError(ValueError):
-    """Text that is no pattern; the message says why."""
+    """Text that is not a pattern; the message says why."""
 
 
 class TooManyError(Exception):
-    """There are more patterns and paths than can be compared soon."""
+    """There are too many patterns and paths to compare in a short time."""
 
 
 class Comparisons:
@@ -44,17 +43,17 @@ class Comparisons:
 
 
 def in_general(path: str) -> str:
-    """``a[*].b`` for ``a[2].b``: what holds of one instance is said of all."""
+    """``a[*].b`` for ``a[2].b``: a message about one instance covers all of them."""
     return _INDEX.sub("[*]", path)
 
 
 def names_asked(pattern: str) -> list[str]:
-    """The segments of a pattern that a path must have, one for one: ``s[3]``, ``s[*]`` or ``s``."""
+    """The segments of a pattern that a path must have: ``s[3]``, ``s[*]`` or ``s``."""
     return [segment for segment in pattern.split(".") if not segment.startswith("*")]
 
 
 def names_of(path: str) -> set[str]:
-    """What patterns may ask for by ``names_asked``, of one path."""
+    """Everything in one path that ``names_asked`` of a pattern may contain."""
     names = set(path.split("."))
     return names | {f"{name[: name.index('[')]}[*]" for name in names if name[-1:] == "]"}
 
@@ -63,23 +62,23 @@ def names_of(path: str) -> set[str]:
 def compile_pattern(text: str) -> re.Pattern[str]:
     """The regular expression of a pattern; raises ``PatternError``."""
     check_pattern(text)
-    # What stands between two `**` is taken where it fits first, and that is final (?>...): to look for it further on
-    # could find nothing more, but might take for ever.
+    # What is between two `**` matches at the first possible place, and that is final (?>...): a later place would give
+    # no more matches, but could take for ever.
     head, *tails = ("".join(map(_expression, segments)) for segments in _split_at_doubles(text))
     expression = head + "".join(rf"(?>(?:[^.]+\.)+?{tail})" for tail in tails[:-1])
     if tails:
         expression += rf"(?:[^.]+\.)+{tails[-1]}"
-    # Every segment has got its dot; the path gets one more to match.
+    # Every segment includes its dot; the path gets one more to match.
     return re.compile(expression)
 
 
 def _expression(segment: str) -> str:
-    """The regular expression of a segment that is not ``**``, and of the dot behind it."""
+    """The regular expression of a segment that is not ``**``, and of the dot after it."""
     return (r"[^.]+" if segment[0] == "*" else re.escape(segment).replace(r"\[\*\]", r"\[\d+\]")) + r"\."
 
 
 def _split_at_doubles(pattern: str) -> list[list[str]]:
-    """The segments before, between and behind the ``**`` of a pattern."""
+    """The segments before, between and after the ``**`` of a pattern."""
     parts: list[list[str]] = [[]]
     for segment in pattern.split("."):
         if segment == "**":
@@ -90,7 +89,7 @@ def _split_at_doubles(pattern: str) -> list[list[str]]:
 
 
 def check_pattern(text: str) -> None:
-    """Raise ``PatternError`` if a text is no pattern."""
+    """Raise ``PatternError`` if a text is not a pattern."""
     if len(text) > MAX_PATTERN:
         raise PatternError(f"a pattern has at most {MAX_PATTERN:,} characters")
     for segment in text.split("."):
@@ -99,7 +98,7 @@ def check_pattern(text: str) -> None:
 
 
 def matches(pattern: str, path: str) -> bool:
-    """Whether the pattern, which is one, selects the path; for a few paths sooner told than by ``compile_pattern``."""
+    """Whether a valid pattern selects the path; for a few paths this is faster than ``compile_pattern``."""
     head, *tails = _split_at_doubles(pattern)
     names = path.split(".")
     if not tails:
@@ -112,11 +111,11 @@ def matches(pattern: str, path: str) -> bool:
     for tail in middle:
         at = next((place for place in range(at + 1, end) if _fit(tail, names[place : place + len(tail)])), end)
         at += len(tail)
-    return at < end  # the last `**` stands for one at least
+    return at < end  # the last `**` matches at least one
 
 
 def _fit(segments: list[str], names: list[str]) -> bool:
-    """Whether so many segments without ``**`` stand for these names."""
+    """Whether segments without ``**`` match these names, one by one."""
     return len(segments) == len(names) and all(map(_fits, segments, names))
 
 
@@ -127,7 +126,7 @@ def _fits(segment: str, name: str) -> bool:
 
 
 def could_be_within(pattern: str, path: str, *, array: bool) -> bool:
-    """Whether a pattern may speak of something behind a path without an index, were there anything.
+    """Whether a pattern could match something below a path without an index, if there were anything.
 
     With ``array``, the pattern must give an index there.
     """
@@ -152,9 +151,9 @@ def _always(_: str) -> bool:
 
 
 class PathIndex:
-    """Paths, for patterns to choose from without a look at each of them: a model may have many of both.
+    """Paths from which patterns select without checking each of them: a model may have many of both.
 
-    ``limits`` are those of the model: patterns that are to be compared with too many paths raise ``TooManyError``.
+    ``limits`` are those of the model: patterns that must be compared with too many paths raise ``TooManyError``.
     """
 
     def __init__(self, paths: Iterable[str], limits: Limits = NORMAL) -> None:
@@ -173,10 +172,10 @@ class PathIndex:
         check_pattern(pattern)
         if "*" not in pattern:
             return [pattern] if pattern in self._place else []
-        # Where the first wildcard stands, `name[*]` still says the name.
+        # At the first wildcard, `name[*]` still gives the name.
         fixed = pattern.partition("*")[0].rstrip("[.")
         candidates: Sequence[str] = self._within.get(fixed, ()) if fixed else self._order
-        # To choose by the names in a pattern pays when there are many patterns.
+        # Selecting by the names in a pattern pays if there are many patterns.
         if self._compared > _MANY * len(self._place):
             others = [self._having.get(name, ()) for name in names_asked(pattern)]
             candidates = min(candidates, *others, key=len) if others else candidates
@@ -192,7 +191,7 @@ class PathIndex:
         return sorted(paths, key=self._place.__getitem__)
 
     def did_you_mean(self, pattern: str, scope: str = "", fits: Callable[[str], bool] = _always) -> str:
-        """Of the paths that fit, the one that was probably meant by a pattern that selects none, to end a message."""
+        """Of the paths that fit, the one that a pattern without matches probably means, as the end of a message."""
         near: Iterable[str] = (path for path in self.inside(scope) if fits(path))
         start = f"{scope}." if scope else ""
         near = (path.removeprefix(start) for path in near)
@@ -201,7 +200,7 @@ class PathIndex:
         return did_you_mean(pattern, near)
 
     def advice(self, pattern: str, scope: str = "", fits: Callable[[str], bool] = _always) -> tuple[str, ...]:
-        """What could be written in place of a pattern that selects none: which ports there are where it points to."""
+        """What to write instead of a pattern without matches: the ports at the place that it names."""
         start = f"{scope}." if scope else ""
         owner = pattern.rpartition(".")[0]
         if len(start) + len(pattern) + 2 > MAX_PATTERN:
@@ -219,12 +218,12 @@ class PathIndex:
         firsts = (path.removeprefix(start).partition(".")[0] for path in self.inside(scope) if fits(path))
         holders = list(dict.fromkeys(map(in_general, firsts)))
         if not holders:
-            return ("there is no port that would do",)
+            return ("there is no suitable port",)
         more = ", ..." if len(holders) > MAX_SHOWN else ""
-        return (f"there are such ports at {', '.join(holders[:MAX_SHOWN])}{more}",)
+        return (f"there are suitable ports at {', '.join(holders[:MAX_SHOWN])}{more}",)
 
     def spend(self, number: int) -> None:
-        """Count paths that are gone through for another reason; raises ``TooManyError`` if there are too many."""
+        """Count paths that are scanned for another reason; raises ``TooManyError`` if there are too many."""
         self._comparisons.spend(number)
 
     def inside(self, scope: str) -> Collection[str]:

@@ -1,4 +1,4 @@
-"""What is wrong with a model, said so that it can be fixed: where, what, and what would be right."""
+"""Problems of a model, reported so that they can be fixed: where, what, and what would be right."""
 
 import unicodedata
 from collections.abc import Iterable
@@ -23,16 +23,16 @@ class Position:
     column: int
     length: int
     source: str
-    told: bool = False  # what is wrong there has been told: what else might be said would be a consequence
+    told: bool = False  # its problem has been reported: other problems there would be consequences
 
     def __str__(self) -> str:
-        """``file:line:column``, to say in a message where something else stands."""
+        """``file:line:column``, for messages that refer to another place."""
         return f"{self.file}:{self.line}:{self.column}"
 
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """One thing that is wrong, where it stands, and what may help."""
+    """One problem, its place, and what may help."""
 
     message: str
     position: Position | None = None
@@ -53,7 +53,7 @@ class Problem:
 
 
 class ModelError(EpicycleError):
-    """A model that cannot be used, with the problems found in it; `more` says that there are others."""
+    """A model that cannot be used, with the problems found in it; `more` means that there are others."""
 
     def __init__(self, problems: Iterable[Problem], more: bool = False) -> None:
         self.problems = tuple(problems)
@@ -71,11 +71,11 @@ class ModelError(EpicycleError):
 
 
 class Problems:
-    """Collects problems, so that one run shows them all; identical ones count once, and after 100 it is enough.
+    """Collects problems, so that one run shows them all; identical ones count once, and collecting ends after 100.
 
-    What is wrong in an array is reported for the first instance: ``about`` is what a problem is about in all of them,
-    where the message names one.  A fault of a composite class is reported for its first use: ``scope`` is the path of
-    the instance that has it, and what stands at one place is reported for the first of them.
+    A problem in an array is reported for the first instance: ``about`` identifies it in all instances, although the
+    message names one.  A fault of a composite class is reported for its first use: ``scope`` is the path of the
+    instance that has it, and a problem at one place is reported for the first of them.
     """
 
     def __init__(self) -> None:
@@ -83,10 +83,10 @@ class Problems:
         self._warnings: dict[tuple[str | tuple[str, ...], Position | None], Problem] = {}
         self._count = 0
         self._scopes: dict[Position, str] = {}
-        self._cause: BaseException | None = None  # the first exception that was not ours
+        self._cause: BaseException | None = None  # the first exception in a user's code
 
     def __len__(self) -> int:
-        """How many there are, those included that follow from what has been told."""
+        """How many there are, including those that follow from reported ones."""
         return self._count
 
     def __bool__(self) -> bool:
@@ -95,16 +95,16 @@ class Problems:
 
     @property
     def found(self) -> tuple[Problem, ...]:
-        """The problems kept so far, in the order they were found."""
+        """The problems kept so far, in the order in which they were found."""
         return tuple(self._kept.values())
 
     @property
     def warnings(self) -> tuple[Problem, ...]:
-        """What is odd but not wrong, as far as noted."""
+        """What is odd but not wrong, so far."""
         return tuple(self._warnings.values())
 
     def warn(self, message: str, position: Position | None = None, *hints: str, about: tuple[str, ...] = ()) -> None:
-        """Note what may be meant, but most likely is not; it does not count as a problem."""
+        """Note something that may be intended but probably is not; it does not count as a problem."""
         if len(self._warnings) < MAX_PROBLEMS:
             self._warnings.setdefault((about or message, position), Problem(message, position, hints, "warning"))
 
@@ -118,7 +118,7 @@ class Problems:
         raised: Position | None = None,
         cause: BaseException | None = None,
     ) -> None:
-        """Note a problem; each hint becomes a line of help.  One too many raises all that there are as a ModelError.
+        """Note a problem; each hint becomes a line of help.  One too many raises all problems as a ModelError.
 
         ``cause`` is an exception in a user's code, and ``raised`` where it comes from.
         """
@@ -129,7 +129,7 @@ class Problems:
         if position is not None and (position.told or self._scopes.setdefault(position, scope) != scope):
             return
         if len(self._kept) == MAX_PROBLEMS:
-            # To find them all, and what each was meant to be, may take very long.
+            # Finding them all, and the nearest valid names, may take very long.
             raise self._error(more=True) from self._cause
         self._kept[key] = Problem(message, position, hints, raised=raised)
         self._cause = self._cause or cause
@@ -140,7 +140,7 @@ class Problems:
             raise self._error() from self._cause
 
     def stop(self, message: str, position: Position | None, *hints: str, scope: str = "") -> NoReturn:
-        """Note a problem after which there is no going on, and raise all as one ModelError."""
+        """Note a problem after which nothing can continue, and raise all as one ModelError."""
         self.add(message, position, *hints, scope=scope)
         raise self._error() from self._cause
 
@@ -167,7 +167,7 @@ def told_raised(at: Position) -> list[str]:
 
 
 def marked(at: Position) -> list[str]:
-    """The line of a place and the carets below it; nothing if it cannot be had, as those of a Python prompt."""
+    """The line of a place and the carets below it; empty if the line is not available, as at a Python prompt."""
     if not at.length:
         return []
     source, carets = _excerpt(at)
@@ -176,7 +176,7 @@ def marked(at: Position) -> list[str]:
 
 
 def _cell(character: str) -> tuple[str, int]:
-    """Return how one character of a source line is shown, and how many columns that takes."""
+    """Return how one character of a source line is shown, and its width in columns."""
     if character == "\t":
         return "    ", 4
     shown = visible_character(character)
@@ -188,7 +188,7 @@ def _cell(character: str) -> tuple[str, int]:
 
 
 def _excerpt(at: Position) -> tuple[str, str]:
-    """Return the source line, cut to a bearable width around the place, and the carets that go below it."""
+    """Return the source line, cut to a readable width around the place, and the carets below it."""
     start = min(max(at.column - 1, 0), len(at.source))
     # A file may be one line of megabytes: only what can be shown is looked at.
     first = max(0, start - MAX_SOURCE_WIDTH)
@@ -200,7 +200,7 @@ def _excerpt(at: Position) -> tuple[str, str]:
         room = MAX_SOURCE_WIDTH - 2 * len(_CUT)
         low = _reach_left(cells, start, room // 3)
         high = _reach_right(cells, low, room)
-        low = _reach_left(cells, high, room)  # near the end of the line, the left side takes what is over
+        low = _reach_left(cells, high, room)  # near the end of the line, the left side takes the remaining room
     cut_left = _CUT if first or low else ""
     cut_right = _CUT if first + high < len(at.source) else ""
     source = cut_left + "".join(shown for shown, _ in cells[low:high]) + cut_right

@@ -1,4 +1,4 @@
-"""A Python program as if it were a text: the lines that call us and that fail in it, and its values as nodes."""
+"""A Python program treated as a text: its lines that call this package or fail, and its values as nodes."""
 
 from __future__ import annotations
 
@@ -34,10 +34,10 @@ def call_site() -> Position:
 
 
 def raised_at(error: BaseException | None) -> Position | None:
-    """The last line of a user's that the exception came through, or else its cause; None if all is library code."""
+    """The last line of user code that the exception, or else its cause, came through; None if all is library code."""
     seen: set[int] = set()
     while error is not None and id(error) not in seen:
-        seen.add(id(error))  # a chain of causes may be a ring
+        seen.add(id(error))  # a chain of causes may be circular
         trace = error.__traceback__
         lines = zip(walk_tb(trace), extract_tb(trace), strict=True)
         found = [line for (frame, _), line in lines if _is_users(frame) and line.line]
@@ -48,10 +48,10 @@ def raised_at(error: BaseException | None) -> Position | None:
 
 
 def _is_users(frame: FrameType) -> bool:
-    """Whether code is neither ours nor a library's; a package's actor is as good as a user's."""
+    """Whether code is neither Epicycle's nor a library's; an actor of a package counts as a user's."""
     if str(frame.f_globals.get("__name__")).startswith("epicycle."):
         return False
-    import sysconfig  # here, as it takes a while and this is for what went wrong
+    import sysconfig  # here, because it takes a while and is needed only for errors
 
     file = frame.f_code.co_filename
     libraries = (sysconfig.get_path(name) + os.sep for name in ("stdlib", "platstdlib"))
@@ -62,8 +62,8 @@ def _is_users(frame: FrameType) -> bool:
 
 
 def _position(line: FrameSummary) -> Position:
-    """The place of the expression that failed, or of its whole line where Python does not tell."""
-    # With its indentation, which the summary has left out.
+    """The place of the expression that failed, or of its whole line if Python does not know it."""
+    # With its indentation, which the summary omits.
     source = linecache.getline(line.filename, line.lineno or 0).rstrip("\n") or line.line or ""
     start, end = len(source) - len(source.lstrip()), len(source.rstrip())
     if line.colno is not None:
@@ -76,12 +76,12 @@ def _position(line: FrameSummary) -> Position:
 
 
 def in_short(file: str) -> str:
-    """A file as seen from the present folder, if it is in there."""
+    """A file relative to the current folder, if it is in there."""
     return file.removeprefix(os.getcwd() + os.sep)
 
 
 def describe(error: BaseException) -> str:
-    """An exception in one line; our own explain themselves without their type."""
+    """An exception in one line; Epicycle's own need no type to be understood."""
     text = str(error).strip()
     if isinstance(error, EpicycleError):
         return text
@@ -107,7 +107,7 @@ def _node(value: Any, position: Position) -> Node:
         return Mapping(
             {str(key): Entry(_key(str(key), position), _node(item, position)) for key, item in value.items()}, position
         )
-    # Anything else is handed on as it is, such as an object that a parameter of an actor takes.
+    # Anything else is passed on unchanged, such as an object that a parameter of an actor takes.
     return Scalar(value, str(value), False, position)
 
 

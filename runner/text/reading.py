@@ -11,27 +11,27 @@ from epicycle.actors import did_you_mean, nearest
 from .document import Entry, Mapping, Node, Scalar, Sequence
 from .problems import Position, Problems
 
-SURE = 0.75  # how like a key must be to the one that it is taken for
+SURE = 0.75  # how similar a key must be to the valid one that it is read as
 NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*\Z")
-NAMES_HAVE = "use letters, digits and _, no digit first"
+NAMES_HAVE = "use letters, digits and _, and no digit first"
 
 
 @dataclass(frozen=True, slots=True)
 class Text:
-    """A piece of text and where it stands."""
+    """A piece of text and its position."""
 
     text: str
     position: Position
 
 
 class NodeReader:
-    """Whatever is misshapen is added to ``problems`` and left out."""
+    """Anything malformed is added to ``problems`` and left out."""
 
     def __init__(self, problems: Problems) -> None:
         self.problems = problems
 
     def entries(self, node: Node, what: str, valid: tuple[str, ...]) -> dict[str, Entry] | None:
-        """The entries of a mapping, unknown keys reported and left out; None if it is no mapping."""
+        """The entries of a mapping, unknown keys reported and left out; None if it is not a mapping."""
         if not isinstance(node, Mapping):
             if is_empty(node):
                 return {}
@@ -44,8 +44,8 @@ class NodeReader:
             else:
                 hint = f"valid keys: {', '.join(valid)}"
                 self.problems.add(f"{what} has no key {key!r}{did_you_mean(key, valid)}", entry.key.position, hint)
-                # Read on as if it had been written right, or else it would seem to be missing as well; but only if
-                # there is no doubt, or else what follows would be judged by what it is not.
+                # Continue as if it were spelled correctly; otherwise it would seem to be missing as well.  But only if
+                # there is no doubt; otherwise its value would be checked as something else.
                 if (meant := nearest(key, valid, SURE)) is not None and meant not in node.entries:
                     known.setdefault(meant, entry)
         return known
@@ -99,7 +99,7 @@ class NodeReader:
 
 
 def inside(node: Scalar, text: str, offset: int, part: str) -> Position:
-    """Where a part of a scalar's text stands that begins at ``offset``; all of it if it is folded or has escapes."""
+    """The position of a part of a scalar's text from ``offset`` on; all of it if it is folded or has escapes."""
     at = node.position
     start = at.column - 1 + (0 if node.plain else 1)
     if not at.source.startswith(text, start):
@@ -108,19 +108,19 @@ def inside(node: Scalar, text: str, offset: int, part: str) -> Position:
 
 
 def is_empty(node: Node) -> bool:
-    """Whether nothing is written there."""
+    """Whether there is no value."""
     return isinstance(node, Scalar) and node.value is None
 
 
 def within(text: Text, part: str) -> Position:
-    """Where a part of a text stands; all of it if that cannot be seen in the file."""
+    """The position of a part of a text; all of it if the part cannot be found in the file."""
     at = text.position
     start = at.source.find(part, at.column - 1)
     return at if start < 0 else replace(at, column=start + 1, length=len(part))
 
 
 def split(text: str, sign: str) -> list[tuple[int, int]]:
-    """Where the parts begin and end that ``sign`` divides, inside of brackets left aside."""
+    """Where the parts separated by ``sign`` begin and end; those in brackets do not count."""
     parts, depth, start = [], 0, 0
     for found in _divider(sign).finditer(text):
         if found[0] in ("[", "{", "("):

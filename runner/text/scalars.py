@@ -8,7 +8,7 @@ Value: TypeAlias = str | int | float | bool | None
 _MAX_DIGITS = 1_000
 _NULLS = frozenset(("", "~", "null", "Null", "NULL"))
 _BOOLS = {"true": True, "True": True, "TRUE": True, "false": False, "False": False, "FALSE": False}
-_SPECIAL_START = frozenset("+-.0123456789")  # most texts start otherwise and need no regular expression
+_SPECIAL_START = frozenset("+-.0123456789")  # most texts start differently and need no regular expression
 _INT = re.compile(r"[-+]?[0-9]+|0o[0-7]+|0x[0-9a-fA-F]+")
 _FLOAT = re.compile(r"[-+]?(?:\.[0-9]+|[0-9]+(?:\.[0-9]*)?)(?:[eE][-+]?[0-9]+)?")
 _NOT_FINITE = re.compile(r"[-+]?\.(?:inf|Inf|INF)|\.(?:nan|NaN|NAN)")
@@ -24,7 +24,7 @@ SCALAR_TAGS: dict[str, tuple[type, ...]] = {
 
 
 def resolve(text: str) -> Value:
-    """Return what a plain scalar means; raise ValueError for a number that no computer number can hold."""
+    """Return what a plain scalar means; raise ValueError for a number that does not fit a float."""
     if text in _NULLS:
         return None
     if text[0] not in _SPECIAL_START:
@@ -44,5 +44,5 @@ def resolve(text: str) -> Value:
 
 
 def short(text: str) -> str:
-    """A text in a message, which may be very long."""
+    """A text for a message, shortened if it is very long."""
     return text if len(text) <= 40 else text[:37] + "..."

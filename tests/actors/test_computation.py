@@ -72,7 +72,7 @@ def test_an_expression_without_names_has_nothing_to_wait_for() -> None:
     model = model_of({"type": "Expression", "expression": 7}, {})
     assert Formula("7").names == ()
     assert model.graph.actors["it"].inputs == {}
-    assert [each.message for each in model.warnings] == ["it can never fire: it is no source, and nothing feeds it"]
+    assert [each.message for each in model.warnings] == ["it can never fire: it is not a source, and nothing feeds it"]
 
 
 @pytest.mark.parametrize(
@@ -156,7 +156,7 @@ def test_instances_may_differ_in_their_ports() -> None:
     with pytest.raises(ModelError) as caught:
         load(text + "  - clock.output -> each[*].x\n")
     assert [problem.message for problem in caught.value.problems] == [
-        "Expression has no input port each[1].x, but others of its array have"
+        "Expression has no input port each[1].x, unlike others in its array"
     ]
 
 

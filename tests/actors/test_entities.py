@@ -71,7 +71,7 @@ def test_a_token_is_not_changed_for_others() -> None:
         ("RecordDisassembler, fields: [cost]", [("input", [[0, 5]])], "the token 5 has no field 'cost'; it has none"),
         ("Unbatch", [("input", [[0, 5]])], "5 is not a list"),
         ("Batch, size: 3, weight: token", [("input", [[0, "heavy"]])],
-         "'token' gives 'heavy', but a weight is a finite number"),
+         "'token' gives 'heavy', but a weight must be a finite number"),
         ("Batch", [("input", [[0, 5]])], "it never sends: give 'number', 'size' or 'after', or connect 'trigger'"),
     ],
 )  # fmt: skip

@@ -213,7 +213,7 @@ def test_ports_that_there_are_not_and_those_that_are_missing(kind: str) -> None:
     assert found == [(f"it: {kind} has no input port 'zzz'", (f"valid input ports: {', '.join(ports)}",))]
     if missing := [name for name, port in ports.items() if port.required]:
         assert [message for message, _ in told(problems(kind, row.parameters, {}))] == [
-            f"it.{name} is not connected, and {kind} cannot do without it" for name in missing
+            f"it.{name} is not connected, but {kind} needs it" for name in missing
         ]
 
 

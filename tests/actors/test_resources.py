@@ -138,7 +138,7 @@ def test_who_asks_a_line_gets_it() -> None:
          ("'rank': the token {'rnk': 2} has no field 'rank', did you mean 'rnk'? it has rnk, and token, time, channel "
           "are known")),
         ("Pool, order: token", [("acquire", [[0, "first"]]), ("release", [])],
-         "'token' gives 'first', but an order is a finite number"),
+         "'token' gives 'first', but an order must be a finite number"),
         ("Pool, balking: waiting + 2", [("acquire", [[0, 0], [0, 1]]), ("release", [])],
          "'waiting + 2' gives 2, but balking is a condition, or a probability"),
         ("WaitingLine, size: token", [("input", [[0, -1]])], "'token' gives -1, but a size is >= 0"),

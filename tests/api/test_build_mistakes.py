@@ -37,10 +37,10 @@ MISTAKES: dict[str, tuple[Callable[[Model], Any], str]] = {
     ),
     "wrong way round": (
         lambda m: m.connect(m["sum"].input, m["late"].output),
-        """error: sum.input is an input of Adder, nothing can come from it
+        """error: sum.input is an input of Adder, so nothing can come from it
    help: valid output ports: output, enough
 
-error: late.output is an output of Noisy, nothing can go to it
+error: late.output is an output of Noisy, so nothing can go to it
    help: valid input ports: input
 2 errors""",
     ),
@@ -50,7 +50,7 @@ error: late.output is an output of Noisy, nothing can go to it
     ),
     "two writers": (
         lambda m: m.connect(m["sum"].output, m["late"].input),
-        """error: late.input takes one connection, and clock.output is connected to it already, at FILE:LINE
+        """error: late.input takes one connection, and clock.output is already connected to it, at FILE:LINE
    help: disconnect that one, or send through an actor that merges them""",
     ),
     "no destination": (
@@ -65,7 +65,7 @@ error: late.output is an output of Noisy, nothing can go to it
     ),
     "array": (
         lambda m: m.connect("robot.position -> sum.input"),
-        """error: robot is an array of 3: say which
+        """error: robot is an array of 3: give an index
    help: write robot[*].position for all, or robot[0].position for the first""",
     ),
     "through a wall": (
@@ -114,24 +114,24 @@ error: late.output is an output of Noisy, nothing can go to it
     ),
     "taken": (
         lambda m: m.add(Adder("sum")),
-        """error: there is a sum already
+        """error: there is already a sum
    help: the first was added at FILE:LINE
    help: give it another name""",
     ),
     "twice": (
         lambda m: m.add(m["sum"]),
-        """error: sum is part of a model already, and an actor belongs to one model
-   help: make another one: Adder(...)""",
+        """error: sum is already part of a model, and an actor belongs to only one
+   help: create another one: Adder(...)""",
     ),
     "dotted name": (
         lambda m: m.add(Adder("robot.sum")),
         """error: 'robot.sum' is not a name
-   help: use letters, digits and _, no digit first; an element of an array is called 'name[0]'
-   help: what is inside of a composite is added to the composite""",
+   help: use letters, digits and _, and no digit first; an element of an array is called 'name[0]'
+   help: add parts of a composite to the composite""",
     ),
     "single and array": (
         lambda m: m.add(Adder("robot")),
-        """error: robot is an array already
+        """error: robot is already an array
    help: give it another name""",
     ),
     "gap": (
@@ -146,12 +146,12 @@ error: late.output is an output of Noisy, nothing can go to it
     ),
     "name of a port": (
         lambda m: m["robot[0]"].add(Adder("trigger")),
-        """error: robot[0].trigger is a port already
+        """error: robot[0].trigger is already a port
    help: give the actor another name""",
     ),
     "port of an actor's name": (
         lambda m: m["robot[0]"].input("inner"),
-        """error: 'robot[0].inner' is the name of an actor and of a port
+        """error: 'robot[0].inner' is the name of both an actor and a port
    help: rename one""",
     ),
     "port twice": (lambda m: m.composite("x", inputs=["a", "a"]), "error: port 'x.a' is declared twice"),
@@ -165,23 +165,23 @@ error: x: director.drift: 0 is out of bounds, expected a number from 1e-06 to 10
     "own port": (
         lambda m: m["robot[0]"].connect("positon -> inner.trigger"),
         """error: robot[0] has no input port 'positon' of its own
-   help: own input ports: trigger
+   help: its own input ports: trigger
    help: a port of an actor is written 'actor.port'""",
     ),
     "path": (lambda m: m["robot[0]"]["iner"], "error: there is no 'robot[0].iner', did you mean 'robot[0].inner'?"),
     "aspect's name": (
         lambda m: m.weave("failure", PacketLoss(probability=0.1), at="sum.input"),
-        """error: there is an aspect 'failure' already
+        """error: there is already an aspect 'failure'
    help: unweave it, or give this another name""",
     ),
     "aspect's class": (
         lambda m: m.weave("loss", PacketLoss, at="sum.input"),
-        """error: PacketLoss is no aspect
+        """error: PacketLoss is not an aspect
    help: give an object, such as PacketLoss(probability=0.1)""",
     ),
     "name of an aspect for one": (
         lambda m: m.weave("loss", "PacketLoss", at="sum.input"),
-        """error: 'PacketLoss' is no aspect
+        """error: 'PacketLoss' is not an aspect
    help: give an object, such as PacketLoss(probability=0.1)""",
     ),
     "aspect's port": (
@@ -191,7 +191,7 @@ error: x: director.drift: 0 is out of bounds, expected a number from 1e-06 to 10
     ),
     "aspect's side": (
         lambda m: m.weave("loss", PacketLoss(probability=0.1), at=m["sum"].output),
-        "error: aspect loss: PacketLoss stands at input ports, but sum.output is an output port",
+        "error: aspect loss: PacketLoss attaches to input ports, but sum.output is an output port",
     ),
     "no aspect": (
         lambda m: m.unweave("failures"),
@@ -209,7 +209,7 @@ error: x: director.drift: 0 is out of bounds, expected a number from 1e-06 to 10
     ),
     "metric": (
         lambda m: m.metric("total", of="sum.output", take="men"),
-        """error: there is a metric 'total' already
+        """error: there is already a metric 'total'
    help: give this another name
 
 error: metric 'total' cannot take 'men', did you mean 'mean'?
@@ -271,7 +271,7 @@ def test_the_whole_is_checked_before_a_run() -> None:
     with pytest.raises(ModelError) as caught:
         Simulation(model)
     text = plainly(caught.value)
-    assert "error: shout.input is not connected, and Shout cannot do without it" in text
+    assert "error: shout.input is not connected, but Shout needs it" in text
     assert "error: a loop without delay: adder -> noisy -> adder" in text
     assert text.endswith("2 errors")
 

@@ -147,7 +147,7 @@ def test_a_study_is_a_mapping_and_shows_its_table() -> None:
 def test_mistakes_in_a_study_are_told_with_their_place() -> None:
     with pytest.raises(ModelError) as caught:
         epicycle.study({**STUDY, "vary": {"lod": [0.5]}})
-    assert str(caught.value).startswith("<python>:4:3: error: 'lod' sets no parameter, did you mean 'load'?\n")
+    assert str(caught.value).startswith("<python>:4:3: error: 'lod' matches no parameter, did you mean 'load'?\n")
     assert not Path("results").exists()
 
 

@@ -181,7 +181,7 @@ def test_an_actor_that_was_refused_can_be_added_elsewhere() -> None:
         assert (actor.path, actor.is_part, actor.input.path) == ("misfit", False, "misfit.input")
     clock = Clock("clock", period=1)
     inner.add(clock)
-    with pytest.raises(ModelError, match="is part of a model already"):
+    with pytest.raises(ModelError, match="is already part of a model"):
         model.add(clock)
     assert clock.path == "inner.clock"
 
@@ -208,7 +208,7 @@ def test_a_scope_survives_what_is_removed_beside_it(folder: Path) -> None:
     assert model["line"] is inner
     inner.add(Scale("third"))
     inner.connect("other -> third.input")
-    with pytest.raises(ModelError, match=r"there is a line\.third already"):
+    with pytest.raises(ModelError, match=r"there is already a line\.third"):
         inner.add(Scale("third"))
 
 
@@ -264,7 +264,7 @@ def test_a_graph_that_is_run_is_frozen() -> None:
     ):
         with pytest.raises(RuntimeError) as caught:
             change()
-        assert str(caught.value) == "a graph that is frozen is not changed: change a copy"
+        assert str(caught.value) == "a frozen graph cannot be changed: change a copy"
     assert state(model) == before
     model.remove("scale")
     model.add(Recorder("recorder"))

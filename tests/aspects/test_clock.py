@@ -196,7 +196,7 @@ WHOLE = "a clock is wrong from the beginning of a run to its end: leave out "
     [
         ("type: ClockDrift, gain: 0.1, at: t, until: 3 s", WHOLE + "'until'"),
         ("type: ClockOffset, at: t, when: t.output > 2", WHOLE + "'when'"),
-        ("type: ClockDrift, gain: 0.1, at: t.output", "ClockDrift stands at actors, but t.output is a port"),
+        ("type: ClockDrift, gain: 0.1, at: t.output", "ClockDrift attaches to actors, but t.output is a port"),
     ],
 )
 def test_what_is_wrong(aspect: str, message: str) -> None:

@@ -111,14 +111,14 @@ def test_assert_that_fails() -> None:
         (
             "{type: Assert, at: a.input, that: tken < 3}",
             (
-                "aspect x.that: 'tken < 3' is not an expression over ports: the name 'tken' is unknown: "
+                "aspect x.that: 'tken < 3' is not an expression over ports: unknown name 'tken': "
                 "a port is written 'actor.port', and 'token' is known"
             ),
         ),
         (
             "{type: Assert, at: a.input, that: 1 < 3}",
             (
-                "aspect x.that: '1 < 3' is not an expression over ports: nothing is named in it: "
+                "aspect x.that: '1 < 3' is not an expression over ports: it names nothing: "
                 "write 'token' or a port as 'actor.port'"
             ),
         ),
@@ -160,5 +160,5 @@ def test_formula_over_a_token_and_ports() -> None:
     assert formula([2.0], token={"x": [1, 8], "y": 3}) is True
     assert formula([2.0], token={"x": [1, 7], "y": 3}) is False
     assert PortFormula("tokens.x + token", ["token"]).references == ("tokens.x",)
-    with pytest.raises(ExpressionError, match="the name 'tag' is unknown"):
+    with pytest.raises(ExpressionError, match="unknown name 'tag'"):
         PortFormula("token > tag", ["token"])

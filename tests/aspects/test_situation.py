@@ -275,7 +275,7 @@ def test_in_a_model(aspect: str, expected: tuple[int, ...]) -> None:
         (
             "loss: {type: RangeLoss, positions: 'robot[*].place', range: 3, sender: sender, at: '*.hear'}",
             (
-                "aspect loss.sender: 'sender' is not an expression over ports: the name 'sender' is unknown: a port is "
+                "aspect loss.sender: 'sender' is not an expression over ports: unknown name 'sender': a port is "
                 "written 'actor.port', and 'token' is known"
             ),
         ),
@@ -293,7 +293,7 @@ def test_in_a_model(aspect: str, expected: tuple[int, ...]) -> None:
         ),
         (
             "view: {type: OutOfRange, positions: 'robot[*].place', target: t.output, range: 3, at: '*.hear'}",
-            "aspect view: OutOfRange stands at output ports, but robot[0].hear is an input port",
+            "aspect view: OutOfRange attaches to output ports, but robot[0].hear is an input port",
         ),
         (
             "cut: {type: Outage, groups: {a: 'robt[0]'}, at: '*.hear'}",

@@ -106,7 +106,7 @@ def test_type_is_imported_when_a_model_names_it(site: Path) -> None:
         (
             GOOD.replace("Lidar", "Radar"),
             "acme_a:Radar",
-            "the class is called Radar, and its entry point must be, too",
+            "the class is called Radar, and its entry point must have the same name",
         ),
     ],
 )
@@ -117,7 +117,7 @@ def test_broken_package_is_named(source: str, entry: str, reason: str, site: Pat
         "    2 | actors: {a: {type: Lidar}}\n"
         "      |                    ^^^^^\n"
         f"   help: its entry point in the group epicycle.actors is Lidar = {entry}\n"
-        "   help: mend or uninstall 'acme-a'"
+        "   help: fix or uninstall 'acme-a'"
     )
     catalogue, errors = installed().loaded()
     assert "Lidar" not in catalogue.actors
@@ -137,7 +137,7 @@ def test_broken_figure_is_named(site: Path) -> None:
         "    2 | figures: {x: {type: Dial}, y: {type: Dail}}\n"
         "      |                     ^^^^\n"
         "   help: its entry point in the group epicycle.figures is Dial = acme_a:Dial\n"
-        "   help: mend or uninstall 'acme-a'\n\n"
+        "   help: fix or uninstall 'acme-a'\n\n"
         "m.yaml:2:38: error: figure y: there is no figure type 'Dail', did you mean 'Dial'?\n"
         "    2 | figures: {x: {type: Dial}, y: {type: Dail}}\n"
         "      |                                      ^^^^\n"
@@ -166,7 +166,7 @@ def test_broken_aspect_is_named(site: Path) -> None:
         "    2 | aspects: {x: {type: Fog, at: a.b}}\n"
         "      |                     ^^^\n"
         "   help: its entry point in the group epicycle.aspects is Fog = acme_a:Fog\n"
-        "   help: mend or uninstall 'acme-a'"
+        "   help: fix or uninstall 'acme-a'"
     )
 
 

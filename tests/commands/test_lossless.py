@@ -27,7 +27,7 @@ actors: {clock: {type: Clock, period: 1 ms}, scale: {type: Scale, factor: 2}}
 connections: [clock.output -> scale.input]
 run: {record: [clock.output]}
 """
-NO_END = "tick has no end: clock ticks for ever, and the model says neither stop nor stop_when"
+NO_END = "tick never ends: clock ticks for ever, and the model sets neither stop nor stop_when"
 
 
 @pytest.fixture

@@ -54,9 +54,12 @@ def test_models_know_a_package_once_it_is_installed(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["my-model"], "error: 'my-model' is not a name\n   help: use letters, digits and _, no digit first\n"),
-        (["class"], "error: 'class' is not a name\n   help: use letters, digits and _, no digit first\n"),
-        (["../up"], "error: '../up' is not a name\n   help: use letters, digits and _, no digit first\n"),
+        (
+            ["my-model"],
+            "error: 'my-model' is not a name\n   help: use letters, digits and _, and no digit first\n",
+        ),
+        (["class"], "error: 'class' is not a name\n   help: use letters, digits and _, and no digit first\n"),
+        (["../up"], "error: '../up' is not a name\n   help: use letters, digits and _, and no digit first\n"),
         (["here"], "error: here.yaml already exists\n   help: choose another name or another folder\n"),
         (["folder", "--package"], "error: folder already exists\n   help: choose another name or another folder\n"),
     ],

@@ -148,7 +148,7 @@ def test_log_formats(tmp_path: Path, ending: str) -> None:
         (
             ("run", "collision_avoidance", "--set", "observer=3"),
             (
-                "command line:1:7: error: 'observer' sets no parameter, did you mean 'observers'?\n"
+                "command line:1:7: error: 'observer' matches no parameter, did you mean 'observers'?\n"
                 "    1 | --set observer=3\n"
                 "      |       ^^^^^^^^^^\n"
             ),

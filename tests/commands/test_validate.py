@@ -20,10 +20,10 @@ connections:
   - {from: "also[0].output", to: idle.input, delay: 1}
 run: {stop: 1 s}
 """
-WARNING = """m.yaml:6:3: {}: also[0] can never fire: it is no source, and only the loop also[0], also[1] feeds it
+WARNING = """m.yaml:6:3: {}: also[0] can never fire: it is not a source, and only the loop also[0], also[1] feeds it
     6 |   also: {{type: Merge, count: 2}}
       |   ^^^^
-   help: nor can what it feeds: idle
+   help: nor can the actors that it feeds: idle
 """
 
 
@@ -47,7 +47,7 @@ def test_overrides(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (folder / "over.yaml").write_text("clock.period: 2 s\n'*.factor': 3\nidle.fcator: 4\n")
     assert main(["validate", "m.yaml", "--overrides", "over.yaml"]) == 2
     assert capsys.readouterr().err == (
-        "over.yaml:3:1: error: 'idle.fcator' sets no parameter, did you mean 'idle.factor'?\n"
+        "over.yaml:3:1: error: 'idle.fcator' matches no parameter, did you mean 'idle.factor'?\n"
         "    3 | idle.fcator: 4\n"
         "      | ^^^^^^^^^^^\n"
     )

@@ -343,8 +343,8 @@ def test_a_composite_cannot_feed_itself_within_the_tag() -> None:
         "   12 |   - c1.tick -> c1.port\n"
         "      |     ^^^^^^^\n"
         "   help: c1.tick -> c1.port (m.yaml:12)\n"
-        "   help: c1 has a director of its own: it fires as one actor, when all that acts within the tag is there\n"
-        "   help: give one of these connections a delay, best the one that leads back: "
+        "   help: c1 has its own director: it fires as one actor, when all inputs that act in the tag have come\n"
+        "   help: give one of these connections a delay, preferably the one that leads back: "
         "{from: c1.tick, to: c1.port, delay: ...}"
     )
     simulation, _ = simulate(LOOP.replace("    director: {}\n", ""), until=1, types=TYPES)  # transparent, it can
@@ -442,7 +442,7 @@ DRIFTS = "is out of bounds, expected a number from 1e-06 to 1000000"
             "c: director.drift: -1 is out of bounds, expected a number from 1e-06 to 1000000",
         ),
         (("director: {}", "director: 3"), "the director of 'C' is not a mapping"),
-        (("    director: {}\n", ""), "c: C has no priority, for its actors fire one by one"),
+        (("    director: {}\n", ""), "c: C has no priority, because its actors fire one by one"),
         (("priority: 2", "priority: first"), "c: priority: 'first' is not an integer"),
         (("priority: 2", "priority: 0.5"), "c: priority: 0.5 is not an integer"),
     ],

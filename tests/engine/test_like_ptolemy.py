@@ -321,7 +321,7 @@ MISTAKES: list[tuple[Any, str]] = [
         lambda: Model("m").composite("c", director=True, ties=3),  # type: ignore[arg-type]
         "c: director.ties: 3 is not one of declared, posted",
     ),
-    (lambda: Model("m").composite("c", like="ptolemy"), "c: 'like' is for a director of its own, and c has none"),
+    (lambda: Model("m").composite("c", like="ptolemy"), "c: 'like' belongs to a director, and c has none of its own"),
 ]
 
 

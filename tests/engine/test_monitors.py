@@ -150,7 +150,7 @@ def test_monitors_of_a_model_built_in_python() -> None:
     steps = built.add(Steps("a", values=[[0, 1], [3, 5]]))
     built.monitor("low", "always a.output < 4", unit="m")
     assert Simulation(built).run().monitors["low"] == Verdict(False, -1.0, 3.0, {"a.output": 5})
-    with pytest.raises(ModelError, match="there is a metric 'low' already"):
+    with pytest.raises(ModelError, match="there is already a metric 'low'"):
         built.monitor("low", "always a.output < 4")
     with pytest.raises(ModelError, match=r"monitor high: property: 'a\.input' names no output port"):
         built.monitor("high", "always a.input < 4")

@@ -80,8 +80,8 @@ m.yaml:9:16: error: inner.double.input takes one connection, but 2 senders write
     9 |       - {from: in, to: [join.input, double.input]}
       |                ^^
    help: the first connection is at m.yaml:9:16
-   help: connect one of them, or send through an actor that merges them
-   help: if all of it is one channel, write {from: [...], to: ..., shared: true}"""
+   help: connect only one of them, or send through an actor that merges them
+   help: if they form one channel, write {from: [...], to: ..., shared: true}"""
     )
 
 

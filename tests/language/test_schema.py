@@ -54,12 +54,13 @@ KNOWN = "|".join({each.__name__ for each in TYPES} | built_in().actors.keys() | 
 # What messages say of a file whose shape is broken, whatever else the model and its parts are.
 SHAPE = re.compile(
     "is not a mapping|has no key|has no type\\b|is not a name|is not a connection|has no port on its|has no '(from|to)'"
-    "|is not a list|is not a text|is not a port name|does not say of what|cannot take|cannot be called|is out of bounds"
-    f"|({KNOWN}) has no parameter|is not (a|an|one of|true or false)\\b"
+    "|is not a list|is not a text|is not a port name|metric '.*' has no port|cannot take|cannot be called"
+    f"|is out of bounds|({KNOWN}) has no parameter|is not (a|an|one of|true or false)\\b"
 )
 # Messages that look like it, but are about other files, computed values, or units.
 NOT_SHAPE = re.compile(
-    r"\$\{|is not an expression|has the unknown unit|is not a number with a unit|no (pattern|pointcut)"
+    r"\$\{|is not an expression|has the unknown unit|is not a number with a unit"
+    r"|is not an? (array|composite|condition|input|output|parameter path|pattern|pointcut|source|type)\b"
     r"|not a function that|of rising, falling"
 )
 

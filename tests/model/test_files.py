@@ -47,7 +47,7 @@ def test_the_user_may_name_any_file(folder: Path) -> None:
     assert load(folder, "data/a.csv", f"reader.file={folder.parent / 'secret.csv'}").read_text() == "2"
 
 
-OUTSIDE = "cannot be read: a file named in a model lies in or below the folder of its YAML file"
+OUTSIDE = "cannot be read: a file named in a model must be in or below the folder of its YAML file"
 
 
 @pytest.mark.parametrize(
@@ -81,10 +81,10 @@ def test_a_composite_may_have_the_name_of_an_actor_type(tmp_path: Path) -> None:
     model = load_model(path)
     assert [str(each) for each in model.warnings] == [
         (
-            f"{path}:3:3: warning: composite 'Merge' hides the actor type of that name\n"
+            f"{path}:3:3: warning: composite 'Merge' hides the actor type with the same name\n"
             "    3 |   Merge: {outputs: [out], actors: {c: {type: Clock, period: 1}}, connections: [c.output -> out]}\n"
             "      |   ^^^^^\n"
-            "   help: give it another name if both are wanted"
+            "   help: rename it if you need both"
         )
     ]
     assert Simulation(model).run()["a.out"].tokens == [0, 1, 2]

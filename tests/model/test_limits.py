@@ -74,8 +74,8 @@ def test_classes_that_nothing_uses(tmp_path: Path) -> None:
     base = "  B: {actors: {s: {type: Clock, period: 1, count: 1000}}}\n"
     many = "".join(f"  C{n}: {{actors: {{s: {{type: B, count: 9}}}}}}\n" for n in range(300))
     assert refused(tmp_path, f"model: m\ncomposites:\n{base}{many}actors:\n{END}") == (
-        "m.yaml:5:3: warning: C1 and 298 others are not checked in full: the model has no instance of such a class, "
-        f"and to try all that it has none of takes more than 10,000 actors and composites\n{HELP}"
+        "m.yaml:5:3: warning: C1 and 298 others are not fully checked: the model has no instance of such a class, "
+        f"and checking all such classes takes more than 10,000 actors and composites\n{HELP}"
     )
 
 
@@ -84,7 +84,7 @@ def test_what_classes_take_over(tmp_path: Path) -> None:
     many = "".join(f"  C{n}: {{extends: B}}\n" for n in range(101))
     most = "100,000 actors, aspects, connections, ports and parameters"
     assert refused(tmp_path, f"model: m\ncomposites:\n{base}{many}actors:\n{END}") == (
-        f"m.yaml:1105:19: error: C100: the classes take over more than {most}\n{HELP}"
+        f"m.yaml:1105:19: error: C100: the classes inherit more than {most}\n{HELP}"
     )
 
 

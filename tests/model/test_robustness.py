@@ -99,9 +99,7 @@ def test_what_is_said_about_bombs(tmp_path: Path) -> None:
     assert "composites are nested deeper than 50 levels" in said(BOMBS["too deep"], tmp_path)
     assert "the model has more than 20,000 actors and composites" in said(BOMBS["doubling"], tmp_path)
     assert "the model has more than 200,000 wires" in said(BOMBS["wires"], tmp_path)
-    assert "a way of more than 200 composite ports in a row, from f0.in to f1999.out" in said(
-        BOMBS["passage"], tmp_path
-    )
+    assert "a path through more than 200 composite ports, from f0.in to f1999.out" in said(BOMBS["passage"], tmp_path)
     assert "more than 100 errors in m.yaml" in said(BOMBS["many mistakes"], tmp_path)
 
 
@@ -173,7 +171,7 @@ def test_limits_are_raised_by_who_wants_a_larger_model(tmp_path: Path) -> None:
         f"{path}:2:49: error: b: the model has more than 40 actors and composites\n"
         "    2 | actors: {a: {type: Const, value: 1, count: 30}, b: {type: Recorder, count: 11}}\n"
         "      |                                                 ^\n"
-        "   help: if it is to be so large, say so: --max-actors N, or load_model(..., max_actors=N)"
+        "   help: if this is intended, raise the limit: --max-actors N, or load_model(..., max_actors=N)"
     )
     model = load_model(path, max_actors=41)
     assert (len(model.graph.actors), model.graph.connections) == (41, 110)

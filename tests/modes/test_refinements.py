@@ -269,7 +269,7 @@ def test_what_is_wrong_is_told(name: str) -> None:
 def test_an_input_that_is_read_in_no_mode_is_told() -> None:
     model = load(switching(TICKING, "on -> off after 1 s, off -> on after 1 s"))
     assert [str(each).partition(": ")[2].splitlines()[0] for each in model.warnings] == [
-        "warning: it: the input 'go' of It is read in no mode"
+        "warning: it: no mode reads the input 'go' of It"
     ]
 
 

@@ -222,7 +222,7 @@ m.yaml:7:5: error: a loop without delay: Scale -> Scale
     7 |   - Scale.output -> Scale.input
       |     ^^^^^^^^^^^^
    help: Scale.output -> Scale.input (m.yaml:7)
-   help: give one of these connections a delay, best the one that leads back: \
+   help: give one of these connections a delay, preferably the one that leads back: \
 {from: Scale.output, to: Scale.input, delay: ...}"""
     )
 

@@ -56,10 +56,10 @@ def test_the_advice_for_the_end_of_runs_can_be_followed(tmp_path: Path, capsys: 
     run = ["study", str(tmp_path / "s.yaml"), "--out", str(tmp_path / "out"), "--jobs", "1"]
     assert main([*run, "--set", "stop=2"]) == 2
     assert capsys.readouterr().err == (
-        "command line:1:7: error: 'stop' sets no parameter\n"
+        "command line:1:7: error: 'stop' matches no parameter\n"
         "    1 | --set stop=2\n"
         "      |       ^^^^^^\n"
-        "   help: a single run is ended by --until, or let the model have a parameter for it: 'stop: ${end}'\n"
+        "   help: set the end of a single run with --until, or give the model a parameter for it: 'stop: ${end}'\n"
     )
     text = head + 'parameters: {end: {value: 5 s, unit: s}}\nrun: {stop: "${end}"}\n'
     (tmp_path / "m.yaml").write_text(text, encoding="utf-8")

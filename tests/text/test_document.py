@@ -141,24 +141,24 @@ TAG_HELP = "\n   help: leave it out, or quote a text that starts with '!'"
         ("---\n...\n", "error: m.yaml is empty"),
         (
             "1: a\n'2': b",
-            "m.yaml:1:1: error: a key must be text, this one is 1, which is not text\n   help: quote it: '1'",
+            "m.yaml:1:1: error: a key must be text, but this one is 1\n   help: quote it: '1'",
         ),
         (
             "true: a",
-            ("m.yaml:1:1: error: a key must be text, this one is true, which is not text\n   help: quote it: 'true'"),
+            ("m.yaml:1:1: error: a key must be text, but this one is true\n   help: quote it: 'true'"),
         ),
-        ("? \n: a", "m.yaml:1:2: error: a key must be text, this one is empty\n   help: quote it: ''"),
+        ("? \n: a", "m.yaml:1:2: error: a key must be text, but this one is empty\n   help: quote it: ''"),
         (
             "[1]: a",
             (
-                "m.yaml:1:1: error: a key must be text, this one is a list\n"
+                "m.yaml:1:1: error: a key must be text, but this one is a list\n"
                 "   help: quote a text that starts with '{' or '['"
             ),
         ),
         (
             "a: {{b}: c}",
             (
-                "m.yaml:1:5: error: a key must be text, this one is a mapping\n"
+                "m.yaml:1:5: error: a key must be text, but this one is a mapping\n"
                 "   help: quote a text that starts with '{' or '['"
             ),
         ),
@@ -189,7 +189,7 @@ TAG_HELP = "\n   help: leave it out, or quote a text that starts with '!'"
             "a: &robot 1\nb: *robt",
             "m.yaml:2:4: error: there is no anchor &robt before this alias, did you mean 'robot'?",
         ),
-        ("a: &b [*b]", "m.yaml:1:8: error: the alias *b stands within &b itself"),
+        ("a: &b [*b]", "m.yaml:1:8: error: the alias *b is inside &b itself"),
         (
             "a: b: c",
             (

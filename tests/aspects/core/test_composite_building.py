@@ -56,7 +56,7 @@ def test_models_built_in_python(tmp_path: Path) -> None:
     net.connect("negate.output -> response")
     model.weave("net", net, at="a.input")
     assert [value for *_, value in sends(run(model), "a.output")] == [0.0, -2.0, -4.0]
-    with pytest.raises(ModelError, match="medium is the model of another aspect already"):
+    with pytest.raises(ModelError, match="medium is already the model of another aspect"):
         model.weave("again", net, at="b.input")
     assert [woven.name for woven in model.aspects] == ["net"]
 
@@ -66,13 +66,13 @@ def test_a_weaving_that_fails_changes_nothing(tmp_path: Path) -> None:
     model = python_pair()
     for at, message in (
         ("a.inptu", "'a.inptu' matches no port"),
-        ("net.server.input", "it cannot stand inside of itself"),
+        ("net.server.input", "it cannot attach to its own inside"),
     ):
         with pytest.raises(ModelError, match=message):
             model.weave("net", desk("net"), at=at)
     assert run(model).digest == run(python_pair()).digest
     model.weave("loss", PacketLoss(probability=0), at="a.input")
-    with pytest.raises(ModelError, match="there is an aspect 'loss' already"):
+    with pytest.raises(ModelError, match="there is already an aspect 'loss'"):
         model.weave("loss", desk("net"), at="a.input")
     assert not model.graph.composites
 
@@ -120,11 +120,11 @@ def test_a_disturbance_brings_its_model_along(tmp_path: Path) -> None:
         later.disturb(path)
     assert run(later).digest == run(load(text)).digest
     path.write_text(DISTURBANCE.replace("Line2", "Line"), encoding="utf-8")
-    with pytest.raises(ModelError, match=r"there is a composite 'Line' already"):
+    with pytest.raises(ModelError, match=r"there is already a composite 'Line'"):
         load(text, disturb=path)
     path.write_text(DISTURBANCE.replace("net:", "a:"), encoding="utf-8")
     for attempt in (lambda: later.disturb(path), lambda: load(text, disturb=path)):
-        with pytest.raises(ModelError, match=r"'a' is the name of an actor and of an aspect that is a model"):
+        with pytest.raises(ModelError, match=r"'a' is the name of both an actor and an aspect that is a model"):
             attempt()
 
 

@@ -27,13 +27,13 @@ WIRE = "inputs: [request]\n    outputs: [response]\n    connections: [request ->
             "net: {type: Desks, at: a.input}",
             """m.yaml:33:23: error: aspect net: there is no aspect type 'Desks', did you mean 'Desk'?
    help: valid types: those that 'epicycle aspects' lists
-   help: one of your own is known after '--types FILE.py'; in Python, give its class as types=[...]""",
+   help: for your own types, add '--types FILE.py'; in Python, pass the classes as types=[...]""",
         ),
         (
             "net: {type: Crossing, at: a.input}",
             """m.yaml:33:37: error: aspect net: Crossing has 2 inputs, none of them called 'request'
    help: its inputs: east, west
-   help: call one of them 'request', or say where the tokens come in: {at: ..., request: ...}""",
+   help: call one of them 'request', or name the input that takes the tokens: {at: ..., request: ...}""",
         ),
         (
             "net: {type: Crossing, at: {at: a.input, request: eats}}",
@@ -42,21 +42,21 @@ WIRE = "inputs: [request]\n    outputs: [response]\n    connections: [request ->
         ),
         (
             "net: {type: PacketLoss, probability: 0, at: {at: a.input, request: east}}",
-            "m.yaml:33:78: error: aspect net: PacketLoss is no composite, so a pointcut of it has no 'request'",
+            "m.yaml:33:78: error: aspect net: PacketLoss is not a composite, so its pointcuts have no 'request'",
         ),
         (
             "net: {type: Desk, at: {at: a.input, type: Scale}}",
-            """m.yaml:33:33: error: a pointcut chooses by pattern, by type or by tag
+            """m.yaml:33:33: error: a pointcut selects by pattern, type or tag
    help: write {at: ...}, {type: ..., port: ...} or {tag: ...}""",
         ),
         (
             "net: {type: Desk, at: [a.input, {at: b, time: 1 s}]}",
-            """m.yaml:33:34: error: aspect net: it stands at ports here, and elsewhere at actors
-   help: give every place a time, or none: actors have one, the execution time of their firings""",
+            """m.yaml:33:34: error: aspect net: it attaches to ports here, but to actors elsewhere
+   help: give every place a time, or none: at actors it is the execution time of their firings""",
         ),
         (
             "net: {type: Desk, at: {at: a.input, time: -1}}",
-            """m.yaml:33:38: error: aspect net: Desk stands at actors, but a.input is a port
+            """m.yaml:33:38: error: aspect net: Desk attaches to actors, but a.input is a port
    help: write 'a', without the port
 m.yaml:33:53: error: aspect net: time: -1 is out of bounds, expected a time in s >= 0, a distribution, \
 or these by input port""",
@@ -67,31 +67,31 @@ or these by input port""",
         ),
         (
             "net: {type: Desk, at: {at: a, time: {inptu: 1}}}",
-            """m.yaml:33:48: error: aspect net: time: no actor that this is for has an input 'inptu', did you mean \
+            """m.yaml:33:48: error: aspect net: time: no actor that this applies to has an input 'inptu', did you mean \
 'input'?
    help: their inputs: input""",
         ),
         (
             "net: {type: PacketLoss, probability: 0, at: {at: a.input, time: 1}}",
-            "m.yaml:33:75: error: aspect net: PacketLoss is no composite, so a pointcut of it has no 'time'",
+            "m.yaml:33:75: error: aspect net: PacketLoss is not a composite, so its pointcuts have no 'time'",
         ),
         (
             "one: {type: Desk, at: {at: a, time: 1}}, two: {type: Desk, at: {at: '*', time: 1}}",
-            """m.yaml:33:52: error: aspect two: a runs on the processor 'one' already
-   help: an actor has one processor: leave it out here, with '!a', or there""",
+            """m.yaml:33:52: error: aspect two: a already runs on the processor 'one'
+   help: an actor has one processor: exclude it here, with '!a', or there""",
         ),
         (
             "net: {type: Desk, at: {at: net.server, time: 1}}",
-            "m.yaml:33:38: error: aspect net: it cannot stand inside of itself, at net.server",
+            "m.yaml:33:38: error: aspect net: it cannot attach to its own inside, at net.server",
         ),
         (
             "a: {type: Desk, at: b.input}",
-            """m.yaml:33:11: error: 'a' is the name of an actor and of an aspect that is a model
+            """m.yaml:33:11: error: 'a' is the name of both an actor and an aspect that is a model
    help: rename one""",
         ),
         (
             "net: {type: Desk, at: net.server.input}",
-            "m.yaml:33:33: error: aspect net: it cannot stand inside of itself, at net.server.input",
+            "m.yaml:33:33: error: aspect net: it cannot attach to its own inside, at net.server.input",
         ),
         (
             "net: {type: Desk, at: a}",
@@ -100,7 +100,7 @@ or these by input port""",
         ),
         (
             "net: {type: Desk}",
-            """m.yaml:33:11: error: aspect net does not say where it stands
+            """m.yaml:33:11: error: aspect net has no 'at'
    help: add 'at:' with ports or patterns""",
         ),
         (
@@ -114,13 +114,13 @@ m.yaml:33:29: error: net: Desk has no parameter 'tiem', did you mean 'time'?
             """m.yaml:33:11: error: a loop without delay: a -> net.negate -> a
    help: a.output -> net.request -> net.negate.input (m.yaml:33, m.yaml:12)
    help: net.negate.output -> net.response -> a.input (m.yaml:12, m.yaml:33)
-   help: the aspect net sends the tokens of all its ports through one model: let it stand at fewer of them, or give \
+   help: the aspect net sends the tokens of all its ports through one model: attach it to fewer of them, or give \
 that model a delay""",
         ),
         (
             "one: {type: Desk, at: two.server.input}, two: {type: Desk, at: one.server.input}",
-            """m.yaml:33:11: error: aspect one: it stands inside of two, and two inside of it
-   help: a token would never come out: let one of them stand elsewhere, or leave it out: '!two.**'""",
+            """m.yaml:33:11: error: aspect one: it attaches inside two, and two inside it
+   help: a token would never leave: attach one of them elsewhere, or exclude it: '!two.**'""",
         ),
     ],
 )
@@ -149,8 +149,8 @@ m.yaml:31:33: error: aspect net: Wire has no input
         (
             WIRE,
             WIRE.replace("[request]", "{request: float}", 1),
-            """m.yaml:5:14: error: aspect net: request of Wire is for float, but through an aspect go requests
-   help: leave out its type: the actors inside get requests, which hold the tokens""",
+            """m.yaml:5:14: error: aspect net: request of Wire has the type float, but aspects pass requests
+   help: leave out its type: the actors inside receive requests, which contain the tokens""",
         ),
         (
             WIRE,
@@ -172,9 +172,9 @@ m.yaml:8:43: error: net.scale.output sends float, but net.response takes Request
         (
             "t.output -> b.input,",
             "t.output -> b.input, t.output -> net.request,",
-            """m.yaml:32:57: error: aspect net: net.request is for the tokens of this aspect, and nothing else can be \
+            """m.yaml:32:57: error: aspect net: net.request takes the tokens of this aspect, so nothing else can be \
 connected to it
-   help: add another input for what else the composite needs""",
+   help: add another input for other tokens""",
         ),
     ],
 )
@@ -188,14 +188,14 @@ def test_wrong_classes(old: str, new: str, message: str) -> None:
         (
             "{}",
             "{net: {type: Desk, at: 'twin[0].scale.input'}}",
-            """error: aspect net: twin[0].scale.input is inside of twin[0], which has a director of its own
-   help: declare it inside of twin[0], or let it stand at the ports of twin[0]""",
+            """error: aspect net: twin[0].scale.input is inside twin[0], which has its own director
+   help: declare it inside twin[0], or attach it to the ports of twin[0]""",
         ),
         (
             "{net: {type: Desk, at: go}}",
             "{}",
-            """error: aspect twin[0].net: twin[0].go is outside of twin[0], which has a director of its own
-   help: declare it outside of twin[0]""",
+            """error: aspect twin[0].net: twin[0].go is outside twin[0], which has its own director
+   help: declare it outside twin[0]""",
         ),
     ],
 )

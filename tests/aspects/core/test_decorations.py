@@ -142,7 +142,7 @@ def test_parameters_from_outside() -> None:
     with pytest.raises(ModelError) as caught:
         load(YAML.format("Sensor"), types=TYPES, set=["s[0].noise.deviation=-1", "s[0].noise.deviatoin=1"])
     assert [problem.message for problem in caught.value.problems] == [
-        "'s[0].noise.deviatoin' sets no parameter, did you mean 's[0].noise.deviation'?",
+        "'s[0].noise.deviatoin' matches no parameter, did you mean 's[0].noise.deviation'?",
         "s[0].noise.deviation: -1 is out of bounds, expected a number >= 0",
     ]
 

@@ -198,7 +198,7 @@ def test_wrong_places(aspect: str, message: str) -> None:
 def test_a_parameter_that_is_connected() -> None:
     to_delay = ("s.output -> d.input", "s.output -> d.input, t.output -> d.delay")
     assert problem("it: {type: Bias, by: 1, at: d.delay}", *to_delay) == (
-        "aspect it: d.delay gets its values over a connection; let the aspect stand at 't.output', where they come from"
+        "aspect it: d.delay gets its values over a connection; attach the aspect to 't.output', where they come from"
     )
 
 

@@ -141,14 +141,14 @@ def test_windows_can_be_set_from_outside() -> None:
             "type: PacketLoss, probability: 1, at: {type: Scales}",
             (
                 "m.yaml:16:55: error: aspect loss: there is no actor of type 'Scales', did you mean 'Scale'?\n"
-                "   help: types in it: Scale, Ticker, Twin"
+                "   help: types here: Scale, Ticker, Twin"
             ),
         ),
         (
             "type: PacketLoss, probability: 1, at: {tag: radios}",
             (
                 "m.yaml:16:54: error: aspect loss: there is no actor with the tag 'radios', did you mean 'radio'?\n"
-                "   help: tags in it: radio, spare"
+                "   help: tags here: radio, spare"
             ),
         ),
         (
@@ -161,7 +161,7 @@ def test_windows_can_be_set_from_outside() -> None:
         (
             "type: PacketLoss, probability: 1, at: {port: input}",
             (
-                "m.yaml:16:48: error: a pointcut chooses by pattern, by type or by tag\n"
+                "m.yaml:16:48: error: a pointcut selects by pattern, type or tag\n"
                 "   help: write {at: ...}, {type: ..., port: ...} or {tag: ...}"
             ),
         ),
@@ -174,7 +174,7 @@ def test_windows_can_be_set_from_outside() -> None:
         ),
         (
             "type: Bias, by: 1, at: 't.output -> b.input'",
-            "m.yaml:16:33: error: aspect loss: Bias stands at output ports, not on connections",
+            "m.yaml:16:33: error: aspect loss: Bias attaches to output ports, not to connections",
         ),
         (
             "type: PacketLoss, probability: 1, at: ['a.input', '!b.inptu']",
@@ -185,23 +185,23 @@ def test_windows_can_be_set_from_outside() -> None:
         ),
         (
             "type: PacketLoss, probability: 1, at: '!a.input'",
-            "m.yaml:16:48: error: aspect loss: 'at' says only where it does not stand",
+            "m.yaml:16:48: error: aspect loss: 'at' has only exclusions",
         ),
         (
             "type: PacketLoss, probability: 1, at: ['a.input', '!*.input']",
-            "m.yaml:16:49: error: aspect loss: all that 'at' selects is left out",
+            "m.yaml:16:49: error: aspect loss: 'at' excludes everything that it selects",
         ),
         (
             "type: PacketLoss, probability: 1, at: ['*.input', '!t.output -> a.input']",
             (
-                "m.yaml:16:60: error: aspect loss: '!t.output -> a.input' leaves out no connection that is selected\n"
-                "   help: ports are left out of ports, connections of connections: select some, as in '*.out -> b.in'"
+                "m.yaml:16:60: error: aspect loss: '!t.output -> a.input' excludes no selected connection\n"
+                "   help: exclude ports from ports and connections from connections: select some, as in '*.out -> b.in'"
             ),
         ),
         (
             "type: PacketLoss, probability: 1, at: 'a.input, b.input'",
             (
-                "m.yaml:16:48: error: aspect loss: 'a.input, b.input' is no pointcut: 'input, b' is not a name, "
+                "m.yaml:16:48: error: aspect loss: 'a.input, b.input' is not a pointcut: 'input, b' is not a name, "
                 "a name with an index, '*' or '**'\n"
                 "   help: for several pointcuts, write a list: [a.in, b.in]"
             ),
@@ -218,7 +218,7 @@ def test_windows_can_be_set_from_outside() -> None:
             "type: PacketLoss, probability: 1, at: a.input, when: x > 3",
             (
                 "m.yaml:16:63: error: aspect loss.when: 'x > 3' is not an expression over ports: "
-                "the name 'x' is unknown: a port is written 'actor.port'"
+                "unknown name 'x': a port is written 'actor.port'"
             ),
         ),
         (
@@ -243,7 +243,7 @@ def test_no_port_of_the_kind() -> None:
     with pytest.raises(ModelError) as caught:
         load(PARTS.replace("a: {{type: Scale", "a: {{type: Recorder").format("type: Bias, by: 1, at: {type: Recorder}"))
     assert str(caught.value).partition("\n")[0].partition("error: ")[2] == (
-        "aspect loss: Bias stands at output ports, but no actor of type 'Recorder' has one"
+        "aspect loss: Bias attaches to output ports, but no actor of type 'Recorder' has one"
     )
 
 
@@ -262,7 +262,7 @@ def test_conditions_on_fields() -> None:
     assert formula([[1.0, 5.0], "x.y"]) is True
     with pytest.raises(EpicycleError, match=r"a\.state\.position"):
         formula(["text", "x.y"])
-    with pytest.raises(ExpressionError, match=r"no port is named in it: write a port as 'actor.port'"):
+    with pytest.raises(ExpressionError, match=r"it names no port: write a port as 'actor.port'"):
         PortFormula("1 < 2")
 
 

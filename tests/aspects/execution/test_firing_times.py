@@ -129,7 +129,7 @@ def test_in_python() -> None:
     with pytest.raises(ModelError) as caught:
         model.weave("more", ExecutionTime(time={"new": 0.1}), at=listener)
     problem, *_, advice = str(caught.value).partition("error: ")[2].splitlines()
-    assert problem == "aspect more: time: no actor that this is for has an input 'new', did you mean 'news'?"
+    assert problem == "aspect more: time: no actor that this applies to has an input 'new', did you mean 'news'?"
     assert advice == "   help: their inputs: go, news, extra"
 
 
@@ -143,6 +143,6 @@ def test_with_an_actor() -> None:
             "actors: {t: {type: Clock}, a: {type: Decorated}}\nconnections: [t.output -> a.go]\nrun: {stop: 1 s}",
             types=[*TYPES, Decorated],
         )
-    assert "aspect a.execution_time: time: no actor that this is for has an input 'goo', did you mean 'go'?" in str(
+    assert "aspect a.execution_time: time: no actor that this applies to has an input 'goo', did you mean 'go'?" in str(
         caught.value
     )

@@ -39,25 +39,25 @@ def test_pointcuts(at: str, actors: dict[str, str]) -> None:
     [
         (
             "type: SkipFiring, probability: 1, at: a.input",
-            "SkipFiring stands at actors, but a.input is a port\n   help: write 'a', without the port",
+            "SkipFiring attaches to actors, but a.input is a port\n   help: write 'a', without the port",
         ),
         (
             "type: SkipFiring, probability: 1, at: 'pair[*].*.output'",
             (
-                "SkipFiring stands at actors, but pair[0].one.output is a port\n"
+                "SkipFiring attaches to actors, but pair[0].one.output is a port\n"
                 "   help: write 'pair[*].*', without the port"
             ),
         ),
         (
             "type: SkipFiring, probability: 1, at: t.output -> a.input",
             (
-                "SkipFiring stands at actors, not on connections\n"
-                "   help: write 'a' for the one that receives"
+                "SkipFiring attaches to actors, not to connections\n"
+                "   help: write 'a' for the receiving actor"
             ),
         ),
         (
             "type: SkipFiring, probability: 1, at: {type: Scale, port: input}",
-            "SkipFiring stands at actors, not at their ports\n   help: leave 'port' out",
+            "SkipFiring attaches to actors, not to their ports\n   help: leave 'port' out",
         ),
         (
             "type: SkipFiring, probability: 1, at: b",
@@ -76,11 +76,11 @@ def test_pointcuts(at: str, actors: dict[str, str]) -> None:
         ),
         (
             "type: SkipFiring, probability: 1, at: a..b",
-            "'a..b' is no pointcut: '' is not a name, a name with an index, '*' or '**'",
+            "'a..b' is not a pointcut: '' is not a name, a name with an index, '*' or '**'",
         ),
         (
             "type: SkipFiring, probability: 1, at: {type: Scael}",
-            "there is no actor of type 'Scael', did you mean 'Scale'?\n   help: types in it: Pair, Scale, Ticker",
+            "there is no actor of type 'Scael', did you mean 'Scale'?\n   help: types here: Pair, Scale, Ticker",
         ),
         (
             "type: PacketLoss, probability: 1, at: a",
@@ -107,7 +107,7 @@ def test_weaving_in_python() -> None:
     assert sent(Simulation(model, keep_log=True).run(), "scale") == [(0.5, 0), (1.5, 1), (2.5, 2)]
     for wrong, message in [
         (Scale("scale"), "scale is not part of this model"),
-        (scale.outputs["output"], "aspect more: ExecutionTime stands at actors, but scale.output is a port"),
+        (scale.outputs["output"], "aspect more: ExecutionTime attaches to actors, but scale.output is a port"),
     ]:
         with pytest.raises(ModelError) as caught:
             model.weave("more", ExecutionTime(time=0.5), at=wrong)

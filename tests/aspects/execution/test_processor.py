@@ -259,8 +259,8 @@ run: {{stop: 1 s}}
         (
             "more: {type: Processor, at: [b, a]}",
             (
-                "7:3: error: aspect more: a runs on the processor 'cpu' already\n"
-                "   help: an actor has one processor: leave it out here, with '!a', or there"
+                "7:3: error: aspect more: a already runs on the processor 'cpu'\n"
+                "   help: an actor has one processor: exclude it here, with '!a', or there"
             ),
         ),
         (
@@ -286,7 +286,7 @@ run: {{stop: 1 s}}
         ),
         (
             "more: {type: Processor, at: a, times: {a: {trigger: 1}}}",
-            """7:46: error: aspect more: times: a: no actor that this is for has an input 'trigger'
+            """7:46: error: aspect more: times: a: no actor that this applies to has an input 'trigger'
    help: their inputs: input""",
         ),
         (
@@ -314,7 +314,7 @@ def test_two_processors_in_python() -> None:
     model.weave("two", Processor(time=1), at="s")
     with pytest.raises(ModelError) as caught:
         Simulation(model)
-    assert "aspect two: s runs on the processor 'one' already" in str(caught.value)
+    assert "aspect two: s already runs on the processor 'one'" in str(caught.value)
 
 
 def test_figures_of_a_processor_to_the_nanosecond() -> None:

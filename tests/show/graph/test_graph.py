@@ -276,7 +276,7 @@ def test_without_a_file_mermaid_is_printed_and_what_is_left_out_is_said(tmp_path
         (("-o", "full.svg"), "error: full.svg cannot be written: No space left on device\n"),
         (
             ("--set", "cel=1"),
-            "command line:1:7: error: 'cel' sets no parameter\n    1 | --set cel=1\n      |       ^^^^^\n",
+            "command line:1:7: error: 'cel' matches no parameter\n    1 | --set cel=1\n      |       ^^^^^\n",
         ),
     ],
 )
