@@ -77,4 +77,4 @@ def _fits(pattern: str, name: str) -> bool:
     try:
         return name != "" and select(pattern, [name]) == [name]
     except PatternError as error:
-        raise LogError(f"{pattern!r} is no pattern: {error}") from None
+        raise LogError(f"{pattern!r} is not a pattern: {error}") from None

@@ -141,6 +141,6 @@ def test_a_wrong_pace(text: str, model: str, capsys: pytest.CaptureFixture[str])
         main(["run", model, f"--realtime={text}"])
     assert caught.value.code == 2
     assert capsys.readouterr().err.splitlines()[-1] == (
-        f"epicycle run: error: argument --realtime: {text!r} is not a number of 1e-09 or more "
+        f"epicycle run: error: argument --realtime: {text!r} is not a number of at least 1e-09 "
         "(write MODEL before --realtime)"
     )

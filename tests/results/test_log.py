@@ -389,7 +389,7 @@ def test_filter(texts: list[str], fits: Callable[[Record], bool]) -> None:
             ("event=drop matches no event of the model, did you mean 'dropped'?; events: send, dropped, replaced"),
         ),
         ("port=a.output", "port=a.output matches no port of the model, did you mean 'output'?; ports: output, input"),
-        ("actor=a..b", "'a..b' is no pattern: '' is not a name, a name with an index, '*' or '**'"),
+        ("actor=a..b", "'a..b' is not a pattern: '' is not a name, a name with an index, '*' or '**'"),
         ("loss", "'loss' is not a filter of the log: write COLUMN=PATTERN, such as aspect=packet_loss"),
         ("aspect=", "'aspect=' is not a filter of the log: write COLUMN=PATTERN, such as aspect=packet_loss"),
         (
