@@ -325,7 +325,7 @@ class Merge(_Merge):
     def __init__(self, path: str, *, discard: bool = ..., whole_channel: bool = ...) -> None: ...
 
 class ModalActor(_ModalActor):
-    """Base of actors with modes, whose transitions are methods."""
+    """Base class of actors with modes whose transitions are methods."""
     def __init__(self, path: str) -> None: ...
 
 class MostRecent(_MostRecent):
@@ -505,7 +505,7 @@ class Spread(_Spread):
     def __init__(self, path: str) -> None: ...
 
 class StateMachine(_StateMachine):
-    """A state machine, with a transition a line and variables that may flow."""
+    """A state machine with one transition per line, and variables that may flow."""
     def __init__(self, path: str, *, modes: object, transitions: object = ..., initial: str | None = ..., variables: abc.Mapping[str, object] = ..., held: abc.Mapping[str, object] = ..., one_at_a_time: bool = ..., set_last: bool = ..., method: Literal['RK45', 'RK23', 'DOP853', 'Radau', 'BDF'] = ..., relative_tolerance: _Number = ..., absolute_tolerance: _Number = ..., max_step: _Number | None = ...) -> None: ...
 
 class StateSpace(_StateSpace):

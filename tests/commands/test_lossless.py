@@ -190,15 +190,15 @@ def test_results_of_another_command_are_not_replaced_silently(folder: Path, caps
     assert run("mm1", "--out", "my out") == (
         2,
         (
-            "error: my out holds results of the model 'tick', not of 'mm1': epicycle run tick.yaml --until 0.01 "
+            "error: my out holds results of the model 'tick', not 'mm1': epicycle run tick.yaml --until 0.01 "
             f"--out 'my out' --seed 2{choose}"
         ),
     )
     assert (folder / "my out" / "manifest.json").read_bytes() == before
     for text in ("{}", "[", "[1]", '{"study": "x", "model": {}}', '{"command": [1], "model": "tick"}'):
         (folder / "my out" / "manifest.json").write_text(text)
-        assert run(*first) == (2, f"error: my out holds other results than those of a run{choose}")
+        assert run(*first) == (2, f"error: my out holds results that are not from a run{choose}")
     os.mkfifo(folder / "results.fifo")
     (folder / "my out" / "manifest.json").unlink()
     (folder / "results.fifo").rename(folder / "my out" / "manifest.json")
-    assert run(*first) == (2, f"error: my out holds other results than those of a run{choose}")
+    assert run(*first) == (2, f"error: my out holds results that are not from a run{choose}")

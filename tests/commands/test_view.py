@@ -158,7 +158,7 @@ def test_other_viewers_are_shown_one_run(line: str, capsys: pytest.CaptureFixtur
         (
             "--rerun",
             "rerun",
-            "a recording of rerun needs the package rerun-sdk, which is not installed: pip install 'epicycle[rerun]'",
+            "a recording for rerun needs the package rerun-sdk, which is not installed: pip install 'epicycle[rerun]'",
         ),
     ],
 )

@@ -1,4 +1,4 @@
-"""Mermaid: an outline as text that GitHub, GitLab and many editors draw."""
+"""Writes an outline as Mermaid text, which GitHub, GitLab and many editors render."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class _Writer:
     def __init__(self, outline: Outline) -> None:
         self.outline = outline
         self.names: dict[str, str] = {}  # of boxes, and of the ports of open composites, by path
-        self.marked: list[str] = []  # where aspects stand
+        self.marked: list[str] = []  # where aspects are attached
         self.boxes: dict[str, Box] = {  # by the paths of their ports
             port.path: box for box in outline.root.walk() for port in (*box.inputs, *box.outputs)
         }
@@ -36,7 +36,7 @@ class _Writer:
             yield f"    class {','.join(self.marked)} aspect"
 
     def inside(self, box: Box, indent: str) -> Iterator[str]:
-        """The boxes in a composite, then their connections."""
+        """The boxes inside a composite, then their connections."""
         for port in (*box.inputs, *box.outputs):
             if box.path:
                 yield f"{indent}{self.name(port.path)}([{_quoted(_with_aspects(port))}])"
@@ -58,7 +58,7 @@ class _Writer:
             yield indent + self.link(link)
 
     def link(self, link: Link) -> str:
-        """A connection, labelled with what its ends do not say."""
+        """A connection, labelled with what its ends do not show."""
         ends = (self.end(link.source, "outputs"), self.end(link.target, "inputs"))
         words = ", ".join(part for part in (" to ".join(filter(None, ends)), label(link)) if part)
         arrow = "-->" if link.delay is None else "-.->"
@@ -66,17 +66,17 @@ class _Writer:
         return f"{self.node(link.source)} {between} {self.node(link.target)}"
 
     def end(self, path: str, side: str) -> str:
-        """What must be said of one end: the name of the port if the box has several, and aspects."""
+        """The label of one end: the name of the port if the box has several, and aspects."""
         box = self.boxes[path]
         ports: list[Port] = [] if box.is_open else getattr(box, side)
         return "".join(_with_aspects(port, named=len(ports) > 1) for port in ports if port.path == path)
 
     def node(self, port: str) -> str:
-        """The node at which a connection ends: a port of an open composite, or else the box."""
+        """The node at which a connection ends: a port of an open composite, otherwise the box."""
         return self.name(port if self.boxes[port].is_open else self.boxes[port].path)
 
     def name(self, path: str) -> str:
-        """A name for Mermaid that no other path has."""
+        """A unique Mermaid name for a path."""
         if path not in self.names:
             plain = re.sub(r"\W+", "_", path, flags=re.ASCII).strip("_")
             plain = f"{plain}_" if plain in RESERVED else plain

@@ -269,7 +269,7 @@ def test_without_a_file_mermaid_is_printed_and_what_is_left_out_is_said(tmp_path
     [
         (
             ("-o", "graph.txt"),
-            "error: graph.txt is no picture: its name must end in .svg, .png, .pdf, .mmd, .md\n",
+            "error: graph.txt is not a picture: its name must end in one of .svg, .png, .pdf, .mmd, .md\n",
         ),
         (("-o", "none/graph.svg"), "error: none/graph.svg cannot be written: there is no folder none\n"),
         (("-o", "folder.svg"), "error: folder.svg cannot be written: it is a folder\n"),

@@ -73,7 +73,7 @@ def test_a_dropped_plan_tells_why_the_robot_did_as_it_did(wifi: Path, opened: Op
     page.tab.mouse.click(box["x"] + spot[0], box["y"] + spot[1])
     words = page.words()
     assert words.startswith(f"dropped by wifi_loss\nat main.peer_plan, {spot[2]}")
-    assert "had to do without it\nmain.controller fired at" in words
+    assert "fired without it\nmain.controller fired at" in words
     assert "led to it" in words
     assert "came of it" in words
     # The controller's next firing says what it did not get, and what came of it: a control for the vehicle.
@@ -209,7 +209,7 @@ def test_noise_loses_nothing_and_who_gets_nothing_never_fires(tmp_path: Path, op
     page.do("state.goTo({run: 0, firing: -1, record: state.run.losses[2].record})")
     words = page.words()
     assert words.startswith("dropped by lost\nat deaf.input, 2 s\n")
-    assert "had to do without it" not in words  # it has never fired
+    assert "fired without it" not in words  # it has never fired
 
 
 def test_two_runs_are_shown_side_by_side_with_their_first_difference(pair: Path, opened: Open) -> None:

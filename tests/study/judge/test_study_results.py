@@ -90,7 +90,7 @@ def test_fewer_replications_take_no_row_from_the_table(
     assert message(capsys, copied, out=True) == f"walks: 4 of 4 runs are finished, and 6 more (10 ok)\n{kept}"
     assert main(["report", str(copied / "out")]) == 0
     page = (copied / "out" / "report.html").read_text(encoding="utf-8")
-    assert "4 of 4 runs are over, and 6 more of replications beyond those asked for." in page
+    assert "4 of 4 runs are finished, and 6 more from replications beyond those requested." in page
     assert "Seeds 20 to 24:" in page
 
 
