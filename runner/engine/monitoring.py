@@ -60,7 +60,7 @@ class _Margin:
         self._since, self._next = now, now + 1
 
     def close(self, upcoming: int) -> None:
-        """Nothing comes any more before ``upcoming``."""
+        """Nothing more comes before ``upcoming``."""
         if self._is_linear and self._next < upcoming:
             self._source.pieces.append(Piece(self._next, upcoming - 1, self._found))
 
@@ -161,7 +161,7 @@ class Monitoring:
         return (readings for condition, readings in pairs if isinstance(condition, Condition))
 
     def verdict(self, end: int) -> Verdict:
-        """What it comes to when the run ends at a time (ns); nothing may be added any more."""
+        """What it comes to when the run ends at a time (ns); nothing more may be added."""
         self.settle(end + 1)
         if self._missing:
             return Verdict(missing=self._missing)

@@ -293,5 +293,5 @@ def test_depth_is_a_whole_number(depth: str, tmp_path: Path) -> None:
     done = epicycle("small.yaml", "--depth", depth, cwd=tmp_path)
     assert (done.returncode, done.stdout) == (BAD_INPUT, "")
     assert done.stderr.splitlines()[-1] == (
-        f"epicycle graph: error: argument --depth: {depth!r} is not a whole number from 0 on"
+        f"epicycle graph: error: argument --depth: {depth!r} is not a whole number of at least 0"
     )
