@@ -44,8 +44,8 @@ class _Writer:
         groups: dict[tuple[str, ...], dict[str, None]] = {}
         for woven in self.outline.model.aspects:
             if key := shared(woven):
-                nodes = filter(None, map(self.shown, [*woven.ports, *woven.actors]))
-                groups.setdefault(key, {}).update(dict.fromkeys(nodes))
+                places = filter(None, map(self.shown, [*woven.ports, *woven.actors]))
+                groups.setdefault(key, {}).update(dict.fromkeys(places))
         for (kind, *rest), nodes in groups.items():
             if len(nodes) > 1:
                 name = self.name(f"shared {rest[-1]}")
