@@ -99,7 +99,7 @@ class Falsified(Tabled):
     def _reservations(self) -> Iterator[str]:
         """What the search could not do."""
         runs = self.findings.runs
-        if failed := [each for each in runs if each.status != OK]:
+        if failed := self.findings.failed:
             yield (
                 f"{counted(len(failed), 'run')} failed, and nothing is known of the property there: 'epicycle status "
                 f"{self.folder}' shows them."
@@ -109,8 +109,8 @@ class Falsified(Tabled):
                 "All values were chosen at random: the library that guides a search is not installed "
                 "(pip install 'epicycle[falsify]')."
             )
-        if missing := sum(each.status == OK and each.holds is None for each in runs):
-            yield f"In {counted(missing, 'run')} the property could not be judged."
+        if missing := self.findings.not_judged:
+            yield f"In {counted(len(missing), 'run')} the property could not be judged."
         if len(runs) > 1 and len({each.digest for each in runs if each.status == OK}) == 1:
             yield "All runs were the same: nothing in the model depends on the seed or on what was varied."
 
@@ -127,8 +127,8 @@ class Falsified(Tabled):
             "command": self.command,
             "explain": self.explain,
             "runs": len(found.runs),
-            "failed": sum(each.status != OK for each in found.runs),
-            "not_judged": sum(each.status == OK and each.holds is None for each in found.runs),
+            "failed": len(found.failed),
+            "not_judged": len(found.not_judged),
             "least": None if found.least is None else _facts(found.least),
             "guided": found.guided,
             "covered": self.covered,

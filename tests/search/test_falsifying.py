@@ -191,7 +191,7 @@ def test_the_folder_is_that_of_a_study(capsys: pytest.CaptureFixture[str]) -> No
     assert (Path("out") / "table.parquet").is_file()
     capsys.readouterr()
     assert main(["status", "out"]) == 0
-    assert capsys.readouterr().out == "falsify_far: 30 of at most 30 runs are over (30 ok)\n"
+    assert capsys.readouterr().out == "falsify_far: 30 of at most 30 runs are finished (30 ok)\n"
     run = table["run"][17].as_py()
     assert main(["replay", "out", run]) == 0
     assert capsys.readouterr().out.endswith(": the same\n")
@@ -345,7 +345,7 @@ def test_a_folder_of_something_else_is_left_alone(capsys: pytest.CaptureFixture[
     capsys.readouterr()
     assert falsify("--runs", 1, "--vary", "x=0.0..1.0", "--out", "out") == 2
     assert capsys.readouterr().err == (
-        "error: out was made when falsify_far had other factors: none, not x (float)\n"
+        "error: out was made when falsify_far had different factors: none, not x (float)\n"
         "   help: choose another folder with --out\n"
     )
     assert main(["falsify", "nosuch", "--monitor", "away"]) == 2
