@@ -23,6 +23,7 @@ actors:
   clock: {type: Clock, period: "${period}", values: ["${loud}", "${mode}", "${share}"]}
 run: {stop: 4 s, record: [clock.output]}
 metrics: {ticks: {of: clock.output, take: count, doc: how many}}
+monitors: {alive: {property: eventually sends clock.output, doc: it ticks}}
 figures: {ticks: {type: TimeSeries, signals: clock.output}}
 """
 
@@ -53,6 +54,9 @@ share      number <= 1                   0.25
 
 metric  takes                  unit  what it is
 ticks   count of clock.output        how many
+
+monitor  property                       unit  what it is
+alive    eventually sends clock.output        it ticks
 
 figure  type
 ticks   TimeSeries
