@@ -10,7 +10,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from epicycle.actors import abridged, counted
+from epicycle.actors import EpicycleError, abridged, counted
 
 from ..bars import bar
 from ..build import load_model
@@ -68,6 +68,11 @@ class Falsified(Tabled):
         if name not in {each.name for each in model.monitors}:
             model.monitor(name, asked.monitor)
         results = Simulation(model, seed=run.seed, acts=Acts(model.exactly)).run()
+        if results.digest != run.digest:
+            raise EpicycleError(
+                f"run {run.number} (seed {run.seed}) does not repeat: its digest is {results.digest[:16]}..., but was "
+                f"{(run.digest or '')[:16]}...; something has changed since"
+            )
         self.verdict = results.monitors[name]
         if results.acts:
             self.explain = ["epicycle", "explain", *self.command[2:], "--monitor", asked.monitor]

@@ -68,6 +68,9 @@ class Findings:
     space: Space
     guided: bool
     runs: list[Run] = field(default_factory=list)
+    broken: Run | None = None  # the first run that breaks the property
+    least: Run | None = None  # the first run of least robustness
+    margin: float | None = None  # its robustness
 
     @property
     def failed(self) -> list[Run]:
@@ -85,16 +88,14 @@ class Findings:
         has_ranges = any(isinstance(axis, Interval) for axis in self.space.axes)
         return has_ranges and not self.guided and len(self.runs) > SPREAD * BATCH
 
-    @property
-    def broken(self) -> Run | None:
-        """The first run that breaks the property."""
-        return next((each for each in self.runs if each.holds is False), None)
-
-    @property
-    def least(self) -> Run | None:
-        """The run of least robustness."""
-        known = [each for each in self.runs if each.robustness is not None and not math.isnan(each.robustness)]
-        return min(known, key=lambda each: each.robustness or 0.0, default=None)
+    def add(self, run: Run) -> None:
+        """Another run is over."""
+        self.runs.append(run)
+        if self.broken is None and run.holds is False:
+            self.broken = run
+        margin = run.robustness
+        if margin is not None and not math.isnan(margin) and (self.margin is None or margin < self.margin):
+            self.least, self.margin = run, margin
 
 
 def falsify(
@@ -132,6 +133,8 @@ class _Searching:
 
     def __init__(self, asked: Asked) -> None:
         self._asked = asked
+        if not 0 < asked.runs <= MAX_RUNS:
+            raise EpicycleError(f"runs {asked.runs:,}: expected a whole number from 1 to {MAX_RUNS:,}")
         types = [each for file in asked.types for each in types_of_file(file)]
         model = load_model(asked.model, set=asked.set, disturb=asked.disturb, types=types)
         self._monitor = asked.monitor
@@ -196,7 +199,7 @@ class _Searching:
             margin = row[f"{found.monitor}_robustness"]
             known = None if holds is None else bool(holds)
             ended = (row["status"], known, margin, row["error"], row["digest"], row["run"])
-            found.runs.append(Run(start + at, level, row["seed"], *ended))
+            found.add(Run(start + at, level, row["seed"], *ended))
         self._levels |= places
         self._latest = [each.robustness for each in found.runs[start:]]
 

@@ -17,6 +17,7 @@ from pathlib import Path
 import pytest
 
 import epicycle
+from epicycle.actors import EpicycleError
 from epicycle.runner.cli import main
 from epicycle.runner.search import falsifying
 from epicycle.runner.search import proposals as proposing
@@ -144,6 +145,12 @@ def test_runs_that_are_all_the_same_are_told() -> None:
         "Tried: 5 runs, seeds 0 to 4. All runs were the same: nothing in the model depends on the seed or on what was "
         "varied."
     )
+
+
+def test_a_program_asks_for_some_runs() -> None:
+    for runs in (0, 10**7):
+        with pytest.raises(EpicycleError, match=f"runs {runs:,}: expected a whole number from 1 to 1,000,000"):
+            epicycle.falsify("far.yaml", "away", runs=runs, out="out")
 
 
 def test_runs_that_fail_or_cannot_be_judged_are_told(capsys: pytest.CaptureFixture[str]) -> None:
