@@ -23,7 +23,6 @@ actors:
   clock: {type: Clock, period: "${period}", values: ["${loud}", "${mode}", "${share}"]}
 run: {stop: 4 s, record: [clock.output]}
 metrics: {ticks: {of: clock.output, take: count, doc: how many}}
-monitors: {alive: {property: eventually sends clock.output, doc: it ticks}}
 figures: {ticks: {type: TimeSeries, signals: clock.output}}
 """
 
@@ -40,6 +39,8 @@ def printed(capsys: pytest.CaptureFixture[str], *arguments: str, code: int = 0) 
 
 
 def test_a_model_shows_what_it_offers(capsys: pytest.CaptureFixture[str]) -> None:
+    monitors = "monitors: {alive: {property: eventually sends clock.output, doc: it ticks}}\n"
+    Path("m.yaml").write_text(MODEL + monitors)
     assert (
         printed(capsys, "show", "m.yaml", "--set", "share=0.25")
         == """\
