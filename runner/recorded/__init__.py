@@ -1,0 +1,1 @@
+"""What was recorded outside of runs: channels fitted to measured traces, and recordings that pass disturbances."""
