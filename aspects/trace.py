@@ -103,9 +103,7 @@ class TraceFile(Configurable):
             file.seek(0)
             # Read from the first block, a type would be too narrow for later ones.
             numbers = {each: float64() for each in wanted if each not in (self.lost, self.received)}
-            return csv.open_csv(
-                file, convert_options=csv.ConvertOptions(include_columns=wanted, column_types=numbers)
-            )
+            return csv.open_csv(file, convert_options=csv.ConvertOptions(include_columns=wanted, column_types=numbers))
 
         return names, batches
 
@@ -134,9 +132,7 @@ class TraceFile(Configurable):
             if name in names:
                 found[what] = name
             elif name not in (None, what):
-                raise self._error(
-                    f"it has no column {name!r}{did_you_mean(name, names)}; columns: {_listed(names)}"
-                )
+                raise self._error(f"it has no column {name!r}{did_you_mean(name, names)}; columns: {_listed(names)}")
         if not found.keys() & {"lost", "received", "delay", "sequence"}:
             raise self._error(
                 f"it has no column {self.lost!r}, {self.received!r} or {self.delay!r}, and no sequence is named; "
@@ -164,9 +160,7 @@ class TraceFile(Configurable):
     def _trace(self, columns: dict[str, NDArray[np.float64]]) -> Trace:
         times = self._times(columns["time"]) if "time" in columns else None
         said = [
-            self._truths(what, columns[what]) ^ (what == "received")
-            for what in ("lost", "received")
-            if what in columns
+            self._truths(what, columns[what]) ^ (what == "received") for what in ("lost", "received") if what in columns
         ]
         if len(said) == 2:
             self._refuse(said[0] != said[1], f"{self.lost} and {self.received} contradict each other")
@@ -190,11 +184,13 @@ class TraceFile(Configurable):
         since = seconds - seconds[0]
         self._refuse(np.diff(since, prepend=0.0) < 0.0, f"{self.time} is before that of the row above")
         self._refuse(since * 1e9 > LONGEST, f"{self.time} is more than 1e9 s after the first")
-        return np.rint(since * 1e9).astype(np.int64)
+        times: NDArray[np.int64] = np.rint(since * 1e9).astype(np.int64)
+        return times
 
     def _truths(self, what: str, numbers: NDArray[np.float64]) -> NDArray[np.bool_]:
         self._refuse(~((numbers == 0.0) | (numbers == 1.0)), f"{getattr(self, what)} is neither true (1) nor false (0)")
-        return numbers == 1.0
+        truths: NDArray[np.bool_] = numbers == 1.0
+        return truths
 
     def _delays(self, numbers: NDArray[np.float64], lost: NDArray[np.bool_]) -> NDArray[np.int64]:
         late = np.where(lost, 0.0, numbers * UNITS[self.delay_unit])
@@ -249,13 +245,14 @@ class TraceReplay(TraceFile, CommunicationAspect):
     )
 
     def check(self) -> None:
-        self._trace = trace = self.read()
+        self._measured = trace = self.read()
         self._length = len(trace)  # rows, or ns
         if self.by == TIME:
             if trace.times is None:
                 raise self._error(f"'by: time' needs a column of times and no sequence; there is no {self.time!r}")
             if len(trace) < 2 or trace.times[-1] == 0:
                 raise self._error("'by: time' needs two rows with different times")
+            self._times_of_rows = trace.times
             self._length = int(2 * trace.times[-1] - trace.times[-2])
 
     def pass_token(self, token: Any, point: JoinPoint) -> None:
@@ -264,9 +261,9 @@ class TraceReplay(TraceFile, CommunicationAspect):
             if self.at_end == STOP:
                 point.stop()
             point.forward(token)
-        elif self._trace.lost[row]:
+        elif self._measured.lost[row]:
             point.act("dropped", token)
-        elif self._trace.delays is not None and (late := int(self._trace.delays[row])):
+        elif self._measured.delays is not None and (late := int(self._measured.delays[row])):
             delay = to_seconds(late)
             point.act("delayed", token, delay)
             point.forward(token, delay)
@@ -291,4 +288,4 @@ class TraceReplay(TraceFile, CommunicationAspect):
             at %= self._length
         if self.by == TOKEN:
             return at
-        return int(np.searchsorted(self._trace.times, at, side="right")) - 1  # type: ignore[arg-type]
+        return int(np.searchsorted(self._times_of_rows, at, side="right")) - 1

@@ -10,7 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from .comparing import Comparison, Difference, compare
+    from .disturbing import Disturbed, disturb
     from .explaining import Explained, explain, explained
+    from .fitting import Fit, fit
     from .picturing import Picture, Pictures, draw, plot, save
     from .running import Changes, Done, as_command, load, perform, run, seconds, watched
     from .studying import study
@@ -20,16 +22,20 @@ __all__ = [
     "Changes",
     "Comparison",
     "Difference",
+    "Disturbed",
     "Done",
     "Explained",
+    "Fit",
     "Page",
     "Picture",
     "Pictures",
     "as_command",
     "compare",
+    "disturb",
     "draw",
     "explain",
     "explained",
+    "fit",
     "load",
     "perform",
     "plot",
@@ -44,7 +50,9 @@ __all__ = [
 
 _HOMES = {
     "comparing": ("Comparison", "Difference", "compare"),
+    "disturbing": ("Disturbed", "disturb"),
     "explaining": ("Explained", "explain", "explained"),
+    "fitting": ("Fit", "fit"),
     "picturing": ("Picture", "Pictures", "draw", "plot", "save"),
     "running": ("Changes", "Done", "as_command", "load", "perform", "run", "seconds", "watched"),
     "studying": ("study",),

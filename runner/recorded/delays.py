@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .losses import Test
+from .losses import Goodness
 
 Delays = NDArray[np.float64]  # in s
 
@@ -32,7 +32,7 @@ class DelayLaw:
     shape: float
     log_likelihood: float
     bic: float
-    spread: Test | None = None
+    spread: Goodness | None = None
 
 
 Law = tuple[float, float, float]  # shift, mean, shape
@@ -49,9 +49,7 @@ def delay_laws(delays: Delays) -> list[DelayLaw]:
             continue
         likelihood = _likelihood(delays, law)
         found.append(
-            DelayLaw(
-                name, *law, likelihood, free * math.log(len(delays)) - 2.0 * likelihood, _tested(delays, fit)
-            )
+            DelayLaw(name, *law, likelihood, free * math.log(len(delays)) - 2.0 * likelihood, _tested(delays, fit))
         )
     return found
 
@@ -70,7 +68,7 @@ def _exponential(delays: Delays) -> Law | None:
 def _shifted_exponential(delays: Delays) -> Law | None:
     """The least delay is 1/n of the mean above the shift on average: without that, the estimate is biased."""
     shift = _highest_shift(delays)
-    return shift, float(np.mean(delays)) - shift, 1.0
+    return (shift, float(np.mean(delays)) - shift, 1.0) if shift > 0.0 else None
 
 
 def _gamma(delays: Delays) -> Law | None:
@@ -84,6 +82,8 @@ def _shifted_gamma(delays: Delays) -> Law | None:
     from scipy.optimize import minimize_scalar
 
     highest = _highest_shift(delays)
+    if highest == 0.0:
+        return None
 
     def cost(shift: float) -> float:
         law = _gamma_above(delays, shift)
@@ -141,7 +141,7 @@ def _likelihood(delays: Delays, law: Law) -> float:
     return whole - len(delays) * (float(gammaln(shape)) + shape * math.log(scale))
 
 
-def _tested(delays: Delays, fit: Callable[[Delays], Law | None]) -> Test | None:
+def _tested(delays: Delays, fit: Callable[[Delays], Law | None]) -> Goodness | None:
     from scipy.stats import gamma, kstest
 
     half, other = delays[0::2], delays[1::2]
@@ -150,4 +150,4 @@ def _tested(delays: Delays, fit: Callable[[Delays], Law | None]) -> Test | None:
         return None
     shift, mean, shape = law
     found: Any = kstest(other, gamma(shape, shift, mean / shape).cdf)
-    return Test("Kolmogorov-Smirnov", float(found.statistic), None, float(found.pvalue))
+    return Goodness("Kolmogorov-Smirnov", float(found.statistic), None, float(found.pvalue))

@@ -21,7 +21,7 @@ _BINS = 20
 
 
 @dataclass(frozen=True)
-class Test:
+class Goodness:
     """A test of goodness of fit; a small ``p`` speaks against the model."""
 
     name: str
@@ -59,8 +59,8 @@ class LossModel:
     log_likelihood: float
     free: int
     bic: float
-    runs: Test | None
-    gain: Test | None
+    runs: Goodness | None
+    gain: Goodness | None
 
 
 def loss_models(lost: NDArray[np.bool_]) -> list[LossModel]:
@@ -73,9 +73,7 @@ def loss_models(lost: NDArray[np.bool_]) -> list[LossModel]:
     ]
     if 0 < count < number:
         bursts = gilbert(losses)
-        found.append(
-            _model(losses, "Gilbert", "GilbertElliott", {"p": bursts.p, "r": bursts.r}, bursts, 2, found[-1])
-        )
+        found.append(_model(losses, "Gilbert", "GilbertElliott", {"p": bursts.p, "r": bursts.r}, bursts, 2, found[-1]))
         hidden = gilbert_elliott(losses)
         found.append(_model(losses, "Gilbert-Elliott", "GilbertElliott", vars(hidden), hidden, 4, found[-1]))
     return found
@@ -96,7 +94,7 @@ def _model(
     gain = None
     if simpler is not None:
         statistic, freedom = max(0.0, 2.0 * (likelihood - simpler.log_likelihood)), free - simpler.free
-        gain = Test("likelihood ratio", statistic, freedom, float(chi2.sf(statistic, freedom)))
+        gain = Goodness("likelihood ratio", statistic, freedom, float(chi2.sf(statistic, freedom)))
     bic = free * math.log(len(losses)) - 2.0 * likelihood
     return LossModel(name, aspect, parameters, likelihood, free, bic, run_lengths(losses, channel, free), gain)
 
@@ -224,7 +222,7 @@ def runs(losses: Losses) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     return (first, second) if len(edges) and not losses[edges[0]] else (second, first)
 
 
-def run_lengths(losses: Losses, channel: Channel, free: int) -> Test | None:
+def run_lengths(losses: Losses, channel: Channel, free: int) -> Goodness | None:
     """Pearson's chi-square test of the lengths of runs; None where there are too few."""
     from scipy.stats import chi2
 
@@ -236,7 +234,7 @@ def run_lengths(losses: Losses, channel: Channel, free: int) -> Test | None:
             statistic += math.fsum((seen - expected) ** 2 / expected for seen, expected in found)
             bins, kinds = bins + len(found), kinds + 1
     freedom = bins - kinds - free
-    return Test("chi-square", statistic, freedom, float(chi2.sf(statistic, freedom))) if freedom > 0 else None
+    return Goodness("chi-square", statistic, freedom, float(chi2.sf(statistic, freedom))) if freedom > 0 else None
 
 
 def _binned(lengths: NDArray[np.int64], channel: Channel) -> list[tuple[int, float]]:

@@ -39,7 +39,7 @@ def file_of(folder: Path, table: str | dict[str, list[Any]]) -> Path:
         (TABLE, {}),
         ("received,delay\n1,2\n0,\n1,0\n1,2500\n", {}),
         ("received,delay\ntrue,2\nfalse,7\ntrue,0\ntrue,2500\n", {}),
-        ("delay\n2\n\"\"\n0\n2500\n", {}),
+        ('delay\n2\n""\n0\n2500\n', {}),
         ("rtt,n\n2500,9\n0,8\n2,6\n3,8\n", {"delay": "rtt", "sequence": "n"}),  # in any order, the second 8 a copy
         ({"lost": [False, True, False, False], "delay": [2, None, 0, 2500]}, {}),
         ({"n": [4, 6, 7], "delay": [2.0, 0.0, 2500.0], "data": ["x", "y", "z"]}, {"sequence": "n"}),
@@ -63,7 +63,7 @@ def test_the_end_of_a_trace(tmp_path: Path) -> None:
 
 
 def test_rows_by_time(tmp_path: Path) -> None:
-    """The times of a log need not begin at zero; a row is valid until the next one, the last as long as the one before."""
+    """A row is valid until the next one, the last for as long as the one before; the first row is time 0."""
     file = file_of(tmp_path, "time,lost\n1700000000.0,0\n1700000000.5,1\n1700000001.5,0\n")
     lost = [5, 6, 7, 8, 9, 10, 11, 12, 13, 14]  # tenths of a second; the trace is 2.5 s long
     bench = Bench(TraceReplay(file=file, by="time")).play(range(50), period=100)
@@ -156,7 +156,11 @@ def whole_message(caught: pytest.ExceptionInfo[BaseException], folder: Path) -> 
         ("lost\n1\n", {"by": "time"}, "'by: time' needs a column of times and no sequence; there is no 'time'"),
         ("time,lost\n1,0\n", {"by": "time"}, "'by: time' needs two rows with different times"),
         ({"lost": ["a"]}, {}, "its column 'lost' holds string values, expected numbers, or true and false"),
-        ({"lost": [[1], [0]]}, {}, "its column 'lost' holds list<element: int64> values, expected numbers, or true and false"),
+        (
+            {"lost": [[1], [0]]},
+            {},
+            "its column 'lost' holds list<element: int64> values, expected numbers, or true and false",
+        ),
     ],
 )
 def test_wrong_tables(tmp_path: Path, table: Any, columns: dict[str, str], message: str) -> None:
