@@ -16,7 +16,8 @@ from epicycle.actors import Configurable, EpicycleError, Parameter, did_you_mean
 from .core import CommunicationAspect, JoinPoint
 
 MOST = 10_000_000  # rows
-LONGEST = 10**9 * 10**9  # ns, of a trace and of a delay
+LONGEST = 1_000_000_000_000_000_000  # ns, of a trace and of a delay
+_EXACT = 9007199254740992.0  # floats up to here hold every whole number
 UNITS = {"s": 1e9, "ms": 1e6, "us": 1e3, "ns": 1.0}  # in ns
 TOKEN, TIME = "token", "time"
 REPEAT, PASS, STOP = "repeat", "pass", "stop"
@@ -69,7 +70,7 @@ class TraceFile(Configurable):
         return self._trace(columns)
 
     def _error(self, reason: str) -> TraceError:
-        return TraceError(f"{self.file} is no trace: {reason}")
+        return TraceError(f"{self.file} is not a trace: {reason}")
 
     # -- columns --------------------------------------------------------------------------------------------------
 
@@ -180,7 +181,7 @@ class TraceFile(Configurable):
         return Trace(lost, late, times)
 
     def _times(self, seconds: NDArray[np.float64]) -> NDArray[np.int64]:
-        self._refuse(~np.isfinite(seconds), f"{self.time} is no time in s")
+        self._refuse(~np.isfinite(seconds), f"{self.time} is not a time in s")
         since = seconds - seconds[0]
         self._refuse(np.diff(since, prepend=0.0) < 0.0, f"{self.time} is before that of the row above")
         self._refuse(since * 1e9 > LONGEST, f"{self.time} is more than 1e9 s after the first")
@@ -201,7 +202,7 @@ class TraceFile(Configurable):
     def _in_sequence(self, numbers: NDArray[np.float64], values: Any, missing: object) -> Any:
         """The values in the order of the sequence numbers; of those with the same number, the first."""
         self._refuse(
-            ~(np.abs(numbers) <= 2.0**53) | (np.rint(numbers) != numbers), f"{self.sequence} is not a whole number"
+            ~(np.abs(numbers) <= _EXACT) | (np.rint(numbers) != numbers), f"{self.sequence} is not a whole number"
         )
         first = float(numbers.min())
         places = (numbers - first).astype(np.int64)

@@ -16,7 +16,7 @@ from typing import IO, Any, BinaryIO, Protocol
 from epicycle.actors import EpicycleError, did_you_mean, open_regular
 
 COLUMNS = ["time", "topic", "value"]
-NANOSECONDS = Decimal(10) ** 9
+NANOSECONDS = Decimal(1_000_000_000)
 _LINE = 2**20  # characters in a line of a CSV log, at most
 _CHUNK = 2**30  # bytes in a chunk of an MCAP file, at most
 _TOPICS = 10_000
@@ -65,7 +65,7 @@ def opened(path: Path) -> Iterator[Recording]:
     kinds: dict[str, Any] = {".mcap": McapRecording, ".csv": CsvRecording}
     kind = kinds.get(path.suffix.lower())
     if kind is None:
-        raise RecordingError(f"{path} is no recording: its name must end in .mcap or .csv")
+        raise RecordingError(f"{path} is not a recording: its name must end in .mcap or .csv")
     try:
         with open_regular(path) as file:
             yield kind(path, file)
@@ -153,11 +153,11 @@ class CsvRecording:
         except InvalidOperation:
             time = Decimal("nan")
         if not (time.is_finite() and -NANOSECONDS * 10 < time < NANOSECONDS * 10):
-            raise self._error(f"line {line:,}: {text[:50]!r} is no time in s")
+            raise self._error(f"line {line:,}: {text[:50]!r} is not a time in s")
         return time
 
     def _error(self, reason: str) -> RecordingError:
-        return RecordingError(f"{self.path} is no recording: {reason}")
+        return RecordingError(f"{self.path} is not a recording: {reason}")
 
     def writing(self, file: BinaryIO) -> Writing:
         return _CsvWriting(self.channels, file)
@@ -239,7 +239,7 @@ class McapRecording:
             raise self._error(f"{said or type(error).__name__}") from None
 
     def _error(self, reason: str) -> RecordingError:
-        return RecordingError(f"{self.path} is no recording: {reason}")
+        return RecordingError(f"{self.path} is not a recording: {reason}")
 
     def writing(self, file: BinaryIO) -> Writing:
         return _McapWriting(self, file)

@@ -145,7 +145,7 @@ def whole_message(caught: pytest.ExceptionInfo[BaseException], folder: Path) -> 
         ("delay\ninf\n", {}, "row 1: delay is not from 0 s to 1e9 s"),
         ("delay\nsoon\n", {}, "In CSV column #0: CSV conversion error to double: invalid value 'soon'"),
         ("time,lost\n1,0\n0.5,0\n", {}, "row 2: time is before that of the row above"),
-        ("time,lost\n1,0\n,0\n", {}, "row 2: time is no time in s"),
+        ("time,lost\n1,0\n,0\n", {}, "row 2: time is not a time in s"),
         ("time,lost\n1,0\n2e9,0\n", {}, "row 2: time is more than 1e9 s after the first"),
         ("n\n1\n1.5\n", {"sequence": "n"}, "row 2: n is not a whole number"),
         (
@@ -167,14 +167,14 @@ def test_wrong_tables(tmp_path: Path, table: Any, columns: dict[str, str], messa
     file = file_of(tmp_path, table)
     with pytest.raises(EpicycleError) as caught:
         TraceReplay(file=file, **columns)
-    assert whole_message(caught, tmp_path) == f"DIR/{file.name} is no trace: {message}"
+    assert whole_message(caught, tmp_path) == f"DIR/{file.name} is not a trace: {message}"
 
 
 def test_wrong_files(tmp_path: Path) -> None:
     binary = np.random.default_rng(1).integers(0, 256, 3_000_000, dtype=np.uint8).tobytes()
     for name in ("t.csv", "t.parquet"):
         (tmp_path / name).write_bytes(binary)
-        with pytest.raises(EpicycleError, match=re.escape(f"{tmp_path / name} is no trace: ")) as caught:
+        with pytest.raises(EpicycleError, match=re.escape(f"{tmp_path / name} is not a trace: ")) as caught:
             TraceReplay(file=tmp_path / name)
         assert len(str(caught.value)) < 1000
     (tmp_path / "t.csv").write_bytes(b"lost\n" + b"1" * 5_000_000)
@@ -186,12 +186,12 @@ def test_wrong_files(tmp_path: Path) -> None:
     ):
         with pytest.raises(EpicycleError) as caught:
             TraceReplay(file=path)
-        assert str(caught.value) == f"{path} is no trace: {message}"
+        assert str(caught.value) == f"{path} is not a trace: {message}"
     if hasattr(os, "mkfifo"):
         os.mkfifo(tmp_path / "pipe.csv")
         with pytest.raises(EpicycleError) as caught:
             TraceReplay(file=tmp_path / "pipe.csv")
-        assert str(caught.value) == f"{tmp_path / 'pipe.csv'} is no trace: it is a named pipe, not a regular file"
+        assert str(caught.value) == f"{tmp_path / 'pipe.csv'} is not a trace: it is a named pipe, not a regular file"
 
 
 def test_a_table_that_is_too_long_is_not_read(tmp_path: Path) -> None:
@@ -203,7 +203,9 @@ def test_a_table_that_is_too_long_is_not_read(tmp_path: Path) -> None:
             writer.write_table(block)
     with pytest.raises(EpicycleError) as caught:
         TraceReplay(file=file)
-    assert str(caught.value) == f"{file} is no trace: it has 15,000,000 rows, more than 10,000,000; take a part of it"
+    assert (
+        str(caught.value) == f"{file} is not a trace: it has 15,000,000 rows, more than 10,000,000; take a part of it"
+    )
 
 
 def test_a_model_is_told_where_its_trace_is_wrong(tmp_path: Path) -> None:
@@ -213,7 +215,7 @@ def test_a_model_is_told_where_its_trace_is_wrong(tmp_path: Path) -> None:
         return [str(problem).replace(str(tmp_path), "DIR") for problem in caught.value.problems]
 
     assert problems(MODEL.replace("ms, at", "ms, by: time, lost: los, at"))[0].startswith(
-        "DIR/m.yaml:8:3: error: aspect it: DIR/trace.csv is no trace: it has no column 'los', did you mean 'lost'?"
+        "DIR/m.yaml:8:3: error: aspect it: DIR/trace.csv is not a trace: it has no column 'los', did you mean 'lost'?"
     )
     outside = problems(MODEL.replace("trace.csv", "../trace.csv"))
     assert "'../trace.csv' cannot be read: a file named in a model must be in or below the folder" in outside[0]

@@ -257,9 +257,9 @@ def test_correlated_delays_are_told(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["none.csv"], "error: none.csv is no trace: No such file or directory\n"),
-        (["t.csv", "--lost", "loses"], "error: t.csv is no trace: it has no column 'loses'; columns: x\n"),
-        (["t.txt"], "error: t.txt is no trace: its name must end in .csv or .parquet\n"),
+        (["none.csv"], "error: none.csv is not a trace: No such file or directory\n"),
+        (["t.csv", "--lost", "loses"], "error: t.csv is not a trace: it has no column 'loses'; columns: x\n"),
+        (["t.txt"], "error: t.txt is not a trace: its name must end in .csv or .parquet\n"),
         (["t.csv", "-o", "no/f.yaml"], "error: --out no/f.yaml cannot be written: there is no folder no\n"),
     ],
 )
