@@ -152,7 +152,7 @@ class Throttle(_Throttle):
 
 class TraceReplay(_TraceReplay):
     """Loses and delays messages exactly as a measured trace says."""
-    def __init__(self, *, by: Literal['token', 'time'] = ..., start: Literal['first', 'random'] = ..., at_end: Literal['repeat', 'pass', 'stop'] = ..., file: str | Path, time: str = ..., lost: str = ..., received: str = ..., delay: str = ..., delay_unit: Literal['s', 'ms', 'us', 'ns'] = ..., sequence: str | None = ..., from_: _Number = ..., until: _Number | None = ..., every: _Number | None = ..., when: str | PortFormula | None = ...) -> None: ...
+    def __init__(self, *, by: Literal['token', 'time'] = ..., start: Literal['first', 'random'] = ..., at_end: Literal['repeat', 'pass', 'stop'] = ..., file: str | Path, time: str = ..., lost: str = ..., received: str = ..., delay: str = ..., delay_unit: Literal['s', 'ms', 'us', 'ns'] = ..., sequence: str | None = ..., wraps: _Whole | None = ..., from_: _Number = ..., until: _Number | None = ..., every: _Number | None = ..., when: str | PortFormula | None = ...) -> None: ...
 
 class Transform(_Transform):
     """Replaces each number by an expression over it, the time and the latest tokens of ports."""

@@ -17,6 +17,7 @@ from .core import CommunicationAspect, JoinPoint
 
 MOST = 10_000_000  # rows
 LONGEST = 1_000_000_000_000_000_000  # ns, of a trace and of a delay
+_BACK = 1_000  # sequence numbers by which a message may come late
 _EXACT = 9007199254740992.0  # floats up to here hold every whole number
 UNITS = {"s": 1e9, "ms": 1e6, "us": 1e3, "ns": 1.0}  # in ns
 TOKEN, TIME = "token", "time"
@@ -56,6 +57,9 @@ class TraceFile(Configurable):
     delay_unit = Parameter(str, "s", choices=tuple(UNITS), doc="the unit of the delays")
     sequence: Parameter[str | None] = Parameter(
         str, None, doc="the column of sequence numbers, if there is one: messages whose numbers are missing were lost"
+    )
+    wraps: Parameter[int | None] = Parameter(
+        int, None, min=2, max=2**53, doc="how many sequence numbers there are before they start again, such as 65536"
     )
 
     def read(self) -> Trace:
@@ -172,8 +176,9 @@ class TraceFile(Configurable):
             lost = np.isnan(delays) if delays is not None else np.zeros(len(columns["sequence"]), bool)
         late = None if delays is None else self._delays(delays, lost)
         if "sequence" in columns:
-            if len(lost := self._in_sequence(columns["sequence"], lost, True)) and late is not None:
-                late = self._in_sequence(columns["sequence"], late, 0)
+            places = self._places(columns["sequence"])
+            lost = _in_sequence(places, lost, True)
+            late = None if late is None else _in_sequence(places, late, 0)
             times = None  # those of the missing ones are unknown
         for array in (lost, late, times):
             if array is not None:
@@ -199,23 +204,33 @@ class TraceFile(Configurable):
         self._refuse((late < 0.0) | (late > LONGEST), f"{self.delay} is not from 0 s to 1e9 s")
         return np.rint(late).astype(np.int64)
 
-    def _in_sequence(self, numbers: NDArray[np.float64], values: Any, missing: object) -> Any:
-        """The values in the order of the sequence numbers; of those with the same number, the first."""
-        self._refuse(
-            ~(np.abs(numbers) <= _EXACT) | (np.rint(numbers) != numbers), f"{self.sequence} is not a whole number"
-        )
-        first = float(numbers.min())
-        places = (numbers - first).astype(np.int64)
+    def _places(self, numbers: NDArray[np.float64]) -> NDArray[np.int64]:
+        """The places of messages with these sequence numbers, from 0 on."""
+        wrong = ~(np.abs(numbers) <= _EXACT) | (np.rint(numbers) != numbers)
+        self._refuse(wrong, f"{self.sequence} is not a whole number")
+        steps: Any = np.diff(numbers.astype(np.int64), prepend=int(numbers[0]))
+        if self.wraps is None:
+            self._refuse(steps < -_BACK, f"{self.sequence} falls by more than {_BACK}; if it starts again, set 'wraps'")
+        else:
+            half = self.wraps // 2
+            steps = (steps + half) % self.wraps - half
+        places: NDArray[np.int64] = np.cumsum(steps)
+        places -= places.min()
         length = int(places.max()) + 1
         if length > MOST:
-            raise self._error(f"its sequence numbers from {first:.0f} on span {length:,} messages, more than {MOST:,}")
-        found = np.full(length, missing, values.dtype)
-        found[places[::-1]] = values[::-1]
-        return found
+            raise self._error(f"its sequence numbers span {length:,} messages, more than {MOST:,}")
+        return places
 
     def _refuse(self, wrong: NDArray[np.bool_], reason: str) -> None:
         if wrong.any():
             raise self._error(f"row {int(np.argmax(wrong)) + 1:,}: {reason}")
+
+
+def _in_sequence(places: NDArray[np.int64], values: Any, missing: object) -> Any:
+    """The values at their places; of several at the same place, the first."""
+    found = np.full(int(places.max()) + 1, missing, values.dtype)
+    found[places[::-1]] = values[::-1]
+    return found
 
 
 def _listed(names: list[str]) -> str:

@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from ..printing import tell, tell_json
-from .options import DONE, JSON, check_path, command, option, several
+from .options import COUNT, DONE, JSON, check_path, command, option, several
 
 COLUMNS = ("time", "lost", "received", "delay", "sequence")
 
@@ -28,6 +28,7 @@ COLUMNS = ("time", "lost", "received", "delay", "sequence")
             strict=True,
         )
     ),
+    option("--wraps", type=COUNT, metavar="N", help="how many sequence numbers there are before they start again"),
     option("--delay-unit", choices=("s", "ms", "us", "ns"), default="s", help="unit of the delays (default: s)"),
     several(
         "--at", metavar="PORTS", help="ports, or a pattern, that the disturbance attaches to (default: all); repeat it"
@@ -44,7 +45,7 @@ def fit(options: argparse.Namespace) -> int:
 
     if options.out is not None:
         check_path("--out", options.out)
-    columns = {each: getattr(options, each) for each in COLUMNS if getattr(options, each) is not None}
+    columns = {each: getattr(options, each) for each in (*COLUMNS, "wraps") if getattr(options, each) is not None}
     found = fit(options.trace, at=options.at or "**", delay_unit=options.delay_unit, **columns)
     if options.out is not None:
         found.save(options.out)

@@ -41,6 +41,7 @@ def file_of(folder: Path, table: str | dict[str, list[Any]]) -> Path:
         ("received,delay\ntrue,2\nfalse,7\ntrue,0\ntrue,2500\n", {}),
         ('delay\n2\n""\n0\n2500\n', {}),
         ("rtt,n\n2500,9\n0,8\n2,6\n3,8\n", {"delay": "rtt", "sequence": "n"}),  # in any order, the second 8 a copy
+        ("rtt,n\n2500,2\n0,1\n2,7\n3,1\n", {"delay": "rtt", "sequence": "n", "wraps": 8}),
         ({"lost": [False, True, False, False], "delay": [2, None, 0, 2500]}, {}),
         ({"n": [4, 6, 7], "delay": [2.0, 0.0, 2500.0], "data": ["x", "y", "z"]}, {"sequence": "n"}),
     ],
@@ -147,11 +148,16 @@ def whole_message(caught: pytest.ExceptionInfo[BaseException], folder: Path) -> 
         ("time,lost\n1,0\n0.5,0\n", {}, "row 2: time is before that of the row above"),
         ("time,lost\n1,0\n,0\n", {}, "row 2: time is not a time in s"),
         ("time,lost\n1,0\n2e9,0\n", {}, "row 2: time is more than 1e9 s after the first"),
+        (
+            "n\n65535\n0\n",
+            {"sequence": "n"},
+            "row 2: n falls by more than 1000; if it starts again, set 'wraps'",
+        ),
         ("n\n1\n1.5\n", {"sequence": "n"}, "row 2: n is not a whole number"),
         (
             "n\n1\n1e12\n",
             {"sequence": "n"},
-            "its sequence numbers from 1 on span 1,000,000,000,000 messages, more than 10,000,000",
+            "its sequence numbers span 1,000,000,000,000 messages, more than 10,000,000",
         ),
         ("lost\n1\n", {"by": "time"}, "'by: time' needs a column of times and no sequence; there is no 'time'"),
         ("time,lost\n1,0\n", {"by": "time"}, "'by: time' needs two rows with different times"),
