@@ -49,12 +49,13 @@ class Opaque:
 class _Sender(Actor):
     """Sends the messages of a recording at their times, each channel by its own output."""
 
-    copies_share = ("_recording",)
+    copies_share = ("_recording", "_came")
 
     ports = texts_parameter(doc="names of the outputs, in the order of the channels")
 
-    def __init__(self, path: str, recording: Recording, ports: list[str]) -> None:
+    def __init__(self, path: str, recording: Recording, came: dict[str, int], ports: list[str]) -> None:
         self._recording = recording
+        self._came = came  # by topic
         super().__init__(path, ports=ports)
 
     def own_ports(self) -> dict[str, InputPort[Any] | OutputPort[Any]]:
@@ -75,6 +76,7 @@ class _Sender(Actor):
 
     def fire(self) -> None:
         assert self._next is not None
+        self._came[self._recording.channels[self._next.channel]] += 1
         self.outputs[self._outputs[self._next.channel]].send(_token(self._next))
         self._prepare()
 
@@ -128,7 +130,7 @@ def pass_recording(
                 delivered[recording.channels[message.channel]] += 1
                 writing.write(start + time, message, changed)
 
-            model = _model(source.stem, recording, names, deliver)
+            model = _model(source.stem, recording, names, came, deliver)
             left_out: list[str] = []
             places = _places(names, recording.channels, list(at))
             for each in disturbances:
@@ -138,8 +140,6 @@ def pass_recording(
                     model.exactly = (model.exactly or frozenset()) | acts
             results = _run(model, seed)
             writing.finish()
-        for message in recording.messages():
-            came[recording.channels[message.channel]] += 1
     return Passed(came, delivered, results.aspects, left_out, seed)
 
 
@@ -184,9 +184,15 @@ def _names(channels: Mapping[int, str]) -> dict[int, _Names]:
     return found
 
 
-def _model(name: str, recording: Recording, names: Mapping[int, _Names], deliver: Callable[[int, Any], None]) -> Model:
+def _model(
+    name: str,
+    recording: Recording,
+    names: Mapping[int, _Names],
+    came: dict[str, int],
+    deliver: Callable[[int, Any], None],
+) -> Model:
     model = Model(name)
-    model.add(_Sender(SENDER, recording, [each.output for each in names.values()]))
+    model.add(_Sender(SENDER, recording, came, [each.output for each in names.values()]))
     ports: dict[str, list[str]] = {}
     for each in names.values():
         ports.setdefault(each.actor, []).append(each.port)

@@ -38,7 +38,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def count(path: Path) -> int:
-    """How many records there are in a log; each has to be readable."""
+    """The number of records in a log, each of which must be readable."""
     if path.suffix == ".parquet":
         return int(pq.read_table(path).num_rows)
     with path.open(encoding="utf-8", newline="") as file:
@@ -82,7 +82,7 @@ def test_a_model_that_may_end_is_not_warned_of(
 
 @pytest.mark.parametrize("ending", ["jsonl", "csv", "parquet"])
 def test_an_interrupt_ends_a_run_without_an_end(ending: str, folder: Path) -> None:
-    """What was recorded and logged until then is there, whole."""
+    """What was recorded and logged before is complete."""
     process = subprocess.Popen(
         [sys.executable, "-m", "epicycle.runner.cli", "run", "tick.yaml", "--out", "out", "--log", f"log.{ending}"],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
@@ -95,7 +95,7 @@ def test_an_interrupt_ends_a_run_without_an_end(ending: str, folder: Path) -> No
     assert process.returncode == 130
     assert said == (
         f"{NO_END}\n   help: end it with Ctrl-C, which keeps what was recorded, or run it with --until\n"
-        "what was recorded until then is in out\ninterrupted\n"
+        "what was recorded before is in out\ninterrupted\n"
     )
     manifest = json.loads((folder / "out" / "manifest.json").read_text())
     assert (manifest["stopped"], manifest["error"]) == ("interrupted", "interrupted")
@@ -108,7 +108,7 @@ def test_a_study_of_a_model_without_an_end_is_warned_of(folder: Path, caplog: py
     (folder / "s.yaml").write_text("study: s\nmodel: ./tick.yaml\nmetrics: {number: events}\n")
     assert main(["validate", "s.yaml"]) == 0
     assert [record.getMessage() for record in caplog.records] == [
-        f"warning: {NO_END}\n   help: set 'stop' in its section 'run'; --run-timeout gives up runs"
+        f"warning: {NO_END}\n   help: set 'stop' in its section 'run'; --run-timeout ends runs that take too long"
     ]
 
 

@@ -1,4 +1,4 @@
-"""The compiled core and Python make the same runs, and each says which one it is."""
+"""The compiled core and the Python core make the same runs, and each reports which one it is."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Multiports, composites and what is heard of them; errors of actors."""
+"""Multiports, composites and what they send; errors of actors."""
 
 from __future__ import annotations
 

@@ -277,7 +277,7 @@ def test_a_refused_model_is_not_written(tmp_path: Path, capsys: pytest.CaptureFi
     )
     assert not out.exists()
     assert main(["import", str(tmp_path / "m.xml"), "-o", str(tmp_path / "m.txt")]) == 2
-    assert capsys.readouterr().err == f"error: {tmp_path}/m.txt is not the name of a model file: it ends in .yaml\n"
+    assert capsys.readouterr().err == f"error: {tmp_path}/m.txt is not a name for a model file: it must end in .yaml\n"
 
 
 def test_help_does_not_load_much() -> None:

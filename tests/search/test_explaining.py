@@ -179,7 +179,7 @@ def test_a_chosen_set_in_the_paper() -> None:
 
 def check_paper(seed: int) -> int:
     made = load_model("collision_avoidance", set={"disturbance": 0.5})
-    made.monitor("near", "always clearance.distance >= 3.6 m")
+    made.monitor("near", "always clearance.distance >= 3.7 m")
 
     def holds(names: list[ActName]) -> Any:
         return Simulation(made, seed=seed, acts=Acts(frozenset(names))).run().monitors["near"].holds
@@ -202,7 +202,7 @@ def test_ten_seeds_of_the_paper_with_the_least_margin() -> None:
     nearest = []
     for seed in range(400):
         with_acts = Simulation(made, seed=seed).run().metrics["min_obstacle_distance"]
-        if with_acts < 3.6 <= Simulation(made, seed=seed, acts=Acts(())).run().metrics["min_obstacle_distance"]:
+        if with_acts < 3.7 <= Simulation(made, seed=seed, acts=Acts(())).run().metrics["min_obstacle_distance"]:
             nearest.append((with_acts, seed))
     assert min(nearest)[0] > 2.0
     sizes = [check_paper(seed) for _, seed in sorted(nearest)[:10]]

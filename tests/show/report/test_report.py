@@ -288,7 +288,7 @@ def test_repeated_runs_give_the_signals_of_single_ones(wheels: Path) -> None:
     with pytest.raises(ReplayError) as caught:
         list(repeat(data.plan, [Replay(1, 0, row["seed"], "0" * 64, ())], 1))
     assert str(caught.value) == (
-        f"run 0 of condition 1 (seed 0) does not repeat: its digest is {row['digest'][:16]}..., "
+        f"run 0 of condition 1 (seed 0) gave a different result: its digest is {row['digest'][:16]}..., "
         "but was 0000000000000000...; something has changed since"
     )
 
