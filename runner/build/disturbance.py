@@ -11,6 +11,7 @@ from epicycle.aspects import ObservationAspect, PortAspect
 from ..catalogue import Catalogue, installed
 from ..graph import ActName, WovenAspect
 from ..language import (
+    COMPOSITE_THERE,
     PARAMETER_THERE,
     CompositeText,
     Disturbance,
@@ -53,39 +54,58 @@ def disturb(
 
 def disturb_ports(
     model: Building,
-    name: str,
+    names: Iterable[str],
     at: AnyMapping[str, list[str]] | None,
     values: Iterable[str | Setting] | AnyMapping[str, object],
     types: Iterable[type],
 ) -> tuple[list[str], frozenset[ActName] | None]:
-    """Weave the aspects of a disturbance that alter, delay or lose tokens; what is left out (in words), the only acts.
+    """Weave the aspects of disturbances that alter, delay or lose tokens; what is left out (in words), the only acts.
 
-    ``at`` are ports, by direction, in place of those that the disturbance names.  Raises ``ModelError``.
+    ``at`` are ports, by direction, in place of those that the disturbances name.  Of aspects with the same name, the
+    last one counts.  Raises ``ModelError``.
     """
-    problems, position = Problems(), call_site()
-    disturbance, catalogue = _loaded(name, problems), installed().with_types(types)
-    left_out = [f"set {setting.path} ({disturbance.text.name})" for setting in disturbance.settings]
-    aspects = {}
+    problems, position, catalogue = Problems(), call_site(), installed().with_types(types)
+    whole = Disturbance(CompositeText("disturbances", position))
+    left_out: list[str] = []
+    for name in names:
+        one = _loaded(name, problems)
+        aspects, unused = _of_ports(one, catalogue, at, Paths(model.draft).ports)
+        left_out += unused
+        if not aspects:
+            message = f"{one.text.name} has no aspect that alters, delays or loses tokens"
+            problems.add(message, one.text.position)
+        parameters = joined(whole.text.parameters, one.text.parameters, PARAMETER_THERE, problems)
+        whole = replace(
+            whole,
+            text=replace(whole.text, parameters=parameters, aspects=whole.text.aspects | aspects),
+            composites=joined(whole.composites, one.composites, COMPOSITE_THERE, problems),
+            exactly=whole.exactly if one.exactly is None else (*(whole.exactly or ()), *one.exactly),
+        )
+    settings = settings_of(values, problems)
+    draft, found, acts = _woven(model, whole, settings, catalogue, position, problems)
+    model.adopt(draft, found)
+    return left_out, acts
+
+
+def _of_ports(
+    disturbance: Disturbance, catalogue: Catalogue, at: AnyMapping[str, list[str]] | None, ports: PathIndex
+) -> tuple[dict[str, PartText], list[str]]:
+    """The aspects of a disturbance that alter, delay or lose tokens, and what else there is, in words."""
+    of = f"({disturbance.text.name})"
+    aspects, left_out = {}, [f"set {setting.path} {of}" for setting in disturbance.settings]
     for key, part in disturbance.text.aspects.items():
         cls = catalogue.aspects.get(part.type.text)
         if cls is not None and (not issubclass(cls, PortAspect) or issubclass(cls, ObservationAspect)):
-            left_out.append(f"{key}: {part.type.text} ({disturbance.text.name})")
+            left_out.append(f"{key}: {part.type.text} {of}")
             continue
         if at is None:
-            part, unmatched = _matched(part, Paths(model.draft).ports)
-            left_out += [f"{key} at {text} ({disturbance.text.name})" for text in unmatched]
+            part, unmatched = _matched(part, ports)
+            left_out += [f"{key} at {text} {of}" for text in unmatched]
         elif cls is not None:
             side = "input" if "input" in cls.stands_at else "output"
             part = replace(part, at=tuple(PointcutText.of(Text(port, part.position)) for port in at[side]))
         aspects[key] = part
-    if not aspects:
-        message = f"{disturbance.text.name} has no aspect that alters, delays or loses tokens"
-        problems.add(message, disturbance.text.position)
-    disturbance = replace(disturbance, text=replace(disturbance.text, aspects=aspects))
-    settings = settings_of(values, problems)
-    draft, found, acts = _woven(model, disturbance, settings, catalogue, position, problems)
-    model.adopt(draft, found)
-    return left_out, acts
+    return aspects, left_out
 
 
 def _matched(part: PartText, ports: PathIndex) -> tuple[PartText, list[str]]:

@@ -112,7 +112,8 @@ class CsvRecording:
         except UnicodeDecodeError:
             raise self._error("it is not a text in UTF-8") from None
         finally:
-            text.detach()
+            with suppress(ValueError):  # the file may be closed before a run that failed lets go of this
+                text.detach()
 
     def _rows(self, text: TextIOWrapper) -> Iterator[Message]:
         rows = csv.reader(self._lines(text), strict=True)

@@ -21,6 +21,7 @@ from ..shown import finite
 from .files import Message, Recording, RecordingError, check_topics, opened, replaced
 
 SENDER = "recording"
+_LONGEST = 1_000_000_000 * 10**9  # ns
 _MESSAGE = "\0"  # the field of a token that says which message it was: a text, which no aspect alters
 _VALUE = "value"  # the field of a token with the content, if that has no fields
 
@@ -72,7 +73,14 @@ class _Sender(Actor):
         if self._next is not None:
             if self._start is None:
                 self._start = self._next.time
-            self.context.wake(self, self._next.time - self._start)
+            time = self._next.time - self._start
+            if time > _LONGEST:
+                topic = self._recording.channels[self._next.channel]
+                raise RecordingError(
+                    f"{self._recording.path} cannot be replayed: a message of {topic} comes {time // 10**9:,} s after "
+                    f"the first one, and a run lasts {_LONGEST // 10**9:,} s at most"
+                )
+            self.context.wake(self, time)
 
     def fire(self) -> None:
         assert self._next is not None
@@ -131,13 +139,8 @@ def pass_recording(
                 writing.write(start + time, message, changed)
 
             model = _model(source.stem, recording, names, came, deliver)
-            left_out: list[str] = []
             places = _places(names, recording.channels, list(at))
-            for each in disturbances:
-                unused, acts = disturb_ports(model, str(each), places, set, types)
-                left_out += unused
-                if acts is not None:
-                    model.exactly = (model.exactly or frozenset()) | acts
+            left_out, model.exactly = disturb_ports(model, map(str, disturbances), places, set, types)
             results = _run(model, seed)
             writing.finish()
     return Passed(came, delivered, results.aspects, left_out, seed)

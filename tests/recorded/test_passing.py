@@ -149,6 +149,33 @@ wrote out.csv
     assert facts["delivered"]["/robot/peer_plan"] == 300 - lost
 
 
+def test_several_disturbances_and_their_parameters() -> None:
+    source = log(ROWS)
+    Path("lossy.yaml").write_text(
+        "disturbance: lossy\nparameters: {share: {value: 0, unit: '1'}}\n"
+        "aspects: {lossy: {type: PacketLoss, probability: '${share}', at: '*.plan'}}\n"
+    )
+    Path("late.yaml").write_text(
+        "disturbance: late\nparameters: {by: {value: 0, unit: s}}\n"
+        "aspects: {late: {type: Latency, delay: '${by}', at: '*.range'}}\n"
+    )
+    found = epicycle.disturb(source, ["lossy.yaml", "late.yaml"], "out.csv", set={"share": 1, "by": "5 ms"})
+    assert found.passed.aspects == {"lossy": {"dropped": 300}, "late": {"delayed": 300}}
+    with pytest.raises(EpicycleError, match=r"'shore' matches no parameter, did you mean 'share'\?"):
+        epicycle.disturb(source, ["lossy.yaml", "late.yaml"], "out.csv", set=["shore=1"])
+
+
+def test_the_only_acts_of_a_disturbance() -> None:
+    Path("d.yaml").write_text(
+        "disturbance: d\naspects: {lossy: {type: PacketLoss, probability: 1, at: robot.plan}}\n"
+        "exactly: [{aspect: lossy, at: robot.plan, token: 2}]\n"
+    )
+    found = epicycle.disturb(log(ROWS), "d.yaml", "out.csv")
+    assert found.passed.delivered["/robot/plan"] == 299
+    gone = [row for row in ROWS if list(row) not in read("out.csv")]
+    assert [row[0] for row in gone] == ["1000.02"]
+
+
 def test_names_of_topics() -> None:
     topics = ["/a/b/c", "/a/b.c", "/a_b/c", "/scan", "/", "/recording/x", "1/2", "a b/ü"]
     names = _names(dict(enumerate(topics)))
@@ -284,6 +311,16 @@ def test_wrong_mcap_files() -> None:
         assert str(caught.value).startswith("in.mcap is not a recording: ")
         assert not Path("out.mcap").exists()
         assert not Path(".out.mcap").exists()
+
+
+def test_a_recording_that_lasts_too_long() -> None:
+    log([("0", "a", "1"), ("1700000000.5", "b", "1")])
+    with pytest.raises(EpicycleError) as caught:
+        epicycle.disturb("in.csv", "wifi_burst", "out.csv", at="*")
+    assert str(caught.value) == (
+        "in.csv cannot be replayed: a message of b comes 1,700,000,000 s after the first one, and a run lasts "
+        "1,000,000,000 s at most"
+    )
 
 
 def test_what_is_not_json_although_its_channel_says_so() -> None:
