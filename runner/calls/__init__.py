@@ -10,8 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from .comparing import Comparison, Difference, compare
+    from .disturbing import Disturbed, disturb
     from .explaining import Explained, explain, explained
     from .falsifying import Falsified, falsified, falsify
+    from .fitting import Fit, fit
     from .picturing import Picture, Pictures, draw, plot, save
     from .running import Changes, Done, as_command, load, perform, run, seconds, watched
     from .studying import study
@@ -21,19 +23,23 @@ __all__ = [
     "Changes",
     "Comparison",
     "Difference",
+    "Disturbed",
     "Done",
     "Explained",
     "Falsified",
+    "Fit",
     "Page",
     "Picture",
     "Pictures",
     "as_command",
     "compare",
+    "disturb",
     "draw",
     "explain",
     "explained",
     "falsified",
     "falsify",
+    "fit",
     "load",
     "perform",
     "plot",
@@ -48,8 +54,10 @@ __all__ = [
 
 _HOMES = {
     "comparing": ("Comparison", "Difference", "compare"),
+    "disturbing": ("Disturbed", "disturb"),
     "explaining": ("Explained", "explain", "explained"),
     "falsifying": ("Falsified", "falsified", "falsify"),
+    "fitting": ("Fit", "fit"),
     "picturing": ("Picture", "Pictures", "draw", "plot", "save"),
     "running": ("Changes", "Done", "as_command", "load", "perform", "run", "seconds", "watched"),
     "studying": ("study",),

@@ -1,6 +1,21 @@
 """The commands of the command line, in the order in which ``epicycle --help`` names them."""
 
-from . import compare, completion, describe, explain, falsify, imports, new, run, show, studies, trace, view
+from . import (
+    compare,
+    completion,
+    describe,
+    disturb,
+    explain,
+    falsify,
+    fit,
+    imports,
+    new,
+    run,
+    show,
+    studies,
+    trace,
+    view,
+)
 
 COMMANDS = (
     run.run,
@@ -8,6 +23,8 @@ COMMANDS = (
     compare.compare,
     explain.explain,
     falsify.falsify,
+    fit.fit,
+    disturb.disturb,
     studies.study,
     studies.resume,
     studies.status,

@@ -29,6 +29,7 @@ from .dimensions import (
 from .disturbance import (
     COMPOSITE_THERE,
     PARAMETER_THERE,
+    Disturbance,
     add_disturbances,
     joined,
     load_disturbance,
@@ -38,7 +39,7 @@ from .files import read_library, read_model
 from .inheritance import inherit
 from .places import connection
 from .schema import CONSTRUCTS, json_schema, schema_text
-from .settings import Setting, Settings, change_aspect, parse_setting, read_overrides, settings_in, without
+from .settings import Setting, Settings, change_aspect, parse_setting, read_overrides, settings_in, settings_of, without
 from .study import MAX_REPLICATIONS, MAX_STUDY_SEED, RESERVED, Study, is_study, read_study, study_of_text
 from .study_metric import ASPECTS, NUMBERS, SIGNALS, StudyMetric, asks_for_none
 from .usage import check_usage
@@ -65,6 +66,7 @@ __all__ = [
     "ConnectionText",
     "Dimension",
     "DimensionReader",
+    "Disturbance",
     "Factor",
     "Guideline",
     "Level",
@@ -104,6 +106,7 @@ __all__ = [
     "read_study",
     "schema_text",
     "settings_in",
+    "settings_of",
     "split_number",
     "study_of_text",
     "without",
