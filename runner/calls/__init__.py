@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from .comparing import Comparison, Difference, compare
     from .explaining import Explained, explain, explained
+    from .falsifying import Falsified, falsified, falsify
     from .picturing import Picture, Pictures, draw, plot, save
     from .running import Changes, Done, as_command, load, perform, run, seconds, watched
     from .studying import study
@@ -22,6 +23,7 @@ __all__ = [
     "Difference",
     "Done",
     "Explained",
+    "Falsified",
     "Page",
     "Picture",
     "Pictures",
@@ -30,6 +32,8 @@ __all__ = [
     "draw",
     "explain",
     "explained",
+    "falsified",
+    "falsify",
     "load",
     "perform",
     "plot",
@@ -45,6 +49,7 @@ __all__ = [
 _HOMES = {
     "comparing": ("Comparison", "Difference", "compare"),
     "explaining": ("Explained", "explain", "explained"),
+    "falsifying": ("Falsified", "falsified", "falsify"),
     "picturing": ("Picture", "Pictures", "draw", "plot", "save"),
     "running": ("Changes", "Done", "as_command", "load", "perform", "run", "seconds", "watched"),
     "studying": ("study",),

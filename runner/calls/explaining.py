@@ -17,14 +17,13 @@ from epicycle.actors import counted, to_seconds
 from ..build import Model
 from ..provenance import version_of
 from ..results import Verdict
-from ..search import Effect, Explanation
+from ..search import AD_HOC, Effect, Explanation
 from ..search import explain as search
 from ..shown import finite, short
 from ..tables import Table, Tabled
 from .running import Changes, as_command, loaded, seconds
 from .viewing import Page, recorded
 
-AD_HOC = "property"  # the name of a monitor that is made of a text
 _SHOWN = 60  # characters of a token
 
 

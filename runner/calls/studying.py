@@ -42,9 +42,7 @@ def study(
     >>> results = epicycle.study({"study": "load", "model": "mm1", "vary": {"load": [0.5, 0.7]}, "replications": 20})
     >>> results.means("mean_wait")
     """
-    pairs = set.items() if isinstance(set, Mapping) else ()
-    changes = [f"{path}={json.dumps(plain(node_of(value, call_site())))}" for path, value in pairs] or set
-    plan = Plan.made(_read(study, changes, map(Path, types), replications, seed))
+    plan = Plan.made(_read(study, as_settings(set), map(Path, types), replications, seed))
     check_figures(plan)
     folder = Path("results") / plan.study.name if out is None else Path(out)
     with progress(plan.study.name) if show_progress else nullcontext() as tell:
@@ -59,6 +57,13 @@ def study(
             scheduler=scheduler,
         )
     return open_study(folder)
+
+
+def as_settings(said: Iterable[str] | Mapping[str, object]) -> list[str]:
+    """What the command line says of values by path: ``path=value``."""
+    if not isinstance(said, Mapping):
+        return list(said)
+    return [f"{path}={json.dumps(plain(node_of(value, call_site())))}" for path, value in said.items()]
 
 
 def _read(

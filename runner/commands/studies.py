@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import math
 import re
+import shlex
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
@@ -116,10 +117,14 @@ def study(options: argparse.Namespace) -> int:
 @command("resume a study", FOLDER, *SESSION, imports=("study",))
 def resume(options: argparse.Namespace) -> int:
     """Make the runs that are missing from the results folder of a study."""
-    from ..study import plan_of_folder
+    from ..study import StoreError, plan_of_folder
 
     _check_session(options)
-    return _session(plan_of_folder(options.folder), options.folder, options)
+    plan = plan_of_folder(options.folder)
+    if plan.search is not None:
+        told = shlex.join(plan.search["command"])
+        raise StoreError(f"{options.folder} holds a search, which its own command continues\n   help: {told}")
+    return _session(plan, options.folder, options)
 
 
 def _check_session(options: argparse.Namespace) -> None:
@@ -226,9 +231,9 @@ def status(options: argparse.Namespace) -> int:
         found = {"study": plan.study.name, "runs": plan.size, "conditions": plan.conditions, "statuses": counts}
         tell_json({**found, "running": running, "failures": failures})
         return DONE
-    beyond = results.beyond()
+    beyond, most = results.beyond(), "at most " if plan.study.until or plan.search else ""
     tell(
-        f"{plan.study.name}: {counts.total() - beyond:,} of {'at most ' if plan.study.until else ''}{plan.size:,} "
+        f"{plan.study.name}: {counts.total() - beyond:,} of {most}{plan.size:,} "
         f"runs are finished{f', and {beyond:,} more' if beyond else ''} ({counted(counts) or 'none yet'})"
         + ("; it is running" if running else "")
     )

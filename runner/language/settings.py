@@ -130,10 +130,10 @@ def is_pattern(path: str, position: Position, problems: Problems) -> bool:
     return True
 
 
-def parse_setting(text: str, problems: Problems) -> Setting | None:
-    """``path=value``, where value is a YAML value such as ``3``, ``5 m`` or ``[0, 1]``."""
-    option = f"--set {text}"
-    position = _in_option(option, 6)
+def parse_setting(text: str, problems: Problems, flag: str = "--set") -> Setting | None:
+    """``path=value``, where value is a YAML value such as ``3``, ``5 m`` or ``[0, 1]``; the ``flag`` stands before."""
+    option = f"{flag} {text}"
+    position = _in_option(option, len(flag) + 1)
     path, equals, value = text.partition("=")
     path = path.strip()
     if not equals or not path:

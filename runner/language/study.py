@@ -8,11 +8,38 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from ..catalogue import find, is_path, unreadable
-from ..text import MAX_SEED, Entry, Mapping, Node, NodeReader, Position, Problems, Scalar, did_you_mean, parse, read
+from ..text import (
+    MAX_SEED,
+    Entry,
+    Mapping,
+    Node,
+    NodeReader,
+    Position,
+    Problems,
+    Scalar,
+    Text,
+    did_you_mean,
+    parse,
+    read,
+)
 from .claims import Questions
 from .declarations import PartText
 from .dimensions import DIMENSIONS, Dimension, Level, Listed
-from .fields import FLAG, LABEL, NAMED, TEXT, Construct, Key, Shape, names_of, node_as, number, one_or_more, ref
+from .fields import (
+    FLAG,
+    LABEL,
+    NAMED,
+    TEXT,
+    Construct,
+    Key,
+    Shape,
+    named,
+    names_of,
+    node_as,
+    number,
+    one_or_more,
+    ref,
+)
 from .files import named_file
 from .models import parts
 from .questions import CLAIMS, GUIDELINE, QuestionReader, without
@@ -51,6 +78,7 @@ class Study:
     seed: int = 0
     paired: bool = True
     until: Until | None = None
+    monitors: dict[str, Text] = field(default_factory=dict)  # beside those of the model
     metrics: tuple[StudyMetric, ...] | None = None  # None: all of the model
     figures: dict[str, PartText] | None = None  # None: those that suit the table
     questions: Questions = field(default_factory=Questions)
@@ -346,6 +374,10 @@ STUDY = Construct(
         "until": Key(
             Shape(UNTIL.schema, _StudyReader.until),
             "When the replications of each condition stop, instead of a fixed number of them.",
+        ),
+        "monitors": Key(
+            named(ref("text"), lambda reader, name, entry: reader.placed(entry.value, f"monitor {name!r}")),
+            "Properties that runs are to have, beside the monitors of the model: 'name: property'.",
         ),
         "metrics": Key(
             Shape(_METRICS, _StudyReader.metrics),

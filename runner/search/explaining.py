@@ -113,12 +113,7 @@ def explain(
     In a ``folder``, every run is noted, and a search that was killed continues there.  ``tell`` is called with how many
     runs were made, and how many acts the last one had.  Raises ``EpicycleError`` if the run does not break it.
     """
-    known = {each.name: each.requirement.property for each in model.monitors}
-    if monitor not in known:
-        near = did_you_mean(monitor, known)
-        raise EpicycleError(
-            f"{model.name} has no monitor {monitor!r}{near}\n   help: its monitors: {', '.join(known) or 'none'}"
-        )
+    source = property_of(model, monitor)
     runs = _Runs(model, monitor, seed, until)
     whole = runs.results(model.exactly)
     verdict = whole.monitors[monitor]
@@ -138,7 +133,7 @@ def explain(
         "model": model.name,
         "seed": whole.seed,
         "until": until,
-        "property": known[monitor],
+        "property": source,
         "digest": whole.digest,
     }
     runs.tried = Tried({**about, "version": version_of("epicycle")}, folder)
@@ -161,7 +156,7 @@ def explain(
         model.name,
         whole.seed,
         monitor,
-        known[monitor],
+        source,
         verdict,
         with_set.monitors[monitor],
         with_none.monitors[monitor],
@@ -170,6 +165,17 @@ def explain(
         steps,
         runs.number,
     )
+
+
+def property_of(model: Model, monitor: str) -> str:
+    """The property that a monitor of a model states; raises ``EpicycleError`` if there is no such monitor."""
+    known = {each.name: each.requirement.property for each in model.monitors}
+    if monitor not in known:
+        near = did_you_mean(monitor, known)
+        raise EpicycleError(
+            f"{model.name} has no monitor {monitor!r}{near}\n   help: its monitors: {', '.join(known) or 'none'}"
+        )
+    return known[monitor]
 
 
 def _steps(graph: ModelGraph, ports: Collection[str], ours: Results, theirs: Results) -> list[Step]:

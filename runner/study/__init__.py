@@ -8,7 +8,7 @@ from .judge.claims import CONFIRMED, NOT_REPRODUCED, REPRODUCED, REVERSED, UNDEC
 from .judge.guideline import Recommendation
 from .judge.study_results import StudyResults, open_study
 from .plan.columns import Column
-from .plan.plan import Plan
+from .plan.plan import Plan, Search
 from .run.backlog import OK
 from .run.manifest import StoreError
 from .run.processes import WorkerError
@@ -16,6 +16,7 @@ from .run.pulse import progress
 from .run.runner import Replay, ReplayError, again, repeat
 from .run.store import WriteError, is_running, replace_file
 from .session import available_cores, check_size, plan_of_folder, run_study
+from .trials import Trials, trials
 
 __all__ = [
     "CONFIRMED",
@@ -32,8 +33,10 @@ __all__ = [
     "Recommendation",
     "Replay",
     "ReplayError",
+    "Search",
     "StoreError",
     "StudyResults",
+    "Trials",
     "WorkerError",
     "WriteError",
     "again",
@@ -51,5 +54,6 @@ __all__ = [
     "repeat",
     "replace_file",
     "run_study",
+    "trials",
     "with_interval",
 ]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -102,7 +102,7 @@ def manifest_of(plan: Plan) -> dict[str, Any]:
 
 
 def plan_of_folder(folder: Path) -> Plan:
-    """The plan of a results folder to resume.
+    """The plan of a results folder whose runs are to be made or repeated.
 
     Raises ``StoreError`` if its model or Epicycle has changed.
     """
@@ -113,7 +113,7 @@ def plan_of_folder(folder: Path) -> Plan:
             f"{folder} was made with Epicycle {before.made_with}, but this is Epicycle {version}\n"
             f"   help: install that version, or repeat all runs: 'epicycle study {before.study.path} --out ANOTHER'"
         )
-    plan = Plan.made(before.study)
+    plan = replace(Plan.made(before.study), search=before.search)
     if changed := sorted(name for name, digest in plan.sources.items() if before.sources.get(name) != digest):
         raise StoreError(
             f"the model has changed since {folder} was made: {', '.join(changed)}\n"

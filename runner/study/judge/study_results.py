@@ -139,6 +139,8 @@ class StudyResults(Tabled):
 
     def beyond(self) -> int:
         """How many runs of the table are replications beyond those that the study now asks for."""
+        if self.plan.search is not None:  # whose replications count its runs
+            return 0
         return sum(each >= self.plan.replications for each in self.table()["replication"].to_pylist())
 
     def counts(self) -> Counter[str]:
@@ -263,7 +265,7 @@ class StudyResults(Tabled):
     def _caption(self) -> str:
         counts, plan = self.counts(), self.plan
         told = ", ".join(f"{number:,} {status}" for status, number in sorted(counts.items())) or "none is over"
-        most = "at most " if plan.study.until else ""
+        most = "at most " if plan.study.until or plan.search else ""
         return f"{plan.study.name}: {counts.total():,} of {most}{counted(plan.size, 'run')} ({told}), in {self.folder}"
 
     def _tables(self) -> list[Table]:

@@ -6,10 +6,10 @@ import hashlib
 import json
 import logging
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from math import prod
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict
 
 from epicycle.actors import EpicycleError
 from epicycle.actors.expression import ExpressionError
@@ -24,6 +24,14 @@ from .columns import Column, check_metric, columns_of
 _LOGGER = logging.getLogger("epicycle")
 
 MAX_TRIED = 20  # levels of a dimension that the model is loaded with before anything runs
+
+
+class Search(TypedDict):
+    """A search whose runs are in a folder: how many it makes at most, and its command, which continues it."""
+
+    runs: int
+    command: list[str]
+
 
 Sources = dict[str, str]  # SHA-256 by the name of a file, and versions by 'package NAME'
 
@@ -62,6 +70,7 @@ class Plan:
     columns: dict[str, Column]
     made_with: str  # the version of Epicycle
     files: Iterable[str] = ()  # all files read, by the names used to read them
+    search: Search | None = None  # what has chosen the conditions, if they were not known from the beginning
 
     # -- making one -----------------------------------------------------------------------------------------------
 
@@ -150,7 +159,8 @@ class Plan:
         study.questions.check(names, problems)
         problems.raise_if_any()
         columns = {name: Column(**said) for name, said in manifest["columns"].items()}
-        return cls(study, metrics, manifest["sources"], extra, manifest["model"], columns, manifest["epicycle"])
+        said_of = (manifest["sources"], extra, manifest["model"], columns, manifest["epicycle"])
+        return cls(study, metrics, *said_of, search=manifest.get("search"))
 
     def manifest(self) -> dict[str, Any]:
         """The entries that ``of_manifest`` needs."""
@@ -171,6 +181,7 @@ class Plan:
             "model": self.texts,
             "sources": self.sources,
             "level_sources": [{str(index): found for index, found in each.items()} for each in self.extra],
+            **({} if self.search is None else {"search": self.search}),
         }
 
     # -- what it holds --------------------------------------------------------------------------------------------
@@ -188,7 +199,7 @@ class Plan:
     @property
     def size(self) -> int:
         """The greatest number of runs."""
-        return self.conditions * self.replications
+        return self.conditions * self.replications if self.search is None else self.search["runs"]
 
     @property
     def decides(self) -> str | None:
@@ -207,6 +218,7 @@ class Plan:
         sources = dict(self.sources)
         for extra, at in zip(self.extra, place, strict=True):
             sources.update(extra.get(at, {}))
+        watched = self.study.monitors
         identity = {
             "epicycle": self.made_with,
             "model": Path(self.study.model).name,
@@ -217,6 +229,7 @@ class Plan:
                 [metric.name, metric.source, *([metric.unit, metric.to] if metric.to else [])]
                 for metric in self.metrics
             ],
+            **({"monitors": [[name, text.text] for name, text in watched.items()]} if watched else {}),
         }
         return Condition(index, level, _hash(identity))
 
@@ -276,7 +289,13 @@ def _together(study: Study, place: Iterable[int]) -> Level:
 
 def _load(study: Study, level: Level) -> Model:
     types = [each for file in study.types for each in types_of_file(file)]
-    return load_model(study.model, set=level.settings, disturb=level.disturb, types=types)
+    model = load_model(study.model, set=level.settings, disturb=level.disturb, types=types)
+    for name, text in study.monitors.items():
+        try:
+            model.monitor(name, text.text)
+        except ModelError as error:
+            raise ModelError(replace(problem, position=text.position) for problem in error.problems) from None
+    return model
 
 
 @dataclass

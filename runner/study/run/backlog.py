@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter, deque
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import chain
@@ -42,14 +42,17 @@ class Backlog:
     on neither the number of workers nor their speed.
     """
 
-    def __init__(self, plan: Plan, known: Mapping[str, Done]) -> None:
+    def __init__(self, plan: Plan, known: Mapping[str, Done], chosen: Iterable[Task] | None = None) -> None:
+        """``chosen`` runs are made instead of all."""
         self.plan = plan
         self.known = known
         self.there: Counter[str] = Counter()  # runs that already existed, by status
         self.made: Counter[str] = Counter()  # new runs, by status
         self.stopped_early = 0  # runs that were not needed
-        self._conditions = iter(plan)  # still to come
-        self._open: dict[int, Iterator[Task | None]] = {}  # runs of started conditions
+        self._conditions = iter(plan if chosen is None else ())  # still to come
+        self._open: dict[int, Iterator[Task | None]] = (
+            {} if chosen is None else {-1: iter(chosen)}
+        )  # runs of started conditions
         self._running: Counter[int] = Counter()  # number of runs, by condition
         self._values: dict[int, list[float]] = {}  # values of the deciding metric, by condition
         self._again: deque[Task] = deque()

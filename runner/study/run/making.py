@@ -25,6 +25,7 @@ class Keeper:
     backlog: Backlog
     timeout: float | None
     _writer: Writer
+    tell: Callable[[Row], None] = lambda row: None  # of each row that is kept
 
     def settle(self, task: Task, outcome: Outcome) -> None:
         """Handle the outcome of a run."""
@@ -52,6 +53,7 @@ class Keeper:
             self._writer.add(row)
         decides = self.backlog.plan.decides
         self.backlog.finished(task, Done(row["status"], row[decides] if decides else None))
+        self.tell(row)
 
 
 @contextmanager
@@ -68,9 +70,15 @@ def keeping(store: Store, backlog: Backlog, timeout: float | None) -> Iterator[K
 
 def make_here(keeper: Keeper, jobs: int, tell: Callable[[], None]) -> None:
     """Make the runs in processes on this machine."""
+    with Processes(Runner.of_manifest, keeper.store.manifest) as processes:
+        make_in(processes, keeper, jobs, tell)
+
+
+def make_in(processes: Processes, keeper: Keeper, jobs: int, tell: Callable[[], None]) -> None:
+    """Make the runs in these processes."""
     backlog, tasks = keeper.backlog, dict[Future[Outcome], Task]()
     over: queue.SimpleQueue[Future[Outcome]] = queue.SimpleQueue()
-    with ThreadPoolExecutor(jobs) as threads, Processes(Runner.of_manifest, keeper.store.manifest) as processes:
+    with ThreadPoolExecutor(jobs) as threads:
         while True:
             # More than there are processes: each starts its next run before the last one is written.
             while len(tasks) < 2 * jobs and (task := backlog.next()) is not None:

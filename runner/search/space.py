@@ -1,0 +1,235 @@
+"""What a search varies: ranges of numbers and lists of values, as ``--vary`` says them, and points in them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+from collections.abc import Sequence as Many
+from dataclasses import dataclass
+from decimal import Decimal
+
+from epicycle.actors import UnitError, declared_parameters, parse_unit
+
+from ..build import Model
+from ..language import (
+    RANGE,
+    RESERVED,
+    Dimension,
+    DimensionReader,
+    Factor,
+    Level,
+    Listed,
+    Setting,
+    as_factor,
+    in_si,
+    kind_of,
+    number_node,
+    parse_setting,
+    split_number,
+)
+from ..text import Entry, Mapping, Node, Position, Problems, Scalar, Sequence, matches, plain, select
+
+HINT = "write load=0.5..0.9, policy=[fifo, lifo] or 'period={from: 1 s, to: 5 s, step: 1 s}'"
+_RANGE = re.compile(r"(.*?\S)\s*\.\.\s*(\S.*)")
+MAX_VALUES = 100_000  # of a list
+MAX_WHOLE, MAX_NUMBER = 10**15, 10**300  # of the ends of a range
+_DIGITS = 6  # of the width of a range, to which its numbers are drawn
+
+
+@dataclass(frozen=True)
+class Interval:
+    """All numbers of a range, or all whole ones."""
+
+    path: str
+    low: Decimal
+    high: Decimal
+    unit: str
+    position: Position
+    is_whole: bool
+
+    @property
+    def kind(self) -> str:
+        """What its column in the table holds."""
+        return "int" if self.is_whole else "float"
+
+    @property
+    def ends(self) -> list[Node]:
+        """The first and the last number."""
+        return [self._node(self.low), self._node(self.high)]
+
+    def node(self, share: float) -> Node:
+        """The number at a share of the range, to six digits of its width."""
+        width = self.high - self.low
+        if self.is_whole:
+            return self._node(min(self.low + int(Decimal(share) * (width + 1)), self.high))
+        low, high = float(self.low), float(self.high)
+        number = round(low + share * (high - low), _DIGITS - 1 - width.adjusted())
+        return number_node(min(max(number, low), high), self.unit, self.position)
+
+    def factor(self, node: Node) -> Factor:
+        """A number as the table has it."""
+        number = split_number(node)
+        assert number is not None
+        return int(number[0]) if self.is_whole else in_si(float(number[0]), self.unit)
+
+    def _node(self, number: Decimal) -> Scalar:
+        return number_node(int(number) if self.is_whole else float(number), self.unit, self.position)
+
+
+@dataclass(frozen=True)
+class Choice:
+    """Some values, which have no order."""
+
+    path: str
+    nodes: tuple[Node, ...]
+    kind: str
+    position: Position
+
+    @property
+    def ends(self) -> list[Node]:
+        """All values."""
+        return list(self.nodes)
+
+    def node(self, share: float) -> Node:
+        """One of the values."""
+        return self.nodes[min(int(share * len(self.nodes)), len(self.nodes) - 1)]
+
+    def factor(self, node: Node) -> Factor:
+        """A value as the table has it."""
+        return as_factor(node, self.kind)
+
+
+Axis = Interval | Choice
+
+
+class Space:
+    """All combinations of some axes."""
+
+    def __init__(self, axes: Many[Axis]) -> None:
+        self.axes = tuple(axes)
+
+    @property
+    def columns(self) -> dict[str, str]:
+        """The columns of the table, and what they hold."""
+        return {axis.path: axis.kind for axis in self.axes}
+
+    def level(self, shares: Many[float]) -> Level:
+        """The point at these shares of the axes."""
+        nodes = [axis.node(share) for axis, share in zip(self.axes, shares, strict=True)]
+        pairs = list(zip(self.axes, nodes, strict=True))
+        settings = tuple(Setting(axis.path, node, axis.position) for axis, node in pairs)
+        return Level(settings, {axis.path: axis.factor(node) for axis, node in pairs})
+
+    def dimensions(self, levels: Many[Level]) -> tuple[Dimension, ...]:
+        """These points, as what a study varies."""
+        if not self.axes:
+            return ()
+        return (Listed("point", self.axes[0].position, self.columns, list(levels)),)
+
+    def ends(self) -> tuple[Dimension, ...]:
+        """The ends of each range and each value of each list: a study of which all conditions must load."""
+        found = []
+        for axis in self.axes:
+            settings = [Setting(axis.path, each, axis.position) for each in axis.ends]
+            levels = [Level((each,), {axis.path: axis.factor(each.node)}) for each in settings]
+            found.append(Listed(axis.path, axis.position, {axis.path: axis.kind}, levels))
+        return tuple(found)
+
+
+def said(levels: Many[Level]) -> dict[str, object]:
+    """What the key ``vary`` of a study says of points."""
+    paths = [setting.path for setting in levels[0].settings] if levels else []
+    if not paths:
+        return {}
+    columns = zip(*([plain(setting.node) for setting in level.settings] for level in levels), strict=True)
+    return {"point": {"zip": {path: list(column) for path, column in zip(paths, columns, strict=True)}}}
+
+
+# -- reading it -------------------------------------------------------------------------------------------------------
+
+
+def read_space(vary: Iterable[str], model: Model, taken: Iterable[str], problems: Problems) -> Space:
+    """The space of some ``path=values``; names that are ``taken`` by other columns cannot be varied."""
+    axes: dict[str, Axis] = {}
+    for text in vary:
+        setting = parse_setting(text, problems, "--vary")
+        if setting is None:
+            continue
+        if setting.path in axes or setting.path in (*RESERVED, *taken):
+            why = "it is varied twice" if setting.path in axes else "the table already has a column with that name"
+            problems.add(f"{setting.path!r} cannot be varied: {why}", setting.position)
+        elif (axis := _axis(setting, model, problems)) is not None:
+            axes[setting.path] = axis
+    return Space(list(axes.values()))
+
+
+def _axis(setting: Setting, model: Model, problems: Problems) -> Axis | None:
+    node = setting.node
+    if isinstance(node, Scalar) and (found := _RANGE.fullmatch(node.text)) is not None:
+        return _interval(setting, found[1], found[2], counts(setting.path, model), problems)
+    if not (isinstance(node, Sequence) or (isinstance(node, Mapping) and node.entries.keys() & RANGE.keys.keys())):
+        problems.add(f"{setting.path!r} is given no range and no list of values", setting.position, HINT)
+        return None
+    key = Scalar(setting.path, setting.path, True, setting.position)
+    dimension = DimensionReader(problems).dimension(setting.path, Entry(key, node))
+    if dimension is None:
+        return None
+    if dimension.size > MAX_VALUES:
+        problems.add(
+            f"{setting.path!r} has {dimension.size:,} values, and {MAX_VALUES:,} are allowed", setting.position
+        )
+        return None
+    nodes = [each.node for at in range(dimension.size) for each in dimension.level(at).settings]
+    kinds = {kind_of([each]) for each in nodes}
+    if kinds == {"int", "float"}:
+        nodes, kinds = [_float(each) for each in nodes], {"float"}
+    if len(kinds) > 1:
+        message = f"the values of {setting.path!r} are of more than one kind: {', '.join(sorted(kinds))}"
+        problems.add(message, setting.position)
+        return None
+    return Choice(setting.path, tuple(nodes), kinds.pop(), setting.position)
+
+
+def counts(path: str, model: Model) -> bool:
+    """Whether a parameter has whole numbers; one of a model or composite, if its own value is one without a unit."""
+    for name, declared in model.declared.items():
+        if matches(path, name):
+            value = declared.value
+            return not declared.unit and isinstance(value, Scalar) and type(value.value) is int
+    owner, _, name = path.rpartition(".")
+    owners: list[type] = [type(each.aspect) for each in model.aspects if each.name == owner]
+    owners += [type(model.graph.actors[each]) for each in (select(owner, model.graph.actors) if owner else ())]
+    found = [declared_parameters(each).get(name) for each in owners]
+    return any(each is not None and each.type is int for each in found)
+
+
+def _float(node: Node) -> Node:
+    number = split_number(node)
+    return node if number is None else number_node(float(number[0]), number[1], node.position)
+
+
+def _interval(setting: Setting, first: str, last: str, is_count: bool, problems: Problems) -> Interval | None:
+    path, at = setting.path, setting.position
+    least, most = (split_number(Scalar(each, each, True, at)) for each in (first, last))
+    if least is None or most is None:
+        wrong = first if least is None else last
+        problems.add(f"the range of {path!r}: {wrong!r} is not a number", at, HINT)
+        return None
+    (low, unit_of_low), (high, unit) = least, most
+    try:
+        for each in filter(None, (unit_of_low, unit)):
+            parse_unit(each)
+    except UnitError as error:
+        problems.add(f"the range of {path!r}: {error}", at)
+        return None
+    if unit_of_low not in ("", unit):
+        problems.add(f"the range of {path!r} has more than one unit", at, "use the same unit for both ends")
+        return None
+    is_whole = is_count and not unit and all("." not in each and "e" not in each.lower() for each in (first, last))
+    if max(abs(low), abs(high)) > (MAX_WHOLE if is_whole else MAX_NUMBER):
+        problems.add(f"the range of {path!r} has numbers that are too large", at)
+    elif not float(low) < float(high):
+        problems.add(f"the range of {path!r} is empty: {first} is not less than {last}", at)
+    else:
+        return Interval(path, low, high, unit, at, is_whole)
+    return None
