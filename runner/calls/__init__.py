@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from .comparing import Comparison, Difference, compare
     from .explaining import Explained, explain, explained
     from .falsifying import Falsified, falsified, falsify
+    from .optimising import Optimised, optimise, optimised
     from .picturing import Picture, Pictures, draw, plot, save
     from .running import Changes, Done, as_command, load, perform, run, seconds, watched
     from .studying import study
@@ -24,6 +25,7 @@ __all__ = [
     "Done",
     "Explained",
     "Falsified",
+    "Optimised",
     "Page",
     "Picture",
     "Pictures",
@@ -35,6 +37,8 @@ __all__ = [
     "falsified",
     "falsify",
     "load",
+    "optimise",
+    "optimised",
     "perform",
     "plot",
     "recorded",
@@ -50,6 +54,7 @@ _HOMES = {
     "comparing": ("Comparison", "Difference", "compare"),
     "explaining": ("Explained", "explain", "explained"),
     "falsifying": ("Falsified", "falsified", "falsify"),
+    "optimising": ("Optimised", "optimise", "optimised"),
     "picturing": ("Picture", "Pictures", "draw", "plot", "save"),
     "running": ("Changes", "Done", "as_command", "load", "perform", "run", "seconds", "watched"),
     "studying": ("study",),

@@ -1,6 +1,6 @@
 """The commands of the command line, in the order in which ``epicycle --help`` names them."""
 
-from . import compare, completion, describe, explain, falsify, imports, new, run, show, studies, trace, view
+from . import compare, completion, describe, explain, falsify, imports, new, optimise, run, show, studies, trace, view
 
 COMMANDS = (
     run.run,
@@ -8,6 +8,7 @@ COMMANDS = (
     compare.compare,
     explain.explain,
     falsify.falsify,
+    optimise.optimise,
     studies.study,
     studies.resume,
     studies.status,
