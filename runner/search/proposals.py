@@ -41,8 +41,8 @@ def proposals(axes: int, seed: int, guided: bool, together: int = BATCH) -> Prop
             points = spread(axes, seed, spreads)
             spreads += 1
             found += zip(map(_number, (yield points)), points, strict=True)
-        if guided and axes:
-            _, start = min(found)
+        least, start = min(found, key=lambda each: each[0])
+        if guided and least < math.inf:  # or there is no slope to follow
             yield from _descent(start, seed, descents, together)
             descents += 1
 

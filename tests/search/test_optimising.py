@@ -154,37 +154,47 @@ def test_the_conditions_of_a_study_count_alike(bowl: str) -> None:
         (["--minimise", "cost"], "error: there is nothing to vary\n   help: add --vary load=0.5..0.9\n"),
         (
             ["--minimise", "csot", "--vary", "x=0..1"],
-            "command line:1:12: error: there is no metric or varied parameter 'csot', did you mean 'cost'?\n"
-            "    1 | --minimise csot\n"
-            "      |            ^^^^\n"
-            "   help: known: cost, x\n",
+            (
+                "command line:1:12: error: there is no metric or varied parameter 'csot', did you mean 'cost'?\n"
+                "    1 | --minimise csot\n"
+                "      |            ^^^^\n"
+                "   help: known: cost, x\n"
+            ),
         ),
         (
             ["--minimise", "cost", "--vary", "x=0..1", "--subject-to", "cost +"],
-            "command line:1:14: error: this is not an expression: invalid syntax\n"
-            "    1 | --subject-to cost +\n"
-            "      |              ^\n",
+            (
+                "command line:1:14: error: this is not an expression: invalid syntax\n"
+                "    1 | --subject-to cost +\n"
+                "      |              ^\n"
+            ),
         ),
         (
             ["--minimise", "cost", "--vary", "x=0..1", "--subject-to", "x + 1"],
-            "command line:1:14: error: 'x + 1' is not a condition\n"
-            "    1 | --subject-to x + 1\n"
-            "      |              ^^^^^\n"
-            "   help: write a comparison such as 'longest_wait < 30'\n",
+            (
+                "command line:1:14: error: 'x + 1' is not a condition\n"
+                "    1 | --subject-to x + 1\n"
+                "      |              ^^^^^\n"
+                "   help: write a comparison such as 'longest_wait < 30'\n"
+            ),
         ),
         (
             ["--minimise", "cost", "--vary", "x=0..1", "--set", "x=3"],
-            "command line:1:7: error: 'x' is set and varied\n"
-            "    1 | --set x=3\n"
-            "      |       ^^^\n"
-            "   help: leave out --set or --vary\n",
+            (
+                "command line:1:7: error: 'x' is set and varied\n"
+                "    1 | --set x=3\n"
+                "      |       ^^^\n"
+                "   help: leave out --set or --vary\n"
+            ),
         ),
         (
             ["--minimise", "cost", "--vary", "z=0..1"],
-            "command line:1:8: error: 'z' matches no parameter\n"
-            "    1 | --vary z=0..1\n"
-            "      |        ^^^^^^\n"
-            "   help: valid parameters here: x, y, n, noise\n",
+            (
+                "command line:1:8: error: 'z' matches no parameter\n"
+                "    1 | --vary z=0..1\n"
+                "      |        ^^^^^^\n"
+                "   help: valid parameters here: x, y, n, noise\n"
+            ),
         ),
     ],
 )
