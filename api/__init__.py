@@ -14,12 +14,14 @@ if TYPE_CHECKING:
     from epicycle.actors import EpicycleError
     from epicycle.runner import Model, ModelError, Results, Simulation, StudyResults, open_study
     from epicycle.runner.calls import (
+        Calibrated,
         Comparison,
         Explained,
         Falsified,
         Optimised,
         Page,
         Picture,
+        calibrate,
         compare,
         draw,
         explain,
@@ -36,6 +38,7 @@ if TYPE_CHECKING:
     __version__: str
 
 __all__ = [
+    "Calibrated",
     "Comparison",
     "EpicycleError",
     "Explained",
@@ -48,6 +51,7 @@ __all__ = [
     "Results",
     "Simulation",
     "StudyResults",
+    "calibrate",
     "compare",
     "draw",
     "explain",
@@ -69,12 +73,14 @@ _HOMES = {
     **dict.fromkeys(("Model", "ModelError", "Results", "Simulation", "StudyResults", "open_study"), "runner"),
     **dict.fromkeys(
         (
+            "Calibrated",
             "Comparison",
             "Explained",
             "Falsified",
             "Optimised",
             "Page",
             "Picture",
+            "calibrate",
             "compare",
             "draw",
             "explain",

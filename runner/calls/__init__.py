@@ -9,6 +9,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from .calibrating import Calibrated, calibrate, calibrated
     from .comparing import Comparison, Difference, compare
     from .explaining import Explained, explain, explained
     from .falsifying import Falsified, falsified, falsify
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from .viewing import Page, recorded, view
 
 __all__ = [
+    "Calibrated",
     "Changes",
     "Comparison",
     "Difference",
@@ -30,6 +32,8 @@ __all__ = [
     "Picture",
     "Pictures",
     "as_command",
+    "calibrate",
+    "calibrated",
     "compare",
     "draw",
     "explain",
@@ -51,6 +55,7 @@ __all__ = [
 ]
 
 _HOMES = {
+    "calibrating": ("Calibrated", "calibrate", "calibrated"),
     "comparing": ("Comparison", "Difference", "compare"),
     "explaining": ("Explained", "explain", "explained"),
     "falsifying": ("Falsified", "falsified", "falsify"),

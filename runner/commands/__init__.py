@@ -1,6 +1,21 @@
 """The commands of the command line, in the order in which ``epicycle --help`` names them."""
 
-from . import compare, completion, describe, explain, falsify, imports, new, optimise, run, show, studies, trace, view
+from . import (
+    calibrate,
+    compare,
+    completion,
+    describe,
+    explain,
+    falsify,
+    imports,
+    new,
+    optimise,
+    run,
+    show,
+    studies,
+    trace,
+    view,
+)
 
 COMMANDS = (
     run.run,
@@ -9,6 +24,7 @@ COMMANDS = (
     explain.explain,
     falsify.falsify,
     optimise.optimise,
+    calibrate.calibrate,
     studies.study,
     studies.resume,
     studies.status,

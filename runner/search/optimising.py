@@ -238,7 +238,7 @@ def _said_of(goal: Goal) -> tuple[dict[str, Any], Path]:
         said: dict[str, Any] = {"study": "optimisation", "model": goal.target}
         return said | ({"disturb": {"given": list(goal.disturb)}} if goal.disturb else {}), FILE
     if goal.disturb:
-        raise EpicycleError("--disturb is for models: a study says itself which disturbances it has")
+        raise EpicycleError("--disturb is for models: a study declares its own disturbances")
     study = read_study(goal.target)
     node = parse(study.text, str(study.path), Problems())
     whole: Any = plain(node) if node is not None else {}
@@ -268,7 +268,7 @@ def _formula(flag: str, text: str, names: Sequence[str], problems: Problems, *, 
 
 
 def _value(formula: Formula | None, row: Mapping[str, Any]) -> Any:
-    """An expression for one run; None if it failed, or has not the numbers that are asked for."""
+    """An expression for one run; None if it failed or lacks a number."""
     assert formula is not None
     known = {name: row[name] for name in formula.names}
     if row["status"] != OK or (None in known.values() and not asks_for_none(formula.source)):

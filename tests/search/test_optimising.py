@@ -211,5 +211,5 @@ def test_failed_runs_are_told(bowl: str) -> None:
 
 
 def test_without_conditions_it_must_be_a_model_for_a_disturbance() -> None:
-    with pytest.raises(EpicycleError, match="--disturb is for models: a study says itself which disturbances it has"):
+    with pytest.raises(EpicycleError, match="--disturb is for models: a study declares its own disturbances"):
         epicycle.optimise("waiting_time", minimise="mean_wait", vary={"load": "0.1..0.2"}, disturb="wifi_burst")
