@@ -24,7 +24,7 @@ CONFIG = ROOT / "website" / "mkdocs.yml"
 ABOVE = {"index.md": "README.md", "contributing.md": "CONTRIBUTING.md", "changelog.md": "CHANGELOG.md"}
 REFERENCE = (ROOT / "docs" / "reference.md").read_text(encoding="utf-8")
 SPLIT = reference(REFERENCE)
-MADE = {"gallery/index.md", "tutorial/12_notebook.md", *(f"{FOLDER}/{name}" for name in SPLIT.pages)}  # by website/
+MADE = {"gallery/index.md", "tutorial/14_notebook.md", *(f"{FOLDER}/{name}" for name in SPLIT.pages)}  # by website/
 
 
 def pages(nav: list[Any]) -> Iterator[str]:

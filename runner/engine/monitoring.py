@@ -13,7 +13,7 @@ from epicycle.aspects import Reading
 
 from ..graph import Monitor
 from ..results import Verdict
-from ..temporal import LINEAR, TINY, Condition, Finding, Judge, Line, Piece, Source, leaves
+from ..temporal import LINEAR, TINY, Condition, Finding, Judge, Line, Piece, Source, leaves, looks_ahead
 
 if TYPE_CHECKING:
     from .director import Director
@@ -94,8 +94,8 @@ class Monitoring:
     """
 
     __slots__ = (
-        "_conditions", "_finding", "_judge", "_latest", "_listening", "_missing", "_past", "_time", "_values",
-        "monitor",
+        "_conditions", "_finding", "_is_late", "_judge", "_latest", "_listening", "_missing", "_past", "_time",
+        "_values", "monitor",
     )  # fmt: skip
 
     def __init__(self, monitor: Monitor) -> None:
@@ -114,6 +114,7 @@ class Monitoring:
         self._time = 0  # the instant that is not settled yet
         self._finding = Finding()
         self._missing = ""  # why it cannot be judged
+        self._is_late = looks_ahead(monitor.tree) or linear  # a break may be found out later than it happens
         self._past: deque[tuple[int, dict[str, Any]]] = deque(maxlen=_KEPT)
         self._values: dict[str, Any] = {}  # of its ports where it broke first
 
@@ -141,7 +142,8 @@ class Monitoring:
         except EpicycleError as error:
             self._missing = f"{error}, at {to_seconds(now):.9g} s"
             return
-        self._past.append((now, dict(self._latest)))
+        if self._is_late:
+            self._past.append((now, dict(self._latest)))
         self._find(over=False)
 
     def _find(self, over: bool) -> None:
@@ -152,7 +154,9 @@ class Monitoring:
 
     def _at(self, time: int) -> dict[str, Any]:
         """What the conditions asked for at a time, if that is still known."""
-        known: dict[str, Any] = next((latest for start, latest in reversed(self._past) if start <= time), {})
+        known: dict[str, Any] = self._latest
+        if self._is_late:
+            known = next((latest for start, latest in reversed(self._past) if start <= time), {})
         asked = dict.fromkeys(each for readings in self._asked() for each in readings)
         return {".".join((port, *path)): value_at(known[port], path) for port, path in asked if port in known}
 

@@ -5,14 +5,17 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from .outlines import Box, Link, Outline, Port, label
+from .outlines import Box, Link, Outline, Port, label, shared
 
 RESERVED = {"call", "class", "classDef", "click", "default", "direction", "end"}
 RESERVED |= {"flowchart", "graph", "href", "linkStyle", "style", "subgraph"}
 
 
 def mermaid(outline: Outline) -> str:
-    """A flowchart: composites as subgraphs with their ports, delayed connections dotted, aspects in guillemets."""
+    """A flowchart: composites as subgraphs with their ports, delayed connections dotted, aspects in guillemets.
+
+    A medium or processor that several places share is a hexagon, with dotted lines to these.
+    """
     return "\n".join(_Writer(outline).lines()) + "\n"
 
 
@@ -31,9 +34,33 @@ class _Writer:
         yield "---"
         yield "flowchart LR"
         yield from self.inside(self.outline.root, "    ")
+        yield from self.media("    ")
         if self.marked:
             yield "    classDef aspect stroke:#D55E00,stroke-width:3px"
             yield f"    class {','.join(self.marked)} aspect"
+
+    def media(self, indent: str) -> Iterator[str]:
+        """What several places share, and where these are."""
+        groups: dict[tuple[str, ...], dict[str, None]] = {}
+        for woven in self.outline.model.aspects:
+            if key := shared(woven):
+                places = filter(None, map(self.shown, [*woven.ports, *woven.actors]))
+                groups.setdefault(key, {}).update(dict.fromkeys(places))
+        for (kind, *rest), nodes in groups.items():
+            if len(nodes) > 1:
+                name = self.name(f"shared {rest[-1]}")
+                yield f"{indent}{name}{{{{{_quoted(f'«{rest[-1]}»<br/>{kind}')}}}}}"
+                yield f"{indent}{name} -.- {' & '.join(nodes)}"
+
+    def shown(self, path: str) -> str:
+        """The node of a port or actor, or of the closed composite around it."""
+        while path:
+            if path in self.boxes:
+                return self.node(path)
+            if path in self.names:
+                return self.names[path]
+            path = path.rpartition(".")[0]
+        return ""
 
     def inside(self, box: Box, indent: str) -> Iterator[str]:
         """The boxes inside a composite, then their connections."""

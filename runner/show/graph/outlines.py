@@ -10,9 +10,10 @@ from dataclasses import dataclass, field
 from itertools import accumulate, chain
 
 from epicycle.actors import InputPort, OutputPort, PortParameter, counted
+from epicycle.aspects import Medium, Processor
 
 from ...build import Model
-from ...graph import Clock, Hop
+from ...graph import Clock, Hop, WovenAspect
 
 MANY = 60  # boxes that a reader can take in; a larger model is folded by default
 
@@ -297,3 +298,11 @@ def _clock(clock: Clock) -> str:
 
 def _owner(path: str) -> str:
     return path.rpartition(".")[0]
+
+
+def shared(woven: WovenAspect) -> tuple[str, ...] | None:
+    """The medium or processor of an aspect, which other aspects may use, too; None if its places share nothing."""
+    if not isinstance(woven.aspect, Medium | Processor):
+        return None
+    name = getattr(woven.aspect, "medium", None)
+    return (woven.kind, woven.name.rpartition(".")[0], name) if name else (woven.kind, woven.name)

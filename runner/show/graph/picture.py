@@ -14,12 +14,12 @@ from typing import Any, NamedTuple
 
 import networkx as nx
 
-from epicycle.aspects import Medium, Processor
+from epicycle.aspects import Processor
 
 from ...graph import WovenAspect, extent
 from ..pen import font, new_canvas, save, style, text_width
 from .layout import MARGIN, PILL, PILL_HEIGHT, PORT, Drawing, Line, Pill, PlacedBox, Point, Wire, Words, pill_width
-from .outlines import duration, short_name
+from .outlines import duration, shared, short_name
 
 INK, SOFT, FAINT = "#1a1a1a", "#5f6672", "#a9afb8"
 FRAMES = ("#f3f5f8", "#e9edf3", "#dfe5ed", "#d5dde7")
@@ -67,14 +67,6 @@ class Row(NamedTuple):
     def indent(self) -> float:
         """Where the explanation starts, beside the sample."""
         return 6.0 + (pill_width(self.words) if self.words else 14.0)
-
-
-def shared(woven: WovenAspect) -> tuple[str, ...] | None:
-    """The medium or processor of an aspect, which other aspects may use, too; None if its places share nothing."""
-    if not isinstance(woven.aspect, Medium | Processor):
-        return None
-    name = getattr(woven.aspect, "medium", None)
-    return (woven.kind, woven.name.rpartition(".")[0], name) if name else (woven.kind, woven.name)
 
 
 def tied(drawing: Drawing) -> list[list[Pill]]:

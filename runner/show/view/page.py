@@ -17,7 +17,7 @@ from epicycle.actors import shortened, to_nanoseconds
 from ...catalogue import Figure
 from ...graph import ModelGraph
 from ...html import Html, tag
-from ...results import Results
+from ...results import Results, Verdict
 from ...shown import in_words, short
 from ..sheet import PALETTE
 from .drawing import drawn
@@ -96,6 +96,7 @@ def _run(recording: Recording, name: str, pack: Pack) -> dict[str, Any]:
         "digest": results.digest,
         "settings": [f"{key} = {short(value)}" for key, value in results.parameters.items()][:40],
         "metrics": _metrics(recording),
+        "monitors": [_monitor(recording, name, each) for name, each in results.monitors.items()],
         "firings": recording.firings,
         "records": recording.records,
         "gaps": recording.gaps(),
@@ -130,6 +131,21 @@ def _metrics(recording: Recording) -> list[list[str]]:
         [each.name, results.outcomes[each.name].shown(_four), "" if each.unit == "1" else each.unit, each.measure.doc]
         for each in model.metrics
     ]
+
+
+def _monitor(recording: Recording, name: str, verdict: Verdict) -> dict[str, Any]:
+    """What a monitor says of the run, and when (ns) it was broken first."""
+    required = next(each.requirement for each in recording.model.monitors if each.name == name)
+    unit = f" {required.unit}" if required.unit else ""
+    margin = f", robustness {_four(verdict.robustness)}{unit}"
+    said = f"cannot be judged: {verdict.missing}" if verdict.missing else "holds" if verdict.holds else verdict.remark
+    time = None if verdict.time is None else to_nanoseconds(verdict.time)
+    return {
+        "name": name,
+        "property": required.property,
+        "text": (said or "broken") + ("" if verdict.missing else margin),
+        "time": None if verdict.holds else time,
+    }
 
 
 def _four(value: Any) -> str:

@@ -41,9 +41,9 @@ class StudyResults(Tabled):
     >>> results.to_pandas().groupby("load")["mean_wait"].mean()
     """
 
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
-        self._store = Store(folder)
+    def __init__(self, folder: str | Path) -> None:
+        self.folder = Path(folder)
+        self._store = Store(self.folder)
         self.manifest = self._store.manifest
         self.plan = Plan.of_manifest(self.manifest)
         self._frozen: tuple[pa.Table, int] | None = None

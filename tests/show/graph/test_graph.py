@@ -255,6 +255,16 @@ def test_packaged_models_are_written_in_every_format(name: str, tmp_path: Path) 
         assert (tmp_path / f"graph{ending}").stat().st_size > 100
 
 
+def test_mermaid_shows_what_places_share() -> None:
+    lines = mermaid(outline(load_model("collision_avoidance", disturb="shared_radio"), depth=0)).splitlines()
+    hexagon = next(number for number, line in enumerate(lines) if "{{" in line)
+    assert lines[hexagon : hexagon + 2] == [
+        '    shared_radio{{"«radio»<br/>RadioMedium"}}',
+        "    shared_radio -.- main & observer_0",
+    ]
+    assert "{{" not in mermaid(outline(load_model("collision_avoidance", disturb="wifi_burst"), depth=0))
+
+
 def test_without_a_file_mermaid_is_printed_and_what_is_left_out_is_said(tmp_path: Path) -> None:
     model = small(tmp_path, *MANY)
     done = epicycle("small.yaml", "--without", "loss", cwd=tmp_path)

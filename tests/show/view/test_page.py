@@ -212,6 +212,21 @@ def test_noise_loses_nothing_and_who_gets_nothing_never_fires(tmp_path: Path, op
     assert "fired without it" not in words  # it has never fired
 
 
+def test_monitors_say_when_they_broke_and_lead_there(tmp_path: Path, opened: Open) -> None:
+    model = tmp_path / "m.yaml"
+    model.write_text(
+        "model: m\nactors: {clock: {type: Clock, period: 1 s}}\nrun: {stop: 10 s}\n"
+        "monitors: {low: always clock.output < 4, high: eventually clock.output > 8}\n",
+        encoding="utf-8",
+    )
+    page = opened(written(tmp_path / "m.html", (str(model), {})))
+    words = page.words()
+    assert "Monitor low\nalways clock.output < 4\tbroken at 4 s, where clock.output = 4, robustness -6" in words
+    assert "Monitor high\neventually clock.output > 8\tholds, robustness 2" in words
+    page.tab.get_by_role("button", name="go to the break").click()
+    assert page.do("return state.time") == 4e9
+
+
 def test_two_runs_are_shown_side_by_side_with_their_first_difference(pair: Path, opened: Open) -> None:
     page = opened(pair)
     page.do("state.setTime(2e9)")

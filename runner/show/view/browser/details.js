@@ -25,6 +25,10 @@ class Details {
     ];
     if (run.settings.length) facts.push(["settings", run.settings.join(", ")]);
     parts.push(table(run.metrics.map(([name, value, unit, doc]) => [name, `${value}${unit ? ` ${unit}` : ""}`, doc]), "metrics"));
+    for (const { name, property, text, time } of run.monitors) {
+      parts.push(element("h2", { text: `Monitor ${name}` }), table([[property, text]], "monitor"));
+      if (time !== null) parts.push(button("go to the break", () => this.state.setTime(time)));
+    }
     parts.push(table(facts, "run"));
     const shown = run.firing_tag.length;
     if (shown < run.firings)

@@ -75,6 +75,10 @@ class Timeline extends View {
     const x = this.x(this.state.cursor);
     if (x >= this.margin - 1) this.line([x, 0, x, this.height], theme.now, 1.5);
     const { data, runs, active } = this.state;
+    for (const { time } of runs[active].monitors) {
+      const at = time === null || this.state.axis.byTag ? -1 : this.x(time);
+      if (at >= this.margin) this.line([at, 0, at, this.height], theme.loss, 1.5, [1, 3]);
+    }
     if (data.difference) {
       const tag = runs[active].tagOfDifference, at = tag === undefined ? -1 : this.x(this.state.place(runs[active], tag));
       if (at >= this.margin) this.line([at, 0, at, this.height], theme.loss, 1.5, [4, 3]);
