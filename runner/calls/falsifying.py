@@ -24,7 +24,7 @@ from ..search import falsify as search
 from ..shown import finite, short
 from ..study import OK, StudyResults, open_study
 from ..tables import Table, Tabled
-from ..text import Scalar, plain
+from ..text import Node, Scalar, plain
 from .running import as_command
 from .studying import as_settings
 
@@ -90,7 +90,7 @@ class Falsified(Tabled):
         found = self.findings
         what = f"{found.monitor} ({found.source})"
         if self.broken is None:
-            told = f"No run broke {what}. That does not show that it always holds: only these were made."
+            told = f"No run broke {what}, which does not prove that it always holds."
         else:
             remark = "" if self.verdict is None else self.verdict.remark
             told = f"Run {self.broken.number}, with {_said(self.broken)}, breaks {what}{remark and ': '}{remark}."
@@ -220,15 +220,17 @@ def as_ranges(said: Mapping[str, object]) -> Iterator[str]:
 
 def _settings(run: Run) -> Iterator[tuple[str, str]]:
     """What a run was given, as ``--set`` takes it."""
-    for setting in run.level.settings:
-        node = setting.node
-        is_bare = isinstance(node, Scalar) and (not isinstance(node.value, str) or _is_bare(node))
-        yield setting.path, node.text if isinstance(node, Scalar) and is_bare else json.dumps(plain(node))
+    return ((setting.path, _text(setting.node)) for setting in run.level.settings)
 
 
-def _is_bare(node: Scalar) -> bool:
-    number = split_number(node)
-    return _BARE.fullmatch(node.text) is not None and (number is None or bool(number[1]))
+def _text(node: Node) -> str:
+    """A value as YAML, without quotes where it can be."""
+    if isinstance(node, Scalar):
+        number = split_number(node)
+        is_bare = _BARE.fullmatch(node.text) is not None and (number is None or bool(number[1]))
+        if is_bare or not isinstance(node.value, str):
+            return node.text
+    return json.dumps(plain(node))
 
 
 def _said(run: Run) -> str:
@@ -254,7 +256,8 @@ def _covered(found: Findings) -> Iterator[str]:
             unit = f" {axis.unit}" if axis.unit else ""
             yield f"{axis.path} {min(numbers):f} to {max(numbers):f}{unit}"
         else:
-            texts = dict.fromkeys(value for each in runs for path, value in _settings(each) if path == axis.path)
-            shown = list(texts)[:_VALUES]
+            tried = {each.level.values[axis.path] for each in runs}
+            texts = [_text(node) for node in axis.nodes if axis.factor(node) in tried]
+            shown = texts[:_VALUES]
             more = f" and {len(texts) - len(shown):,} more" if len(texts) > len(shown) else ""
             yield f"{axis.path} {' or '.join(shown)}{more}"

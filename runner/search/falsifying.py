@@ -110,7 +110,7 @@ def falsify(
                 searching.make(points, open_trials, lambda: tell(len(found.runs), found.least))
                 points = [] if found.broken else searching.next()
         finally:
-            open_trials.describe(searching.whole([]))
+            open_trials.describe(searching.whole(points))
     return found
 
 

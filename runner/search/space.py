@@ -168,7 +168,7 @@ def _axis(setting: Setting, model: Model, problems: Problems) -> Axis | None:
     if isinstance(node, Scalar) and (found := _RANGE.fullmatch(node.text)) is not None:
         return _interval(setting, found[1], found[2], counts(setting.path, model), problems)
     if not (isinstance(node, Sequence) or (isinstance(node, Mapping) and node.entries.keys() & RANGE.keys.keys())):
-        problems.add(f"{setting.path!r} is given no range and no list of values", setting.position, HINT)
+        problems.add(f"{setting.path!r} has neither a range nor a list of values", setting.position, HINT)
         return None
     key = Scalar(setting.path, setting.path, True, setting.position)
     dimension = DimensionReader(problems).dimension(setting.path, Entry(key, node))
@@ -176,7 +176,7 @@ def _axis(setting: Setting, model: Model, problems: Problems) -> Axis | None:
         return None
     if dimension.size > MAX_VALUES:
         problems.add(
-            f"{setting.path!r} has {dimension.size:,} values, and {MAX_VALUES:,} are allowed", setting.position
+            f"{setting.path!r} has {dimension.size:,} values; at most {MAX_VALUES:,} are allowed", setting.position
         )
         return None
     nodes = [each.node for at in range(dimension.size) for each in dimension.level(at).settings]
@@ -225,11 +225,12 @@ def _interval(setting: Setting, first: str, last: str, is_count: bool, problems:
     if unit_of_low not in ("", unit):
         problems.add(f"the range of {path!r} has more than one unit", at, "use the same unit for both ends")
         return None
-    is_whole = is_count and not unit and all("." not in each and "e" not in each.lower() for each in (first, last))
-    if max(abs(low), abs(high)) > (MAX_WHOLE if is_whole else MAX_NUMBER):
-        problems.add(f"the range of {path!r} has numbers that are too large", at)
+    if max(abs(low), abs(high)) > (MAX_WHOLE if is_count else MAX_NUMBER):
+        problems.add(f"the range of {path!r} exceeds ±{MAX_WHOLE if is_count else MAX_NUMBER:.0e}", at)
+    elif is_count and any(each != each.to_integral_value() for each in (low, high)):
+        problems.add(f"{path!r} takes whole numbers, and the ends of its range are not", at)
     elif not float(low) < float(high):
         problems.add(f"the range of {path!r} is empty: {first} is not less than {last}", at)
     else:
-        return Interval(path, low, high, unit, at, is_whole)
+        return Interval(path, low, high, unit, at, is_count)
     return None

@@ -102,7 +102,7 @@ def manifest_of(plan: Plan) -> dict[str, Any]:
 
 
 def plan_of_folder(folder: Path) -> Plan:
-    """The plan of a results folder whose runs are to be made or repeated.
+    """The plan of a results folder, whose runs are to be made or repeated.
 
     Raises ``StoreError`` if its model or Epicycle has changed.
     """

@@ -70,7 +70,7 @@ class Plan:
     columns: dict[str, Column]
     made_with: str  # the version of Epicycle
     files: Iterable[str] = ()  # all files read, by the names used to read them
-    search: Search | None = None  # what has chosen the conditions, if they were not known from the beginning
+    search: Search | None = None  # what chose the conditions, if they were not known from the start
 
     # -- making one -----------------------------------------------------------------------------------------------
 

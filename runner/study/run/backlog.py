@@ -49,10 +49,9 @@ class Backlog:
         self.there: Counter[str] = Counter()  # runs that already existed, by status
         self.made: Counter[str] = Counter()  # new runs, by status
         self.stopped_early = 0  # runs that were not needed
-        self._conditions = iter(plan if chosen is None else ())  # still to come
-        self._open: dict[int, Iterator[Task | None]] = (
-            {} if chosen is None else {-1: iter(chosen)}
-        )  # runs of started conditions
+        # The conditions still to come, and the runs of started ones.
+        self._conditions = iter(plan if chosen is None else ())
+        self._open: dict[int, Iterator[Task | None]] = {} if chosen is None else {-1: iter(chosen)}
         self._running: Counter[int] = Counter()  # number of runs, by condition
         self._values: dict[int, list[float]] = {}  # values of the deciding metric, by condition
         self._again: deque[Task] = deque()
