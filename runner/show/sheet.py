@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
 from pathlib import Path
 from textwrap import fill
 from typing import Any, Literal, NamedTuple
@@ -25,14 +27,26 @@ MAX_LINES = 40  # per panel of a study
 MAX_PANELS = 24
 MAX_TEXT = 200  # characters per label
 MAX_TIPS = 3000  # per picture
-WIDTH = 7.0  # inches
+WIDTH, NARROW = 7.0, 3.7  # inches; the latter is for the screen of a telephone
 _MAX_NAME = 36  # characters of a name beside an axis
 _LONG = 30  # characters per line beside an axis
 _LONGEST = {1: 90, 2: 46, 3: 30}  # and above a panel, by the number of columns
+_LONGEST_NARROW = 44
 _NAMED = 26  # rows of a band that are named
 _PAD = 0.06  # inches around the drawing
 _SVG = "http://www.w3.org/2000/svg"
 _INDEX = re.compile(r"\[(\d+)\]")
+_is_narrow: ContextVar[bool] = ContextVar("is_narrow", default=False)
+
+
+@contextmanager
+def narrow() -> Iterator[None]:
+    """Within this, sheets are narrow: their panels are below each other."""
+    token = _is_narrow.set(True)
+    try:
+        yield
+    finally:
+        _is_narrow.reset(token)
 
 
 def colours(count: int) -> list[str]:
@@ -71,12 +85,12 @@ class Sheet:
         same_x: bool = False,
         same_y: bool | Literal["row"] = False,
     ) -> None:
-        count = len(panels)
+        count, is_narrow = len(panels), _is_narrow.get()
         few = {0: 1, 4: 2}.get(count, min(count, 3))
-        self.columns = 1 if heights else columns or (few if count <= 12 else 4)
+        self.columns = 1 if heights or is_narrow else columns or (few if count <= 12 else 4)
         rows = math.ceil(count / self.columns)
         tall = sum(heights) if heights else rows * height * {1: 1.25, 2: 1.0, 3: 1.0}.get(self.columns, 0.85)
-        self.canvas = new_canvas(WIDTH, 0.5 + tall)
+        self.canvas = new_canvas(NARROW if is_narrow else WIDTH, 0.5 + tall)
         self.canvas.set_layout_engine("constrained", h_pad=0.06, w_pad=0.06)
         grid = self.canvas.subplots(
             rows, self.columns, squeeze=False, sharex=same_x, sharey=same_y, height_ratios=heights or None
@@ -89,7 +103,8 @@ class Sheet:
         for index, (axes, title) in enumerate(zip(self.axes, panels, strict=True)):
             letter = f"({chr(ord('a') + index)}) " if 1 < count <= 26 and not heights else ""
             if letter or title:
-                axes.set_title(fill(f"{letter}{title}", _LONGEST.get(self.columns, 22)), loc="left")
+                longest = _LONGEST_NARROW if is_narrow else _LONGEST.get(self.columns, 22)
+                axes.set_title(fill(f"{letter}{title}", longest), loc="left")
 
     def call(self, axes: Any, x: str, y: str) -> None:
         """Label the axes of a panel; panels with the same axes are labelled only once."""
@@ -111,6 +126,8 @@ class Sheet:
             return
         long = max(map(len, labels)) > 22
         columns = min(len(handles), 2 if long else 5 if self.columns > 1 else 4)
+        if _is_narrow.get():
+            columns = 1 if long else 2
         self.canvas.legend(handles, labels, title=title or None, loc="outside upper center", ncols=columns)
 
     def band(self, names: Sequence[str], shades: Sequence[str], title: str) -> None:
@@ -195,7 +212,10 @@ def tips_of(svg: bytes) -> Tipped | None:
 
 def legend_beside(axes: Any, **options: Any) -> None:
     """A legend to the right of the axes, of any length."""
-    found = axes.legend(loc="upper left", bbox_to_anchor=(1.02, 1.0), borderaxespad=0.0, **options)
+    where = {"loc": "upper left", "bbox_to_anchor": (1.02, 1.0), "borderaxespad": 0.0}
+    if _is_narrow.get():  # below
+        where = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.2)}
+    found = axes.legend(**where, **options)
     for text in found.get_texts():
         text.set_text(fill(abridged(text.get_text(), 2 * _MAX_NAME), _MAX_NAME))
 

@@ -44,6 +44,7 @@ class Picture(NamedTuple):
     doc: str
     svg: bytes | None
     said: str
+    narrow: bytes | None = None  # the same for a narrow screen
 
 
 def report_page(
@@ -210,13 +211,15 @@ def _picture(number: int, picture: Picture) -> Html:
     if picture.svg is None:
         shown = tag("p", f"This figure could not be drawn: {picture.said}", class_="problem")
     else:
-        shown = _shown(picture.svg, what)
+        shown = _shown(picture.svg, what, "wide" if picture.narrow else "")
+        if picture.narrow:
+            shown = tag("div", shown, _shown(picture.narrow, what, "narrow"))
         caption += [" ", tag("span", picture.said, class_="note")]
         caption.insert(0, tag("button", "enlarge", type="button", class_="enlarge", aria_label=f"enlarge: {what}"))
     return tag("figure", shown, tag("figcaption", caption), id=f"figure-{picture.name}")
 
 
-def _shown(svg: bytes, what: str) -> Html:
+def _shown(svg: bytes, what: str, screen: str) -> Html:
     """A picture that can be enlarged, with tips over it; as an image, it cannot run anything."""
     source = f"data:image/svg+xml;base64,{base64.b64encode(svg).decode()}"
     found = tips_of(svg)
@@ -229,7 +232,7 @@ def _shown(svg: bytes, what: str) -> Html:
         over = tag("svg", dots, class_="tips", aria_hidden="true", **view)
         image = tag("img", src=source, alt=what, width=width, height=height)
         frame = tag("div", image, over, class_="frame", tabindex="0")
-    return tag("div", frame, class_="scroll")
+    return tag("div", frame, class_=f"scroll {screen}".rstrip())
 
 
 def _means(data: Data) -> Iterable[Html]:
