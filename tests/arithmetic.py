@@ -61,7 +61,6 @@ EXCEPTIONS = {  # file or folder: what it may use, and why
     "runner/text/problems.py": (("sum",), WHOLE),
     "runner/results/arrow.py": (("numpy.cumsum",), WHOLE),
     "runner/show": ((), DRAWN),
-    "runner/calls/falsifying.py": (("sum",), WHOLE),
     "runner/calls/optimising.py": (("sum",), WHOLE),
     "runner/search/calibrating.py": (("scipy", "numpy.linalg", "@"), DRAWN),
     "runner/shown.py": (("**", "math.log10"), DRAWN),

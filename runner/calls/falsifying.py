@@ -10,7 +10,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from epicycle.actors import abridged, counted
+from epicycle.actors import EpicycleError, abridged, counted
 
 from ..bars import bar
 from ..build import load_model
@@ -68,6 +68,11 @@ class Falsified(Tabled):
         if name not in {each.name for each in model.monitors}:
             model.monitor(name, asked.monitor)
         results = Simulation(model, seed=run.seed, acts=Acts(model.exactly)).run()
+        if results.digest != run.digest:
+            raise EpicycleError(
+                f"run {run.number} (seed {run.seed}) does not repeat: its digest is {results.digest[:16]}..., but was "
+                f"{(run.digest or '')[:16]}...; something has changed since"
+            )
         self.verdict = results.monitors[name]
         if results.acts:
             self.explain = ["epicycle", "explain", *self.command[2:], "--monitor", asked.monitor]
@@ -99,7 +104,7 @@ class Falsified(Tabled):
     def _reservations(self) -> Iterator[str]:
         """What the search could not do."""
         runs = self.findings.runs
-        if failed := [each for each in runs if each.status != OK]:
+        if failed := self.findings.failed:
             yield (
                 f"{counted(len(failed), 'run')} failed, and nothing is known of the property there: 'epicycle status "
                 f"{self.folder}' shows them."
@@ -109,8 +114,8 @@ class Falsified(Tabled):
                 "All values were chosen at random: the library that guides a search is not installed "
                 "(pip install 'epicycle[falsify]')."
             )
-        if missing := sum(each.status == OK and each.holds is None for each in runs):
-            yield f"In {counted(missing, 'run')} the property could not be judged."
+        if missing := self.findings.not_judged:
+            yield f"In {counted(len(missing), 'run')} the property could not be judged."
         if len(runs) > 1 and len({each.digest for each in runs if each.status == OK}) == 1:
             yield "All runs were the same: nothing in the model depends on the seed or on what was varied."
 
@@ -127,8 +132,8 @@ class Falsified(Tabled):
             "command": self.command,
             "explain": self.explain,
             "runs": len(found.runs),
-            "failed": sum(each.status != OK for each in found.runs),
-            "not_judged": sum(each.status == OK and each.holds is None for each in found.runs),
+            "failed": len(found.failed),
+            "not_judged": len(found.not_judged),
             "least": None if found.least is None else _facts(found.least),
             "guided": found.guided,
             "covered": self.covered,

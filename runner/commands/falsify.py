@@ -91,4 +91,4 @@ def falsify(options: argparse.Namespace) -> int:
         tell(f"wrote {found.results.path}")
     if found.broken is not None:
         return BROKEN
-    return FAILED if found.facts()["failed"] else DONE
+    return FAILED if found.findings.failed else DONE

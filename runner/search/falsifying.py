@@ -10,10 +10,12 @@ from typing import Any
 
 import yaml
 
+from epicycle.actors import EpicycleError, counted
+
 from ..build import Model, load_model
 from ..catalogue import types_of_file
 from ..language import Dimension, Level, parse_setting, study_of_text
-from ..study import Plan, Search, Trials, available_cores, trials
+from ..study import OK, Plan, Search, Trials, available_cores, open_trials
 from ..text import COMMAND_LINE, ModelError, Position, Problems
 from .explaining import property_of
 from .proposals import BATCH, SPREAD, Point, is_guided, proposals
@@ -22,6 +24,7 @@ from .space import Interval, Space, read_space, said
 AD_HOC = "property"  # the name of a monitor that is made of a text
 FILE = Path("falsify")  # what the study of a search has for a file, so that paths are relative to the working directory
 MAX_RUNS = 1_000_000
+MAX_POINTS = 150_000  # numbers in the text of a study, which is read with limits
 _GROWTH = 1.1  # of the number of runs, after which the folder is told of them
 
 
@@ -65,6 +68,19 @@ class Findings:
     space: Space
     guided: bool
     runs: list[Run] = field(default_factory=list)
+    broken: Run | None = None  # the first run that breaks the property
+    least: Run | None = None  # the first run of least robustness
+    margin: float | None = None  # its robustness
+
+    @property
+    def failed(self) -> list[Run]:
+        """The runs of which nothing is known, as they raised an error or took too long."""
+        return [each for each in self.runs if each.status != OK]
+
+    @property
+    def not_judged(self) -> list[Run]:
+        """The runs of which nobody can tell whether they have the property."""
+        return [each for each in self.runs if each.status == OK and each.holds is None]
 
     @property
     def unguided(self) -> bool:
@@ -72,16 +88,14 @@ class Findings:
         has_ranges = any(isinstance(axis, Interval) for axis in self.space.axes)
         return has_ranges and not self.guided and len(self.runs) > SPREAD * BATCH
 
-    @property
-    def broken(self) -> Run | None:
-        """The first run that has not the property."""
-        return next((each for each in self.runs if each.holds is False), None)
-
-    @property
-    def least(self) -> Run | None:
-        """The run of least robustness."""
-        known = [each for each in self.runs if each.robustness is not None and not math.isnan(each.robustness)]
-        return min(known, key=lambda each: each.robustness or 0.0, default=None)
+    def add(self, run: Run) -> None:
+        """Another run is over."""
+        self.runs.append(run)
+        if self.broken is None and run.holds is False:
+            self.broken = run
+        margin = run.robustness
+        if margin is not None and not math.isnan(margin) and (self.margin is None or margin < self.margin):
+            self.least, self.margin = run, margin
 
 
 def falsify(
@@ -100,17 +114,17 @@ def falsify(
     searching = _Searching(asked)
     found = searching.findings
     points = searching.next()
-    with trials(searching.plan(points), folder, jobs or available_cores(), timeout) as open_trials:
+    with open_trials(searching.plan(points), folder, jobs or available_cores(), timeout) as made:
         told = 0
         try:
             while points:
                 if len(found.runs) + len(points) >= _GROWTH * told:
                     told = len(found.runs) + len(points)
-                    open_trials.describe(searching.whole(points))
-                searching.make(points, open_trials, lambda: tell(len(found.runs), found.least))
+                    made.describe(searching.whole(points))
+                searching.make(points, made, lambda: tell(len(found.runs), found.least))
                 points = [] if found.broken else searching.next()
         finally:
-            open_trials.describe(searching.whole(points))
+            made.describe(searching.whole(points))
     return found
 
 
@@ -119,6 +133,8 @@ class _Searching:
 
     def __init__(self, asked: Asked) -> None:
         self._asked = asked
+        if not 0 < asked.runs <= MAX_RUNS:
+            raise EpicycleError(f"runs {asked.runs:,}: expected a whole number from 1 to {MAX_RUNS:,}")
         types = [each for file in asked.types for each in types_of_file(file)]
         model = load_model(asked.model, set=asked.set, disturb=asked.disturb, types=types)
         self._monitor = asked.monitor
@@ -133,6 +149,12 @@ class _Searching:
             if each is not None and each.path in space.columns:
                 problems.add(f"{each.path!r} is set and varied", each.position, "leave out --set or --vary")
         problems.raise_if_any()
+        if asked.runs * len(space.axes) > MAX_POINTS:
+            most = MAX_POINTS // len(space.axes)
+            raise EpicycleError(
+                f"{asked.runs:,} runs are too many for one folder, where {counted(len(space.axes), 'parameter')} "
+                f"may take {most:,} values each\n   help: search with --runs {most} and several seeds, in a folder each"
+            )
         study = study_of_text(self._text(model.name, []), FILE, asked.set, asked.types)
         self._others: tuple[Dimension, ...] = study.dimensions  # the disturbances
         base = Plan.made(replace(study, dimensions=(*space.ends(), *self._others)))
@@ -154,7 +176,7 @@ class _Searching:
                 raise
             option = f"--monitor {self._asked.monitor}"
             at = Position(COMMAND_LINE, 1, 11, max(1, len(option) - 10), option)
-            raise ModelError(replace(problem, position=at) for problem in error.problems) from None
+            raise ModelError(replace(each, position=at) for each in error.problems) from None
 
     def next(self) -> list[Point]:
         """The points of the next batch; none if there are as many runs as were asked for."""
@@ -177,7 +199,7 @@ class _Searching:
             margin = row[f"{found.monitor}_robustness"]
             known = None if holds is None else bool(holds)
             ended = (row["status"], known, margin, row["error"], row["digest"], row["run"])
-            found.runs.append(Run(start + at, level, row["seed"], *ended))
+            found.add(Run(start + at, level, row["seed"], *ended))
         self._levels |= places
         self._latest = [each.robustness for each in found.runs[start:]]
 

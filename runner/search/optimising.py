@@ -15,7 +15,7 @@ from epicycle.actors.expression import ExpressionError, Formula
 
 from ..catalogue import is_path, packaged_files
 from ..language import Level, asks_for_none, is_study, parse_setting, read_study, study_of_text
-from ..study import OK, Estimate, Plan, Search, Trials, available_cores, mean, trials
+from ..study import OK, Estimate, Plan, Search, Trials, available_cores, mean, open_trials
 from ..text import COMMAND_LINE, Position, Problems, parse, plain
 from .proposals import Point, is_guided, proposals
 from .space import Interval, Space, read_space, said
@@ -116,7 +116,7 @@ def optimise(
     chosen = proposals(len(found.space.axes), work.seed, found.guided, _TOGETHER)
     points = next(chosen)[: goal.points]
     work.add(points)
-    with trials(work.told(), folder, jobs or available_cores(), timeout) as made:
+    with open_trials(work.told(), folder, jobs or available_cores(), timeout) as made:
         while True:
             tested = work.test(points, made)
             tell(found)

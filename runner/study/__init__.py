@@ -16,7 +16,7 @@ from .run.pulse import progress
 from .run.runner import Replay, ReplayError, again, repeat
 from .run.store import WriteError, is_running, replace_file
 from .session import available_cores, check_size, plan_of_folder, run_study
-from .trials import Trials, trials
+from .trials import Trials, open_trials
 
 __all__ = [
     "CONFIRMED",
@@ -47,6 +47,7 @@ __all__ = [
     "is_running",
     "mean",
     "open_study",
+    "open_trials",
     "paired_difference",
     "plan_of_folder",
     "progress",
@@ -54,6 +55,5 @@ __all__ = [
     "repeat",
     "replace_file",
     "run_study",
-    "trials",
     "with_interval",
 ]

@@ -48,7 +48,7 @@ class _Bench:
 
 
 class Trials:
-    """A results folder that a search writes to; ``trials`` opens one."""
+    """A results folder that a search writes to; ``open_trials`` opens one."""
 
     def __init__(self, keeper: Keeper, processes: Processes, jobs: int, known: dict[str, Row]) -> None:
         self._keeper = keeper
@@ -81,7 +81,7 @@ class Trials:
 
 
 @contextmanager
-def trials(plan: Plan, folder: Path, jobs: int, timeout: float | None) -> Iterator[Trials]:
+def open_trials(plan: Plan, folder: Path, jobs: int, timeout: float | None) -> Iterator[Trials]:
     """Open a folder for a search whose first conditions are those of a plan; raises ``StoreError``.
 
     At the end, the table of the runs is written that were described last.

@@ -17,6 +17,7 @@ from pathlib import Path
 import pytest
 
 import epicycle
+from epicycle.actors import EpicycleError
 from epicycle.runner.cli import main
 from epicycle.runner.search import falsifying
 from epicycle.runner.search import proposals as proposing
@@ -146,6 +147,12 @@ def test_runs_that_are_all_the_same_are_told() -> None:
     )
 
 
+def test_a_program_asks_for_some_runs() -> None:
+    for runs in (0, 10**7):
+        with pytest.raises(EpicycleError, match=f"runs {runs:,}: expected a whole number from 1 to 1,000,000"):
+            epicycle.falsify("far.yaml", "away", runs=runs, out="out")
+
+
 def test_runs_that_fail_or_cannot_be_judged_are_told(capsys: pytest.CaptureFixture[str]) -> None:
     Path("walk.yaml").write_text(MODEL, encoding="utf-8")
     options = ["--types", str(THIS), "--runs", "20", "--out", "out", "--set", "fails=[3, 4]", "--jobs", "1"]
@@ -191,7 +198,7 @@ def test_the_folder_is_that_of_a_study(capsys: pytest.CaptureFixture[str]) -> No
     assert (Path("out") / "table.parquet").is_file()
     capsys.readouterr()
     assert main(["status", "out"]) == 0
-    assert capsys.readouterr().out == "falsify_far: 30 of at most 30 runs are over (30 ok)\n"
+    assert capsys.readouterr().out == "falsify_far: 30 of at most 30 runs are finished (30 ok)\n"
     run = table["run"][17].as_py()
     assert main(["replay", "out", run]) == 0
     assert capsys.readouterr().out.endswith(": the same\n")
@@ -345,7 +352,7 @@ def test_a_folder_of_something_else_is_left_alone(capsys: pytest.CaptureFixture[
     capsys.readouterr()
     assert falsify("--runs", 1, "--vary", "x=0.0..1.0", "--out", "out") == 2
     assert capsys.readouterr().err == (
-        "error: out was made when falsify_far had other factors: none, not x (float)\n"
+        "error: out was made when falsify_far had different factors: none, not x (float)\n"
         "   help: choose another folder with --out\n"
     )
     assert main(["falsify", "nosuch", "--monitor", "away"]) == 2

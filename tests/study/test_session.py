@@ -11,6 +11,7 @@ import pytest
 
 from epicycle.runner import open_study
 from epicycle.runner.cli import main
+from epicycle.runner.study import run_study
 from epicycle.runner.study import session as session_module
 from epicycle.runner.study.plan import plan as plan_module
 from epicycle.runner.study.run.backlog import Backlog
@@ -132,3 +133,19 @@ def test_a_thousand_million_runs_are_asked_back(tmp_path: Path, capsys: pytest.C
     backlog = Backlog(plan, {})
     tasks = [backlog.next() for _ in range(5)]
     assert [(task.condition, task.replication) for task in tasks if task] == [(0, each) for each in range(5)]
+
+
+def test_a_study_may_ask_for_properties_of_its_own(tmp_path: Path) -> None:
+    text = STUDY.replace(
+        "metrics:\n", "monitors: {low: always walk.output < 5}\nmetrics:\n  low: low\n  margin: low_robustness\n"
+    )
+    run_study(plan_of(write(tmp_path, text)), tmp_path / "out", jobs=1)
+    table = open_study(tmp_path / "out").table().to_pylist()
+    assert {row["low"] for row in table} == {0.0, 1.0}
+    assert all((row["margin"] > 0) == bool(row["low"]) for row in table)
+    # Another property is another study; what is there of this one is left out.
+    plan = plan_of(write(tmp_path, text.replace("output < 5", "output < 500")))
+    run_study(plan, tmp_path / "out", jobs=1)
+    again = open_study(tmp_path / "out")
+    assert again.left_out == len(table)
+    assert {row["low"] for row in again.table().to_pylist()} == {1.0}

@@ -6,7 +6,7 @@ import hashlib
 import json
 import logging
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field
 from math import prod
 from pathlib import Path
 from typing import Any, TypedDict
@@ -290,11 +290,14 @@ def _together(study: Study, place: Iterable[int]) -> Level:
 def _load(study: Study, level: Level) -> Model:
     types = [each for file in study.types for each in types_of_file(file)]
     model = load_model(study.model, set=level.settings, disturb=level.disturb, types=types)
+    problems = Problems()
     for name, text in study.monitors.items():
         try:
             model.monitor(name, text.text)
         except ModelError as error:
-            raise ModelError(replace(problem, position=text.position) for problem in error.problems) from None
+            for problem in error.problems:
+                problems.add(problem.message, text.position, *problem.help)
+    problems.raise_if_any()
     return model
 
 
