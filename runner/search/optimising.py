@@ -242,6 +242,8 @@ def _said_of(goal: Goal) -> tuple[dict[str, Any], Path]:
     study = read_study(goal.target)
     node = parse(study.text, str(study.path), Problems())
     whole: Any = plain(node) if node is not None else {}
+    if "point" in (whole.get("vary") or {}):
+        raise EpicycleError(f"{study.name} varies 'point', which is the name of what a search varies: rename it")
     left_out = ("claims", "guideline", "figures", "until")
     return {key: value for key, value in whole.items() if key not in left_out}, study.path
 

@@ -213,3 +213,10 @@ def test_failed_runs_are_told(bowl: str) -> None:
 def test_without_conditions_it_must_be_a_model_for_a_disturbance() -> None:
     with pytest.raises(EpicycleError, match="--disturb is for models: a study declares its own disturbances"):
         epicycle.optimise("waiting_time", minimise="mean_wait", vary={"load": "0.1..0.2"}, disturb="wifi_burst")
+
+
+def test_a_study_may_not_vary_what_a_search_adds(bowl: str) -> None:
+    Path("s.yaml").write_text("study: s\nmodel: ./bowl.yaml\nvary: {point: {cases: {one: , two: {n: 5}}}}\n")
+    told = "^s varies 'point', which is the name of what a search varies: rename it$"
+    with pytest.raises(EpicycleError, match=told):
+        epicycle.optimise("./s.yaml", minimise="cost", vary={"x": "0..3"})
