@@ -11,8 +11,10 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from .calibrating import Calibrated, calibrate, calibrated
     from .comparing import Comparison, Difference, compare
+    from .disturbing import Disturbed, disturb
     from .explaining import Explained, explain, explained
     from .falsifying import Falsified, falsified, falsify
+    from .fitting import Fit, fit
     from .optimising import Optimised, optimise, optimised
     from .picturing import Picture, Pictures, draw, plot, save
     from .running import Changes, Done, as_command, load, perform, run, seconds, watched
@@ -24,9 +26,11 @@ __all__ = [
     "Changes",
     "Comparison",
     "Difference",
+    "Disturbed",
     "Done",
     "Explained",
     "Falsified",
+    "Fit",
     "Optimised",
     "Page",
     "Picture",
@@ -35,11 +39,13 @@ __all__ = [
     "calibrate",
     "calibrated",
     "compare",
+    "disturb",
     "draw",
     "explain",
     "explained",
     "falsified",
     "falsify",
+    "fit",
     "load",
     "optimise",
     "optimised",
@@ -57,9 +63,11 @@ __all__ = [
 _HOMES = {
     "calibrating": ("Calibrated", "calibrate", "calibrated"),
     "comparing": ("Comparison", "Difference", "compare"),
+    "disturbing": ("Disturbed", "disturb"),
     "explaining": ("Explained", "explain", "explained"),
     "falsifying": ("Falsified", "falsified", "falsify"),
     "optimising": ("Optimised", "optimise", "optimised"),
+    "fitting": ("Fit", "fit"),
     "picturing": ("Picture", "Pictures", "draw", "plot", "save"),
     "running": ("Changes", "Done", "as_command", "load", "perform", "run", "seconds", "watched"),
     "studying": ("study",),

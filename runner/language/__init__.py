@@ -29,6 +29,7 @@ from .dimensions import (
 from .disturbance import (
     COMPOSITE_THERE,
     PARAMETER_THERE,
+    Disturbance,
     add_disturbances,
     joined,
     load_disturbance,
@@ -39,7 +40,7 @@ from .inheritance import inherit
 from .places import connection
 from .sampling import MORRIS, SOBOL, Design
 from .schema import CONSTRUCTS, json_schema, schema_text
-from .settings import Setting, Settings, change_aspect, parse_setting, read_overrides, settings_in, without
+from .settings import Setting, Settings, change_aspect, parse_setting, read_overrides, settings_in, settings_of, without
 from .study import MAX_REPLICATIONS, MAX_STUDY_SEED, RESERVED, Study, is_study, read_study, study_of_text
 from .study_metric import ASPECTS, NUMBERS, SIGNALS, StudyMetric, asks_for_none
 from .usage import check_usage
@@ -69,6 +70,7 @@ __all__ = [
     "Design",
     "Dimension",
     "DimensionReader",
+    "Disturbance",
     "Factor",
     "Guideline",
     "Level",
@@ -108,6 +110,7 @@ __all__ = [
     "read_study",
     "schema_text",
     "settings_in",
+    "settings_of",
     "split_number",
     "study_of_text",
     "without",
