@@ -11,7 +11,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from epicycle.actors import abridged, counted, to_seconds
+from epicycle.actors import counted, to_seconds
 
 from ..bars import bar
 from ..language import number_node
@@ -167,11 +167,6 @@ def calibrated(task: Task, folder: Path | None) -> Calibrated:
                 show(float(runs), None, f"{runs:,} runs")
 
         return Calibrated(search(task, folder, tell), task)
-
-
-def default_folder(model: str) -> Path:
-    """Where the command writes."""
-    return Path("results") / abridged(Path(model).stem, 60) / "calibration"
 
 
 def _value(each: Fitted) -> str:

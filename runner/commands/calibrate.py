@@ -40,7 +40,9 @@ def calibrate(options: argparse.Namespace) -> int:
     a file for --overrides, the facts as JSON, and the residuals.  Each run that was made is noted there, so that an
     interrupted search continues.
     """
-    from ..calls.calibrating import calibrated, default_folder
+    from epicycle.actors import abridged
+
+    from ..calls import calibrated
     from ..search import Task
 
     task = Task(
@@ -53,7 +55,7 @@ def calibrate(options: argparse.Namespace) -> int:
         options.disturb,
         [Path(each) for each in options.types],
     )
-    folder = options.out or default_folder(options.model)
+    folder = options.out or Path("results") / abridged(Path(options.model).stem, 60) / "calibration"
     try:
         found = calibrated(task, folder)
     except KeyboardInterrupt:
