@@ -9,17 +9,20 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from .calibrating import Calibrated, calibrate, calibrated
     from .comparing import Comparison, Difference, compare
     from .disturbing import Disturbed, disturb
     from .explaining import Explained, explain, explained
     from .falsifying import Falsified, falsified, falsify
     from .fitting import Fit, fit
+    from .optimising import Optimised, optimise, optimised
     from .picturing import Picture, Pictures, draw, plot, save
     from .running import Changes, Done, as_command, load, perform, run, seconds, watched
     from .studying import study
     from .viewing import Page, recorded, view
 
 __all__ = [
+    "Calibrated",
     "Changes",
     "Comparison",
     "Difference",
@@ -28,10 +31,13 @@ __all__ = [
     "Explained",
     "Falsified",
     "Fit",
+    "Optimised",
     "Page",
     "Picture",
     "Pictures",
     "as_command",
+    "calibrate",
+    "calibrated",
     "compare",
     "disturb",
     "draw",
@@ -41,6 +47,8 @@ __all__ = [
     "falsify",
     "fit",
     "load",
+    "optimise",
+    "optimised",
     "perform",
     "plot",
     "recorded",
@@ -53,10 +61,12 @@ __all__ = [
 ]
 
 _HOMES = {
+    "calibrating": ("Calibrated", "calibrate", "calibrated"),
     "comparing": ("Comparison", "Difference", "compare"),
     "disturbing": ("Disturbed", "disturb"),
     "explaining": ("Explained", "explain", "explained"),
     "falsifying": ("Falsified", "falsified", "falsify"),
+    "optimising": ("Optimised", "optimise", "optimised"),
     "fitting": ("Fit", "fit"),
     "picturing": ("Picture", "Pictures", "draw", "plot", "save"),
     "running": ("Changes", "Done", "as_command", "load", "perform", "run", "seconds", "watched"),

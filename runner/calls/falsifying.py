@@ -182,7 +182,7 @@ def falsify(
 
     >>> epicycle.falsify("mm1", "always server.size < 40", vary={"load": "0.5..0.9"}, runs=100).sentence
     """
-    ranges = vary if not isinstance(vary, Mapping) else [*_vary(vary)]
+    ranges = vary if not isinstance(vary, Mapping) else [*as_ranges(vary)]
     given = [disturb] if isinstance(disturb, (str, Path)) else disturb
     asked = Asked(
         str(model),
@@ -217,7 +217,7 @@ def falsified(
         return Falsified(search(asked, folder, jobs=jobs, timeout=timeout, tell=tell), asked, folder)
 
 
-def _vary(said: Mapping[str, object]) -> Iterator[str]:
+def as_ranges(said: Mapping[str, object]) -> Iterator[str]:
     """What the command line says of ranges and lists by path."""
     for path, value in said.items():
         yield f"{path}={value}" if isinstance(value, str) else as_settings({path: value})[0]

@@ -1,6 +1,7 @@
 """The commands of the command line, in the order in which ``epicycle --help`` names them."""
 
 from . import (
+    calibrate,
     compare,
     completion,
     describe,
@@ -10,6 +11,7 @@ from . import (
     fit,
     imports,
     new,
+    optimise,
     run,
     show,
     studies,
@@ -23,6 +25,8 @@ COMMANDS = (
     compare.compare,
     explain.explain,
     falsify.falsify,
+    optimise.optimise,
+    calibrate.calibrate,
     fit.fit,
     disturb.disturb,
     studies.study,

@@ -38,6 +38,7 @@ from .disturbance import (
 from .files import read_library, read_model
 from .inheritance import inherit
 from .places import connection
+from .sampling import MORRIS, SOBOL, Design
 from .schema import CONSTRUCTS, json_schema, schema_text
 from .settings import Setting, Settings, change_aspect, parse_setting, read_overrides, settings_in, settings_of, without
 from .study import MAX_REPLICATIONS, MAX_STUDY_SEED, RESERVED, Study, is_study, read_study, study_of_text
@@ -54,16 +55,19 @@ __all__ = [
     "GREATER",
     "MAX_REPLICATIONS",
     "MAX_STUDY_SEED",
+    "MORRIS",
     "NUMBERS",
     "PARAMETER_THERE",
     "RANGE",
     "RESERVED",
     "RISES",
     "SIGNALS",
+    "SOBOL",
     "ActText",
     "Claim",
     "CompositeText",
     "ConnectionText",
+    "Design",
     "Dimension",
     "DimensionReader",
     "Disturbance",

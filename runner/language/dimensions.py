@@ -11,13 +11,29 @@ from dataclasses import dataclass, field
 from decimal import Decimal
 from typing import Any, TypeAlias
 
-from epicycle.actors import Quantity, UnitError, parse_unit, random_stream
+from epicycle.actors import Quantity, UnitError, parse_unit
 
-from ..text import MAX_SEED, Entry, Mapping, Node, NodeReader, Position, Scalar, Sequence, is_empty, plain
-from .fields import QUANTITY_SCHEMA, Construct, Key, Schema, Shape, node_as, number, ref
+from ..text import Entry, Mapping, Node, NodeReader, Position, Scalar, Sequence, is_empty, plain
+from .fields import QUANTITY_SCHEMA, Construct, Key, Schema, Shape, node_as, ref
+from .sampling import (
+    HYPERCUBE,
+    LATIN,
+    MAX_SAMPLES,
+    MORRIS,
+    MORRIS_INDICES,
+    SAMPLINGS,
+    SOBOL,
+    SOBOL_INDICES,
+    Design,
+    Point,
+    latin_hypercube,
+    morris_blocks,
+    sobol_blocks,
+)
 from .settings import Setting, is_pattern, settings_in
 
 Factor: TypeAlias = bool | int | float | str | None
+Bounds: TypeAlias = tuple[float, float, str, Position]  # low, high, their unit, and where they are given
 KINDS: dict[str, type] = {"bool": bool, "int": int, "float": float, "text": str}
 
 _NUMBER = re.compile(r"\s*([-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]{1,3})?)\s*(.*?)\s*")
@@ -33,7 +49,12 @@ class Level:
 
 
 class Dimension(ABC):
-    """Levels by their number; ``columns`` are the table's columns that it fills, and what they hold (``KINDS``)."""
+    """Levels by their number; ``columns`` are the table's columns that it fills, and what they hold (``KINDS``).
+
+    ``design``, if there is one, says how the levels give sensitivity indices.
+    """
+
+    design: Design | None = None
 
     def __init__(self, name: str, position: Position, columns: dict[str, str]) -> None:
         self.name = name
@@ -57,8 +78,16 @@ class Dimension(ABC):
 class Listed(Dimension):
     """Levels that are written out, one by one."""
 
-    def __init__(self, name: str, position: Position, columns: dict[str, str], levels: list[Level]) -> None:
+    def __init__(
+        self,
+        name: str,
+        position: Position,
+        columns: dict[str, str],
+        levels: list[Level],
+        design: Design | None = None,
+    ) -> None:
         super().__init__(name, position, columns)
+        self.design = design
         self._levels = tuple(levels)
         self._places = {tuple(level.values.values()): index for index, level in enumerate(levels)}
 
@@ -167,7 +196,6 @@ def _quantity(node: Node) -> float | None:
 
 
 MAX_LEVELS = 10**12  # of a range
-MAX_SAMPLES = 100_000  # of a Latin hypercube, whose points are made together
 
 
 class DimensionReader(NodeReader):
@@ -184,18 +212,22 @@ class DimensionReader(NodeReader):
         return tuple(dimension for dimension in found if dimension is not None)
 
     def dimension(self, name: str, entry: Entry) -> Dimension | None:
-        """A list, a range, or a mapping with the key zip, cases or latin_hypercube."""
+        """A list, a range, or a mapping with the key zip, cases, latin_hypercube, sobol or morris."""
         node, position = entry.value, entry.key.position
         if isinstance(node, Sequence):
             return self.listed(name, position, {name: Entry(entry.key, node)})
         if isinstance(node, Mapping):
             keys = node.entries.keys()
-            for form, reader in (("zip", self.zipped), ("cases", self.cases), ("latin_hypercube", self.hypercube)):
+            for form, reader in (("zip", self.zipped), ("cases", self.cases)):
                 if form in keys and len(keys) == 1:
                     return reader(name, position, node.entries[form].value)
+            for form in SAMPLINGS:
+                if form in keys and len(keys) == 1:
+                    return self.sampled(name, position, form, node.entries[form].value)
             if keys & RANGE.keys.keys():
                 return self.ranged(name, position, node)
-        hint = "give a list, {from, to, step}, {zip: ...}, {cases: ...} or {latin_hypercube: ...}"
+        forms = ", ".join(f"{{{form}: ...}}" for form in ("zip", "cases", LATIN, SOBOL))
+        hint = f"give a list, {{from, to, step}}, {forms} or {{{MORRIS}: ...}}"
         self.problems.add(f"{name!r} has no values", node.position, hint)
         return None
 
@@ -307,22 +339,53 @@ class DimensionReader(NodeReader):
             return None
         return found
 
-    def hypercube(self, name: str, position: Position, node: Node) -> Dimension | None:
-        """Points that fill a box evenly: each of the ``size`` slices of each range contains one point."""
+    def sampled(self, name: str, position: Position, form: str, node: Node) -> Dimension | None:
+        """Points of a box: a Latin hypercube, or the design of a sensitivity analysis."""
         before = len(self.problems)
-        entries = HYPERCUBE.entries(self, node, f"latin_hypercube of {name!r}") or {}
+        entries = SAMPLINGS[form].entries(self, node, f"{form} of {name!r}") or {}
         if "size" not in entries or "ranges" not in entries:
-            hint = "write {size: 20, seed: 1, ranges: {load: [0.1, 0.9]}}"
-            self.problems.add(f"latin_hypercube of {name!r} needs 'size' and 'ranges'", position, hint)
+            hint = f"write {{size: {16 if form == SOBOL else 20}, seed: 1, ranges: {{load: [0.1, 0.9]}}}}"
+            self.problems.add(f"{form} of {name!r} needs 'size' and 'ranges'", position, hint)
             return None
-        said = HYPERCUBE.values(self, entries, "", position)
-        size, seed = said.get("size", 1), said.get("seed", 0)
-        box = entries["ranges"].value
-        if not isinstance(box, Mapping) or not box.entries:
-            self.problems.add(f"the ranges of {name!r} are not a mapping from parameters to [low, high]", box.position)
+        said = SAMPLINGS[form].values(self, entries, "", position)
+        size, seed, steps = said.get("size", 1), said.get("seed", 0), said.get("levels", 4)
+        box = self.box(name, entries["ranges"].value)
+        if form == SOBOL and size.bit_count() != 1:
+            near = 1 << size.bit_length()
+            hint = f"a Sobol sequence fills the box evenly only then: take {near // 2:,} or {near:,}"
+            self.problems.add(f"the size {size} of {name!r} is not a power of 2", entries["size"].value.position, hint)
+        if steps % 2:
+            hint = f"steps go over half of the grid: take {steps - 1 or 2} or {steps + 1}"
+            self.problems.add(f"the levels {steps} of {name!r} are not even", entries["levels"].value.position, hint)
+        most = MAX_SAMPLES // {SOBOL: len(box) + 2, MORRIS: len(box) + 1}.get(form, 1)
+        if size > most:
+            told = f"{form} of {name!r} has more than {MAX_SAMPLES:,} points"
+            self.problems.add(
+                told, entries["size"].value.position, f"with {len(box)} parameters, take at most {most:,}"
+            )
+        if len(self.problems) > before:
             return None
-        bounds: dict[str, tuple[float, float, str, Position]] = {}
-        for path, entry in box.entries.items():
+        taken: tuple[tuple[tuple[int, float], ...], ...] = ()
+        if form == SOBOL:
+            blocks = sobol_blocks(size, seed, list(box))
+        elif form == MORRIS:
+            blocks, found = morris_blocks(size, seed, list(box), steps)
+            taken = tuple(found)
+        else:
+            blocks = [[point] for point in latin_hypercube(size, seed, list(box))]
+        places: dict[Point, int] = {}  # a point that comes twice is run once
+        numbers = tuple(tuple(places.setdefault(point, len(places)) for point in block) for block in blocks)
+        levels = [_level_at(point, box) for point in places]
+        design = Design(form, tuple(box), numbers, taken) if form in (SOBOL, MORRIS) else None
+        return Listed(name, position, dict.fromkeys(box, "float"), levels, design)
+
+    def box(self, name: str, node: Node) -> dict[str, Bounds]:
+        """``path: [low, high]`` for each parameter."""
+        bounds: dict[str, Bounds] = {}
+        if not isinstance(node, Mapping) or not node.entries:
+            self.problems.add(f"the ranges of {name!r} are not a mapping from parameters to [low, high]", node.position)
+            return bounds
+        for path, entry in node.entries.items():
             is_pattern(path, entry.key.position, self.problems)
             items = entry.value.items if isinstance(entry.value, Sequence) else ()
             ends = [end for item in items if (end := self.quantity(item, f"a bound of {path!r}")) is not None]
@@ -332,21 +395,16 @@ class DimensionReader(NodeReader):
                 self.problems.add(f"{path!r} is not [low, high] in one unit", entry.value.position)
             else:
                 bounds[path] = float(ends[0][0]), float(ends[1][0]), ends[0][1], entry.key.position
-        if len(self.problems) > before:
-            return None
-        shares = []
-        for path in bounds:
-            stream = random_stream(seed, path, "latin hypercube")
-            shares.append([(slice_ + stream.random()) / size for slice_ in stream.permutation(size).tolist()])
-        levels = []
-        for point in zip(*shares, strict=True):
-            settings, values = [], {}
-            for (path, (low, high, unit, at)), share in zip(bounds.items(), point, strict=True):
-                value = low + share * (high - low)
-                settings.append(Setting(path, number_node(value, unit, at), at))
-                values[path] = in_si(value, unit)
-            levels.append(Level(tuple(settings), dict(values)))
-        return Listed(name, position, dict.fromkeys(bounds, "float"), levels)
+        return bounds
+
+
+def _level_at(point: Point, box: AnyMapping[str, Bounds]) -> Level:
+    settings, values = [], {}
+    for (path, (low, high, unit, at)), share in zip(box.items(), point, strict=True):
+        value = low + share * (high - low)
+        settings.append(Setting(path, number_node(value, unit, at), at))
+        values[path] = in_si(value, unit)
+    return Level(tuple(settings), dict(values))
 
 
 _QUANTITY = node_as(QUANTITY_SCHEMA)
@@ -359,23 +417,6 @@ RANGE = Construct(
     },
     type="object",
     required=["from", "to", "step"],
-)
-HYPERCUBE = Construct(
-    "",
-    {
-        "size": Key(number(int, 1, MAX_SAMPLES), "The number of points."),
-        "seed": Key(number(int, 0, MAX_SEED), "The seed that the points are drawn with (default: 0)."),
-        "ranges": Key(
-            node_as(
-                {
-                    "type": "object",
-                    "additionalProperties": {"type": "array", "items": QUANTITY_SCHEMA, "minItems": 2, "maxItems": 2},
-                }
-            ),
-            "'path: [low, high]' for each parameter.",
-        ),
-    },
-    required=["size", "ranges"],
 )
 DIMENSIONS = Shape(
     {"type": ["object", "null"], "additionalProperties": ref("dimension")},
@@ -390,7 +431,9 @@ def dimension_schema() -> Schema:
     forms = {
         "zip": Key(node_as(lists), "Parameters that vary together: 'path: [value, ...]', all of the same length."),
         "cases": Key(node_as(sets), "Named sets of values: 'name: {path: value}'."),
-        "latin_hypercube": Key(node_as(HYPERCUBE.schema), "Points that fill a box evenly."),
+        LATIN: Key(node_as(HYPERCUBE.schema), "Points that fill a box evenly."),
+        SOBOL: Key(node_as(SOBOL_INDICES.schema), "Points for Sobol's sensitivity indices: shares of the variance."),
+        MORRIS: Key(node_as(MORRIS_INDICES.schema), "Points for Morris's elementary effects, to find what matters."),
     }
     single = (Construct("", {key: each}, type="object", required=[key]).schema for key, each in forms.items())
     return {

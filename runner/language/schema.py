@@ -14,7 +14,7 @@ from epicycle.actors import Configurable, declared_parameters
 from epicycle.aspects import FiringTimeParameter
 
 from ..catalogue import Catalogue, doc_of, first_sentence, parts_of
-from .dimensions import HYPERCUBE, RANGE, dimension_schema
+from .dimensions import RANGE, dimension_schema
 from .disturbance import ACT, DISTURBANCE
 from .fields import (
     EXPRESSION,
@@ -46,6 +46,7 @@ from .models import (
 from .monitors import MONITOR
 from .places import CONNECTION, PATTERN_SCHEMA, POINTCUT, POINTCUTS_SCHEMA, PORT_SCHEMA, PORTS_SCHEMA, connection_schema
 from .questions import CLAIM, GUIDELINE
+from .sampling import HYPERCUBE, MORRIS_INDICES, SOBOL_INDICES
 from .study import METRIC as METRIC_OF_STUDY
 from .study import STUDY, UNTIL
 
@@ -68,6 +69,8 @@ CONSTRUCTS = {
     "A study": STUDY,
     "A range": RANGE,
     "A Latin hypercube": HYPERCUBE,
+    "Sobol indices": SOBOL_INDICES,
+    "Morris indices": MORRIS_INDICES,
     "A metric of a study": METRIC_OF_STUDY,
     "Until": UNTIL,
     "A claim": CLAIM,

@@ -27,8 +27,10 @@ def is_guided() -> bool:
     return True
 
 
-def proposals(axes: int, seed: int, guided: bool) -> Proposals:
+def proposals(axes: int, seed: int, guided: bool, together: int = BATCH) -> Proposals:
     """Batches of points, without end; each is sent the robustness that was found at its points.
+
+    Guided points are chosen so many ``together``.
 
     Each batch depends on nothing but the seed and what was found before it.
     """
@@ -41,7 +43,7 @@ def proposals(axes: int, seed: int, guided: bool) -> Proposals:
             found += zip(map(_number, (yield points)), points, strict=True)
         least, start = min(found, key=lambda each: each[0])
         if guided and least < math.inf:  # or there is no slope to follow
-            yield from _descent(start, seed, descents)
+            yield from _descent(start, seed, descents, together)
             descents += 1
 
 
@@ -54,7 +56,7 @@ def spread(axes: int, seed: int, number: int) -> list[Point]:
     return list(zip(*columns, strict=True)) if columns else [()] * BATCH
 
 
-def _descent(start: Point, seed: int, number: int) -> Proposals:
+def _descent(start: Point, seed: int, number: int, together: int) -> Proposals:
     """Points of CMA-ES from a point on, until its step is small."""
     import cma
     import numpy as np
@@ -65,8 +67,8 @@ def _descent(start: Point, seed: int, number: int) -> Proposals:
         return np.array([stream.normal(0.0, 1.0) for _ in range(math.prod(shape))]).reshape(shape)
 
     width = max(len(start), 2)  # the library knows no fewer; the rest is for nothing
-    options = {"bounds": [0.0, 1.0], "popsize": BATCH, "randn": normal, "seed": math.nan, "tolx": FINE, "verbose": -9}
-    options |= {"maxiter": LONGEST}
+    options = {"bounds": [0.0, 1.0], "randn": normal, "seed": math.nan, "tolx": FINE, "verbose": -9}
+    options |= {"popsize": together, "maxiter": LONGEST * BATCH // together}
     strategy = cma.CMAEvolutionStrategy([*start, *[0.5] * (width - len(start))], STEP, options)
     while not strategy.stop():
         asked = strategy.ask()

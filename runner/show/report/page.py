@@ -30,6 +30,7 @@ from ...study import (
 from ...text import plain
 from ..sheet import tips_of
 from .data import Condition, Data, Names, estimated, mean_of, shown
+from .indices import indices
 
 MAX_ROWS = 400  # of one table
 MAX_FAILURES = 50  # that are listed one by one
@@ -57,6 +58,7 @@ def report_page(
     sections: list[tuple[str, list[Html]]] = [  # answers first, then numbers, then their origin
         ("Claims", list(claims(data.names, judgements))),
         ("Guideline", list(_guideline(data, recommendations))),
+        ("Sensitivity", list(indices(data))),
         ("Figures", [tag("div", figures, class_="figures")] if figures else []),
         ("Means", list(_means(data))),
         ("Study", list(_what(data))),
@@ -133,6 +135,9 @@ def _what(data: Data) -> Iterable[Html]:
 
 def _levels(data: Data, factor: str) -> str:
     dimension = next(each for each in data.plan.study.dimensions if factor in each.columns)
+    if dimension.design is not None:
+        values = sorted(float(dimension.level(index).values[factor] or 0) for index in range(dimension.size))
+        return f"{shown(values[0])} to {shown(values[-1])}, {dimension.size:,} points"
     if dimension.size > 2 * MAX_PIVOT:
         ends = [shown(dimension.level(index).values[factor]) for index in (0, dimension.size - 1)]
         return f"{ends[0]} to {ends[1]}, {dimension.size:,} levels"

@@ -24,6 +24,7 @@ from ..run.store import BEST_FIRST, Store, parquet_of, replace_file
 from .claims import Judgement, Standing, judge, ranked
 from .guideline import Recommendation, recommend
 from .samples import Samples
+from .sensitivity import sensitivity
 
 if TYPE_CHECKING:
     import pandas
@@ -216,6 +217,19 @@ class StudyResults(Tabled):
     def guideline(self) -> list[Recommendation]:
         """What the study's guideline recommends, at every combination of the factors that are not chosen."""
         return recommend(self._samples())
+
+    def sensitivity(self, metric: str, level: float = LEVEL) -> list[dict[str, Any]]:
+        """How much each parameter of a Sobol or Morris design matters: a row for each parameter and index.
+
+        Each row has the other factors, ``factor``, ``index`` (``first_order`` and ``total``, or ``mu_star``, ``mu`` and
+        ``sigma``), its ``value`` with standard error and interval, the ``count`` of blocks of the design behind it, and
+        how many are ``missing``; with more than one in 20 missing, there is no value.
+        """
+        self._check("metric", metric, self.metrics)
+        return [
+            {**each.where, "factor": each.factor, "index": each.index, **asdict(each.estimate), "missing": each.missing}
+            for each in sensitivity(self._samples(), metric, level)
+        ]
 
     def find(self, run: str) -> dict[str, Any]:
         """The row of a run, by the beginning of its key; raises ``StoreError``."""

@@ -74,3 +74,22 @@ def test_latin_hypercube_meets_every_slice_once(tmp_path: Path) -> None:
         assert sorted(slices) == list(range(20))
     assert values(tmp_path, text) == found
     assert values(tmp_path, text.replace("seed: 3", "seed: 4")) != found
+
+
+@pytest.mark.parametrize("form", ["sobol: {size: 8", "morris: {size: 8"])
+def test_points_of_a_design_lie_in_their_ranges_and_depend_on_the_seed_alone(form: str, tmp_path: Path) -> None:
+    text = f"vary: {{box: {{{form}, seed: 3, ranges: {{drift: [1 m/s, 3 m/s], pause: [0, 1.0]}}}}}}}}\n"
+    found = values(tmp_path, text)
+    assert all(1.0 <= each["drift"] <= 3.0 and 0.0 <= each["pause"] <= 1.0 for each in found)
+    assert values(tmp_path, text) == found
+    assert values(tmp_path, text.replace("seed: 3", "seed: 4")) != found
+
+
+def test_sobol_points_meet_every_slice_once(tmp_path: Path) -> None:
+    text = "vary: {box: {sobol: {size: 16, seed: 3, ranges: {drift: [1 m/s, 3 m/s], pause: [0, 1.0]}}}}\n"
+    plan = plan_of(write(tmp_path, HEAD + text))
+    design = plan.study.dimensions[0].design
+    for at in (0, -1):  # A and B
+        points = [plan.condition(block[at]).values for block in design.blocks]
+        for name, low, width in (("drift", 1.0, 2.0), ("pause", 0.0, 1.0)):
+            assert sorted(np.floor([(each[name] - low) / width * 16 for each in points])) == list(range(16))

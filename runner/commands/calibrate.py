@@ -1,0 +1,71 @@
+"""fit parameters to measured signals"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from ..printing import complain, tell, tell_json
+from .options import DISTURB, DONE, INTERRUPTED, SEED, TYPES, command, option, several
+
+
+@command(
+    "fit parameters to measured signals",
+    option("model", metavar="MODEL", help="a path to a YAML file, or the name of a packaged model"),
+    several(
+        "--match",
+        metavar="SIGNAL=FILE",
+        help="an output port, and a .csv or .parquet file of what was measured there, with the columns time (s) and "
+        "value; may be repeated",
+    ),
+    several("--vary", metavar="PATH=LOW..HIGH", help="fit a parameter: mass='1 kg..5 kg'; may be repeated"),
+    option(
+        "--between",
+        choices=("hold", "linear"),
+        default="hold",
+        help="what a signal does between two tokens (default: hold)",
+    ),
+    SEED,
+    several("--set", metavar="PATH=VALUE", help="set a parameter in all runs; may be repeated"),
+    DISTURB,
+    option("--out", metavar="DIR", type=Path, help="folder for what is found (default: results/MODEL/calibration)"),
+    option("--json", action="store_true", help="print one JSON object instead of the text"),
+    TYPES,
+    imports=("calls.calibrating",),
+)
+def calibrate(options: argparse.Namespace) -> int:
+    """Fit parameters so that signals of the model match measured ones, by least squares.
+
+    Points are spread over the ranges first; least squares start from the best three.  The folder gets the parameters as
+    a file for --overrides, the facts as JSON, and the residuals.  Each run that was made is noted there, so that an
+    interrupted search continues.
+    """
+    from epicycle.actors import abridged
+
+    from ..calls import calibrated
+    from ..search import Task
+
+    task = Task(
+        options.model,
+        options.match,
+        options.vary,
+        options.between == "linear",
+        options.seed,
+        options.set,
+        options.disturb,
+        [Path(each) for each in options.types],
+    )
+    folder = options.out or Path("results") / abridged(Path(options.model).stem, 60) / "calibration"
+    try:
+        found = calibrated(task, folder)
+    except KeyboardInterrupt:
+        complain("interrupted; what was finished is kept: the same command goes on")
+        return INTERRUPTED
+    written = found.save(folder)
+    if options.json:
+        tell_json(found.facts())
+        return DONE
+    tell(str(found))
+    for path in written:
+        tell(f"wrote {path}")
+    return DONE

@@ -1,0 +1,322 @@
+"""Calibrate: parameters for which signals of a model are closest to measured ones, by least squares."""
+
+from __future__ import annotations
+
+import math
+from bisect import bisect_right
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from epicycle.actors import EpicycleError, read_table, to_nanoseconds, to_seconds
+
+from ..build import Model, load_model
+from ..catalogue import types_of_file
+from ..engine import Simulation
+from ..language import Setting, number_node
+from ..provenance import version_of
+from ..student import student_quantile
+from ..text import COMMAND_LINE, ModelError, Position, Problems
+from .proposals import SPREAD, Point, spread
+from .space import Interval, read_space
+from .tried import Tried
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+LEVEL = 0.95
+STARTS = 3  # of the points that are spread first, the best ones, from which least squares start
+_STEP = 1e-4  # of a range: the step of derivatives
+_ALIKE = 0.01  # of a range: within which two starts end at the same place
+_LARGEST = 1e9  # s; no clock of a model goes further
+_BLIND = 1e-7  # of the largest singular value: below it, the data do not tell a direction
+
+
+@dataclass(frozen=True)
+class Task:
+    """What is to be calibrated: the words of the command."""
+
+    model: str
+    match: Sequence[str]  # signal=file
+    vary: Sequence[str]
+    linear: bool = False
+    seed: int | None = None
+    set: Sequence[str] = ()
+    disturb: Sequence[str] = ()
+    types: Sequence[Path] = ()
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """A parameter with its value, standard error and 95 % interval, in its unit; infinite if unknown."""
+
+    path: str
+    unit: str
+    value: float
+    error: float
+    low: float
+    high: float
+    at_end: bool  # of its range
+
+
+@dataclass(frozen=True)
+class Match:
+    """A measured signal, and what the model sends at the same times."""
+
+    signal: str
+    times: list[int]  # ns
+    measured: list[float]
+    modelled: list[float]
+
+    @property
+    def residuals(self) -> list[float]:
+        """What was measured less what the model sends."""
+        return [one - other for one, other in zip(self.measured, self.modelled, strict=True)]
+
+    @property
+    def rms(self) -> float:
+        """The root of the mean square of the residuals."""
+        return math.sqrt(math.fsum(each * each for each in self.residuals) / len(self.times))
+
+    @property
+    def correlation(self) -> float:
+        """How alike neighbouring residuals are, from -1 to 1: about 0 if nothing but independent errors is left."""
+        squares = math.fsum(each * each for each in self.residuals)
+        return math.fsum(one * other for one, other in pairwise(self.residuals)) / squares if squares else 0.0
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """The fitted parameters, the fit of each signal, and how many of the starts have ended there."""
+
+    model: str
+    seed: int
+    parameters: list[Fitted]
+    matches: list[Match]
+    pairs: list[tuple[str, str, float]]  # of parameters that the data hardly tell apart, with their correlation
+    starts: int
+    agreeing: int
+    runs: int
+
+
+def calibrate(task: Task, folder: Path | None, tell: Callable[[int], None] = lambda runs: None) -> Calibration:
+    """Fit parameters to measured signals, from the best of points that are spread over the ranges.
+
+    Each run is noted in the folder, so that a search that was killed continues there.  ``tell`` is called with how many
+    runs were made.  Raises ``EpicycleError``.
+    """
+    import numpy as np
+    from scipy.optimize import least_squares
+
+    runs = _Runs(task, folder, tell)
+    count = len(runs.axes)
+    if len(runs.scales) <= count:
+        raise EpicycleError(f"{len(runs.scales)} measured values cannot tell {count} parameters: more are needed")
+
+    def residuals(shifted: NDArray[np.float64]) -> NDArray[np.float64]:
+        # From 1 to 2, not from 0 to 1: steps of derivatives are relative.
+        modelled = runs.modelled(tuple(float(each) - 1.0 for each in shifted))
+        gaps = (one - other for one, other in zip(runs.measured, modelled, strict=True))
+        return np.array([gap / scale for gap, scale in zip(gaps, runs.scales, strict=True)])
+
+    points = [point for number in range(SPREAD) for point in spread(count, runs.seed, number)]
+    costs = [math.fsum(each * each for each in residuals(np.array(point) + 1.0).tolist()) for point in points]
+    ends = []
+    for at in sorted(range(len(points)), key=costs.__getitem__)[:STARTS]:
+        found = least_squares(
+            residuals,
+            np.array(points[at]) + 1.0,
+            jac="3-point",
+            bounds=(1.0, 2.0),
+            diff_step=_STEP,
+            xtol=1e-10,
+            ftol=1e-10,
+            gtol=1e-12,
+            max_nfev=100,
+        )
+        ends.append((float(found.cost), [float(each) - 1.0 for each in found.x], found.jac))
+    cost, best, slopes = min(ends, key=lambda each: each[0])
+    agreeing = sum(max(abs(a - b) for a, b in zip(place, best, strict=True)) < _ALIKE for _, place, _ in ends)
+    parameters, pairs = _parameters(runs.axes, best, slopes, 2.0 * cost)
+    modelled, matches, start = runs.modelled(tuple(best)), [], 0
+    for signal, times, measured in runs.signals:
+        matches.append(Match(signal, times, measured, modelled[start : start + len(times)]))
+        start += len(times)
+    return Calibration(runs.name, runs.seed, parameters, matches, pairs, len(ends), agreeing, runs.number)
+
+
+def _parameters(
+    axes: Sequence[Interval], best: Sequence[float], slopes: NDArray[np.float64], squares: float
+) -> tuple[list[Fitted], list[tuple[str, str, float]]]:
+    """Values with intervals from the slopes of the residuals, as if the model were linear in its parameters there."""
+    import numpy as np
+
+    freedom = len(slopes) - len(axes)
+    _, sizes, directions = np.linalg.svd(slopes, full_matrices=False)
+    told = sizes > _BLIND * max(float(sizes[0]), 1e-300)
+    unseen = [row for row, is_told in zip(directions.tolist(), told, strict=True) if not is_told]
+    blind = [any(abs(row[at]) > 0.1 for row in unseen) for at in range(len(axes))]
+    inverse = directions[told].T / sizes[told]
+    spread_of = inverse @ inverse.T * (squares / freedom)
+    errors = [math.inf if blind[at] else math.sqrt(float(spread_of[at, at])) for at in range(len(axes))]
+    fitted = []
+    for axis, share, error in zip(axes, best, errors, strict=True):
+        low, width = float(axis.low), float(axis.high) - float(axis.low)
+        value, half = low + share * width, student_quantile((1.0 + LEVEL) / 2.0, freedom) * error * width
+        at_end = min(share, 1.0 - share) < 1e-3
+        fitted.append(Fitted(axis.path, axis.unit, value, error * width, value - half, value + half, at_end))
+    pairs = []
+    for at, one in enumerate(axes):
+        for other in range(at):
+            both = errors[at] * errors[other]
+            if 0.0 < both < math.inf and abs(likeness := float(spread_of[at, other]) / both) > LEVEL:
+                pairs.append((axes[other].path, one.path, likeness))
+    return fitted, pairs
+
+
+class _Runs:
+    """Runs of a model with different parameters, each made once; ``modelled`` is what they are asked for."""
+
+    def __init__(self, task: Task, folder: Path | None, tell: Callable[[int], None]) -> None:
+        self._task, self._tell = task, tell
+        self._types = [each for file in task.types for each in types_of_file(file)]
+        model = self._load(())
+        problems = Problems()
+        space = read_space(task.vary, model, (), problems)
+        problems.raise_if_any()
+        self.axes = [axis for axis in space.axes if isinstance(axis, Interval) and not axis.is_whole]
+        if wrong := [axis.path for axis in space.axes if axis not in self.axes]:
+            raise EpicycleError(f"{wrong[0]!r} has no range of real numbers, which least squares need")
+        if not self.axes:
+            raise EpicycleError("there is nothing to vary\n   help: add --vary load=0.5..0.9")
+        self.signals = [_measured(text) for text in task.match]
+        if not self.signals:
+            raise EpicycleError("there is nothing to match\n   help: add --match server.size=measured.csv")
+        self.measured = [value for _, _, values in self.signals for value in values]
+        self.scales = [_deviation(values) for _, _, values in self.signals for _ in values]
+        self.seed = model.seed if task.seed is None else task.seed
+        self.name, self.number = model.name, 0
+        digest = self._results(model).digest
+        about = {"model": model.name, "seed": self.seed, "digest": digest, "match": list(task.match)}
+        about |= {"times": [times for _, times, _ in self.signals], "linear": task.linear}
+        self._tried = Tried({**about, "set": list(task.set), "version": version_of("epicycle")}, folder)
+
+    def _load(self, settings: Sequence[Setting]) -> Model:
+        task = self._task
+        return load_model(task.model, set=[*task.set, *settings], disturb=task.disturb, types=self._types)
+
+    def _results(self, model: Model) -> Any:
+        for signal, _, _ in self.signals:
+            try:
+                model.record(signal)
+            except ModelError as error:
+                option = f"--match {signal}"
+                at = Position(COMMAND_LINE, 1, 9, len(signal), option)
+                raise ModelError(replace(problem, position=at) for problem in error.problems) from None
+        return Simulation(model, seed=self.seed).run()
+
+    def modelled(self, point: Point) -> list[float]:
+        """What the model sends at the times of all measured values."""
+        settings = [
+            Setting(axis.path, number_node(_number(axis, share), axis.unit, axis.position), axis.position)
+            for axis, share in zip(self.axes, point, strict=True)
+        ]
+        key = ", ".join(f"{each.path}={getattr(each.node, 'text', '')}" for each in settings)
+
+        def found() -> list[float]:
+            self.number += 1
+            self._tell(self.number)
+            try:
+                results = self._results(self._load(settings))
+            except EpicycleError as error:
+                raise EpicycleError(f"{key}: {error}") from error
+            return [
+                value
+                for signal, times, _ in self.signals
+                for value in _sampled(results.signals[signal], signal, times, results.end, self._task.linear, key)
+            ]
+
+        values: list[float] = self._tried.outcome(key, found)
+        return values
+
+
+def _number(axis: Interval, share: float) -> float:
+    low, high = float(axis.low), float(axis.high)
+    return min(max(low + share * (high - low), low), high)
+
+
+def _measured(text: str) -> tuple[str, list[int], list[float]]:
+    """The signal that ``signal=file`` names, with the times (ns) and values of its file."""
+    signal, equals, name = (each.strip() for each in text.partition("="))
+    if not equals or not signal or not name:
+        raise EpicycleError(f"--match {text}: write signal=file.csv")
+    if "*" in signal:
+        raise EpicycleError(f"--match {text}: give one output port, not a pattern")
+    path = Path(name)
+    if path.suffix.lower() not in (".csv", ".parquet"):
+        raise EpicycleError(f"--match {text}: {path.name!r} must end in .csv or .parquet")
+    try:
+        table = read_table(path)
+    except OSError as error:
+        raise EpicycleError(f"{path} cannot be read: {error.strerror}") from None
+    columns = table.column_names
+    values = [each for each in (signal, "value") if each in columns] or [each for each in columns if each != "time"]
+    is_clear = len(values) == 1 or values[:1] in ([signal], ["value"])
+    if "time" not in columns or len(set(columns)) < len(columns) or not is_clear:
+        raise EpicycleError(
+            f"{path} has the columns {', '.join(columns)}\n   help: it needs 'time' and 'value', or {signal!r}"
+        )
+    rows = []
+    for row, pair in enumerate(zip(table["time"].to_pylist(), table[values[0]].to_pylist(), strict=True), start=1):
+        time, value = (_cell(path, row, *each) for each in zip(("time", values[0]), pair, strict=True))
+        if not 0.0 <= time <= _LARGEST:
+            raise EpicycleError(f"{path}: row {row}: time is {time:g}, expected 0 to {_LARGEST:g} s")
+        rows.append((to_nanoseconds(time), value))
+    if not rows:
+        raise EpicycleError(f"{path} has no rows")
+    rows.sort(key=lambda each: each[0])
+    return signal, [time for time, _ in rows], [value for _, value in rows]
+
+
+def _cell(path: Path, row: int, column: str, cell: Any) -> float:
+    """The number in a cell; a column in which one cell is none has texts."""
+    with suppress(TypeError, ValueError):
+        if not isinstance(cell, bool) and math.isfinite(number := float(cell)):
+            return number
+    shown = "empty" if cell is None or cell == "" else repr(cell)
+    raise EpicycleError(f"{path}: row {row}: {column} is {shown}, expected a number")
+
+
+def _deviation(values: Sequence[float]) -> float:
+    """By which residuals of signals in different units are made alike; 1 if all values are the same."""
+    middle = math.fsum(values) / len(values)
+    return math.sqrt(math.fsum((each - middle) * (each - middle) for each in values) / len(values)) or 1.0
+
+
+def _sampled(signal: Any, name: str, times: Sequence[int], end: float, linear: bool, key: str) -> list[float]:
+    """The values of a signal at some times: each token lasts until the next one, or changes linearly to it."""
+    sent, tokens = list(signal.samples.times), signal.tokens
+    if any(isinstance(each, bool) or not isinstance(each, (int, float)) for each in tokens):
+        raise EpicycleError(f"{name} does not send numbers, which measured values can be compared with")
+    first = to_seconds(sent[0]) if sent else math.inf
+    if not sent or times[0] < sent[0]:
+        missing = f"{name} has no value at {to_seconds(times[0])} s yet; its first is at {first} s"
+        raise EpicycleError(f"{key}: {missing}")
+    if times[-1] > to_nanoseconds(end):
+        last = to_seconds(times[-1])
+        raise EpicycleError(f"{key}: the run ends at {end} s, before the last measured value at {last} s")
+    found = []
+    for time in times:
+        at = bisect_right(sent, time) - 1
+        value = float(tokens[at])
+        if linear and sent[at] < time and at + 1 < len(sent):
+            share = (time - sent[at]) / (sent[at + 1] - sent[at])
+            value += share * (float(tokens[at + 1]) - value)
+        found.append(value)
+    if not all(map(math.isfinite, found)):
+        raise EpicycleError(f"{key}: {name} is not finite at all times")
+    return found

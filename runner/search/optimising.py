@@ -1,0 +1,281 @@
+"""Optimise: look for the parameters with the best mean, and keep all runs in the results folder of a study."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from epicycle.actors import EpicycleError, did_you_mean
+from epicycle.actors.expression import ExpressionError, Formula
+
+from ..catalogue import is_path, packaged_files
+from ..language import Level, asks_for_none, is_study, parse_setting, read_study, study_of_text
+from ..study import OK, Estimate, Plan, Search, Trials, available_cores, mean, open_trials
+from ..text import COMMAND_LINE, Position, Problems, parse, plain
+from .proposals import Point, is_guided, proposals
+from .space import Interval, Space, read_space, said
+
+MAX_POINTS = 100_000
+FILE = Path("optimise")  # the file of the study of a search over a model: paths are relative to the working directory
+_FORBIDDEN = math.ldexp(1.0, 1_000)  # what a point that breaks a condition counts as, more than any number
+_SHARED = 0.05  # of the runs may be without a number
+_TOGETHER = 8  # points that are chosen together when the search is guided; more are quicker only on many cores
+
+
+@dataclass(frozen=True)
+class Goal:
+    """What is to be optimised: the words of the command, and as many points at most."""
+
+    target: str  # a model or a study
+    objective: str
+    greatest: bool = False
+    subject_to: Sequence[str] = ()
+    vary: Sequence[str] = ()
+    points: int = 200
+    replications: int | None = None
+    seed: int | None = None
+    set: Sequence[str] = ()
+    disturb: Sequence[str] = ()
+    types: Sequence[Path] = ()
+    command: Sequence[str] = ()
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What came of the runs of a point: the mean of the objective, and how many runs broke which condition."""
+
+    value: Estimate | None  # None: too many runs have no number
+    runs: int
+    broken: dict[str, int]
+
+    @property
+    def is_feasible(self) -> bool:
+        """Whether all runs meet all conditions, and the mean is known."""
+        return self.value is not None and not any(self.broken.values())
+
+
+@dataclass(frozen=True)
+class Tested:
+    """A point that was tried, by its number from 1."""
+
+    number: int
+    level: Level
+    outcome: Outcome
+
+
+@dataclass
+class Optimum:
+    """What an optimisation has found: all points, the best of them, and what came of it with new seeds."""
+
+    goal: Goal
+    space: Space
+    guided: bool
+    tested: list[Tested] = field(default_factory=list)
+    check: Outcome | None = None
+
+    @property
+    def best(self) -> Tested | None:
+        """The first of the points with the best mean that meet all conditions."""
+        return next(iter(self.ranked), None)
+
+    @property
+    def ranked(self) -> list[Tested]:
+        """The points that meet all conditions, the best first."""
+        feasible = (each for each in self.tested if each.outcome.is_feasible)
+        return sorted(feasible, key=lambda each: self.cost(each.outcome))
+
+    def cost(self, outcome: Outcome) -> float:
+        """What is to be small: a condition that is broken counts more than any number, and no number most of all."""
+        if outcome.value is None:
+            return math.inf
+        if not outcome.is_feasible:
+            return _FORBIDDEN * (1.0 + math.fsum(outcome.broken.values()) / outcome.runs)
+        return -outcome.value.value if self.goal.greatest else outcome.value.value
+
+
+def optimise(
+    goal: Goal,
+    folder: Path,
+    *,
+    jobs: int | None = None,
+    timeout: float | None = None,
+    tell: Callable[[Optimum], None] = lambda found: None,
+) -> Optimum:
+    """Try points until there are as many as are asked for, and then the best of them with new seeds.
+
+    Runs that are in the folder already are not made again, so that a search that was killed continues.  ``tell`` is
+    called after each batch.  Raises ``EpicycleError``.
+    """
+    work = _Optimising(goal)
+    found = work.found
+    chosen = proposals(len(found.space.axes), work.seed, found.guided, _TOGETHER)
+    points = next(chosen)[: goal.points]
+    work.add(points)
+    with open_trials(work.told(), folder, jobs or available_cores(), timeout) as made:
+        while True:
+            tested = work.test(points, made)
+            tell(found)
+            if len(found.tested) >= goal.points:
+                break
+            points = chosen.send([found.cost(each.outcome) for each in tested])[: goal.points - len(found.tested)]
+        if found.best is not None:
+            found.check = work.check(found.best, made)
+    return found
+
+
+class _Optimising:
+    def __init__(self, goal: Goal) -> None:
+        self._goal = goal
+        self._said, self._path = _said_of(goal)
+        study = study_of_text(self._text([]), self._path, goal.set, goal.types, goal.replications, goal.seed)
+        base = Plan.made(study)
+        problems = Problems()
+        metrics = [metric.name for metric in base.metrics]
+        space = read_space(goal.vary, base.load(base.condition(0)), (*metrics, *study.factors), problems)
+        for each in [parse_setting(text, problems) for text in goal.set]:
+            if each is not None and each.path in space.columns:
+                problems.add(f"{each.path!r} is set and varied", each.position, "leave out --set or --vary")
+        problems.raise_if_any()
+        if not space.axes:
+            raise EpicycleError("there is nothing to vary\n   help: add --vary load=0.5..0.9")
+        names = [*metrics, *space.columns]
+        flag = "--maximise" if goal.greatest else "--minimise"
+        self._objective = _formula(flag, goal.objective, names, problems, is_condition=False)
+        conditions = {
+            text: _formula("--subject-to", text, names, problems, is_condition=True) for text in goal.subject_to
+        }
+        problems.raise_if_any()
+        self._conditions = {text: each for text, each in conditions.items() if each is not None}
+        tried = Plan.made(replace(study, dimensions=(*space.ends(), *study.dimensions)))
+        extra = {name: digest for each in tried.extra for more in each.values() for name, digest in more.items()}
+        self._others = base.conditions
+        runs = (goal.points + 1) * self._others * study.replications
+        search = Search(runs=runs, command=list(goal.command))
+        self._base = replace(tried, study=study, sources=tried.sources | extra, search=search)
+        self._levels: dict[tuple[Any, ...], Level] = {}  # of all points, each once
+        self.found = Optimum(goal, space, is_guided() and any(isinstance(each, Interval) for each in space.axes))
+
+    @property
+    def seed(self) -> int:
+        """The seed of the study, which is that of the search."""
+        return self._base.study.seed
+
+    def add(self, points: Sequence[Point]) -> dict[tuple[Any, ...], Level]:
+        """The points with what they set, each once; the study has them from now on."""
+        levels = [self.found.space.level(point) for point in points]
+        found = {tuple(level.values.values()): level for level in levels}
+        self._levels |= found
+        return found
+
+    def test(self, points: Sequence[Point], made: Trials) -> list[Tested]:
+        """Make the runs of some points, and judge them."""
+        new = self.add(points)
+        made.describe(self.told())
+        order, replications = list(new), range(self._base.study.replications)
+        numbers = [(index, replication) for index in range(len(order) * self._others) for replication in replications]
+        rows = made.made(self.plan_of(list(new.values())), numbers, lambda: None)
+        share = self._others * len(replications)
+        outcomes = [self._outcome(rows[at * share : (at + 1) * share]) for at in range(len(order))]
+        tested = []
+        for point in points:
+            level = self.found.space.level(point)
+            outcome = outcomes[order.index(tuple(level.values.values()))]
+            tested.append(Tested(len(self.found.tested) + 1, level, outcome))
+            self.found.tested.append(tested[-1])
+        return tested
+
+    def check(self, best: Tested, made: Trials) -> Outcome:
+        """What comes of a point with as many seeds again, which had no part in its choice."""
+        count = self._base.study.replications
+        numbers = [(index, count + each) for index in range(self._others) for each in range(count)]
+        return self._outcome(made.made(self.plan_of([best.level]), numbers, lambda: None))
+
+    def _outcome(self, rows: Sequence[Mapping[str, Any]]) -> Outcome:
+        """Conditions must hold in each run; the objective is a mean over runs, all conditions of a study alike."""
+        by_replication: dict[int, list[float]] = {}
+        missing = 0
+        for row in rows:
+            number = _value(self._objective, row)
+            if number is None or not math.isfinite(number):
+                missing += 1
+            else:
+                by_replication.setdefault(row["replication"], []).append(number)
+        means = [mean(each).value for each in by_replication.values()]
+        broken = {
+            text: len([row for row in rows if not _value(formula, row)]) for text, formula in self._conditions.items()
+        }
+        return Outcome(mean(means) if means and missing <= _SHARED * len(rows) else None, len(rows), broken)
+
+    # -- as a study -------------------------------------------------------------------------------------------------
+
+    def plan_of(self, levels: list[Level]) -> Plan:
+        """A plan of some points."""
+        dimensions = (*self.found.space.dimensions(levels), *self._base.study.dimensions)
+        study = replace(self._base.study, dimensions=dimensions)
+        return replace(self._base, study=study, extra=[{} for _ in dimensions])
+
+    def told(self) -> Plan:
+        """What the folder is to know: all points until now."""
+        levels = list(self._levels.values())
+        plan = self.plan_of(levels)
+        return replace(plan, study=replace(plan.study, text=self._text(levels)))
+
+    def _text(self, levels: list[Level]) -> str:
+        vary = {**said(levels), **(self._said.get("vary") or {})}
+        text: str = yaml.safe_dump({**self._said, "vary": vary}, sort_keys=False, allow_unicode=True, width=1_000)
+        return text
+
+
+def _said_of(goal: Goal) -> tuple[dict[str, Any], Path]:
+    """The study that a search adds points to, as a mapping, and its file."""
+    target = Path(goal.target)
+    if not (is_study(target) if is_path(goal.target) else goal.target in packaged_files("study")):
+        said: dict[str, Any] = {"study": "optimisation", "model": goal.target}
+        return said | ({"disturb": {"given": list(goal.disturb)}} if goal.disturb else {}), FILE
+    if goal.disturb:
+        raise EpicycleError("--disturb is for models: a study declares its own disturbances")
+    study = read_study(goal.target)
+    node = parse(study.text, str(study.path), Problems())
+    whole: Any = plain(node) if node is not None else {}
+    if "point" in (whole.get("vary") or {}):
+        raise EpicycleError(f"{study.name} varies 'point', which is the name of what a search varies: rename it")
+    left_out = ("claims", "guideline", "figures", "until")
+    return {key: value for key, value in whole.items() if key not in left_out}, study.path
+
+
+def _formula(flag: str, text: str, names: Sequence[str], problems: Problems, *, is_condition: bool) -> Formula | None:
+    """An expression over columns of the table; what is wrong with it is added to the problems."""
+    option = f"{flag} {text}"
+
+    def at(offset: int, length: int) -> Position:
+        return Position(COMMAND_LINE, 1, len(flag) + 2 + offset, max(length, 1), option)
+
+    try:
+        formula = Formula(text)
+    except ExpressionError as error:
+        problems.add(str(error), at(error.offset, error.length))
+        return None
+    for name in formula.names:
+        if name not in names:
+            message = f"there is no metric or varied parameter {name!r}{did_you_mean(name, names)}"
+            problems.add(message, at(text.find(name), len(name)), f"known: {', '.join(names)}")
+    if is_condition and not formula.is_condition:
+        problems.add(f"{text!r} is not a condition", at(0, len(text)), "write a comparison such as 'longest_wait < 30'")
+    return formula
+
+
+def _value(formula: Formula | None, row: Mapping[str, Any]) -> Any:
+    """An expression for one run; None if it failed or lacks a number."""
+    assert formula is not None
+    known = {name: row[name] for name in formula.names}
+    if row["status"] != OK or (None in known.values() and not asks_for_none(formula.source)):
+        return None
+    try:
+        return formula(known)
+    except EpicycleError:  # it cannot be evaluated for this run
+        return None
