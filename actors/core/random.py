@@ -63,6 +63,10 @@ class RandomStream(Words):
         inner = bits.advance(-len(self._ahead)).state["state"]
         return int(inner["state"]), int(inner["inc"])
 
+    def become(self, other: RandomStream) -> None:
+        """Engine: go on as another stream does, which nobody may use any more."""
+        self._bits, self._block, self._ahead = other._bits, other._block, other._ahead
+
     # -- bits ------------------------------------------------------------------------------------------------------
 
     def below(self, bound: int) -> int:
@@ -256,6 +260,7 @@ if TYPE_CHECKING:
 
         def word(self) -> int: ...
         def below(self, bound: int) -> int: ...
+        def become(self, other: Stream) -> None: ...
 
 else:
     Stream = RandomStream
@@ -266,3 +271,23 @@ def random_stream(seed: int, path: str, purpose: str = "") -> Stream:
     digest = hashlib.sha256(f"{path}\0{purpose}".encode()).digest()
     key = tuple(int.from_bytes(digest[i : i + 4], "little") for i in range(0, 16, 4))
     return cast(Stream, RandomStream(np.random.PCG64(np.random.SeedSequence(seed, spawn_key=key))))
+
+
+class Streams:
+    """The random streams of a run."""
+
+    def __init__(self, seed: int) -> None:
+        self._seed = seed
+        self._made: list[tuple[Stream, str, str]] = []
+
+    def of(self, path: str, purpose: str = "") -> Stream:
+        """A new stream for one purpose of one actor or aspect."""
+        stream = random_stream(self._seed, path, purpose)
+        self._made.append((stream, path, purpose))
+        return stream
+
+    def reseed(self, seed: int) -> None:
+        """From now on all streams, those that are still to be made too, are those of a run with another seed."""
+        self._seed = seed
+        for stream, path, purpose in self._made:
+            stream.become(random_stream(seed, path, purpose))

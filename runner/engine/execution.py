@@ -38,6 +38,7 @@ class Execution:
         self.border: Border | None = None  # of the composite that it is in, if it is put off from outside of that
         self.refinement: Refinement | None = None  # that it is in, if errors in there lead to a transition
         self.seed = director.seed
+        self.streams = director.streams
         self.environment = local.environment
         self.stop = local.stop
         self._director = director
