@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from .comparing import Comparison, Difference, compare
+    from .estimating import RareEvent, rare
     from .explaining import Explained, explain, explained
     from .picturing import Picture, Pictures, draw, plot, save
     from .running import Changes, Done, as_command, load, perform, run, seconds, watched
@@ -25,6 +26,7 @@ __all__ = [
     "Page",
     "Picture",
     "Pictures",
+    "RareEvent",
     "as_command",
     "compare",
     "draw",
@@ -33,6 +35,7 @@ __all__ = [
     "load",
     "perform",
     "plot",
+    "rare",
     "recorded",
     "run",
     "save",
@@ -44,6 +47,7 @@ __all__ = [
 
 _HOMES = {
     "comparing": ("Comparison", "Difference", "compare"),
+    "estimating": ("RareEvent", "rare"),
     "explaining": ("Explained", "explain", "explained"),
     "picturing": ("Picture", "Pictures", "draw", "plot", "save"),
     "running": ("Changes", "Done", "as_command", "load", "perform", "run", "seconds", "watched"),

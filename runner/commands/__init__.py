@@ -1,12 +1,13 @@
 """The commands of the command line, in the order in which ``epicycle --help`` names them."""
 
-from . import compare, completion, describe, explain, imports, new, run, show, studies, trace, view
+from . import compare, completion, describe, explain, imports, new, rare, run, show, studies, trace, view
 
 COMMANDS = (
     run.run,
     view.view,
     compare.compare,
     explain.explain,
+    rare.rare,
     studies.study,
     studies.resume,
     studies.status,

@@ -186,6 +186,8 @@ class Run:
             self.go(stop)
             if robustness and not self._awaited:
                 self.stopped = ""  # it is not over
+            for name in self._awaited:
+                self._monitorings[name].settle(self._end(self.stopped) + 1)
         finally:
             self.director.watch, self._awaited = before, {}
 

@@ -148,8 +148,8 @@ class Simulation(Tabled):
     def reach(self, robustness: Mapping[str, float], *, until: float | None = None) -> bool:
         """Go on until the ``robustness`` of one of these monitors is at most the number given; whether one is.
 
-        The run pauses before the time advances, when everything at the present time is done.  If there is none, it has
-        come to its stop time (``until``, in s, or the model's), or there is nothing more to do.
+        The run pauses before the time advances, when everything at the present time is done.  If there is none, or only
+        at the end, it has come to its stop time (``until``, in s, or the model's), or there is nothing more to do.
         """
         self._refuse_over()
         for name in robustness:

@@ -15,30 +15,33 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from epicycle.actors import EpicycleError, Process, elementary, random_stream
+from epicycle.actors import EpicycleError, Process, counted, elementary, random_stream
 
 from ..build import Model
 from ..engine import Simulation
 from ..provenance import version_of
+from ..shown import finite, short
 from ..student import student_quantile
+from ..tables import Table, Tabled
 from .tried import Tried
 
 SHARE = 0.2  # of the runs that should get from one level to the next: few levels, and yet many runs at each
+ENOUGH = 0.1  # of the runs from a level that break the property: it needs no further level
 MOST = 100  # levels
 CONFIDENCE = 0.95
 
 
 @dataclass(frozen=True)
-class RareEvent:
+class RareEvent(Tabled):
     """The probability that a run of a model breaks a monitor, and what its estimate is made of.
 
-    Each of ``estimates`` comes from a repetition of its own; ``levels`` are what the robustness of ``guide`` falls to.
-    ``runs`` is how many start from the beginning and from each level, ``tags`` how many tags were handled in all of
-    them, the search for levels included; ``tags_of_run`` is how many a whole run has on average.
+    ``levels`` are what the robustness of ``guide`` falls to, and ``shares``, in each repetition, how many of the
+    ``runs`` from one level get to the next, and from the last to the break; it ends where none does.  ``runs_made`` and
+    ``tags``, of which there are ``tags_of_run`` in a whole run, count the search for levels, too.
     """
 
     model: str
@@ -49,14 +52,19 @@ class RareEvent:
     guide: str
     levels: list[float]
     runs: int
-    estimates: list[float]
+    shares: list[list[float]]
     runs_made: int
     tags: int
     tags_of_run: float
 
     @property
+    def estimates(self) -> list[float]:
+        """What each repetition comes to."""
+        return [math.prod(each) for each in self.shares]
+
+    @property
     def probability(self) -> float:
-        """Their mean, of which the mean over all seeds is the probability."""
+        """The mean of the estimates, whose own mean over all seeds is the probability."""
         return math.fsum(self.estimates) / len(self.estimates)
 
     @property
@@ -91,8 +99,56 @@ class RareEvent:
 
     @property
     def plain_runs(self) -> float:
-        """How many whole runs would have the same standard error if their share were the estimate."""
-        return (1.0 - self.probability) / self.probability / (self.error * self.error) if self.error else math.nan
+        """How many whole runs it would take for the same standard error; NaN if that is not known."""
+        if not self.error > 0.0:
+            return math.nan
+        return (1.0 - self.probability) / self.probability / (self.error * self.error)
+
+    @property
+    def sentence(self) -> str:
+        """What is to be known, in words."""
+        number = len(self.shares)
+        done = (
+            f"{number} repetitions with {self.runs:,} runs from each of {counted(len(self.levels) + 1, 'level')}, the "
+            f"beginning included; {self.runs_made:,} runs in all"
+        )
+        if self.interval is None:
+            return f"No run broke {self.monitor} ({self.source}): {done}. That does not bound the probability."
+        low, high = self.interval
+        said = (
+            f"A run of {self.model} breaks {self.monitor} ({self.source}) with a probability of {self.probability:.2g} "
+            f"(95 % interval: {low:.2g} to {high:.2g}): {done}."
+        )
+        if not math.isnan(self.plain_runs):
+            events = self.plain_runs * self.tags_of_run / self.tags
+            said += (
+                f" Plain sampling needs {self.plain_runs / self.runs_made:.2g} times as many runs, and {events:.2g} "
+                "times as many tags, for the same standard error."
+            )
+        if empty := self.estimates.count(0.0):
+            said += f" {counted(empty, 'repetition')} broke nothing, so the interval is too narrow: use more runs."
+        if not self.levels:
+            said += " There was no level on the way, so this is plain sampling."
+        return said
+
+    def facts(self) -> dict[str, Any]:
+        """Everything that was found, for programs."""
+        own = {"probability": self.probability, "interval": self.interval, "error": self.error}
+        more = {"estimates": self.estimates, "plain_runs": self.plain_runs, "sentence": self.sentence}
+        found = finite({**own, **more, **asdict(self), "version": version_of("epicycle")})
+        assert isinstance(found, dict)
+        return found
+
+    def _caption(self) -> str:
+        return self.sentence
+
+    def _tables(self) -> list[Table]:
+        rows = []
+        for place, name in enumerate([*map(short, self.levels), "broken"]):
+            tried = [each[place] for each in self.shares if place < len(each)]
+            mean = math.fsum(tried) / len(tried) if tried else math.nan
+            rows.append((name, "" if math.isnan(mean) else f"{mean:.3f}", f"{len(tried)}"))
+        return [Table((f"robustness of {self.guide}", "share that gets there", "repetitions that tried"), rows)]
 
 
 class _Trial(NamedTuple):
@@ -170,7 +226,7 @@ class _Trials:
             level = reached[math.ceil(SHARE * self.runs) - 1]
             if level == reached[-1]:  # which all of them reach: the next one that some do
                 level = max((each for each in reached if each < level), default=-math.inf)
-            if level == -math.inf:
+            if level == -math.inf or reached.count(-math.inf) >= ENOUGH * self.runs:
                 break
             levels.append(level)
             origins = [trial for trial in self.from_level(origins, level, key) if trial.reached <= level]
@@ -182,16 +238,17 @@ class _Trials:
         self.made = self.tags = 0
         return made, tags
 
-    def estimate(self, levels: Sequence[float], key: str) -> float:
-        """The product of the shares that get from level to level, and then to the break."""
-        product, origins = 1.0, None
+    def shares(self, levels: Sequence[float], key: str) -> list[float]:
+        """The shares that get from level to level, and then to the break; the last one is 0 where none does."""
+        shares: list[float] = []
+        origins = None
         for place, level in enumerate([*levels, None]):
             trials = self.from_level(origins, level, f"{key} {place}")
             origins = [trial for trial in trials if trial.reached <= (-math.inf if level is None else level)]
-            product *= len(origins) / self.runs
+            shares.append(len(origins) / self.runs)
             if not origins:
                 break
-        return product
+        return shares
 
 
 def rare(
@@ -229,16 +286,16 @@ def rare(
     trials = _Trials(model, monitor, guide, seed, until, runs)
     levels, tags_of_run, made, tags = tried.outcome("levels", lambda: [*trials.levels(), *trials.spent()])
 
-    def repetition(key: str) -> tuple[float, int, int]:
-        estimate, made, tags = tried.outcome(key, lambda: [trials.estimate(levels, key), *trials.spent()])
-        return estimate, made, tags
+    def repetition(key: str) -> tuple[list[float], int, int]:
+        shares, made, tags = tried.outcome(key, lambda: [trials.shares(levels, key), *trials.spent()])
+        return shares, made, tags
 
-    estimates: list[float] = []
+    found: list[list[float]] = []
     for number in range(repetitions):
         if tell is not None:
             tell(made, number)
-        estimate, more, tags_more = repetition(f"repetition {number}")
-        estimates.append(estimate)
+        shares, more, tags_more = repetition(f"repetition {number}")
+        found.append(shares)
         made, tags = made + more, tags + tags_more
     source = known[monitor]
-    return RareEvent(model.name, seed, until, monitor, source, guide, levels, runs, estimates, made, tags, tags_of_run)
+    return RareEvent(model.name, seed, until, monitor, source, guide, levels, runs, found, made, tags, tags_of_run)
