@@ -16,18 +16,18 @@ help:
 	@echo "make paper  the paper's evaluation: 6,000 runs and their report, into results/table_1"
 	@echo "make test   the quick tests"
 	@echo "make portable  every digest under settings that stand for other machines (10 min)"
-	@echo "make core   compile the core anew, after a change of its sources"
+	@echo "make core   recompile the core, after a change of its sources"
 	@echo "make cores  100,000 random networks: does each core make the same runs? (20 min)"
-	@echo "make lint   ruff, formatting, arithmetic that is the same everywhere, prose, the order of imports, and types"
-	@echo "make check  lint and every test, the slow ones too"
-	@echo "make bench  benchmarks against peers into benchmarks/RESULTS.md (20 min; let the machine do nothing else)"
-	@echo "make fuzz   50,000 mutants of good models: does each end soon in a model or a message?"
-	@echo "make mutants 200 small changes of our sources: do the quick tests notice 90 % of them or more?"
-	@echo "make robust 100,000 problems that no scenario poses: does the solver answer each within its limits?"
-	@echo "make reference  write docs/reference.md and models/schema.json anew from what the code declares"
-	@echo "make docs   the site of the documents, into site/ (runs every packaged model; 2 min)"
+	@echo "make lint   check style, formatting, portable arithmetic, prose, the order of imports, and types"
+	@echo "make check  lint and every test, including the slow ones"
+	@echo "make bench  benchmarks against peers, into benchmarks/RESULTS.md (20 min; keep the machine otherwise idle)"
+	@echo "make fuzz   50,000 mutants of valid models: does each soon give a model or a message?"
+	@echo "make mutants 200 small changes of our sources: do the quick tests notice at least 90 % of them?"
+	@echo "make robust 100,000 problems beyond any scenario: does the solver answer each within its limits?"
+	@echo "make reference  regenerate docs/reference.md and models/schema.json from the declarations in the code"
+	@echo "make docs   build the site of the documents into site/ (runs every packaged model; 2 min)"
 	@echo "make wheel  build dist/epicycle-*.whl"
-	@echo "make clean  remove all that these made, except results/"
+	@echo "make clean  remove everything that these made, except results/"
 
 run: $(USE)
 	$(BIN)/epicycle run collision_avoidance --set observers=3 --set disturbance=0.25 --seed 7 --out results/collision_avoidance
@@ -91,13 +91,13 @@ clean:
 	find actors aspects models runner tests -name __pycache__ -type d -prune -exec rm -rf {} +
 	find actors aspects runner \( -name '*.so' -o -name '*.pyd' \) -exec rm -f {} +
 
-# Three stamps on one environment; all grow stale when pyproject.toml changes.
+# Three stamps on one environment; all become stale when pyproject.toml changes.
 $(BIN)/python:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11) and "Epicycle needs Python 3.11 or newer: make PYTHON=python3.x")'
 	@$(PYTHON) -m venv $(VENV) || { rm -rf $(VENV); exit 1; }
 
-# mypy cannot follow an editable install to the folders at the root.  It looks into a package of stubs, which Python does
-# not: links there let it check the programs of users against the source.
+# mypy cannot follow an editable install to the folders at the root.  It does read a package of stubs, which Python
+# ignores: links there let it check the programs of users against the source.
 $(LINKED): pyproject.toml | $(BIN)/python
 	@site=$$($(BIN)/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))') && \
 	mkdir -p "$$site/epicycle-stubs" && \

@@ -1,8 +1,8 @@
-"""Builds the compiled core, where there is a compiler; all else about the package is in pyproject.toml.
+"""Builds the compiled core, if there is a compiler; everything else about the package is in pyproject.toml.
 
-Its modules are the Python sources themselves, with types for C beside them (``.pxd``), or have a twin in Cython
+Its modules are the Python sources themselves, with types for C in a ``.pxd`` beside them, or have a twin in Cython
 (``.pyx``).  They are compiled from a copy under ``build``, where folders have the names under which they are imported.
-A manifest says of which sources they are: others are not replaced by them (``actors/compiled.py``).
+A manifest records their sources: they do not replace other ones (``actors/compiled.py``).
 """
 
 from __future__ import annotations
@@ -38,16 +38,16 @@ def check_forms() -> None:
         found = hashlib.sha256(core["text_of"](ROOT / "actors" / file, name).encode()).hexdigest()[:16]
         if found != digest:
             sys.exit(
-                f"{name} in actors/{file} has changed since its native form was written: see that the form in "
-                f"runner/engine/forms.pyx does the same, and write {found} there"
+                f"{name} in actors/{file} has changed since its native form was written: make the form in "
+                f"runner/engine/forms.pyx do the same, and write {found} there"
             )
 
 
 def for_cython(source: Path) -> str:
-    """A source as classes in C take it.
+    """A source in the form that classes in C accept.
 
-    Left out are the imports in whose place the types for C are (those for type checkers, those of the .pxd), overloads,
-    and the parameters of generic classes.
+    It lacks the imports that the types for C replace (those for type checkers, those of the .pxd), overloads, and the
+    parameters of generic classes.
     """
     text = source.read_text(encoding="utf-8")
     types = source.with_suffix(".pxd")
@@ -57,7 +57,7 @@ def for_cython(source: Path) -> str:
     lines = text.splitlines()
 
     def put(first: int, last: int, left: str) -> None:
-        lines[first - 1 : last] = [left] + [""] * (last - first)  # places of errors stay
+        lines[first - 1 : last] = [left] + [""] * (last - first)  # keeps the lines of errors
 
     for node in ast.walk(ast.parse(text)):
         last = getattr(node, "end_lineno", 0)
@@ -80,7 +80,7 @@ def for_cython(source: Path) -> str:
 
 
 def copied() -> list[Path]:
-    """Lay the sources where their names as modules say; those to compile."""
+    """Copy the sources to the places that their module names require; returns those to compile."""
     found = []
     for face in ROOT.glob("*/**/__init__.pxd"):
         if face.is_relative_to(ROOT / "build"):
@@ -96,18 +96,18 @@ def copied() -> list[Path]:
             if source.with_suffix(ending).exists():
                 shutil.copy2(source.with_suffix(ending), target.with_suffix(ending))
             else:
-                target.with_suffix(ending).unlink(missing_ok=True)  # of an earlier build
+                target.with_suffix(ending).unlink(missing_ok=True)  # from an earlier build
         found.append(target.with_suffix(".pyx" if target.with_suffix(".pyx").exists() else ".py"))
-        if found[-1].suffix == ".pyx":  # of which the Python source is the twin
+        if found[-1].suffix == ".pyx":  # its twin is the Python source
             target.with_suffix(".py").unlink(missing_ok=True)
         else:
             found[-1].write_text(for_cython(found[-1]), encoding="utf-8")
-            shutil.copystat(source.with_suffix(".py"), found[-1])  # what has not changed is not compiled again
+            shutil.copystat(source.with_suffix(".py"), found[-1])  # unchanged files are not compiled again
     return found
 
 
 class BuildCore(build_ext):
-    """Builds all modules of the core or, if one cannot be built, leaves no manifest: then Python serves."""
+    """Builds all modules of the core or, if one cannot be built, leaves no manifest: then the Python core is used."""
 
     def run(self) -> None:
         """Build what has changed."""
@@ -120,16 +120,16 @@ class BuildCore(build_ext):
             from numpy import get_include
 
             if [int(each) for each in cython.split(".")[:2]] >= [3, 3]:
-                raise RuntimeError(f"Cython {cython} adds 0 and -0.0 wrongly, take one below 3.3")
+                raise RuntimeError(f"Cython {cython} adds 0 and -0.0 wrongly: install a version below 3.3")
             options = {"language_level": 3, "annotation_typing": False, "auto_pickle": False, "binding": False}
             pairs = zip(core["CORE_MODULES"], copied(), strict=True)
             made = [Extension(name, [str(path)], include_dirs=[get_include()]) for name, path in pairs]
             made = cythonize(made, include_path=[str(TREE)], compiler_directives=options, quiet=True)
-        except Exception as error:  # no Cython or NumPy, or one that does not do
-            print(f"the core is not compiled, Python serves: {error}", file=sys.stderr)
+        except Exception as error:  # no Cython or NumPy, or an unsuitable one
+            print(f"the core is not compiled, so the Python core is used: {error}", file=sys.stderr)
             self.extensions = []
             return
-        # setuptools has filled in what it needs to know of the first ones.
+        # setuptools has filled in what it needs to know about the first ones.
         for extension, ready in zip(self.extensions, made, strict=True):
             extension.sources, extension.depends = ready.sources, ready.depends
             extension.include_dirs = [*extension.include_dirs, *ready.include_dirs]
@@ -137,10 +137,10 @@ class BuildCore(build_ext):
         self._say()
 
     def remove_stale(self) -> None:
-        """Remove what was compiled of modules that are in the core no longer: Python would prefer it to their sources.
+        """Remove the compiled files of modules that are no longer in the core: Python would prefer them to the sources.
 
-        That is each file in the folder of one of our packages that ends as what this Python compiles, and that no
-        module of the core is compiled to.  What another Python has compiled there it alone imports.
+        These are the files in the folders of our packages with the suffix of this Python's compiled modules that belong
+        to no module of the core.  Files that another Python has compiled have another suffix.
         """
         wanted = {Path(self.get_ext_fullpath(name)) for name in core["CORE_MODULES"]}
         for package in self.distribution.packages or ():
@@ -151,7 +151,7 @@ class BuildCore(build_ext):
     def _say(self) -> None:
         files = [Path(self.get_ext_fullpath(each.name)) for each in self.extensions]
         made = [Path(each.sources[0]).stat().st_mtime for each in self.extensions]
-        # One that could not be compiled may have left an older one in its place.
+        # A module that could not be compiled may have left an older file in its place.
         if all(file.exists() and file.stat().st_mtime >= time for file, time in zip(files, made, strict=True)):
             place = files[0].parents[len(core["CORE_MODULES"][0].split(".")) - 2] / core["MANIFEST"]
             built = {"python": sys.implementation.cache_tag, "modules": core["digests"](ROOT)}

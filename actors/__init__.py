@@ -1,4 +1,4 @@
-"""What can stand in a model graph: the actor contract, the library of actors, and the robots of the example."""
+"""The parts of a model graph: the actor contract, the library of actors, and the robots of the example."""
 
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 from .compiled import CORE, CORE_MODULES, CORE_REASON
 
 # isort: split
-# What comes before decides what all imports behind find: compiled modules, or their sources.
+# The import above decides what all later imports find: compiled modules, or their sources.
 from .core import *
 
 if TYPE_CHECKING:
@@ -101,8 +101,8 @@ __all__ = [
 ]  # fmt: skip
 
 
-# Where those of __all__ are that are imported when they are asked for: few models need them, and with robots and what
-# solves differential equations they take as long as all else.
+# Modules of the names in __all__ that are imported on first use: few models need them, and with the robots and the
+# solvers of differential equations they take as long as everything else.
 _LATER = {
     ".blocks": ("BlockExpression", "HoldingExpression"),
     ".continuous": ("ODE",),

@@ -1,4 +1,4 @@
-"""What adds up what comes, or tells how it changes: Counter, Accumulator, Integrator, TimeAverage, Derivative,
+"""Actors that add up tokens, or compute how they change: Counter, Accumulator, Integrator, TimeAverage, Derivative,
 Difference."""
 
 from __future__ import annotations
@@ -14,21 +14,26 @@ from .matching import taken
 class Counter(Actor):
     """Counts tokens of any kind: up for each at ``increment``, down for each at ``decrement``.
 
-    The number is sent once per tag at which it was counted; where the ports keep their tokens, as in Ptolemy, once for
-    those that come first on each channel, and so on.  Ptolemy: ``Counter``.
+    The count is sent once for each tag at which tokens came. Where the ports keep their tokens, as in Ptolemy, it is
+    sent once for the first tokens of all channels, once for the second ones, and so on.  Ptolemy: ``Counter``.
     """
 
-    increment = InputPort(multi=True, required=False, ptolemy={"keep": True}, doc="each token counts one up")
-    decrement = InputPort(multi=True, required=False, ptolemy={"keep": True}, doc="each token counts one down")
-    reset = InputPort(required=False, ptolemy={"keep": True}, doc="sets the number back, before the tag is counted")
+    increment = InputPort(multi=True, required=False, ptolemy={"keep": True}, doc="each token increases the count by 1")
+    decrement = InputPort(multi=True, required=False, ptolemy={"keep": True}, doc="each token decreases the count by 1")
+    reset = InputPort(
+        required=False, ptolemy={"keep": True}, doc="resets the count, before the tokens of the tag are counted"
+    )
     output = OutputPort(int, doc="the number")
 
-    initial = Parameter(int, 0, doc="the number at the start and after a reset")
+    initial = Parameter(int, 0, doc="the count at the start and after a reset")
     reset_by = Parameter(
-        str, "any", choices=("any", "true"), ptolemy="true", doc="which tokens reset it: any, or those that are true"
+        str, "any", choices=("any", "true"), ptolemy="true", doc="which tokens reset: any, or only true ones"
     )
     reset_last = Parameter(
-        bool, False, ptolemy=True, doc="whether a reset counts behind what is counted at its tag, not before it"
+        bool,
+        False,
+        ptolemy=True,
+        doc="whether a reset takes effect after the tokens of its tag are counted, not before",
     )
 
     def initialize(self) -> None:
@@ -52,21 +57,21 @@ class Counter(Actor):
 
 
 class Accumulator(Actor):
-    """The sum of all tokens so far, those of this tag included.
+    """The sum of all tokens so far, including those of the present tag.
 
-    Under ``like: ptolemy`` lists are added up item by item, too.  Ptolemy: ``Accumulator``.
+    Under ``like: ptolemy``, lists are also added, item by item.  Ptolemy: ``Accumulator``.
     """
 
-    input = InputPort(float, multi=True, ptolemy={"type": Any}, doc="what is added up")
-    reset = InputPort(multi=True, required=False, doc="sets the sum back, before the tag is added")
-    output = OutputPort(float, ptolemy={"type": Any}, doc="the sum; sent for each round of tokens, and at a reset")
+    input = InputPort(float, multi=True, ptolemy={"type": Any}, doc="the numbers to add")
+    reset = InputPort(multi=True, required=False, doc="resets the sum, before the tokens of the tag are added")
+    output = OutputPort(float, ptolemy={"type": Any}, doc="the sum, sent for each round of tokens and at a reset")
 
     initial: Parameter[float] = Parameter(int | float, 0, doc="the sum at the start and after a reset")
     reset_by = Parameter(
-        str, "any", choices=("any", "true"), ptolemy="true", doc="which tokens reset it: any, or those that are true"
+        str, "any", choices=("any", "true"), ptolemy="true", doc="which tokens reset: any, or only true ones"
     )
-    low: Parameter[float | None] = Parameter(int | float, None, doc="the least that the sum can be")
-    high: Parameter[float | None] = Parameter(int | float, None, doc="the greatest that the sum can be")
+    low: Parameter[float | None] = Parameter(int | float, None, doc="the lowest value of the sum")
+    high: Parameter[float | None] = Parameter(int | float, None, doc="the highest value of the sum")
 
     def initialize(self) -> None:
         self._sum: Any = self.initial
@@ -94,19 +99,21 @@ class Accumulator(Actor):
 
 
 class Integrator(Actor):
-    """The integral over time of a signal that comes as tokens.
+    """The integral over time of a signal that arrives as tokens.
 
     ``hold``: the signal keeps the value of a token until the next one comes, ``sum(x[k] * (t[k+1] - t[k]))``, which is
-    exact for queue lengths and other step signals.  ``trapezoid``: it runs straight from token to token,
-    ``sum((x[k] + x[k+1]) / 2 * (t[k+1] - t[k]))``.  Before the first token the signal is 0.  The integral up to now is
-    sent for each token, and for each ``trigger``, where the signal is taken to hold its latest value.
-    The unit is that of the input times s.  Ptolemy: ``Integrator`` of its DE library (``trapezoid``); for the other,
-    which is continuous, see ``ODE``.
+    exact for queue lengths and other step signals.  ``trapezoid``: it is linear from token to token, ``sum((x[k] +
+    x[k+1]) / 2 * (t[k+1] - t[k]))``.  Before the first token the signal is 0.  The integral up to now is sent for each
+    token and for each ``trigger``; up to a trigger, the signal holds its latest value.
+    The unit is that of the input times s.  Ptolemy: ``Integrator`` of its DE library (``trapezoid``); for its
+    continuous ``Integrator``, see ``ODE``.
     """
 
     input = InputPort(float, doc="the signal")
-    trigger = InputPort(required=False, doc="asks for the integral at other times")
-    reset = InputPort(required=False, doc="starts again after this tag, once the integral up to now is sent")
+    trigger = InputPort(required=False, doc="requests the integral at other times")
+    reset = InputPort(
+        required=False, doc="restarts the integral after this tag, when the integral up to now has been sent"
+    )
     output = OutputPort(float, doc="the integral up to now")
 
     method = Parameter(str, "hold", choices=("hold", "trapezoid"), doc="what the signal does between two tokens")
@@ -135,19 +142,19 @@ class Integrator(Actor):
         return 0.0 if self._value is None else self._value
 
     def _elapsed(self) -> float:
-        """Seconds since the latest token; none before the first, up to which the signal is 0."""
+        """Seconds since the latest token; 0 before the first, because the signal is 0 until then."""
         return 0.0 if self._value is None else to_seconds(self.tag.time - self._since)
 
 
 class Derivative(Actor):
-    """How fast a signal changes from token to token: ``(x[k] - x[k-1]) / (t[k] - t[k-1])``; nothing for the first.
+    """The rate of change of a signal from token to token: ``(x[k] - x[k-1]) / (t[k] - t[k-1])``; nothing for the first.
 
-    Two tokens of one time must be equal, and tell nothing.  The unit is that of the input per s.
+    Two tokens at the same time must be equal; nothing is sent for the second.  The unit is that of the input per s.
     Ptolemy: ``Derivative``.
     """
 
     input = InputPort(float, doc="the signal")
-    reset = InputPort(required=False, doc="forgets the signal behind this tag")
+    reset = InputPort(required=False, doc="forgets the signal after this tag")
     output = OutputPort(float, doc="its slope")
 
     def initialize(self) -> None:
@@ -160,7 +167,7 @@ class Derivative(Actor):
             if self._value is not None and gap:
                 self.output.send((token - self._value) / to_seconds(gap))
             elif self._value not in (None, token):
-                raise EpicycleError(f"{self._value!r} and {token!r} come at one time: a jump has no slope")
+                raise EpicycleError(f"{self._value!r} and {token!r} came at the same time, and a jump has no slope")
             self._value, self._since = token, self.tag.time
         if self.reset.present:
             self.initialize()
@@ -169,7 +176,7 @@ class Derivative(Actor):
 class TimeAverage(Actor):
     """The mean over time of a signal that keeps the value of a token until the next one comes, from 0 s up to now.
 
-    Before the first token the signal is 0.  It is sent for each token from the second on, but not at 0 s.
+    Before the first token the signal is 0.  The mean is sent for each token from the second on, but not at 0 s.
     Ptolemy: ``AverageOverTime``.
     """
 
@@ -192,7 +199,7 @@ class TimeAverage(Actor):
 
 
 class Difference(Actor):
-    """Each token minus the one before.
+    """Each token minus the one before it.
 
     Nothing is sent for the first token unless ``initial`` is given.  Ptolemy: ``Differential``.
     """
@@ -200,7 +207,7 @@ class Difference(Actor):
     input = InputPort(float, doc="the numbers")
     output = OutputPort(float, ptolemy={"type": Any}, doc="x[k] - x[k-1]")
 
-    initial: Parameter[float | None] = Parameter(int | float, None, doc="what counts as the token before the first")
+    initial: Parameter[float | None] = Parameter(int | float, None, doc="used as the token before the first")
 
     def initialize(self) -> None:
         self._before = self.initial

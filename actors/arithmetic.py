@@ -1,7 +1,7 @@
 """Arithmetic on tokens: AddSubtract, MultiplyDivide, Extreme, Scale, MathFunction.
 
-Integers stay integers where arithmetic keeps them.  A result that is no real number (a division by zero, the root of
-a negative number) ends the run with an error.
+Integers stay integers where the result is one.  A result that is no real number (a division by zero, the root of a
+negative number) ends the run with an error.
 """
 
 from __future__ import annotations
@@ -30,14 +30,14 @@ from .items import less as _less
 
 
 class AddSubtract(Actor):
-    """The sum of what comes at ``plus`` minus the sum of what comes at ``minus``.
+    """The sum of the tokens at ``plus`` minus the sum of those at ``minus``.
 
-    Channels without a token at this tag do not count.  Under ``like: ptolemy`` the ports take other tokens, too: texts
-    are joined, lists added item by item, fields by their names.  Ptolemy: ``AddSubtract``.
+    Channels without a token at this tag are ignored.  Under ``like: ptolemy``, the ports also take other tokens: texts
+    are joined, lists are added item by item, and records field by field.  Ptolemy: ``AddSubtract``.
     """
 
-    plus = InputPort(float, multi=True, required=False, ptolemy={"type": Any}, doc="what is added")
-    minus = InputPort(float, multi=True, required=False, ptolemy={"type": Any}, doc="what is subtracted")
+    plus = InputPort(float, multi=True, required=False, ptolemy={"type": Any}, doc="the numbers to add")
+    minus = InputPort(float, multi=True, required=False, ptolemy={"type": Any}, doc="the numbers to subtract")
     output = OutputPort(float, ptolemy={"type": Any}, doc="sum(plus) - sum(minus)")
 
     def fire(self) -> None:
@@ -50,10 +50,10 @@ class AddSubtract(Actor):
 
 
 class MultiplyDivide(Actor):
-    """The product of what comes at ``multiply``, divided by all that comes at ``divide``.
+    """The product of the tokens at ``multiply``, divided by each token at ``divide``.
 
-    Channels without a token at this tag do not count.  With ``whole``, as in Ptolemy, whole numbers are divided without
-    remainder, towards zero, and lists are multiplied item by item.  Ptolemy: ``MultiplyDivide``.
+    Channels without a token at this tag are ignored.  With ``whole``, as in Ptolemy, quotients of whole numbers are
+    rounded towards zero, and lists are multiplied item by item.  Ptolemy: ``MultiplyDivide``.
     """
 
     multiply = InputPort(
@@ -61,12 +61,14 @@ class MultiplyDivide(Actor):
         multi=True,
         required=False,
         ptolemy={"type": Any},
-        doc="the factors; their product is 1 if there are none",
+        doc="the factors; without any, their product is 1",
     )
     divide = InputPort(float, multi=True, required=False, ptolemy={"type": Any}, doc="the divisors")
     output = OutputPort(float, ptolemy={"type": Any}, doc="prod(multiply) / prod(divide)")
 
-    whole = Parameter(bool, False, ptolemy=True, doc="whether a quotient of whole numbers is one, too")
+    whole = Parameter(
+        bool, False, ptolemy=True, doc="whether a quotient of whole numbers is rounded to a whole number, towards zero"
+    )
 
     def fire(self) -> None:
         for multiply, divide in rounds(self.multiply, self.divide):
@@ -79,7 +81,7 @@ class MultiplyDivide(Actor):
 
     def _divided(self, product: Any, divisor: Any) -> Any:
         if divisor == 0:
-            raise EpicycleError(f"{product!r} is to be divided by {divisor!r}")
+            raise EpicycleError(f"{product!r} cannot be divided by {divisor!r}")
         if self.whole and isinstance(product, int) and isinstance(divisor, int):
             sign = 1 if (product < 0) == (divisor < 0) else -1
             return sign * (abs(product) // abs(divisor))
@@ -87,17 +89,17 @@ class MultiplyDivide(Actor):
 
 
 class Extreme(Actor):
-    """The greatest or the least of what comes together, and the channel on which it came; of equals, the first.
+    """The largest or smallest of the tokens that come together, and its channel; of equal ones, the first.
 
-    Channels without a token at this tag do not count.  Ptolemy: ``Maximum`` (``maximumValue``, ``channelNumber``),
+    Channels without a token at this tag are ignored.  Ptolemy: ``Maximum`` (``maximumValue``, ``channelNumber``),
     ``Minimum``.
     """
 
-    input = InputPort(float, multi=True, doc="what is compared")
-    value = OutputPort(float, ptolemy={"type": Any}, doc="the greatest or the least")
-    channel = OutputPort(int, doc="where it came, from 0")
+    input = InputPort(float, multi=True, doc="the numbers to compare")
+    value = OutputPort(float, ptolemy={"type": Any}, doc="the largest or smallest number")
+    channel = OutputPort(int, doc="the channel on which it came, from 0")
 
-    take = Parameter(str, choices=("greatest", "least"), doc="which of them")
+    take = Parameter(str, choices=("greatest", "least"), doc="which of the two")
 
     def fire(self) -> None:
         for (tokens,) in rounds(self.input):
@@ -109,16 +111,16 @@ class Extreme(Actor):
 
 
 class Scale(Actor):
-    """Multiplies each token: ``factor * input + offset``; under ``like: ptolemy`` of a list each item.
+    """Multiplies each token: ``factor * input + offset``; under ``like: ptolemy`` also each item of a list.
 
     Ptolemy: ``Scale``, ``AddSubtract`` with a constant.
     """
 
-    input: InputPort[Any] = InputPort(float, ptolemy={"type": Any}, doc="what is multiplied")
+    input: InputPort[Any] = InputPort(float, ptolemy={"type": Any}, doc="the numbers to multiply")
     output = OutputPort(float, ptolemy={"type": Any}, doc="factor * input + offset")
 
-    factor: PortParameter[float] = PortParameter(int | float, 1, doc="what it is multiplied by")
-    offset: PortParameter[float] = PortParameter(int | float, 0, doc="what is added then")
+    factor: PortParameter[float] = PortParameter(int | float, 1, doc="what each token is multiplied by")
+    offset: PortParameter[float] = PortParameter(int | float, 0, doc="what is added to the product")
 
     def fire(self) -> None:
         for token in self.input.tokens:
@@ -155,7 +157,7 @@ FUNCTIONS: Final[dict[str, Callable[[Any], Any]]] = {
 
 
 class MathFunction(Actor):
-    """One of the usual functions of one number; angles in rad.
+    """A common function of one number; angles are in rad.
 
     Ptolemy: ``AbsoluteValue``, ``MathFunction``, ``TrigFunction``, ``Round``.
     """
@@ -171,4 +173,4 @@ class MathFunction(Actor):
             try:
                 self.output.send(function(token))
             except (ValueError, OverflowError):
-                raise EpicycleError(f"{self.function} of {token!r} is not a real number of bearable size") from None
+                raise EpicycleError(f"{self.function} of {token!r} is not a real number, or is too large") from None

@@ -22,33 +22,33 @@ from .matching import matched
 
 
 class HoldingExpression(Actor):
-    """Evaluates an expression, some of whose inputs hold a value from the start.
+    """Evaluates an expression with some inputs that hold a value from the start.
 
     Every name in the expression is an input port, as of an ``Expression``.  Those in ``held`` need not be connected:
-    they have the value given there until a token comes, and keep the latest one from then on.  The value is sent
-    whenever there is a token at each of the other inputs, where these wait if they are kept, as in Ptolemy; if all are
-    held, whenever one comes.
+    they have the value given there until a token comes, and from then on that of the latest token.  The value is sent
+    whenever there is a token at each of the other inputs (under ``like: ptolemy``, tokens wait there for each other);
+    if all inputs are held, whenever a token comes.
     Ptolemy: actors with a ``PortParameter``, such as ``ArrayElement``: ``input[index]`` with ``held: {index: 0}``.
     """
 
     output: OutputPort[Any] = OutputPort(doc="the value of the expression")
 
-    expression = FormulaParameter(doc="what is computed; its names are the input ports, 'time' is the time in s")
+    expression = FormulaParameter(doc="the expression; its names are the input ports, 'time' is the time in s")
     held: Parameter[dict[str, Any]] = MappingParameter(
-        Parameter(object), doc="the inputs that hold a value, and that which they have at the start"
+        Parameter(object), doc="the inputs that hold a value, with their values at the start"
     )
 
     def check(self) -> None:
         for name in self.held:
             if name not in self.expression.names:
-                raise ParameterError(f"held: {name!r} is not in the expression {self.expression}")
+                raise ParameterError(f"held: {name!r} is not a name in the expression {self.expression}")
 
     def own_ports(self) -> dict[str, InputPort[Any] | OutputPort[Any]]:
         names = [name for name in self.expression.names if name != "time"]
         return {
-            name: InputPort(required=False, doc="a name of the expression, which holds a value")
+            name: InputPort(required=False, doc="a name in the expression, which holds its value")
             if name in self.held
-            else InputPort(ptolemy={"keep": True}, doc="a name of the expression")
+            else InputPort(ptolemy={"keep": True}, doc="a name in the expression")
             for name in names
         }
 
@@ -77,25 +77,25 @@ class HoldingExpression(Actor):
 class BlockExpression(Actor):
     """Evaluates an expression over blocks of ``number`` tokens each, as soon as a block is full.
 
-    ``block`` is the list of its tokens, ``past`` that of the latest tokens before it: as many as the parameter ``past``
-    gives values for the start.  With ``items`` the value is a list, whose items are sent one by one.
-    Every second token is ``{number: 2, expression: "block[1]"}``; each with two zeros behind it
+    ``block`` is the list of its tokens.  ``past`` is the list of the latest tokens before it, as long as the parameter
+    ``past``, which gives their values at the start.  With ``items``, the value is a list whose items are sent one by
+    one.  For every second token write ``{number: 2, expression: "block[1]"}``; for two zeros after each token,
     ``{expression: "[block[0], 0, 0]", items: true}``.
-    Ptolemy: ``DownSample``, ``UpSample``, ``Chop``, ``CountTrues``, ``DelayLine``, ``Repeat`` of blocks.
+    Ptolemy: ``DownSample``, ``UpSample``, ``Chop``, ``CountTrues``, ``DelayLine``, and ``Repeat`` for blocks.
     """
 
     input = InputPort(doc="the stream")
-    output: OutputPort[Any] = OutputPort(doc="what is made of each block")
+    output: OutputPort[Any] = OutputPort(doc="the value for each block")
 
-    expression = FormulaParameter(doc="what is computed, over 'block' and 'past'")
-    number = Parameter(int, 1, min=1, doc="how many tokens are a block")
-    past: Parameter[Any] = Parameter(object, (), shape=(None,), doc="the tokens before the first, the oldest first")
+    expression = FormulaParameter(doc="the expression, over 'block' and 'past'")
+    number = Parameter(int, 1, min=1, doc="tokens in a block")
+    past: Parameter[Any] = Parameter(object, (), shape=(None,), doc="the tokens before the first one, oldest first")
     items = Parameter(bool, False, doc="whether the value is a list whose items are sent one by one")
 
     def check(self) -> None:
         for name in self.expression.names:
             if name not in ("block", "past"):
-                raise ParameterError(f"expression: it knows 'block' and 'past', not {name!r}")
+                raise ParameterError(f"expression: {name!r} is unknown; the names are 'block' and 'past'")
 
     def initialize(self) -> None:
         self._block: list[Any] = []

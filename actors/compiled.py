@@ -1,8 +1,8 @@
 """Which core runs: the modules that were compiled when Epicycle was installed, or their Python sources.
 
-Both do the same, to the bit.  A compiled module lies beside its source, where Python prefers it.  If the sources have
-changed since, or EPICYCLE_CORE=python asks for it, all of them are passed over.  This module is imported first, by the
-package, and read by ``setup.py``, which builds the core.
+Both do the same, to the bit.  A compiled module is beside its source, and Python prefers it.  If the sources have
+changed since, or if EPICYCLE_CORE=python is set, all compiled modules are ignored.  This module is imported first, by
+the package, and read by ``setup.py``, which builds the core.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-# In the order of their imports.  Each costs 2 to 4 s of CPU at install.
+# In the order of their imports.  Each costs 2 to 4 s of CPU time at installation.
 CORE_MODULES = (
     "epicycle.actors.core.primitives",
     "epicycle.actors.core.tag",
@@ -62,7 +62,7 @@ CHOICES = ("python", "compiled")
 
 
 def digests(root: Path) -> dict[str, str]:
-    """What each module of the core is made of: a digest of its files, by name; ``root`` holds the packages."""
+    """A digest of the files of each module of the core, by its name; ``root`` is the folder with the packages."""
     found = {}
     for name in CORE_MODULES:
         source = root.joinpath(*name.split(".")[1:])
@@ -73,7 +73,7 @@ def digests(root: Path) -> dict[str, str]:
 
 
 def text_of(source: Path, name: str) -> str:
-    """The text of a class or function but for its docstrings, of which native forms know a digest."""
+    """The text of a class or function without its docstrings; native forms hold a digest of it."""
     text = source.read_text(encoding="utf-8")
     lines = text.splitlines()
     (found,) = (node for node in ast.parse(text).body if getattr(node, "name", "") == name)
@@ -91,7 +91,7 @@ def text_of(source: Path, name: str) -> str:
 
 
 class _Sources:
-    """Finds the Python sources of the core's modules, past what was compiled of them."""
+    """Finds the Python sources of the core's modules instead of the compiled ones."""
 
     def __init__(self, root: Path) -> None:
         self._root = root
@@ -103,36 +103,38 @@ class _Sources:
 
 
 def choose(wanted: str = "") -> tuple[str, str]:
-    """Which core the process runs, and why if that is Python.
+    """Which core the process runs, and the reason if it is Python.
 
-    Raises ``ImportError`` if another one is wanted that cannot be had.
+    Raises ``ImportError`` if the requested core does not exist or is not available.
     """
     root = Path(__file__).parents[1]
     if wanted and wanted not in CHOICES:
-        raise ImportError(f"EPICYCLE_CORE={wanted}: the cores are {' and '.join(CHOICES)}", name="EPICYCLE_CORE")
+        raise ImportError(
+            f"EPICYCLE_CORE={wanted} is unknown; the cores are {' and '.join(CHOICES)}", name="EPICYCLE_CORE"
+        )
     if wanted == "python":
-        reason = "EPICYCLE_CORE says so"
+        reason = "chosen by EPICYCLE_CORE"
     else:
         reason = _missing(root)
     if not reason:
         return "compiled", ""
     if wanted == "compiled":
-        raise ImportError(f"EPICYCLE_CORE=compiled cannot be had: {reason}", name="EPICYCLE_CORE")
+        raise ImportError(f"EPICYCLE_CORE=compiled is not available: {reason}", name="EPICYCLE_CORE")
     finder: Any = _Sources(root)
     sys.meta_path.insert(0, finder)
     return "python", reason
 
 
 def _missing(root: Path) -> str:
-    """Why the compiled core cannot serve, if so."""
+    """Why the compiled core cannot be used; empty if it can."""
     try:
         built = json.loads((root / MANIFEST).read_bytes())
     except (OSError, ValueError):
-        return "the core was not compiled at install; install Epicycle once more where there is a C compiler"
+        return "the core was not compiled at installation; reinstall Epicycle where a C compiler is available"
     if built.get("python") != sys.implementation.cache_tag:
-        return f"the core was compiled for {built.get('python')}; install Epicycle once more"
+        return f"the core was compiled for {built.get('python')}; reinstall Epicycle"
     if built.get("modules") != digests(root):
-        return "the sources have changed since the core was compiled; install Epicycle once more"
+        return "the sources have changed since the core was compiled; reinstall Epicycle"
     return ""
 
 

@@ -57,7 +57,7 @@ _Rows: TypeAlias = abc.Sequence[_Row] | NDArray[Any]
 _Texts: TypeAlias = str | abc.Sequence[str]
 
 class Accumulator(_Accumulator):
-    """The sum of all tokens so far, those of this tag included."""
+    """The sum of all tokens so far, including those of the present tag."""
     def __init__(self, path: str, *, initial: _Number = ..., reset_by: Literal['any', 'true'] = ..., low: _Number | None = ..., high: _Number | None = ...) -> None: ...
 
 class Ackermann(_Ackermann):
@@ -65,15 +65,15 @@ class Ackermann(_Ackermann):
     def __init__(self, path: str, *, steering: _Number = ..., wheelbase: _Number = ..., max_steering: _Number = ..., start: _Row = ..., heading: _Number = ..., speed: _Number = ..., max_speed: _Number = ...) -> None: ...
 
 class AddSubtract(_AddSubtract):
-    """The sum of what comes at `plus` minus the sum of what comes at `minus`."""
+    """The sum of the tokens at `plus` minus the sum of those at `minus`."""
     def __init__(self, path: str) -> None: ...
 
 class ArqReceiver(_ArqReceiver):
-    """The receiving end of an automatic repeat request: passes on what comes by an `ArqSender`, once and in order."""
+    """The receiving end of an automatic repeat request: passes on the tokens of an `ArqSender`, once and in order."""
     def __init__(self, path: str, *, repeat: Literal['all', 'one'] = ...) -> None: ...
 
 class ArqSender(_ArqSender):
-    """The sending end of an automatic repeat request: keeps frames until they are acknowledged, and sends them again."""
+    """The sending end of an automatic repeat request: keeps frames until they are acknowledged, and repeats them."""
     def __init__(self, path: str, *, window: _Whole = ..., timeout: _Number, spacing: _Number = ..., repeat: Literal['all', 'one'] = ...) -> None: ...
 
 class Barrier(_Barrier):
@@ -81,15 +81,15 @@ class Barrier(_Barrier):
     def __init__(self, *, gap: _Number = ..., last_parameter: _Number = ..., free_controls: _Whole = ..., infeasible: Literal['progress', 'least_violation', 'brake'] = ...) -> None: ...
 
 class Batch(_Batch):
-    """Collects tokens into lists: as many as `number`, or as fit into `size`, or what has come after `after`."""
+    """Collects tokens into lists."""
     def __init__(self, path: str, *, number: _Whole | None = ..., size: _Number | None = ..., weight: str | float | Formula = ..., after: _Number | None = ..., key: str | float | Formula | None = ...) -> None: ...
 
 class Bernoulli(_Bernoulli):
-    """True with a probability, otherwise false."""
+    """True with a given probability, otherwise false."""
     def __init__(self, *, probability: _Number = ...) -> None: ...
 
 class Binomial(_Binomial):
-    """The binomial distribution: how many of several trials succeed."""
+    """The binomial distribution: the number of successful trials."""
     def __init__(self, *, trials: _Whole = ..., probability: _Number = ...) -> None: ...
 
 class BlockExpression(_BlockExpression):
@@ -97,19 +97,19 @@ class BlockExpression(_BlockExpression):
     def __init__(self, path: str, *, expression: str | float | Formula, number: _Whole = ..., past: abc.Sequence[object] = ..., items: bool = ...) -> None: ...
 
 class BooleanSelect(_BooleanSelect):
-    """Each `control` token lets the next token of `true_input` or of `false_input` pass, as it says."""
+    """Each `control` token lets the next token of `true_input` or `false_input` pass."""
     def __init__(self, path: str, *, unread: Literal['kept', 'lost'] = ...) -> None: ...
 
 class BooleanSwitch(_BooleanSwitch):
-    """Sends each token to `true_output` or `false_output`, as the latest `control` token says."""
+    """Sends each token to `true_output` or `false_output`, according to the latest `control` token."""
     def __init__(self, path: str, *, control: bool = ...) -> None: ...
 
 class BroadcastChannel(_BroadcastChannel):
-    """Hands what one participant says to all the others."""
+    """Passes the messages of each participant to all the others."""
     def __init__(self, path: str) -> None: ...
 
 class Butterworth(_Butterworth):
-    """The flattest low pass or high pass: half the power passes at the cutoff frequency, at 20 dB a decade and order."""
+    """The low pass or high pass with the flattest passband: half the power passes at the cutoff."""
     def __init__(self, *, cutoff: _Number, period: _Number, order: _Whole = ..., passes: Literal['low', 'high'] = ...) -> None: ...
 
 class Casadi(_Casadi):
@@ -117,11 +117,11 @@ class Casadi(_Casadi):
     def __init__(self, *, max_iterations: _Whole = ...) -> None: ...
 
 class Cauchy(_Cauchy):
-    """The Cauchy distribution, which has no mean; in physics that of Breit and Wigner."""
+    """The Cauchy distribution, which has no mean; in physics, the Breit-Wigner distribution."""
     def __init__(self, *, median: _Number = ..., scale: _Number = ..., cut: _Number | None = ...) -> None: ...
 
 class Changes(_Changes):
-    """Passes on the first number, and then each that differs by more than `by` from the one handed on before."""
+    """Passes on the first number, and then each that differs by more than `by` from the last one passed on."""
     def __init__(self, path: str, *, by: _Number = ...) -> None: ...
 
 class ChiSquare(_ChiSquare):
@@ -129,7 +129,7 @@ class ChiSquare(_ChiSquare):
     def __init__(self, *, freedom: _Number) -> None: ...
 
 class Choice(_Choice):
-    """One of several values of any kind, all alike or by weight."""
+    """One of several values of any kind, with equal probability or by weight."""
     def __init__(self, *, values: abc.Sequence[object], weights: _Row | None = ...) -> None: ...
 
 class CircularMotion(_CircularMotion):
@@ -145,7 +145,7 @@ class Collect(_Collect):
     def __init__(self, path: str, *, joined: bool = ...) -> None: ...
 
 class Commutator(_Commutator):
-    """Passes on what comes at the channels of its input in turn, `block` tokens of each; tokens wait for their turn."""
+    """Passes on tokens from the channels of its input in turn, `block` from each; tokens wait for their turn."""
     def __init__(self, path: str, *, block: _Whole = ..., waits: bool = ...) -> None: ...
 
 class Comparator(_Comparator):
@@ -157,7 +157,7 @@ class Const(_Const):
     def __init__(self, path: str, *, value: object = ..., limit: _Whole | None = ...) -> None: ...
 
 class Constant(_Constant):
-    """Always the same value; the actor that sends one is `Const`."""
+    """Always the same value; an actor that sends it is `Const`."""
     def __init__(self, *, value: _Number) -> None: ...
 
 class Counter(_Counter):
@@ -169,35 +169,35 @@ class CurrentMicrostep(_CurrentMicrostep):
     def __init__(self, path: str) -> None: ...
 
 class CurrentTime(_CurrentTime):
-    """Sends the present time for each trigger, those that come together included."""
+    """Sends the present time for each trigger, also for each of several that come together."""
     def __init__(self, path: str) -> None: ...
 
 class DRand(_DRand):
-    """The generator of the Colt library, of which the actors of Ptolemy II that are called Colt take their numbers."""
+    """The generator of the Colt library, from which the actors of Ptolemy II named Colt draw their numbers."""
     def __init__(self, *, seed: _Whole) -> None: ...
 
 class DeadZone(_DeadZone):
-    """Outputs zero between two values, and beyond them the excess: play, or a valve that overlaps."""
+    """Outputs zero between two values, and the excess beyond them: play, or a valve with overlap."""
     def __init__(self, path: str, *, low: _Number, high: _Number) -> None: ...
 
 class Default(_Default):
-    """Passes on what comes at `preferred`, and otherwise, if nothing does, what comes at `alternate`."""
+    """Passes on the token at `preferred`, or, if there is none, the one at `alternate`."""
     def __init__(self, path: str, *, both: bool = ...) -> None: ...
 
 class Derivative(_Derivative):
-    """How fast a signal changes from token to token."""
+    """The rate of change of a signal from token to token."""
     def __init__(self, path: str) -> None: ...
 
 class Difference(_Difference):
-    """Each token minus the one before."""
+    """Each token minus the one before it."""
     def __init__(self, path: str, *, initial: _Number | None = ...) -> None: ...
 
 class DiscreteFilter(_DiscreteFilter):
-    """A linear filter of a sampled signal: each token in gives one token out, whatever the time between."""
+    """A linear filter of a sampled signal: each token in gives one token out, at any times."""
     def __init__(self, path: str, *, numerator: _Row | None = ..., denominator: _Row | None = ..., design: FilterDesign | abc.Mapping[str, object] | None = ..., start: Literal['zero', 'settled'] = ...) -> None: ...
 
 class Display(_Display):
-    """Writes a line for each token: time, own path, and the token."""
+    """Writes a line for each token: the time, the path of the actor, and the token."""
     def __init__(self, path: str, *, title: str = ...) -> None: ...
 
 class DistanceMonitor(_DistanceMonitor):
@@ -205,7 +205,7 @@ class DistanceMonitor(_DistanceMonitor):
     def __init__(self, path: str) -> None: ...
 
 class Equals(_Equals):
-    """Sends whether all tokens that come together are equal; channels without a token do not count."""
+    """Sends whether all tokens that come together are equal; channels without a token are ignored."""
     def __init__(self, path: str, *, tolerance: _Number = ...) -> None: ...
 
 class Exponential(_Exponential):
@@ -217,7 +217,7 @@ class Expression(_Expression):
     def __init__(self, path: str, *, expression: str | float | Formula, gives: Literal['number', 'truth value', 'text', 'any value'] | None = ..., hold: bool = ..., iteration: bool = ...) -> None: ...
 
 class Extreme(_Extreme):
-    """The greatest or the least of what comes together, and the channel on which it came; of equals, the first."""
+    """The largest or smallest of the tokens that come together, and its channel; of equal ones, the first."""
     def __init__(self, path: str, *, take: Literal['greatest', 'least']) -> None: ...
 
 class Filter(_Filter):
@@ -229,11 +229,11 @@ class FilterPyEstimator(_FilterPyEstimator):
     def __init__(self, path: str, *, filter: Literal['ExtendedKalmanFilter', 'UnscentedKalmanFilter', 'CubatureKalmanFilter', 'KalmanFilter', 'SquareRootKalmanFilter'] = ..., period: _Number = ..., prior_mean: _Row = ..., prior_variance: _Row = ..., max_delay: _Number = ..., noise_direction: Literal['expected', 'predicted'] = ..., position_noise: _Number = ..., velocity_noise: _Number = ..., kappa: _Number = ...) -> None: ...
 
 class FirstOfInstant(_FirstOfInstant):
-    """Passes on the first token of each instant; those that come at the same time, also at later microsteps, are lost."""
+    """Passes on the first token of each instant; others at the same time, also at later microsteps, are lost."""
     def __init__(self, path: str) -> None: ...
 
 class FirstOrder(_FirstOrder):
-    """A lag of first order, `1 / (T s + 1)`, for an input that is held from sample to sample: exponential smoothing."""
+    """A first-order lag, `1 / (T s + 1)`, for an input held from sample to sample: exponential smoothing."""
     def __init__(self, *, time_constant: _Number, period: _Number) -> None: ...
 
 class Function(_Function):
@@ -245,7 +245,7 @@ class Gamma(_Gamma):
     def __init__(self, *, shape: _Number = ..., mean: _Number = ...) -> None: ...
 
 class GoalMonitor(_GoalMonitor):
-    """Tells when a body first comes within `tolerance` of the goal, and how far it has travelled."""
+    """Sends when a body first comes within `tolerance` of the goal, and how far it has travelled."""
     def __init__(self, path: str, *, goal: _Row = ..., tolerance: _Number = ...) -> None: ...
 
 class Histogram(_Histogram):
@@ -253,7 +253,7 @@ class Histogram(_Histogram):
     def __init__(self, path: str, *, low: _Number, high: _Number, bins: _Whole = ...) -> None: ...
 
 class HoldingExpression(_HoldingExpression):
-    """Evaluates an expression, some of whose inputs hold a value from the start."""
+    """Evaluates an expression with some inputs that hold a value from the start."""
     def __init__(self, path: str, *, expression: str | float | Formula, held: abc.Mapping[str, object]) -> None: ...
 
 class Hysteresis(_Hysteresis):
@@ -261,31 +261,31 @@ class Hysteresis(_Hysteresis):
     def __init__(self, path: str, *, upper: _Number, lower: _Number, on: _Number = ..., off: _Number = ..., initial: bool = ...) -> None: ...
 
 class InertialSensor(_InertialSensor):
-    """An inertial measurement unit in the plane: turn rate and acceleration, with noise and biases that wander."""
+    """An inertial measurement unit in the plane: turn rate and acceleration, with noise and drifting biases."""
     def __init__(self, path: str, *, turn_rate_noise: _Number = ..., turn_rate_walk: _Number = ..., turn_rate_bias: _Number = ..., acceleration_noise: _Number = ..., acceleration_walk: _Number = ..., acceleration_bias: _Row = ...) -> None: ...
 
 class Inform(_Inform):
-    """Eq. (5): what range measurements at the end of the horizon tell, less a penalty for distance."""
+    """Eq. (5): the information of range measurements at the end of the horizon, minus a penalty for distance."""
     def __init__(self, *, range: _Number = ..., penalty: _Number = ..., variance: _Number = ..., unit: Literal['nat', 'bit'] = ..., joint: bool = ...) -> None: ...
 
 class Inhibit(_Inhibit):
-    """Passes on what comes unless an `inhibit` token comes with it; the opposite of a `Sampler`."""
+    """Passes on tokens unless an `inhibit` token comes with them; the opposite of a `Sampler`."""
     def __init__(self, path: str) -> None: ...
 
 class Integrator(_Integrator):
-    """The integral over time of a signal that comes as tokens."""
+    """The integral over time of a signal that arrives as tokens."""
     def __init__(self, path: str, *, method: Literal['hold', 'trapezoid'] = ..., initial: _Number = ...) -> None: ...
 
 class IsPresent(_IsPresent):
-    """Sends, for each channel, whether it has a token, whenever any of them has one."""
+    """Sends for each channel whether it has a token, whenever any channel has one."""
     def __init__(self, path: str) -> None: ...
 
 class JavaRandom(_JavaRandom):
-    """`java.util.Random`, of which most random actors of Ptolemy II take their numbers."""
+    """`java.util.Random`, from which most random actors of Ptolemy II draw their numbers."""
     def __init__(self, *, seed: _Whole) -> None: ...
 
 class LatestOfAll(_LatestOfAll):
-    """Sends the latest token of every channel whenever one comes on any of them."""
+    """Sends the latest token of every channel whenever a token comes on any of them."""
     def __init__(self, path: str, *, initial: object = ...) -> None: ...
 
 class Limiter(_Limiter):
@@ -309,7 +309,7 @@ class LookupTable(_LookupTable):
     def __init__(self, path: str, *, values: abc.Sequence[object], at: _Row | None = ..., outside: Literal['error', 'nearest', 'nothing'] = ...) -> None: ...
 
 class Machine(_Machine):
-    """A machine that makes one part after the other, breaks down now and then, and waits to be repaired."""
+    """A machine that makes one part after another, breaks down now and then, and waits for repair."""
     def __init__(self, path: str, *, number: _Whole = ..., work_time: Distribution | abc.Mapping[str, object], time_to_failure: Distribution | abc.Mapping[str, object]) -> None: ...
 
 class Match(_Match):
@@ -317,7 +317,7 @@ class Match(_Match):
     def __init__(self, path: str, *, key: str | float | Formula | None = ...) -> None: ...
 
 class MathFunction(_MathFunction):
-    """One of the usual functions of one number; angles in rad."""
+    """A common function of one number; angles are in rad."""
     def __init__(self, path: str, *, function: Literal['abs', 'negate', 'sign', 'square', 'sqrt', 'exp', 'log', 'log10', 'sin', 'cos', 'tan', 'asin', 'acos', 'atan', 'floor', 'ceil', 'round']) -> None: ...
 
 class Merge(_Merge):
@@ -325,7 +325,7 @@ class Merge(_Merge):
     def __init__(self, path: str, *, discard: bool = ..., whole_channel: bool = ...) -> None: ...
 
 class ModalActor(_ModalActor):
-    """Base of actors with modes, whose transitions are methods."""
+    """Base class of actors with modes whose transitions are methods."""
     def __init__(self, path: str) -> None: ...
 
 class MostRecent(_MostRecent):
@@ -337,19 +337,19 @@ class MovingAverage(_MovingAverage):
     def __init__(self, path: str, *, whole: bool = ..., size: _Whole | None = ..., span: _Number | None = ...) -> None: ...
 
 class MovingStatistics(_MovingStatistics):
-    """Mean, standard deviation, least and greatest of the latest tokens; sent for each token."""
+    """Mean, standard deviation, minimum and maximum of the latest tokens; sent for each token."""
     def __init__(self, path: str, *, size: _Whole | None = ..., span: _Number | None = ...) -> None: ...
 
 class MultiplyDivide(_MultiplyDivide):
-    """The product of what comes at `multiply`, divided by all that comes at `divide`."""
+    """The product of the tokens at `multiply`, divided by each token at `divide`."""
     def __init__(self, path: str, *, whole: bool = ...) -> None: ...
 
 class NegativeBinomial(_NegativeBinomial):
-    """The negative binomial distribution: how many trials fail before some have succeeded."""
+    """The negative binomial distribution: the number of failures before a number of successes."""
     def __init__(self, *, successes: _Number = ..., probability: _Number = ...) -> None: ...
 
 class NetworkSwitch(_NetworkSwitch):
-    """A store-and-forward switch: each frame goes to the channel of the output that `port` says, and waits there."""
+    """A store-and-forward switch: each frame goes to the channel of the output given by `port`, and waits there."""
     def __init__(self, path: str, *, port: str | float | Formula, latency: _Number = ..., rate: _Number | None = ..., size: str | float | Formula = ..., order: str | float | Formula = ..., buffer: _Number | None = ...) -> None: ...
 
 class Normal(_Normal):
@@ -365,7 +365,7 @@ class PID(_PID):
     def __init__(self, path: str, *, setpoint: _Number = ..., proportional: _Number = ..., integral: _Number = ..., derivative: _Number = ..., integration: Literal['hold', 'trapezoid'] = ..., filter_time: _Number = ..., setpoint_weight: _Number = ..., derivative_weight: _Number = ..., low: _Number = ..., high: _Number = ..., anti_windup: Literal['clamping', 'back_calculation', 'none'] = ..., tracking_time: _Number | None = ..., initial: _Number = ..., late_reset: bool = ...) -> None: ...
 
 class Poisson(_Poisson):
-    """The Poisson distribution: how many of many rare things happen."""
+    """The Poisson distribution: the number of rare events."""
     def __init__(self, *, mean: _Number = ...) -> None: ...
 
 class PoissonClock(_PoissonClock):
@@ -373,35 +373,35 @@ class PoissonClock(_PoissonClock):
     def __init__(self, path: str, *, mean_interval: _Number = ..., fire_at_start: bool = ..., generator: Generator | abc.Mapping[str, object] | None = ..., one_at_a_time: bool = ..., values: abc.Sequence[object] | None = ..., stop_time: _Number | None = ...) -> None: ...
 
 class Pool(_Pool):
-    """Units of a resource: a token at `acquire` asks for some, comes back by `granted` when it has them, and one at `release` returns them."""
+    """Units of a resource: a token at `acquire` requests some and comes back from `granted` when it has them; a token at `release` returns them."""
     def __init__(self, path: str, *, capacity: _Whole = ..., amount: str | float | Formula = ..., preemptive: bool = ..., key: str | float | Formula | None = ..., discipline: Literal['fifo', 'lifo', 'random'] = ..., order: str | float | Formula = ..., room: _Number | None = ..., balking: str | float | Formula | None = ..., patience: Distribution | abc.Mapping[str, object] | None = ...) -> None: ...
 
 class Previous(_Previous):
-    """Sends for each token the one that came before it; for the first `initial`, or nothing if that is not given."""
+    """Sends for each token the one before it; for the first one `initial`, or nothing if that is left out."""
     def __init__(self, path: str, *, initial: object = ...) -> None: ...
 
 class Pulse(_Pulse):
-    """Sends a value at certain triggers, counted from 0, and a zero like it at all others."""
+    """Sends a value at certain triggers, counted from 0, and a zero of the same kind at all others."""
     def __init__(self, path: str, *, values: abc.Sequence[object] = ..., indexes: abc.Sequence[object] = ..., repeat: bool = ..., limit: _Whole | None = ...) -> None: ...
 
 class Quantizer(_Quantizer):
-    """Rounds a signal to steps, as a converter from analog to digital does."""
+    """Rounds a signal to steps, as an analog-to-digital converter does."""
     def __init__(self, path: str, *, step: _Number, offset: _Number = ..., rounding: Literal['nearest', 'down', 'up'] = ...) -> None: ...
 
 class Queue(_Queue):
-    """Keeps tokens, first in, first out, and lets one go for each trigger."""
+    """Keeps tokens, first in, first out, and releases one for each trigger."""
     def __init__(self, path: str, *, capacity: _Whole | None = ..., persistent_trigger: bool = ..., one_at_a_time: bool = ...) -> None: ...
 
 class Ramp(_Ramp):
-    """Counts triggers: sends `init` for the first, and then `step` more for each."""
+    """Counts triggers: sends `init` for the first one, and `step` more for each further one."""
     def __init__(self, path: str, *, init: _Number = ..., step: _Number = ..., late_step: bool = ..., limit: _Whole | None = ...) -> None: ...
 
 class Random(_Random):
-    """Sends a token drawn from `distribution` for each trigger, independent of all others."""
+    """Sends a token drawn from `distribution` for each trigger, independently of all others."""
     def __init__(self, path: str, *, distribution: Distribution | abc.Mapping[str, object], generator: Generator | abc.Mapping[str, object] | None = ...) -> None: ...
 
 class RandomInteger(_RandomInteger):
-    """All integers from `low` to `high` alike, both included."""
+    """All integers from `low` to `high` with equal probability, both included."""
     def __init__(self, *, low: _Whole = ..., high: _Whole = ...) -> None: ...
 
 class RangeBearingSensor(_RangeBearingSensor):
@@ -417,23 +417,23 @@ class ReachGoal(_ReachGoal):
     def __init__(self, *, goal: _Row = ...) -> None: ...
 
 class RecordAssembler(_RecordAssembler):
-    """Makes one token with fields of the tokens of several inputs, which are called like the fields."""
+    """Makes one token with fields from tokens at several inputs, which have the names of the fields."""
     def __init__(self, path: str, *, fields: _Texts, onto: str | None = ..., apart: bool = ...) -> None: ...
 
 class RecordDisassembler(_RecordDisassembler):
-    """Sends fields of each token by outputs that are called like the fields."""
+    """Sends fields of each token by outputs with the names of the fields."""
     def __init__(self, path: str, *, fields: _Texts, partial: bool = ...) -> None: ...
 
 class Recorder(_Recorder):
-    """Keeps what comes, for Python to read after the run."""
+    """Keeps tokens, for Python to read after the run."""
     def __init__(self, path: str, *, capacity: _Whole | None = ...) -> None: ...
 
 class Register(_Register):
-    """Sends the latest token of each channel from before this tag whenever it is triggered, as often as that happens."""
+    """Sends the latest token of each channel from before this tag whenever it is triggered."""
     def __init__(self, path: str, *, initial: object = ...) -> None: ...
 
 class Repeat(_Repeat):
-    """Sends each token several times."""
+    """Sends each token a number of times."""
     def __init__(self, path: str, *, times: _Whole = ...) -> None: ...
 
 class Replay(_Replay):
@@ -449,11 +449,11 @@ class RobustController(_RobustController):
     def __init__(self, path: str, *, objective: Objective | abc.Mapping[str, object] = ..., solver: Solver | abc.Mapping[str, object] = ..., max_speed: _Number = ..., max_acceleration: _Number = ..., horizon: _Whole = ..., horizon_from: Literal['now', 'decision'] = ..., period: _Number = ..., safe_distance: _Number = ..., margin: _Number = ..., tube_initial: _Number = ..., tube_growth: _Number = ..., tube_time: Literal['steps', 'seconds'] = ..., covariance_noise: bool = ..., peers_at_start: _Rows = ..., robot_name: str = ..., position_noise: _Number = ..., velocity_noise: _Number = ..., kappa: _Number = ...) -> None: ...
 
 class Router(_Router):
-    """Sends each token to one channel of its output: in turn, at random, to the least loaded, or as the token says."""
+    """Sends each token to one channel of its output: in turn, at random, to the least loaded, or by a property of the token."""
     def __init__(self, path: str, *, policy: Literal['round robin', 'random', 'shortest queue', 'expression'] = ..., weights: _Row | None = ..., channel: str | float | Formula | None = ...) -> None: ...
 
 class Sampler(_Sampler):
-    """Passes on what comes at the same tag as a trigger; all other tokens are lost."""
+    """Passes on tokens that come at the same tag as a trigger; all others are lost."""
     def __init__(self, path: str) -> None: ...
 
 class Scale(_Scale):
@@ -473,15 +473,15 @@ class SeparationMonitor(_SeparationMonitor):
     def __init__(self, path: str) -> None: ...
 
 class Sequence(_Sequence):
-    """Sends the next of its values for each trigger, and nothing once all are used."""
+    """Sends the next of its values for each trigger, and nothing when all are used."""
     def __init__(self, path: str, *, values: abc.Sequence[object], repeat: bool = ..., hold: bool = ...) -> None: ...
 
 class Sequencer(_Sequencer):
-    """Hands tokens on in the order of their numbers, which count up from `first`; each waits until it is its turn."""
+    """Passes on tokens in the order of their numbers, which count up from `first`; each waits for its turn."""
     def __init__(self, path: str, *, first: _Whole = ...) -> None: ...
 
 class Server(_Server):
-    """Serves tokens in the order of their arrival, `servers` of them at a time, and sends each when it is done."""
+    """Serves tokens in the order of their arrival, `servers` of them at a time, and sends each when its service ends."""
     def __init__(self, path: str, *, service_time: _Number = ..., distribution: Distribution | abc.Mapping[str, object] | None = ..., servers: _Whole | None = ..., capacity: _Whole | None = ..., one_at_a_time: bool = ...) -> None: ...
 
 class SetFields(_SetFields):
@@ -489,23 +489,23 @@ class SetFields(_SetFields):
     def __init__(self, path: str, *, draw: abc.Mapping[str, Distribution | abc.Mapping[str, object]] = ..., set: abc.Mapping[str, str | float | Formula] = ..., remove: _Texts = ...) -> None: ...
 
 class SetVariable(_SetVariable):
-    """Hands what comes to a `Variable`, and tells what this is worth at the tag of the setting."""
+    """Passes tokens to a `Variable`, and sends the value of the variable at the tag of the change."""
     def __init__(self, path: str, *, value: object = ..., delayed: bool = ...) -> None: ...
 
 class SharedQueue(_SharedQueue):
-    """One line for several: a channel of `trigger` asks for a token, and gets it by the channel of `output`."""
+    """One queue for several consumers: a channel of `trigger` requests a token, and gets it on the same channel of `output`."""
     def __init__(self, path: str, *, capacity: _Whole | None = ...) -> None: ...
 
 class SingleEvent(_SingleEvent):
-    """Sends one token at one time."""
+    """Sends one token at a given time."""
     def __init__(self, path: str, *, time: _Number = ..., value: object = ...) -> None: ...
 
 class Spread(_Spread):
-    """Sends what is in a list by the channels of its output, in their order; what is left over is lost."""
+    """Sends the items of a list over the channels of its output, in order; surplus items are lost."""
     def __init__(self, path: str) -> None: ...
 
 class StateMachine(_StateMachine):
-    """A state machine, with a transition a line and variables that may flow."""
+    """A state machine with one transition per line, and variables that may flow."""
     def __init__(self, path: str, *, modes: object, transitions: object = ..., initial: str | None = ..., variables: abc.Mapping[str, object] = ..., held: abc.Mapping[str, object] = ..., one_at_a_time: bool = ..., set_last: bool = ..., method: Literal['RK45', 'RK23', 'DOP853', 'Radau', 'BDF'] = ..., relative_tolerance: _Number = ..., absolute_tolerance: _Number = ..., max_step: _Number | None = ...) -> None: ...
 
 class StateSpace(_StateSpace):
@@ -513,11 +513,11 @@ class StateSpace(_StateSpace):
     def __init__(self, path: str, *, a: _Rows, b: _Rows, c: _Rows | None = ..., d: _Rows | None = ..., initial: _Row | None = ..., held: _Row | None = ..., sampled: bool = ...) -> None: ...
 
 class Station(_Station):
-    """A station with `places`, at which tokens are served one to a place; those that are urgent go first."""
+    """A station with `places`, each of which serves one token at a time; urgent tokens go first."""
     def __init__(self, path: str, *, places: _Whole = ..., service_time: Distribution | abc.Mapping[str, object]) -> None: ...
 
 class Stop(_Stop):
-    """Ends the run with the tag at which a true token comes; what belongs to that tag is still done."""
+    """Ends the run with the tag at which a true token comes; that tag is completed."""
     def __init__(self, path: str) -> None: ...
 
 class StudentT(_StudentT):
@@ -533,7 +533,7 @@ class Synchronizer(_Synchronizer):
     def __init__(self, path: str) -> None: ...
 
 class Test(_Test):
-    """Compares what comes with what is expected, in order, and ends the run with an error where they differ."""
+    """Compares tokens with expected values, in order, and ends the run with an error if they differ."""
     def __init__(self, path: str, *, values: abc.Sequence[object], times: _Row | None = ..., tolerance: _Number = ..., complete: bool = ..., together: bool = ..., follow: bool = ..., lenient: bool = ...) -> None: ...
 
 class TextFunction(_TextFunction):
@@ -545,7 +545,7 @@ class TimeAverage(_TimeAverage):
     def __init__(self, path: str) -> None: ...
 
 class TimeCompare(_TimeCompare):
-    """Sends by how much a token of `second` comes after one of `first`: the one after its first, and so on."""
+    """Sends the time between a token of `first` and one of `second`: between the first tokens, the second ones, and so on."""
     def __init__(self, path: str, *, nonnegative: bool = ...) -> None: ...
 
 class TimeDelay(_TimeDelay):
@@ -557,19 +557,19 @@ class TimeGap(_TimeGap):
     def __init__(self, path: str) -> None: ...
 
 class Timer(_Timer):
-    """Sends a value after the number of seconds in each token; any number of tokens may wait at the same time."""
+    """Sends a value after the number of seconds in each token; any number of times may run in parallel."""
     def __init__(self, path: str, *, one_at_a_time: bool = ..., value: object = ...) -> None: ...
 
 class TransferFunction(_TransferFunction):
-    """A linear system of one input and one output by its transfer function, such as `2 / (s^2 + 0.4 s + 4)`."""
+    """A linear system with one input and one output, given by its transfer function, such as `2 / (s^2 + 0.4 s + 4)`."""
     def __init__(self, path: str, *, numerator: _Row = ..., denominator: _Row, initial: _Row = ..., held: _Number = ..., sampled: bool = ...) -> None: ...
 
 class Triangular(_Triangular):
-    """The triangular distribution: a least, a likeliest and a greatest number."""
+    """The triangular distribution between a lowest and a highest number, with a most likely one."""
     def __init__(self, *, low: _Number = ..., mode: _Number = ..., high: _Number = ...) -> None: ...
 
 class Unbatch(_Unbatch):
-    """Sends what is in a list, one by one, at the same tag."""
+    """Sends the items of a list one by one, at the same tag."""
     def __init__(self, path: str) -> None: ...
 
 class Unicycle(_Unicycle):
@@ -577,7 +577,7 @@ class Unicycle(_Unicycle):
     def __init__(self, path: str, *, turn_rate: _Number = ..., max_turn_rate: _Number = ..., start: _Row = ..., heading: _Number = ..., speed: _Number = ..., max_speed: _Number = ...) -> None: ...
 
 class Uniform(_Uniform):
-    """All numbers of an interval alike."""
+    """All numbers of an interval with equal probability."""
     def __init__(self, *, low: _Number = ..., high: _Number = ...) -> None: ...
 
 class UnscentedEstimator(_UnscentedEstimator):
@@ -585,11 +585,11 @@ class UnscentedEstimator(_UnscentedEstimator):
     def __init__(self, path: str, *, period: _Number = ..., prior_mean: _Row = ..., prior_variance: _Row = ..., max_delay: _Number = ..., noise_direction: Literal['expected', 'predicted'] = ..., position_noise: _Number = ..., velocity_noise: _Number = ..., kappa: _Number = ...) -> None: ...
 
 class Variable(_Variable):
-    """A value that may change: the latest token is its value from the next microstep on, and is sent then."""
+    """A value that may change: a token becomes its value at the next microstep, and is sent then."""
     def __init__(self, path: str, *, delayed: bool = ...) -> None: ...
 
 class VaryingRandom(_VaryingRandom):
-    """A `Random` whose distribution changes in the run: some of its parameters have inputs of their names."""
+    """A `Random` whose distribution changes during the run: some of its parameters have inputs with their names."""
     def __init__(self, path: str, *, varying: _Texts, distribution: Distribution | abc.Mapping[str, object], generator: Generator | abc.Mapping[str, object] | None = ...) -> None: ...
 
 class Vehicle(_Vehicle):
@@ -601,7 +601,7 @@ class VonMises(_VonMises):
     def __init__(self, *, mean: _Number = ..., concentration: _Number = ...) -> None: ...
 
 class WaitingLine(_WaitingLine):
-    """A queue in any order from which each trigger takes a token: on the channel of the output that it came by."""
+    """A queue in any order from which each trigger takes a token, sent on the same channel of the output."""
     def __init__(self, path: str, *, size: str | float | Formula = ..., credits: _Whole = ..., persistent_trigger: bool = ..., discipline: Literal['fifo', 'lifo', 'random'] = ..., order: str | float | Formula = ..., room: _Number | None = ..., balking: str | float | Formula | None = ..., patience: Distribution | abc.Mapping[str, object] | None = ...) -> None: ...
 
 class WaitingTime(_WaitingTime):

@@ -35,45 +35,50 @@ class ODE(Actor):
           directions: {bounce: falling}
           resets: {bounce: {height: 0, speed: -0.8 * speed}}
 
-    Every state is an output port: its value is sent for each ``trigger``, and at each crossing.  Every crossing is an
-    output port, too: it sends its number, from 0, when its expression crosses zero, as exactly as the tolerances
-    allow.  Resets take place at the crossing, all from the state just before it; what the states send at that tag is
-    the state after it.  Names in the expressions that are neither states nor ``time`` are input ports; between
-    two tokens an input holds its value.  The states do not depend on the inputs at once, so the actor may stand in a
-    loop without delay: what comes at a tag bends the solution from then on.
+    Every state is an output port: its value is sent for each ``trigger`` and at each crossing.  Every crossing is also
+    an output port: when its expression crosses zero, it sends the number of the crossing, from 0, at a time as exact as
+    the tolerances allow.  Resets take place at the crossing, all computed from the state just before it; at that tag,
+    the states send their values after it.  Names in the expressions that are neither states nor ``time`` are input
+    ports; an input holds its value between tokens.  The states do not depend on the inputs within the same tag, so the
+    actor may be part of a loop without delay: a token changes the derivatives from its tag on.
 
-    A jump of an input, or a reset, that takes a crossing's expression to its other side makes it cross one microstep
-    later.  An expression that is zero at the start does not cross there.  Crossings of one kind that come closer
-    together than ``min_interval`` end the run with an error: a ball that comes to rest bounces without end (Zeno).
+    If a jump of an input, or a reset, takes a crossing's expression to its other side, it crosses one microstep later.
+    An expression that is zero at the start does not cross there.  Crossings of one kind that follow each other within
+    ``min_interval`` end the run with an error: a ball that comes to rest bounces without end (Zeno).
 
-    The solution does not depend on when it is looked at, and has the same bits on every processor.  Numbers are bare,
-    in the units that the model chooses, time in s.
+    The solution does not depend on when it is requested, and has the same bits on every processor.  Numbers have no
+    units: the model chooses them; time is in s.
 
     Methods: ``RK23`` (Bogacki-Shampine), ``RK45`` (Dormand-Prince) and ``DOP853`` (Hairer) are explicit Runge-Kutta
-    methods.  ``Radau`` (Radau IIA of order 5) and ``BDF`` (order 1 to 5) are for stiff systems: ``Radau`` is the more
-    exact one at loose tolerances, ``BDF`` takes fewer evaluations at tight ones.  The steps are those of SciPy's
-    solvers of these names, but the arithmetic is our own.
+    methods.  ``Radau`` (Radau IIA of order 5) and ``BDF`` (order 1 to 5) are for stiff systems: ``Radau`` is more exact
+    at loose tolerances, ``BDF`` takes fewer evaluations at tight ones.  The steps are those of SciPy's solvers of these
+    names, but the arithmetic is our own.
 
     Steps are as long as the tolerances allow, but longer than 1 s only where nothing can hide in them: bounds on the
-    derivatives along the step (interval arithmetic) must show that they stay near what the step has seen.  A crossing
-    that comes and goes within an eighth of a second may be missed, if such bounds do not show that there is none.
-    With ``max_step`` no step is longer, that check is left out, and its eighth takes the place of the second's.
+    derivatives along the step (interval arithmetic) must show that they stay near the values that the step has
+    evaluated.  Two crossings within an eighth of a second may be missed unless such bounds exclude them. With
+    ``max_step``, no step is longer than that, the bounds are not checked, and an eighth of ``max_step`` takes the place
+    of an eighth of a second.
 
     Ptolemy: ``DifferentialSystem``, ``LevelCrossingDetector``.
     """
 
     is_source: ClassVar[bool] = True
 
-    trigger = InputPort(required=False, doc="asks for the states")
+    trigger = InputPort(required=False, doc="requests the states")
 
     initial = MappingParameter(Parameter(float), doc="the states and their values at the start")
-    derivatives = MappingParameter(FormulaParameter(), doc="how fast each state changes, per s")
+    derivatives = MappingParameter(FormulaParameter(), doc="the derivative of each state, per s")
     crossings = MappingParameter(FormulaParameter(), {}, doc="expressions whose zero crossings are events")
     directions = MappingParameter(
-        Parameter(str, choices=("rising", "falling", "both")), {}, doc="which crossings count; both if left out"
+        Parameter(str, choices=("rising", "falling", "both")),
+        {},
+        doc="which direction of a crossing counts; both if left out",
     )
     resets = MappingParameter(
-        MappingParameter(FormulaParameter()), {}, doc="the values that states take at a crossing; others go on"
+        MappingParameter(FormulaParameter()),
+        {},
+        doc="new values of states at a crossing; other states stay as they are",
     )
     held = MappingParameter(Parameter(float), {}, doc="values of the inputs before their first token; 0 if left out")
 
@@ -81,17 +86,17 @@ class ODE(Actor):
     relative_tolerance = Parameter(
         float, 1e-10, unit="1", min=1e-13, max=0.1, doc="error per step, relative to each state"
     )
-    absolute_tolerance = Parameter(float, 1e-12, above=0, doc="error per step, added to the relative one")
+    absolute_tolerance = Parameter(float, 1e-12, above=0, doc="absolute error per step, added to the relative one")
     max_step = Parameter(
         float, None, unit="s", above=0, max=1e6,
-        doc="longest step; if left out, 1 s, or what the tolerances allow where nothing can hide in it",
+        doc="longest step; if left out, 1 s, or as long as the tolerances allow where nothing can hide in it",
     )  # fmt: skip
-    min_interval = Parameter(float, 1e-6, unit="s", above=0, doc="what crossings of one kind keep between them")
+    min_interval = Parameter(float, 1e-6, unit="s", above=0, doc="shortest time between crossings of one kind")
 
     def check(self) -> None:
         self._states = tuple(self.initial)
         if not self._states:
-            raise ParameterError("initial: there is no state")
+            raise ParameterError("initial: the mapping is empty; give at least one state")
         _same_names("derivatives", self.derivatives, "state", self._states, all_of_them=True)
         _same_names("directions", self.directions, "crossing", self.crossings)
         _same_names("resets", self.resets, "crossing", self.crossings)
@@ -106,14 +111,14 @@ class ODE(Actor):
             ports[state] = OutputPort(float, depends_on=("trigger",), doc="a state")
         for crossing in self.crossings:
             if crossing in ports:
-                raise ParameterError(f"crossings: {crossing!r} is the name of a state, too")
-            ports[crossing] = OutputPort(int, depends_on=(), doc="number of the zero crossing, from 0")
+                raise ParameterError(f"crossings: {crossing!r} is also the name of a state")
+            ports[crossing] = OutputPort(int, depends_on=(), doc="the number of the crossing, from 0")
         for formula in (each for group in formulas for each in group.values()):
             for name in formula.names:
                 if name in self.crossings:
-                    raise ParameterError(f"{formula} asks for {name!r}, which is a crossing and has no value")
+                    raise ParameterError(f"{formula} uses {name!r}, which is a crossing and has no value")
                 if name not in ("time", *ports):
-                    ports[name] = InputPort(doc="an input, held from token to token")
+                    ports[name] = InputPort(doc="an input, held between tokens")
         return ports
 
     # -- the run --------------------------------------------------------------------------------------------------
@@ -159,7 +164,7 @@ class ODE(Actor):
         self._plan()
 
     def _cross(self, at: float, crossed: Mapping[int, int]) -> None:
-        """Send the crossings, reset what they reset, and begin a new solution."""
+        """Send the crossings, apply their resets, and begin a new solution."""
         trajectory = self._trajectory
         state = trajectory.solution.at(at)
         trajectory.solution.rewind(at)
@@ -175,7 +180,7 @@ class ODE(Actor):
         signs = trajectory.signs(0.0, start)
         for number, side in crossed.items():
             if start != state:
-                # After a reset at zero, the solution will show which side comes of it.
+                # After a reset to zero, the solution will show which side it goes to.
                 side = -side if signs[number] == -side else 0
             trajectory.guards[number].side = side
         self._notice_jumps(before, signs, crossed)
@@ -184,8 +189,8 @@ class ODE(Actor):
         if time - self._latest[name] < self.min_interval:
             raise EpicycleError(
                 f"crossing {name!r} comes again after {time - self._latest[name]:.3g} s, which is less than "
-                f"min_interval, {self.min_interval:g} s: it may go on so without end (Zeno); "
-                f"stop before, for example when {name!r} has come often enough"
+                f"min_interval, {self.min_interval:g} s: it may repeat without end (Zeno); end the run earlier, for "
+                f"example after a number of {name!r}"
             )
         self._latest[name] = time
         self.outputs[name].send(self._counts[name])
@@ -209,7 +214,7 @@ class ODE(Actor):
         self._notice_jumps(before, trajectory.signs(0.0, state), self._jumps)
 
     def _notice_jumps(self, before: list[int], after: list[int], known: Mapping[int, int]) -> None:
-        """See which guards are on their other side all at once."""
+        """Find the guards that a jump has taken to their other side."""
         for number, guard in enumerate(self._trajectory.guards):
             if number not in known and before[number] * after[number] < 0:
                 if guard.counts(after[number]):
@@ -217,9 +222,9 @@ class ODE(Actor):
                 guard.side = after[number]
 
     def _plan(self) -> None:
-        """Ask to be fired at the next crossing or, while none is in sight, where the search for it ends.
+        """Request a firing at the next crossing or, while none is in sight, where the search for it ends.
 
-        A wake-up that an input has overtaken is cancelled, because the solution it was found on no longer exists.
+        A wake-up found before an input came is cancelled, because its solution no longer exists.
         """
         if self._wake is not None and not self._wake.due:
             self._wake.cancel()
@@ -231,7 +236,7 @@ class ODE(Actor):
 
 
 def _same_names(label: str, given: Mapping[str, object], kind: str, known: Any, *, all_of_them: bool = False) -> None:
-    """Every name that is given is known, and, if need be, the other way round."""
+    """Check that every given name is known and, if required, that every known name is given."""
     for name in given:
         if name not in known:
             raise ParameterError(

@@ -1,4 +1,4 @@
-"""Probability distributions that a parameter may be given: ``distribution: {type: Exponential, mean: 2}``."""
+"""Probability distributions as values of parameters: ``distribution: {type: Exponential, mean: 2}``."""
 
 from __future__ import annotations
 
@@ -20,27 +20,27 @@ from .generators import Numbers
 
 
 class Distribution(Configurable):
-    """Base of the distributions: what single values are drawn from.
+    """Base of the distributions, from which single values are drawn.
 
-    Their parameters count in what is drawn: where that is a time, they are times.
+    Their parameters have the unit of the drawn value: for a time, they are times.
     """
 
     token_type: Any = float
 
     def draw(self, random: Stream) -> Any:
-        """A value, from the stream given."""
+        """A value drawn from the given stream."""
         raise NotImplementedError(f"{type(self).__name__} has no draw()")
 
     def draw_time(self, random: Stream, what: str = "a time") -> float:
-        """A value that is how long something takes, in s; raises ``EpicycleError`` if it cannot be that."""
+        """A duration in s; raises ``EpicycleError`` if the value cannot be one."""
         time = self.draw(random)
         if isinstance(time, bool) or not isinstance(time, (int, float)) or not time >= 0:
-            raise EpicycleError(f"{time!r} drawn from {self!r} is not {what} in s, a number >= 0")
+            raise EpicycleError(f"{time!r} drawn from {self!r} is not {what} in s: it must be a number >= 0")
         return float(time)
 
 
 class Constant(Distribution):
-    """Always the same value; the actor that sends one is ``Const``."""
+    """Always the same value; an actor that sends it is ``Const``."""
 
     value = Parameter(float, doc="the value")
 
@@ -49,10 +49,10 @@ class Constant(Distribution):
 
 
 class Uniform(Distribution):
-    """All numbers of an interval alike."""
+    """All numbers of an interval with equal probability."""
 
-    low = Parameter(float, 0.0, doc="the least number")
-    high = Parameter(float, 1.0, doc="the bound above, not drawn itself")
+    low = Parameter(float, 0.0, doc="the lowest number")
+    high = Parameter(float, 1.0, doc="the upper bound, never drawn itself")
 
     def check(self) -> None:
         _check_order("low", self.low, "high", self.high)
@@ -74,7 +74,7 @@ class Normal(Distribution):
 class LogNormal(Distribution):
     """A positive number whose logarithm is normally distributed."""
 
-    median = Parameter(float, 1.0, min=0, doc="the median, e to the mean of the logarithm")
+    median = Parameter(float, 1.0, min=0, doc="the median, exp of the mean of the logarithm")
     sigma = Parameter(float, 1.0, unit="1", min=0, doc="standard deviation of the logarithm")
 
     def draw(self, random: Stream) -> float:
@@ -84,7 +84,7 @@ class LogNormal(Distribution):
 class Exponential(Distribution):
     """The exponential distribution: waiting times without memory."""
 
-    mean = Parameter(float, 1.0, min=0, doc="the mean, one over the rate")
+    mean = Parameter(float, 1.0, min=0, doc="the mean, 1 / rate")
 
     def draw(self, random: Stream) -> float:
         return random.exponential(self.mean)
@@ -94,7 +94,7 @@ class Gamma(Distribution):
     """The gamma distribution; with a whole ``shape`` the Erlang distribution."""
 
     shape = Parameter(float, 1.0, unit="1", above=0, doc="the shape k; k = 1 is the exponential distribution")
-    mean = Parameter(float, 1.0, min=0, doc="the mean, shape times scale")
+    mean = Parameter(float, 1.0, min=0, doc="the mean, shape * scale")
 
     def draw(self, random: Stream) -> float:
         return random.gamma(self.shape, self.mean / self.shape)
@@ -103,7 +103,7 @@ class Gamma(Distribution):
 class ChiSquare(Distribution):
     """The chi-square distribution: the sum of squares of standard normal numbers."""
 
-    freedom = Parameter(float, unit="1", min=1, doc="degrees of freedom, how many squares")
+    freedom = Parameter(float, unit="1", min=1, doc="degrees of freedom, the number of squares")
 
     def draw(self, random: Stream) -> float:
         return random.chisquare(self.freedom)
@@ -112,7 +112,7 @@ class ChiSquare(Distribution):
 class StudentT(Distribution):
     """Student's t distribution."""
 
-    # Below, the sum of squares that it divides by is too small for a float every now and then.
+    # Below this, the sum of squares in the denominator is now and then too small for a float.
     freedom = Parameter(float, unit="1", min=0.1, doc="degrees of freedom")
 
     def draw(self, random: Stream) -> float:
@@ -120,11 +120,13 @@ class StudentT(Distribution):
 
 
 class Cauchy(Distribution):
-    """The Cauchy distribution, which has no mean; in physics that of Breit and Wigner."""
+    """The Cauchy distribution, which has no mean; in physics, the Breit-Wigner distribution."""
 
     median = Parameter(float, 0.0, doc="the median")
     scale = Parameter(float, 1.0, above=0, doc="half the width at half the height")
-    cut: Parameter[float | None] = Parameter(float, None, above=0, doc="how far from the median it ends, if it does")
+    cut: Parameter[float | None] = Parameter(
+        float, None, above=0, doc="distance from the median at which it is truncated; not truncated if left out"
+    )
 
     def draw(self, random: Stream) -> float:
         if self.cut is None:
@@ -136,15 +138,15 @@ class Cauchy(Distribution):
 class VonMises(Distribution):
     """The von Mises distribution of angles, in rad."""
 
-    mean = Parameter(float, 0.0, unit="rad", doc="the likeliest angle")
-    concentration = Parameter(float, 1.0, unit="1", above=0, doc="kappa, for large ones 1 / variance")
+    mean = Parameter(float, 0.0, unit="rad", doc="the most likely angle")
+    concentration = Parameter(float, 1.0, unit="1", above=0, doc="kappa; if large, about 1 / variance")
 
     def draw(self, random: Stream) -> float:
         return random.vonmises(self.mean, self.concentration)
 
 
 class Poisson(Distribution):
-    """The Poisson distribution: how many of many rare things happen."""
+    """The Poisson distribution: the number of rare events."""
 
     token_type: Any = int
 
@@ -155,35 +157,35 @@ class Poisson(Distribution):
 
 
 class Binomial(Distribution):
-    """The binomial distribution: how many of several trials succeed."""
+    """The binomial distribution: the number of successful trials."""
 
     token_type: Any = int
 
-    trials = Parameter(int, 1, min=0, max=2**63 - 1, doc="how many trials")
-    probability = Parameter(float, 0.5, unit="1", min=0, max=1, doc="of success in each")
+    trials = Parameter(int, 1, min=0, max=2**63 - 1, doc="the number of trials")
+    probability = Parameter(float, 0.5, unit="1", min=0, max=1, doc="probability of success in each trial")
 
     def draw(self, random: Stream) -> int:
         return random.binomial(self.trials, self.probability)
 
 
 class NegativeBinomial(Distribution):
-    """The negative binomial distribution: how many trials fail before some have succeeded."""
+    """The negative binomial distribution: the number of failures before a number of successes."""
 
     token_type: Any = int
 
-    successes = Parameter(float, 1.0, unit="1", above=0, doc="how many successes")
-    probability = Parameter(float, 0.5, unit="1", above=0, max=1, doc="of success in each trial")
+    successes = Parameter(float, 1.0, unit="1", above=0, doc="the number of successes")
+    probability = Parameter(float, 0.5, unit="1", above=0, max=1, doc="probability of success in each trial")
 
     def draw(self, random: Stream) -> int:
         return random.negative_binomial(self.successes, self.probability)
 
 
 class Triangular(Distribution):
-    """The triangular distribution: a least, a likeliest and a greatest number."""
+    """The triangular distribution between a lowest and a highest number, with a most likely one."""
 
-    low = Parameter(float, 0.0, doc="the least number")
-    mode = Parameter(float, 0.5, doc="the likeliest number")
-    high = Parameter(float, 1.0, doc="the greatest number")
+    low = Parameter(float, 0.0, doc="the lowest number")
+    mode = Parameter(float, 0.5, doc="the most likely number")
+    high = Parameter(float, 1.0, doc="the highest number")
 
     def check(self) -> None:
         _check_order("low", self.low, "mode", self.mode)
@@ -194,7 +196,7 @@ class Triangular(Distribution):
 
 
 class Bernoulli(Distribution):
-    """True with a probability, otherwise false."""
+    """True with a given probability, otherwise false."""
 
     token_type: Any = bool
 
@@ -205,12 +207,12 @@ class Bernoulli(Distribution):
 
 
 class RandomInteger(Distribution):
-    """All integers from ``low`` to ``high`` alike, both included."""
+    """All integers from ``low`` to ``high`` with equal probability, both included."""
 
     token_type: Any = int
 
-    low = Parameter(int, 0, doc="the least integer")
-    high = Parameter(int, 1, doc="the greatest integer")
+    low = Parameter(int, 0, doc="the lowest integer")
+    high = Parameter(int, 1, doc="the highest integer")
 
     def check(self) -> None:
         _check_order("low", self.low, "high", self.high)
@@ -220,16 +222,16 @@ class RandomInteger(Distribution):
 
 
 class Choice(Distribution):
-    """One of several values of any kind, all alike or by weight."""
+    """One of several values of any kind, with equal probability or by weight."""
 
-    values: Parameter[Any] = Parameter(object, shape=(None,), doc="what is chosen from")
+    values: Parameter[Any] = Parameter(object, shape=(None,), doc="the values to choose from")
     weights: Parameter[Any] = array_parameter(
-        (None,), None, unit="1", min=0, doc="how likely each is, relative to the others; all alike if left out"
+        (None,), None, unit="1", min=0, doc="relative probability of each value; all equal if left out"
     )
 
     def check(self) -> None:
         if not self.values:
-            raise ParameterError("Choice.values: the list is empty, there is nothing to choose from")
+            raise ParameterError("Choice.values: the list is empty; give at least one value")
         self.token_type = token_type(self.values)
         weights = [1.0] * len(self.values) if self.weights is None else self.weights.tolist()
         try:
@@ -238,7 +240,7 @@ class Choice(Distribution):
             self._sums = []
         if len(self._sums) != len(self.values):
             raise ParameterError(
-                f"Choice.weights: {weights} does not give a weight to each of {counted(len(self.values), 'value')}"
+                f"Choice.weights: {weights} must have one weight for each of {counted(len(self.values), 'value')}"
             )
 
     def draw(self, random: Stream) -> Any:
@@ -251,5 +253,5 @@ class Choice(Distribution):
 def _check_order(low_name: str, low: float, high_name: str, high: float) -> None:
     if low > high:
         raise ParameterError(
-            f"{low_name} is {low:g} and {high_name} is {high:g}: {low_name} may not be above {high_name}"
+            f"{low_name} is {low:g} and {high_name} is {high:g}: {low_name} must not be above {high_name}"
         )

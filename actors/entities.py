@@ -27,19 +27,22 @@ class SetFields(Actor):
     """Sets fields of tokens: a token with fields is a mapping, as YAML writes it and expressions read it.
 
     ``draw: {work: {type: Exponential, mean: 5 s}}`` draws fields, then ``set: {due: came + 2 * work}`` computes some,
-    one after the other, over the token's fields, ``token`` (as it came) and ``time`` (s).  What comes without fields,
-    such as a number, becomes a token that has just these.  The token that came is left as it is: others may have it.
+    one after the other, over the token's fields, ``token`` (as it came) and ``time`` (s).  A token without fields, such
+    as a number, is replaced by one with these fields alone.  The original token is not changed, because other actors
+    may have received it.
     Ptolemy: ``RecordUpdater``.
     """
 
     input = InputPort(doc="the tokens")
-    output: OutputPort[Any] = OutputPort(dict, doc="each with its fields set")
+    output: OutputPort[Any] = OutputPort(dict, doc="each token with its fields set")
 
     draw: Parameter[dict[str, Distribution]] = MappingParameter(
-        Parameter(Distribution), {}, doc="what fields are drawn from; times in s"
+        Parameter(Distribution), {}, doc="distributions of fields to draw; times in s"
     )
-    set: Parameter[dict[str, Any]] = MappingParameter(FormulaParameter(), {}, doc="expressions for fields, in order")
-    remove = texts_parameter((), doc="fields that are taken away, at last")
+    set: Parameter[dict[str, Any]] = MappingParameter(
+        FormulaParameter(), {}, doc="expressions for fields, computed in order"
+    )
+    remove = texts_parameter((), doc="fields to remove, after all others are set")
 
     def fire(self) -> None:
         for token in self.input.tokens:
@@ -55,27 +58,29 @@ class SetFields(Actor):
 
 
 class RecordAssembler(Actor):
-    """Makes one token with fields of the tokens of several inputs, which are called like the fields.
+    """Makes one token with fields from tokens at several inputs, which have the names of the fields.
 
-    It waits until there is one at each input; others wait in the order of their arrival.  ``onto`` is the name of one
-    more input: its tokens have fields of their own, which stay as they are unless they are set here.  With ``apart`` a
-    token makes one by itself, which has a single field.
+    It waits until there is a token at each input; further ones wait in the order of arrival.  ``onto`` is the name of
+    one more input: its tokens have fields already, which are kept unless they are set here.  With ``apart``, each token
+    makes a token by itself, with a single field.
     Ptolemy: ``RecordAssembler``, ``RecordUpdater`` (``onto: input``), ``UnionMerge`` (``apart``).
     """
 
-    output: OutputPort[Any] = OutputPort(dict, doc="a token with these fields")
+    output: OutputPort[Any] = OutputPort(dict, doc="tokens with these fields")
 
-    fields = texts_parameter(doc="names of the fields, which are the inputs")
-    onto: Parameter[str | None] = Parameter(str, None, doc="name of the input whose tokens are given these fields")
-    apart = Parameter(bool, False, doc="whether each token makes one by itself, those of the first fields first")
+    fields = texts_parameter(doc="names of the fields and the inputs")
+    onto: Parameter[str | None] = Parameter(
+        str, None, doc="name of an input whose tokens get these fields in addition to their own"
+    )
+    apart = Parameter(bool, False, doc="whether each token makes a token by itself, in the order of the fields")
 
     def own_ports(self) -> dict[str, InputPort[Any] | OutputPort[Any]]:
         _check_names(self.fields)
         ports: dict[str, InputPort[Any] | OutputPort[Any]] = {name: InputPort(doc="a field") for name in self.fields}
         if self.onto in ports:
-            raise ParameterError(f"onto: {self.onto!r} is one of the fields")
+            raise ParameterError(f"onto: {self.onto!r} is also one of the fields; choose another name")
         if self.onto is not None and self.apart:
-            raise ParameterError("onto and apart: a token by itself has nothing onto which it could be set")
+            raise ParameterError("onto and apart exclude each other: with 'apart', fields are not added to a token")
         return ports if self.onto is None else {self.onto: InputPort(doc="tokens with fields"), **ports}
 
     def initialize(self) -> None:
@@ -97,15 +102,15 @@ class RecordAssembler(Actor):
 
 
 class RecordDisassembler(Actor):
-    """Sends fields of each token by outputs that are called like the fields.
+    """Sends fields of each token by outputs with the names of the fields.
 
     Ptolemy: ``RecordDisassembler``, ``UnionDisassembler`` (``partial``).
     """
 
     input = InputPort(doc="tokens with fields")
 
-    fields = texts_parameter(doc="names of the fields, which are the outputs")
-    partial = Parameter(bool, False, doc="whether a token may lack some of the fields")
+    fields = texts_parameter(doc="names of the fields and the outputs")
+    partial = Parameter(bool, False, doc="whether tokens may lack some of the fields")
 
     def own_ports(self) -> dict[str, InputPort[Any] | OutputPort[Any]]:
         _check_names(self.fields)
@@ -120,34 +125,35 @@ class RecordDisassembler(Actor):
 
 def _check_names(fields: tuple[str, ...]) -> None:
     if not fields:
-        raise ParameterError("fields: the list is empty")
+        raise ParameterError("fields: the list is empty; name at least one field")
     for name in fields:
         if fields.count(name) > 1:
-            raise ParameterError(f"fields: {name!r} is named twice")
+            raise ParameterError(f"fields: {name!r} is listed twice")
 
 
 class Batch(Actor):
-    """Collects tokens into lists: as many as ``number``, or as fit into ``size``, or what has come after ``after``.
+    """Collects tokens into lists: ``number`` of them, or as many as fit into ``size``, or those that came within
+    ``after``.
 
     Tokens with different values of ``key`` go into different batches.  A batch is full when it has ``number`` tokens,
-    or when the sizes of its tokens (``weight``) come to ``size``; a token that would exceed it begins the next.
+    or when the sizes of its tokens (``weight``) add up to ``size``; a token that would exceed it begins the next batch.
     ``trigger`` sends all batches as they are.  Sources: Pegden and others, Introduction to Simulation Using SIMAN
     (group); Ptolemy: ``SequenceToArray``.
     """
 
-    input = InputPort(doc="what is collected")
-    trigger = InputPort(required=False, doc="sends what is there")
-    output: OutputPort[Any] = OutputPort(list, doc="a batch, in the order in which its tokens came")
-    waiting = OutputPort(int, doc="how many tokens wait for the rest of their batch, whenever that changes")
+    input = InputPort(doc="tokens to collect")
+    trigger = InputPort(required=False, doc="sends all batches as they are")
+    output: OutputPort[Any] = OutputPort(list, doc="a batch, with its tokens in the order of arrival")
+    waiting = OutputPort(int, doc="number of tokens that wait for the rest of their batch, whenever it changes")
 
-    number: Parameter[int | None] = Parameter(int, None, min=1, doc="how many tokens are a batch")
-    size: Parameter[float | None] = Parameter(float, None, above=0, doc="how large a batch may be")
-    weight = FormulaParameter("1", doc="size of a token; of its fields, token, time")
+    number: Parameter[int | None] = Parameter(int, None, min=1, doc="tokens in a full batch")
+    size: Parameter[float | None] = Parameter(float, None, above=0, doc="largest size of a batch")
+    weight = FormulaParameter("1", doc="size of a token: an expression over its fields, token, time")
     after: Parameter[float | None] = Parameter(
-        float, None, unit="s", min=0, doc="how long the first of a batch waits at most"
+        float, None, unit="s", min=0, doc="longest wait of the first token of a batch"
     )
     key: Parameter[Any] = FormulaParameter(
-        None, doc="what tokens of a batch have in common; of their fields, and token"
+        None, doc="tokens of a batch have this value in common: an expression over their fields, and token"
     )
 
     def initialize(self) -> None:
@@ -203,13 +209,13 @@ class _Open:
 
 
 class Unbatch(Actor):
-    """Sends what is in a list, one by one, at the same tag.
+    """Sends the items of a list one by one, at the same tag.
 
     Ptolemy: ``ArrayToSequence``.
     """
 
     input = InputPort(doc="lists")
-    output = OutputPort(doc="what is in them")
+    output = OutputPort(doc="the items of the lists")
 
     def fire(self) -> None:
         for token in self.input.tokens:
@@ -218,7 +224,7 @@ class Unbatch(Actor):
 
 
 def _items(token: Any) -> Any:
-    """A token that is a list, with its items as they are; raises ``EpicycleError`` if it is none."""
+    """A token that is a list, with its items unchanged; raises ``EpicycleError`` if it is not one."""
     if isinstance(seen := operand(token), list):
         return token
     raise EpicycleError(f"{brief(seen)} is not a list")
@@ -226,15 +232,14 @@ def _items(token: Any) -> Any:
 
 class Collect(Actor):
     """Makes a list of one token from each channel, once every channel has one; others wait in the order of arrival.
-
-    With ``joined`` the tokens are lists, and one is made of all that is in them.
+    With ``joined``, the tokens are lists, which are joined to one.
     Ptolemy: ``ElementsToArray``, ``ArrayAppend`` (``joined``).
     """
 
-    input = InputPort(multi=True, doc="what is collected")
-    output: OutputPort[Any] = OutputPort(list, doc="a token of each channel, in their order")
+    input = InputPort(multi=True, doc="tokens to collect")
+    output: OutputPort[Any] = OutputPort(list, doc="a token of each channel, in the order of the channels")
 
-    joined = Parameter(bool, False, doc="whether the tokens are lists that are joined")
+    joined = Parameter(bool, False, doc="whether the tokens are lists, to be joined")
 
     def initialize(self) -> None:
         self._waiting: list[deque[Any]] = [deque() for _ in range(self.input.width)]
@@ -250,13 +255,13 @@ class Collect(Actor):
 
 
 class Spread(Actor):
-    """Sends what is in a list by the channels of its output, in their order; what is left over is lost.
+    """Sends the items of a list over the channels of its output, in order; surplus items are lost.
 
     Ptolemy: ``ArrayToElements``.
     """
 
     input = InputPort(doc="lists")
-    output = OutputPort(multi=True, doc="the items of a list, one by each channel")
+    output = OutputPort(multi=True, doc="the items of a list, one on each channel")
 
     def fire(self) -> None:
         for token in self.input.tokens:
@@ -267,16 +272,18 @@ class Spread(Actor):
 class Match(Actor):
     """Waits until there is a token with an equal ``key`` on every channel, and sends them as a list: a join.
 
-    The fork before it is an output with several connections.  Tokens of one channel with equal keys wait in the order
-    of their arrival; without ``key``, all are equal.  Sources: Pegden and others, Introduction to Simulation Using
-    SIMAN (match); Ptolemy: ``Synchronizer``, for tokens without a key.
+    The matching fork is an output with several connections.  Tokens of one channel with equal keys wait in the order of
+    arrival; without ``key``, all tokens are equal.  Sources: Pegden and others, Introduction to Simulation Using SIMAN
+    (match); Ptolemy: ``Synchronizer``, for tokens without a key.
     """
 
     input = InputPort(multi=True, doc="the parts")
     output: OutputPort[Any] = OutputPort(list, doc="a token of each channel, in the order of the channels")
-    waiting = OutputPort(int, doc="how many tokens wait for others, whenever that changes")
+    waiting = OutputPort(int, doc="number of tokens that wait for others, whenever it changes")
 
-    key: Parameter[Any] = FormulaParameter(None, doc="what belongs together; of a token's fields, and token")
+    key: Parameter[Any] = FormulaParameter(
+        None, doc="tokens with an equal value belong together: an expression over their fields, and token"
+    )
 
     def initialize(self) -> None:
         self._parts: dict[Any, list[deque[Any]]] = {}

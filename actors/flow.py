@@ -27,22 +27,22 @@ from .expression import FormulaParameter, of_token
 class Merge(Actor):
     """Joins the tokens of all its channels into one stream, one token per microstep.
 
-    Of tokens at the same tag, that of the lowest channel comes first and the others in the microsteps after; with
-    ``discard`` the others are lost.  With ``whole_channel``, as in Ptolemy, all tokens of a channel come at once.
+    Of tokens at the same tag, that of the lowest channel is sent first, the others at the following microsteps; with
+    ``discard``, the others are lost.  With ``whole_channel``, as in Ptolemy, all tokens of a channel are sent at once.
     Ptolemy: ``Merge``.
     """
 
     input = InputPort(multi=True, doc="the streams")
-    output = OutputPort(doc="one token at a time")
+    output = OutputPort(doc="the tokens, one at a time")
 
-    discard = Parameter(bool, False, doc="whether all but the first token of a tag are lost")
+    discard = Parameter(bool, False, doc="whether only the first token of a tag is sent")
     whole_channel = Parameter(
         bool, False, ptolemy=True, doc="whether tokens that come together on one channel leave together"
     )
 
     def initialize(self) -> None:
         self._waiting: list[deque[Any]] = [deque() for _ in range(self.input.width)]
-        self._left: Tag | None = None  # the tag at which a channel was sent whole, and others had to wait
+        self._left: Tag | None = None  # the tag at which a whole channel was sent and others had to wait
 
     def fire(self) -> None:
         for queue, tokens in zip(self._waiting, self.input.by_channel(), strict=True):
@@ -63,17 +63,18 @@ class Merge(Actor):
 
 
 class Router(Actor):
-    """Sends each token to one channel of its output: in turn, at random, to the least loaded, or as the token says.
+    """Sends each token to one channel of its output: in turn, at random, to the least loaded, or by a property of the
+    token.
 
-    For ``shortest queue``, ``load`` takes the load of what each channel leads to, such as the ``size`` of a
-    ``Server``, in the order of the output's channels; it is 0 before the first value, plus one for each token sent
-    before the next value.  Ties are broken at random.  For ``expression``, give ``channel:
+    For ``shortest queue``, connect to ``load`` the load behind each channel, such as the ``size`` of a ``Server``, in
+    the order of the output's channels.  A load is 0 before the first value, plus one for each token sent since the
+    latest value.  Ties are broken at random.  For ``expression``, give ``channel:
     number % 3``, over the token's fields.  Ptolemy: ``Distributor``.
     """
 
-    input = InputPort(doc="what is handed on")
-    load = InputPort(float, multi=True, required=False, doc="how much waits behind each channel of the output")
-    output = OutputPort(multi=True, depends_on=("input",), doc="a channel for each connection, in their order")
+    input = InputPort(doc="tokens to pass on")
+    load = InputPort(float, multi=True, required=False, doc="the load behind each channel of the output")
+    output = OutputPort(multi=True, depends_on=("input",), doc="a channel for each connection, in order")
 
     policy = Parameter(
         str,
@@ -83,18 +84,20 @@ class Router(Actor):
         doc="how the channel is chosen",
     )
     weights: Parameter[Any] = array_parameter(
-        (None,), None, unit="1", min=0, doc="how likely each channel is with 'random'; all alike if left out"
+        (None,), None, unit="1", min=0, doc="relative probability of each channel with 'random'; all equal if left out"
     )
     channel: Parameter[Any] = FormulaParameter(
-        None, doc="the channel for 'expression', from 0; of the token's fields, token, time, channels (how many)"
+        None,
+        doc="the channel for 'expression', from 0: an expression over the token's fields, token, time, channels "
+        "(their number)",
     )
 
     def check(self) -> None:
         for name, policy in (("weights", "random"), ("channel", "expression")):
             if getattr(self, name) is not None and self.policy != policy:
-                raise ParameterError(f"{name}: it is for the policy {policy!r}, and the policy is {self.policy!r}")
+                raise ParameterError(f"{name}: it is for the policy {policy!r}, but the policy is {self.policy!r}")
         if self.policy == "expression" and self.channel is None:
-            raise ParameterError("policy: 'expression' needs 'channel', which says which channel a token goes to")
+            raise ParameterError("policy: 'expression' needs 'channel', an expression for the channel of a token")
         self._sums: list[float] | None = None
         if self.weights is not None:
             try:
@@ -108,11 +111,12 @@ class Router(Actor):
         if self.policy == "shortest queue" and self.load.width != width:
             raise PortError(
                 f"{self.output.path} has {counted(width, 'channel')} and {self.load.path} has {self.load.width}; "
-                "'shortest queue' needs to be told of each"
+                "'shortest queue' needs one load for each channel"
             )
         if self._sums is not None and len(self._sums) != width:
             raise PortError(
-                f"{self.output.path} has {counted(width, 'channel')}, and there are {len(self._sums)} weights"
+                f"{self.output.path} has {counted(width, 'channel')}, but there are {len(self._sums)} weights; give "
+                "one for each"
             )
         self._loads = [0.0] * width
 
@@ -155,16 +159,16 @@ class Switch(Actor):
     Ptolemy: ``Switch``.
     """
 
-    input = InputPort(doc="what is handed on")
-    control = InputPort(int, doc="the number of the channel, from 0; 0 until a token comes")
-    output = OutputPort(multi=True, doc="a channel for each connection, in their order")
+    input = InputPort(doc="tokens to pass on")
+    control = InputPort(int, doc="number of the channel, from 0; 0 until a token comes")
+    output = OutputPort(multi=True, doc="a channel for each connection, in order")
 
     outside = Parameter(
         str,
         "error",
         choices=("error", "nothing"),
         ptolemy="nothing",
-        doc="what is sent while control names no channel",
+        doc="what is sent while control does not name a channel",
     )
 
     def initialize(self) -> None:
@@ -182,13 +186,13 @@ class Switch(Actor):
 
 
 class BooleanSwitch(Actor):
-    """Sends each token to ``true_output`` or ``false_output``, as the latest ``control`` token says.
+    """Sends each token to ``true_output`` or ``false_output``, according to the latest ``control`` token.
 
-    With several connections of ``input``, each channel leads to that of the outputs with its number.
+    With several connections of ``input``, each channel leads to the channel of the outputs with the same number.
     Ptolemy: ``BooleanSwitch``, ``ConfigurationSwitch`` (whose ``selector`` is ``control``).
     """
 
-    input = InputPort(multi=True, doc="what is handed on")
+    input = InputPort(multi=True, doc="tokens to pass on")
     true_output = OutputPort(multi=True, doc="the tokens that come while control is true")
     false_output = OutputPort(multi=True, doc="the tokens that come while control is false")
 
@@ -205,20 +209,20 @@ class BooleanSwitch(Actor):
 class Select(Actor):
     """Passes on the tokens of the channel that the latest ``control`` token names; those of the others are lost.
 
-    If unread tokens are ``kept``, those of the others wait until they are chosen, and one goes on in each firing, which
-    takes one token of ``control``; a number that names no channel chooses none.
+    If unread tokens are ``kept``, those of the others wait until they are chosen.  Each firing then takes one token of
+    ``control`` and passes one token on; a number that does not name a channel passes none.
     Ptolemy: ``Multiplexor`` and ``BooleanMultiplexor`` (true is channel 1), with tokens kept ``Select``.
     """
 
-    input = InputPort(multi=True, doc="a channel for each connection, in their order")
-    control = InputPort(int, doc="the number of the channel, from 0")
-    output = OutputPort(doc="the tokens of the channel chosen")
+    input = InputPort(multi=True, doc="a channel for each connection, in order")
+    control = InputPort(int, doc="number of the channel, from 0")
+    output = OutputPort(doc="the tokens of the chosen channel")
 
     unread = Parameter(
-        str, "lost", choices=("lost", "kept"), ptolemy="kept", doc="what becomes of tokens that are not chosen"
+        str, "lost", choices=("lost", "kept"), ptolemy="kept", doc="what happens to tokens that are not chosen"
     )
     initial: Parameter[int | None] = Parameter(
-        int, 0, min=0, optional=True, doc="the channel before the first token of control; none if null"
+        int, 0, min=0, optional=True, doc="the channel until the first token of control comes; no channel if null"
     )
 
     def check(self) -> None:
@@ -245,15 +249,15 @@ class Select(Actor):
 
 
 class Repeat(Actor):
-    """Sends each token several times.
+    """Sends each token a number of times.
 
     Ptolemy: ``Repeat``.
     """
 
-    input = InputPort(doc="what is repeated")
-    output = OutputPort(doc="each token, as often as told")
+    input = InputPort(doc="tokens to repeat")
+    output = OutputPort(doc="each token, 'times' times")
 
-    times = PortParameter(int, 2, min=0, doc="how often each token is sent")
+    times = PortParameter(int, 2, min=0, doc="how many times each token is sent")
 
     def fire(self) -> None:
         for token in self.input.tokens:
@@ -262,21 +266,21 @@ class Repeat(Actor):
 
 
 class ByChannel(Actor):
-    """What these actors share: an input and an output with channels that belong together."""
+    """The common part of actors with an input and an output whose channels belong together."""
 
     input = InputPort(multi=True, doc="the streams")
-    output = OutputPort(multi=True, doc="channel by channel what the input gets")
+    output = OutputPort(multi=True, doc="the tokens of the input, channel by channel")
 
     def initialize(self) -> None:
         wanted, found = self.input.width, self.output.width
         if wanted > 1 and found not in (0, wanted):
             raise PortError(
-                f"{self.input.path} has {wanted} channels and {self.output.path} has {found}; they must have "
-                "equally many, for each channel of the input leads to one of the output"
+                f"{self.input.path} has {wanted} channels and {self.output.path} has {found}; give both the same "
+                "number of channels, because each channel of the input leads to one of the output"
             )
 
     def send(self, token: Any, channel: int) -> None:
-        """Send what came on a channel."""
+        """Send the tokens of a channel."""
         if self.input.width == 1 or self.output.width == 0:
             self.output.send(token)
         else:
@@ -284,12 +288,12 @@ class ByChannel(Actor):
 
 
 class Sampler(ByChannel):
-    """Passes on what comes at the same tag as a trigger; all other tokens are lost.
+    """Passes on tokens that come at the same tag as a trigger; all others are lost.
 
     Ptolemy: ``Sampler``.
     """
 
-    trigger = InputPort(multi=True, doc="when to hand on")
+    trigger = InputPort(multi=True, doc="when to pass tokens on")
 
     def fire(self) -> None:
         if self.trigger.present:
@@ -301,13 +305,13 @@ class Sampler(ByChannel):
 class MostRecent(ByChannel):
     """Sends the latest token of each channel whenever it is triggered, even if it has not changed: a zero-order hold.
 
-    A channel on which no token has come yet sends ``initial``, or nothing if that is not given.
+    A channel on which no token has come yet sends ``initial``, or nothing if that is left out.
     Ptolemy: ``MostRecent``, ``ZeroOrderHold``.
     """
 
-    trigger = InputPort(multi=True, doc="when to send; triggers that come together, one on each channel, are one")
+    trigger = InputPort(multi=True, doc="when to send; triggers that come together, one on each channel, count as one")
 
-    initial: Parameter[Any] = Parameter(object, None, doc="what is sent for a channel before its first token")
+    initial: Parameter[Any] = Parameter(object, None, doc="value of a channel before its first token")
 
     def initialize(self) -> None:
         super().initialize()
@@ -318,7 +322,7 @@ class MostRecent(ByChannel):
         self.send_latest()
 
     def note(self) -> None:
-        """Take note of the latest tokens."""
+        """Store the latest tokens."""
         for channel, tokens in enumerate(self.input.by_channel()):
             if tokens:
                 self._latest[channel] = tokens[-1]
@@ -334,7 +338,7 @@ class MostRecent(ByChannel):
 class Synchronizer(ByChannel):
     """Waits until there is a token on every channel, and then sends one of each at the same tag.
 
-    Tokens wait in the order of their arrival.  Ptolemy: ``Synchronizer``.
+    Tokens wait in the order of arrival.  Ptolemy: ``Synchronizer``.
     """
 
     def initialize(self) -> None:

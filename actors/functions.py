@@ -44,27 +44,27 @@ class Expression(Actor):
     """Evaluates an expression whenever one of its inputs gets a token.
 
     Every name in the expression is an input port: ``expression: a + 2 * b`` has the inputs ``a`` and ``b``.  ``time``
-    is the present time in s, ``pi``, ``e`` and ``inf`` are what they are called.  The language is that of ``${...}``:
-    nothing in it can reach files or Python.  An array comes as a list, a record as a dict of its fields
-    (``state['position'][0]``).  What ``${...}`` puts into the text is put in as it is written, so a value that may be
-    negative belongs in parentheses: ``(${a}) ** 2``.
+    is the present time in s, ``pi``, ``e`` and ``inf`` are constants.  The language is that of ``${...}``: it has no
+    access to files or Python.  An array comes as a list, a record as a dict of its fields (``state['position'][0]``).
+    ``${...}`` is replaced by the text of its value, so write a value that may be negative in parentheses: ``(${a}) **
+    2``.
 
-    Nothing is sent before every input has had a token.  Where the inputs keep their tokens, as in Ptolemy, each is used
-    once: with those of the other inputs that are their turn.  Ptolemy: ``Expression``, and most actors that compute
-    something of one token: ``input[index]`` is its ``ArrayElement``.
+    Nothing is sent before every input has had a token.  Where the inputs keep their tokens, as in Ptolemy, each token
+    is used once: the k-th tokens of all inputs together.  Ptolemy: ``Expression``, and most actors that compute one
+    token from another: ``input[index]`` is its ``ArrayElement``.
     """
 
     output: OutputPort[Any] = OutputPort(float, doc="the value of the expression")
 
-    expression = FormulaParameter(doc="what is computed; its names are the input ports")
+    expression = FormulaParameter(doc="the expression; its names are the input ports")
     gives: Parameter[str | None] = Parameter(
         str,
         None,
         choices=tuple(_KINDS),
         ptolemy="any value",
-        doc="what the value is; a truth value for a comparison and otherwise a number if left out",
+        doc="type of the value; if left out, a truth value for a comparison, a number otherwise",
     )
-    hold = Parameter(bool, True, doc="whether an input without a token counts with its latest one")
+    hold = Parameter(bool, True, doc="whether an input without a token is used with its latest one")
     iteration = Parameter(bool, False, doc="whether the name 'iteration' is the number of the evaluation, from 1")
 
     def check(self) -> None:
@@ -74,7 +74,7 @@ class Expression(Actor):
     def own_ports(self) -> dict[str, InputPort[Any] | OutputPort[Any]]:
         known = ("time", "iteration") if self.iteration else ("time",)
         names = [name for name in self.expression.names if name not in known]
-        return {name: InputPort(ptolemy={"keep": True}, doc="a name of the expression") for name in names}
+        return {name: InputPort(ptolemy={"keep": True}, doc="a name in the expression") for name in names}
 
     def initialize(self) -> None:
         self._ports = list(self.inputs.values())
@@ -99,11 +99,13 @@ class Expression(Actor):
     def _checked(self, value: Any) -> Any:
         if _IS_KIND[self._kind](value):
             return value
-        raise EpicycleError(f"{self.expression} gives {value!r}, which is not a {self._kind}: say so with 'gives'")
+        raise EpicycleError(
+            f"{self.expression} gives {value!r}, which is not a {self._kind}; set 'gives' to the type of the value"
+        )
 
 
 class FunctionParameter(Parameter[Callable[..., Any]]):
-    """A function that a model file names: one of those given in Python, or one that an installed package offers."""
+    """A function named in a model file: given in Python, or offered by an installed package."""
 
     def __init__(self, given: Mapping[str, Callable[..., Any]], *, doc: str = "") -> None:
         super().__init__(str, doc=doc)  # type: ignore[arg-type]
@@ -127,13 +129,13 @@ class FunctionParameter(Parameter[Callable[..., Any]]):
                 except Exception as error:
                     raise ParameterError(f"{value!r} cannot be loaded: {type(error).__name__}: {error}") from None
                 if not callable(found):
-                    raise ParameterError(f"{value!r} is not a function but {type(found).__name__}")
+                    raise ParameterError(f"{value!r} is not a function but of type {type(found).__name__}")
                 return found  # type: ignore[no-any-return]
         known = sorted({*self.given, *(point.name for point in offered)})
         raise ParameterError(
-            f"{value!r} is not a function that models may call{did_you_mean(value, known)}; "
-            f"they may call {', '.join(known) or 'none'}; a package offers its functions as entry points of the group "
-            f"{FUNCTION_GROUP!r}, Python gives them with load_model(types=[Function.knowing(f)])"
+            f"{value!r} is not a function that models may call{did_you_mean(value, known)}; they may call: "
+            f"{', '.join(known) or 'none'}; packages offer functions as entry points of the group "
+            f"{FUNCTION_GROUP!r}, Python programs with load_model(types=[Function.knowing(f)])"
         )
 
 
@@ -142,23 +144,23 @@ class Function(Actor):
 
     The parameters of the function are the input ports; those with a default need not be connected.  Annotations with
     plain types are the types of the ports.  Nothing is sent before every connected input has had a token, nor when
-    the function returns ``None``.  The function should be pure: it is called whenever tokens come, and a state of its
-    own, or random numbers, would make runs differ.
+    the function returns ``None``.  The function should be pure: it is called whenever tokens come, and internal state
+    or random numbers would make runs differ.
 
-    A model file cannot make Epicycle run what it likes.  It may name functions that an installed package offers as
-    entry points of the group ``epicycle.functions`` (``magnitude = "my_package.geometry:magnitude"``), by their name
-    or as ``my_package.geometry:magnitude``; and those that a Python program hands over:
-    ``load_model("m.yaml", types=[Function.knowing(magnitude)])``.
+    A model file cannot make Epicycle run arbitrary code.  It may name functions that an installed package offers as
+    entry points of the group ``epicycle.functions`` (``magnitude = "my_package.geometry:magnitude"``), by their name or
+    as ``my_package.geometry:magnitude``; and those that a Python program provides: ``load_model("m.yaml",
+    types=[Function.knowing(magnitude)])``.
     """
 
-    output = OutputPort(doc="what the function returns")
+    output = OutputPort(doc="the return value of the function")
 
-    function = FunctionParameter({}, doc="which function, by its name or as package.module:name")
-    hold = Parameter(bool, True, doc="whether an input without a token counts with its latest one")
+    function = FunctionParameter({}, doc="the function, by its name or as package.module:name")
+    hold = Parameter(bool, True, doc="whether an input without a token is used with its latest one")
 
     @classmethod
     def knowing(cls, *functions: Callable[..., Any]) -> type[Function]:
-        """This actor, for models that may name these functions as well, by ``name`` or ``module:name``."""
+        """This actor class, for models that may also name these functions, as ``name`` or ``module:name``."""
         before = declared_parameters(cls)["function"]
         assert isinstance(before, FunctionParameter)
         given = dict(before.given)
@@ -175,13 +177,15 @@ class Function(Actor):
         try:
             parameters = inspect.signature(self.function).parameters.values()
         except (TypeError, ValueError):
-            raise ParameterError(f"function: {name} does not tell its parameters, which would be the ports") from None
+            raise ParameterError(
+                f"function: {name} does not declare its parameters, which are needed as ports"
+            ) from None
         hints = _hints(self.function)
         ports: dict[str, InputPort[Any] | OutputPort[Any]] = {}
         for each in parameters:
             if each.kind in (each.VAR_POSITIONAL, each.VAR_KEYWORD):
                 raise ParameterError(
-                    f"function: {name} takes any number of arguments ({each.name}), which gives no ports"
+                    f"function: {name} takes any number of arguments ({each.name}), so its ports are unknown"
                 )
             ports[each.name] = InputPort(
                 _port_type(hints.get(each.name)), required=each.default is each.empty, doc=f"argument of {name}"
@@ -203,12 +207,12 @@ class Function(Actor):
 def _hints(function: Callable[..., Any]) -> dict[str, Any]:
     try:
         return typing.get_type_hints(function)
-    except Exception:  # annotations may be anything, and need not make sense here
+    except Exception:  # annotations may be anything, and may make no sense here
         return {}
 
 
 def _port_type(hint: Any) -> Any:
-    """The port type for an annotation: that of a plain class or a union of them, or else any."""
+    """The port type for an annotation: a plain class or a union of them, otherwise any type."""
     if isinstance(hint, UnionType):
         kinds = [each for each in typing.get_args(hint) if each is not type(None)]
         return typing.Union[tuple(map(_port_type, kinds))]  # noqa: UP007
@@ -218,13 +222,13 @@ def _port_type(hint: Any) -> Any:
 class LookupTable(Actor):
     """Looks a number up in a table.
 
-    Without ``at``, the input is an index into ``values``, the first being 0.  With it, ``values[k]`` belongs to the
-    argument ``at[k]``, and between two arguments the values are interpolated linearly.
+    Without ``at``, the input is an index into ``values``, from 0.  With ``at``, ``values[k]`` is the value at the
+    argument ``at[k]``, and values are interpolated linearly between arguments.
     Ptolemy: ``LookupTable``, ``Interpolator``.
     """
 
     input = InputPort(float, doc="an index, or an argument if 'at' is given")
-    output = OutputPort(doc="the value that belongs to it")
+    output = OutputPort(doc="the value at the index or argument")
 
     values: Parameter[Any] = Parameter(object, shape=(None,), doc="the table")
     at: Parameter[Any] = array_parameter((None,), None, doc="the arguments of the values, ascending")
@@ -233,37 +237,41 @@ class LookupTable(Actor):
         "error",
         choices=("error", "nearest", "nothing"),
         ptolemy="nothing",
-        doc="what is sent for an input beyond the table's ends",
+        doc="what is sent for an input outside the table",
     )
 
     def check(self) -> None:
         if not self.values:
-            raise ParameterError("values: the table is empty")
+            raise ParameterError("values: the table is empty; give at least one value")
         self.output.type = token_type(self.values)
         numeric = self.output.type in (int, float)
         if self.at is None:
             return
         self.output.type = float
         if not numeric:
-            raise ParameterError("values: only numbers can be interpolated")
+            raise ParameterError(
+                "values: they must be numbers to be interpolated; leave out 'at' to look them up by index"
+            )
         if len(self.at) != len(self.values):
-            raise ParameterError(f"at: {counted(len(self.at), 'argument')} for {counted(len(self.values), 'value')}")
+            raise ParameterError(
+                f"at: {counted(len(self.at), 'argument')} for {counted(len(self.values), 'value')}; give one for each"
+            )
         if not np.all(np.diff(self.at) > 0):
-            raise ParameterError(f"at: {self.at.tolist()} does not ascend")
+            raise ParameterError(f"at: {self.at.tolist()} is not ascending")
 
     def fire(self) -> None:
         low, high = (0, len(self.values) - 1) if self.at is None else (self.at[0], self.at[-1])
         for token in self.input.tokens:
             inside = low <= token <= high
             if not inside and (self.outside == "error" or math.isnan(token)):
-                raise EpicycleError(f"{token!r} lies outside of the table, which goes from {low:g} to {high:g}")
+                raise EpicycleError(f"{token!r} is outside the table, which goes from {low:g} to {high:g}")
             if inside or self.outside == "nearest":
                 self.output.send(self._at(min(max(token, low), high)))
 
     def _at(self, argument: float) -> Any:
         if self.at is None:
             if int(argument) != argument:
-                raise EpicycleError(f"{argument!r} is not an index: with 'at' the table would be interpolated")
+                raise EpicycleError(f"{argument!r} is not an index; give 'at' to interpolate the table")
             return self.values[int(argument)]
         right = bisect_right(self.at, argument)
         if right == len(self.at):

@@ -1,6 +1,6 @@
-"""Generators of other programs, whose numbers a model may ask for to be compared with them: JavaRandom, DRand.
+"""Generators of other programs, so that a model can be compared with them: JavaRandom, DRand.
 
-Everybody else takes the numbers of the actor's own stream, which depend on the run's seed and the actor's path alone.
+All other models use the actor's own stream, which depends only on the seed of the run and the path of the actor.
 """
 
 from __future__ import annotations
@@ -17,17 +17,17 @@ _STEP = 1.0 / 2**53
 
 
 class Numbers:
-    """Random numbers with those methods of a ``Stream`` that distributions ask for: write ``random``."""
+    """Random numbers with the methods of a ``Stream`` that distributions use: write ``random``."""
 
     def __init__(self) -> None:
-        self._gaussian: float | None = None  # which is left of a pair
+        self._gaussian: float | None = None  # the second of a pair
 
     def random(self) -> float:
         """Uniform in [0, 1)."""
         raise NotImplementedError
 
     def weighted(self, sums: Sequence[float]) -> int:
-        """An index, as likely as its weight; ``sums`` are those of the weights up to each."""
+        """An index with a probability in proportion to its weight; ``sums`` are the cumulated weights."""
         return min(bisect_left(sums, self.random() * sums[-1]), len(sums) - 1)
 
     def uniform(self, low: float = 0.0, high: float = 1.0) -> float:
@@ -68,14 +68,14 @@ class Numbers:
     def __getattr__(self, name: str) -> Any:
         if name.startswith("_"):
             raise AttributeError(name)
-        raise EpicycleError(f"a generator of another program has no {name!r}: leave 'generator' out")
+        raise EpicycleError(f"a generator of another program has no {name!r}; leave out 'generator'")
 
 
 class Generator(Configurable):
     """Base of the generators of other programs."""
 
     def numbers(self) -> Numbers:
-        """Its numbers from the first on."""
+        """Its numbers, from the first one."""
         raise NotImplementedError(f"{type(self).__name__} has no numbers()")
 
 
@@ -93,13 +93,13 @@ class _OfJava(Numbers):
 
 
 class JavaRandom(Generator):
-    """``java.util.Random``, of which most random actors of Ptolemy II take their numbers.
+    """``java.util.Random``, from which most random actors of Ptolemy II draw their numbers.
 
-    There the seed is ``privateSeed``, or ``seed`` plus Java's hash of the actor's full name, ``.Model.Actor``.
-    Source: Lehmer's linear congruential generator modulo 2^48, as the documentation of Java 8 gives it.
+    In Ptolemy, the seed is ``privateSeed``, or ``seed`` plus Java's hash of the actor's full name, ``.Model.Actor``.
+    Source: Lehmer's linear congruential generator modulo 2^48, as given in the documentation of Java 8.
     """
 
-    seed = Parameter(int, doc="the seed, a whole number of which the last 64 bits count")
+    seed = Parameter(int, doc="the seed, a whole number of which the last 64 bits are used")
 
     def numbers(self) -> Numbers:
         return _OfJava(self.seed & _OF_LONG)
@@ -123,7 +123,7 @@ class _OfDRand(Numbers):
         return y, x
 
     def gamma(self, shape: float, scale: float = 1.0) -> float:
-        """Gamma, by what Ahrens and Dieter call GS and GD (Computing 12, 1974, and CACM 25, 1982)."""
+        """Gamma, by the methods GS and GD of Ahrens and Dieter (Computing 12, 1974, and CACM 25, 1982)."""
         return scale * (self._small_gamma(shape) if shape < 1.0 else self._large_gamma(shape))
 
     def _small_gamma(self, shape: float) -> float:
@@ -142,7 +142,7 @@ class _OfDRand(Numbers):
     def _large_gamma(self, shape: float) -> float:
         square = shape - 0.5
         root = math.sqrt(square)
-        normal = self._pair()[1]  # the first of the two, and of numbers of its own
+        normal = self._pair()[1]  # the first of the two, from separate numbers
         guess = root + 0.5 * normal
         if normal >= 0.0:
             return guess * guess
@@ -183,7 +183,7 @@ class _OfDRand(Numbers):
         """Poisson with a mean below 10, by inversion."""
         if not mean < 10.0:
             raise EpicycleError(
-                f"DRand draws Poisson numbers whose mean is below 10, not {mean:g}: leave 'generator' out"
+                f"DRand draws Poisson numbers only with a mean below 10, not {mean:g}; leave out 'generator'"
             )
         while True:
             share = self.random()
@@ -196,12 +196,12 @@ class _OfDRand(Numbers):
                     return number
 
     def binomial(self, trials: int, probability: float) -> int:
-        """Binomial with fewer than 10 to be expected, or as few failures, by inversion."""
+        """Binomial with a mean of fewer than 10 successes or failures, by inversion."""
         small = min(probability, 1.0 - probability)
         mean, other = trials * small, 1.0 - small
         if not mean < 10.0:
             raise EpicycleError(
-                f"DRand draws binomial numbers whose mean is below 10, not {mean:g}: leave 'generator' out"
+                f"DRand draws binomial numbers only with a mean below 10, not {mean:g}; leave out 'generator'"
             )
         if mean == 0.0:
             return trials if probability == 1.0 else 0
@@ -218,7 +218,7 @@ class _OfDRand(Numbers):
         return trials - number if probability > 0.5 else number
 
     def negative_binomial(self, successes: float, probability: float) -> int:
-        """Failures before so many successes: Poisson, with a gamma mean."""
+        """Failures before a number of successes: Poisson with a gamma mean."""
         return self.poisson((1.0 - probability) / probability * self.gamma(successes))
 
     def chisquare(self, freedom: float) -> float:
@@ -259,12 +259,12 @@ class _OfDRand(Numbers):
     def vonmises(self, mean: float, concentration: float) -> float:
         """Von Mises, by the method of Best and Fisher (Applied Statistics 28, 1979).
 
-        Raises ``EpicycleError`` where its ratios lose all their digits, and Colt's own loop does not end.
+        Raises ``EpicycleError`` where the ratios lose all digits, and Colt's own loop does not end.
         """
         if not 1e-6 <= concentration <= 1e6:
             raise EpicycleError(
-                f"DRand draws angles whose concentration is from 1e-6 to 1e6, not {concentration:g}: "
-                "leave 'generator' out"
+                f"DRand draws angles only with a concentration from 1e-6 to 1e6, not {concentration:g}; leave out "
+                "'generator'"
             )
         tau = 1.0 + math.sqrt(1.0 + 4.0 * concentration * concentration)
         rho = (tau - math.sqrt(2.0 * tau)) / (2.0 * concentration)
@@ -279,7 +279,7 @@ class _OfDRand(Numbers):
                 return mean + (angle if self.random() > 0.5 else -angle)
 
 
-# Of Ahrens and Dieter, 1982: lowest power first, from the first power on.
+# Of Ahrens and Dieter, 1982: lowest power first, starting with the first.
 _Q = (
     0.0416666664, 0.0208333723, 0.0079849875, 0.0015746717, -0.0003349403, 0.0003340332, 0.0006053049, -0.0004701849,
     0.0001710320,
@@ -300,13 +300,13 @@ def _polynomial(coefficients: Sequence[float], x: float) -> float:
 
 
 class DRand(Generator):
-    """The generator of the Colt library, of which the actors of Ptolemy II that are called Colt take their numbers.
+    """The generator of the Colt library, from which the actors of Ptolemy II named Colt draw their numbers.
 
-    The seed is as for ``JavaRandom``.  Laws of whole numbers are drawn for means below 10.  Source: Colt 1.2,
-    ``cern.jet.random``, after the papers that it names.
+    The seed is as for ``JavaRandom``.  Laws of whole numbers are supported for means below 10.  Source: Colt 1.2,
+    ``cern.jet.random``, after the papers that it cites.
     """
 
-    seed = Parameter(int, doc="the seed, a whole number of which the last 32 bits count")
+    seed = Parameter(int, doc="the seed, a whole number of which the last 32 bits are used")
 
     def numbers(self) -> Numbers:
         return _OfDRand(self.seed)

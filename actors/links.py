@@ -26,25 +26,27 @@ from .resources import Waiter, Waiters
 
 
 class _Transmitter:
-    """What stands before a wire: frames that wait, in their order, and the one that is being sent."""
+    """The sending end of a wire: frames that wait, in order, and the one that is being sent."""
 
     def __init__(self) -> None:
         self.waiting = Waiters()
         self.sent: Any = None
-        self.wake: Wake | None = None  # when it is sent; none if nothing is
-        self.rest = 0.0  # s that whole nanoseconds have left over while it was busy
+        self.wake: Wake | None = None  # when it has been sent; None if nothing is being sent
+        self.rest = 0.0  # rounding to whole nanoseconds, in s, added up while it was busy
 
 
 class _Transmitting(Actor):
-    """What a link and a switch share: a transmitter for each channel of the output."""
+    """The common part of a link and a switch: a transmitter for each channel of the output."""
 
     rate: PortParameter[float | None] = PortParameter(
-        float, None, unit="bit/s", above=0, doc="how fast frames are sent; at once if left out"
+        float, None, unit="bit/s", above=0, doc="rate at which frames are sent; without delay if left out"
     )
-    size = FormulaParameter("1", doc="length of a frame in bits; of its fields, token, time")
-    order = FormulaParameter("0", doc="of those that wait, the least is sent first; of the same")
+    size = FormulaParameter("1", doc="length of a frame in bits: an expression over its fields, token, time")
+    order = FormulaParameter(
+        "0", doc="of waiting frames, the one with the lowest value is sent first: an expression like size"
+    )
     buffer: Parameter[float | None] = Parameter(
-        float, None, unit="bit", min=0, doc="how much may wait, the frame that is being sent not counted"
+        float, None, unit="bit", min=0, doc="most bits that may wait, without the frame that is being sent"
     )
 
     def initialize(self) -> None:
@@ -53,7 +55,7 @@ class _Transmitting(Actor):
         self._count = 0
 
     def _finish(self) -> list[tuple[int, Any]]:
-        """The frames that have been sent by now, each with its channel."""
+        """The frames that have been sent, each with its channel."""
         found = []
         for channel, transmitter in enumerate(self._transmitters):
             if transmitter.wake is not None and transmitter.wake.due:
@@ -62,11 +64,11 @@ class _Transmitting(Actor):
         return found
 
     def _enqueue(self, token: Any, channel: int) -> bool:
-        """Let a frame wait for its channel; whether there is room for it."""
+        """Let a frame wait for its channel; returns whether there is room for it."""
         transmitter = self._transmitters[channel]
         size = number_of_token(self.size, "a size", token, time=self.now)
         if size < 0:
-            raise EpicycleError(f"{self.size} gives {size:g} for {brief(token)}, but a size is >= 0")
+            raise EpicycleError(f"{self.size} gives {size:g} for {brief(token)}, but a size must be >= 0")
         order = number_of_token(self.order, "an order", token, time=self.now)
         frame = Waiter(token, channel, order, float(self._came), size, self._came)
         self._came += 1
@@ -79,7 +81,7 @@ class _Transmitting(Actor):
         return True
 
     def _begin(self) -> None:
-        """Let those transmitters go on that are free."""
+        """Let free transmitters continue."""
         for transmitter in self._transmitters:
             if transmitter.wake is not None:
                 continue
@@ -103,21 +105,19 @@ class _Transmitting(Actor):
 class Link(_Transmitting):
     """A link in one direction: frames wait, are sent one by one at ``rate``, and arrive after ``delay``.
 
-    A frame takes ``size / rate`` to be sent; then it is lost with the probability ``loss``, or travels for ``delay``,
-    whatever comes behind it.  With Poisson arrivals and frames of one length the wait is that of M/D/1.  At one tag
-    what is sent makes place for what comes.  The output does not depend on the input at once: the actor may stand in a
-    loop. Source: Bertsekas and Gallager, Data Networks.
+    A frame takes ``size / rate`` to be sent; then it is lost with probability ``loss``, or travels for ``delay``,
+    independently of later frames.  With Poisson arrivals and frames of equal length, the wait is that of M/D/1.  At one
+    tag, a frame that has been sent makes room before others come in.  The output does not depend on the input within
+    the same tag, so the actor may be part of a loop. Source: Bertsekas and Gallager, Data Networks.
     """
 
     input = InputPort(multi=True, doc="frames")
     output = OutputPort(depends_on=(), doc="each frame at the other end")
-    lost = OutputPort(depends_on=(), doc="the frames that are lost on the way, when they have been sent")
-    rejected = OutputPort(doc="the frames that found the buffer full")
-    waiting = OutputPort(int, doc="how many frames wait, whenever that changes")
+    lost = OutputPort(depends_on=(), doc="frames lost on the way, sent when their transmission ends")
+    rejected = OutputPort(doc="frames that found the buffer full")
+    waiting = OutputPort(int, doc="number of waiting frames, whenever it changes")
 
-    delay: PortParameter[float] = PortParameter(
-        float, 0.0, unit="s", min=0, doc="propagation: how long a frame travels"
-    )
+    delay: PortParameter[float] = PortParameter(float, 0.0, unit="s", min=0, doc="propagation delay")
     loss: PortParameter[float] = PortParameter(
         float, 0.0, unit="1", min=0, max=1, doc="probability that a frame is lost"
     )
@@ -146,21 +146,21 @@ class Link(_Transmitting):
 
 
 class NetworkSwitch(_Transmitting):
-    """A store-and-forward switch: each frame goes to the channel of the output that ``port`` says, and waits there.
+    """A store-and-forward switch: each frame goes to the channel of the output given by ``port``, and waits there.
 
     ``port: destination`` takes the channel from a field; ``port: "[0, 0, 1][destination]"`` is a table.  Each channel
-    of the output sends its frames one by one at ``rate``, in the order of ``order`` (``order: -priority``), and has a
-    ``buffer`` of its own.  ``latency`` is how long the switch takes to find the channel.  The output does not depend on
-    the input at once: the actor may stand in a loop.  Source: IEEE 802.1Q, strict priority.
+    of the output sends its frames one by one at ``rate``, in the order of ``order`` (``order: -priority``), and has its
+    own ``buffer``.  ``latency`` is how long the switch takes to find the channel.  The output does not depend on the
+    input within the same tag, so the actor may be part of a loop.  Source: IEEE 802.1Q, strict priority.
     """
 
-    input = InputPort(multi=True, doc="frames, of all channels alike")
-    output = OutputPort(multi=True, depends_on=(), doc="the frames, on the channel of their port")
-    rejected = OutputPort(depends_on=(), doc="the frames that found the buffer of their channel full")
-    waiting = OutputPort(int, depends_on=(), doc="how many frames wait in all, whenever that changes")
+    input = InputPort(multi=True, doc="frames, on any channel")
+    output = OutputPort(multi=True, depends_on=(), doc="the frames, on the channel given by 'port'")
+    rejected = OutputPort(depends_on=(), doc="frames that found the buffer of their channel full")
+    waiting = OutputPort(int, depends_on=(), doc="total number of waiting frames, whenever it changes")
 
-    port = FormulaParameter(doc="the channel of the output, from 0; of the frame's fields, token, time")
-    latency = Parameter(float, 0.0, unit="s", min=0, doc="how long a frame is looked at; 0 is a microstep")
+    port = FormulaParameter(doc="the channel of the output, from 0: an expression over the frame's fields, token, time")
+    latency = Parameter(float, 0.0, unit="s", min=0, doc="processing time of a frame; 0 is a microstep")
 
     def initialize(self) -> None:
         super().initialize()
@@ -188,40 +188,46 @@ class NetworkSwitch(_Transmitting):
 
 
 class ArqSender(Actor):
-    """The sending end of an automatic repeat request: keeps frames until they are acknowledged, and sends them again.
+    """The sending end of an automatic repeat request: keeps frames until they are acknowledged, and repeats them.
 
-    A frame is ``{number, data}``, with the token that came as its data.  ``window: 1`` is stop-and-wait.  Otherwise,
-    when the oldest frame has not been acknowledged for ``timeout``, ``repeat: all`` sends all outstanding frames again
-    (go back N), and ``repeat: one`` each frame whose own timeout has elapsed (selective repeat).  An acknowledgement is
-    the number of a frame: with ``all`` it acknowledges all up to this one, with ``one`` this one alone.  Frames go
-    through a ``Link`` with loss to an ``ArqReceiver``, whose acknowledgements come back by another.  The output does
-    not depend on ``ack`` at once.
+    A frame is ``{number, data}``, where data is the incoming token.  ``window: 1`` is stop-and-wait.  Otherwise, when
+    the oldest frame has not been acknowledged for ``timeout``, ``repeat: all`` sends all outstanding frames again (go
+    back N), and ``repeat: one`` each frame whose own timeout has elapsed (selective repeat).  An acknowledgement is the
+    number of a frame: with ``all`` it acknowledges all frames up to this one, with ``one`` only this one.  Frames go
+    through a lossy ``Link`` to an ``ArqReceiver``, whose acknowledgements return by another.  The output does not
+    depend on ``ack`` within the same tag.
 
     Sources: Bertsekas and Gallager, Data Networks, 2.4; Tanenbaum, Computer Networks, 3.4.
     """
 
-    input = InputPort(doc="what is to be delivered")
+    input = InputPort(doc="tokens to deliver")
     ack = InputPort(int, doc="numbers of frames that have arrived")
     output: OutputPort[Any] = OutputPort(dict, depends_on=(), doc="frames: {number, data}")
-    acknowledged = OutputPort(depends_on=(), doc="what came in, when it is known to have arrived")
+    acknowledged = OutputPort(depends_on=(), doc="the tokens that are known to have arrived")
     repeated = OutputPort(int, depends_on=(), doc="the number of each frame that is sent again")
-    waiting = OutputPort(int, depends_on=(), doc="how many wait for the window to move, whenever that changes")
+    waiting = OutputPort(
+        int, depends_on=(), doc="number of tokens that wait for the window to move, whenever it changes"
+    )
 
-    window = Parameter(int, 1, min=1, doc="how many frames may be out")
+    window = Parameter(int, 1, min=1, doc="most frames that may be unacknowledged")
     timeout: PortParameter[float] = PortParameter(
         float, unit="s", above=0, doc="how long to wait for an acknowledgement"
     )
-    spacing = Parameter(float, 0.0, unit="s", min=0, doc="time from one frame to the next at least: what a link takes")
-    repeat = Parameter(str, "all", choices=("all", "one"), doc="what is sent again: all that are out, or what is late")
+    spacing = Parameter(
+        float, 0.0, unit="s", min=0, doc="shortest time from one frame to the next, such as the time that a link takes"
+    )
+    repeat = Parameter(
+        str, "all", choices=("all", "one"), doc="what is sent again: all outstanding frames, or those that are late"
+    )
 
     def initialize(self) -> None:
         self._queue: deque[Any] = deque()
         self._acks: list[int] = []
         self._out: dict[int, Any] = {}  # tokens by number, the oldest first
-        self._late: dict[int, Wake] = {}  # of those that have been sent: when they are late
-        self._ahead: list[int] = []  # those that are to be sent, the oldest first
+        self._late: dict[int, Wake] = {}  # of sent frames: when they are late
+        self._ahead: list[int] = []  # frames to be sent, the oldest first
         self._next = 0  # number
-        self._sent = -1  # the last that was sent for the first time
+        self._sent = -1  # of the latest frame sent for the first time
         self._free = 0  # when (ns) the next may be sent
         self._wake: Wake | None = None
         self._count = 0
@@ -239,7 +245,7 @@ class ArqSender(Actor):
             self._ask(self.context.time)
 
     def _ask(self, time: int) -> None:
-        """See to it that it goes on at a time (ns), or before."""
+        """Make sure that it continues at a time (ns) or earlier."""
         if self._wake is None or self._wake.time > time:
             if self._wake is not None:
                 self._wake.cancel()
@@ -265,7 +271,7 @@ class ArqSender(Actor):
         self._acks = []
 
     def _open(self) -> None:
-        """Let in what the window has place for."""
+        """Let in as many as the window has room for."""
         while self._queue and self._next - next(iter(self._out), self._next) < self.window:
             self._out[self._next] = self._queue.popleft()
             self._ahead.append(self._next)
@@ -288,17 +294,17 @@ class ArqSender(Actor):
 
 
 class ArqReceiver(Actor):
-    """The receiving end of an automatic repeat request: passes on what comes by an ``ArqSender``, once and in order.
+    """The receiving end of an automatic repeat request: passes on the tokens of an ``ArqSender``, once and in order.
 
-    With ``repeat: all`` a frame that is not the next one is thrown away, and the last one in order is acknowledged;
-    with ``one`` it is kept until its turn, and each frame is acknowledged by itself.  Sources: see ``ArqSender``.
+    With ``repeat: all``, a frame that is not the next one is discarded, and the last one in order is acknowledged; with
+    ``one``, it is kept until its turn, and each frame is acknowledged separately.  Sources: see ``ArqSender``.
     """
 
     input: InputPort[Any] = InputPort(dict, doc="frames: {number, data}")
     output = OutputPort(doc="their data, in order")
-    ack = OutputPort(int, doc="numbers of frames, for the sender")
+    ack = OutputPort(int, doc="acknowledgements for the sender: numbers of frames")
 
-    repeat = Parameter(str, "all", choices=("all", "one"), doc="as of the sender")
+    repeat = Parameter(str, "all", choices=("all", "one"), doc="as for the sender")
 
     def initialize(self) -> None:
         self._expected = 0
@@ -308,7 +314,7 @@ class ArqReceiver(Actor):
         for frame in self.input.tokens:
             number, data = field_of(frame, "number"), field_of(frame, "data")
             if isinstance(number, bool) or not isinstance(number, int):
-                raise EpicycleError(f"the number of a frame is {number!r}, but they are counted 0, 1, 2, ...")
+                raise EpicycleError(f"the number of a frame is {number!r}, expected 0, 1, 2, ...")
             if number == self._expected or (number > self._expected and self.repeat == "one"):
                 self._kept[number] = data
             while self._expected in self._kept:

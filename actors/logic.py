@@ -21,15 +21,15 @@ GATES: Final[dict[str, Callable[[list[bool]], bool]]] = {
 class LogicGate(Actor):
     """Combines truth values: and, or, xor (an odd number is true), and their negations nand, nor, xnor.
 
-    ``not`` is ``nor`` of one input.  Channels without a token at this tag do not count, unless ``hold`` is set.
+    ``not`` is ``nor`` of one input.  Channels without a token at this tag are ignored, unless ``hold`` is set.
     Ptolemy: ``LogicFunction``, ``LogicalNot``.
     """
 
     input = InputPort(bool, multi=True, doc="the truth values")
     output = OutputPort(bool, doc="their combination")
 
-    function = Parameter(str, choices=(*GATES, "not"), doc="how they are combined")
-    hold = Parameter(bool, False, doc="whether a channel without a token counts with its latest one")
+    function = Parameter(str, choices=(*GATES, "not"), doc="how truth values are combined")
+    hold = Parameter(bool, False, doc="whether a channel without a token is used with its latest one")
 
     def initialize(self) -> None:
         self._held: list[Any] = []
@@ -61,8 +61,8 @@ COMPARISONS: Final[dict[str, Callable[[Any, Any, float], bool]]] = {
 class Comparator(Actor):
     """Compares ``left`` with ``right``, or with ``value`` if nothing is connected to ``right``.
 
-    A tolerance widens what passes: ``left >= right`` holds down to ``right - tolerance``.  Where the ports keep their
-    tokens, as in Ptolemy, each is compared once: with the token of the other side that is its turn.
+    A tolerance relaxes the comparison: ``left >= right`` holds down to ``right - tolerance``.  Where the ports keep
+    their tokens, as in Ptolemy, each is compared once: the k-th token of one side with the k-th of the other.
     Ptolemy: ``Comparator``.
     """
 
@@ -72,8 +72,8 @@ class Comparator(Actor):
 
     comparison = Parameter(str, choices=tuple(COMPARISONS), doc="which comparison")
     value: Parameter[Any] = Parameter(object, 0, doc="the right side if that port is not connected")
-    tolerance = Parameter(float, 0.0, min=0, doc="by how much numbers may differ and still count as equal")
-    hold = Parameter(bool, True, doc="whether an input without a token counts with its latest one")
+    tolerance = Parameter(float, 0.0, min=0, doc="largest difference of numbers that still count as equal")
+    hold = Parameter(bool, True, doc="whether an input without a token is used with its latest one")
 
     def initialize(self) -> None:
         self._latest = Latest([self.left, self.right], hold=self.hold)
@@ -85,16 +85,16 @@ class Comparator(Actor):
 
 
 class Equals(Actor):
-    """Sends whether all tokens that come together are equal; channels without a token do not count.
+    """Sends whether all tokens that come together are equal; channels without a token are ignored.
 
     Ptolemy: ``Equals``.
     """
 
-    input = InputPort(multi=True, doc="what is compared")
+    input = InputPort(multi=True, doc="the tokens to compare")
     output = OutputPort(bool, doc="whether all are equal")
 
     tolerance = Parameter(
-        float, 0.0, min=0, doc="by how much numbers, also in lists and fields, may differ from the first"
+        float, 0.0, min=0, doc="largest difference of numbers, also in lists and fields, from the first token"
     )
 
     def fire(self) -> None:

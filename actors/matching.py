@@ -10,9 +10,10 @@ from .expression import operand
 
 
 def matched(ports: Sequence[InputPort[Any]]) -> Iterator[dict[str, Any]]:
-    """Of single ports that keep their tokens, the first of each, by its name, once there is one at each connected port.
+    """The first token of each of several single ports that keep their tokens, by name, if there is one at each
+    connected port.
 
-    Once at most: as long as there are more the actor fires again, as in Ptolemy.
+    At most once: while there are more tokens, the actor fires again, as in Ptolemy.
     """
     connected = [port for port in ports if port.width]
     if all(port.present for port in connected):
@@ -20,13 +21,14 @@ def matched(ports: Sequence[InputPort[Any]]) -> Iterator[dict[str, Any]]:
 
 
 def taken(port: InputPort[Any]) -> int:
-    """Take the first token of each channel out of a port that keeps them; how many there were."""
+    """Take out the first token of each channel of a port that keeps tokens; returns how many there were."""
     found = [port.get(channel) for channel in range(port.width) if port.waiting(channel)]
     return len(found)
 
 
 def alike(token: Any, other: Any, tolerance: float) -> bool:
-    """Whether tokens are equal but for numbers that may differ so much; lists and fields are compared item by item."""
+    """Whether tokens are equal except that numbers may differ by a tolerance; lists and fields are compared item by
+    item."""
     token, other = operand(token), operand(other)
     if isinstance(token, list) and isinstance(other, list):
         return len(token) == len(other) and all(map(alike, token, other, [tolerance] * len(token)))

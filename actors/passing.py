@@ -1,5 +1,5 @@
-"""What passes of a stream, and when: Filter, Inhibit, FirstOfInstant, Changes, Previous, Register, LatestOfAll,
-BooleanSelect, Commutator, Sequencer, Default, IsPresent."""
+"""Actors that pass on some of the tokens of a stream, or at other times: Filter, Inhibit, FirstOfInstant, Changes,
+Previous, Register, LatestOfAll, BooleanSelect, Commutator, Sequencer, Default, IsPresent."""
 
 from __future__ import annotations
 
@@ -18,26 +18,26 @@ class Filter(ByChannel):
     Ptolemy: ``EventFilter``, ``TrueGate``.
     """
 
-    condition = FormulaParameter("token", doc="which tokens pass; of the token's fields, token, time")
+    condition = FormulaParameter("token", doc="which tokens pass: an expression over the token's fields, token, time")
 
     def fire(self) -> None:
         for channel, tokens in enumerate(self.input.by_channel()):
             for token in tokens:
                 passes = of_token(self.condition, token, time=self.now)
                 if not isinstance(passes, bool):
-                    raise EpicycleError(f"{self.condition} gives {passes!r} for {brief(token)}, not true or false")
+                    raise EpicycleError(f"{self.condition} gives {passes!r} for {brief(token)}, expected true or false")
                 if passes:
                     self.send(token, channel)
 
 
 class Inhibit(ByChannel):
-    """Passes on what comes unless an ``inhibit`` token comes with it; the opposite of a ``Sampler``.
+    """Passes on tokens unless an ``inhibit`` token comes with them; the opposite of a ``Sampler``.
 
-    Of several tokens of a channel at one tag, each ``inhibit`` token stops one, the first ones first.
+    Of several tokens of a channel at one tag, each ``inhibit`` token stops one, beginning with the first.
     Ptolemy: ``Inhibit``.
     """
 
-    inhibit = InputPort(multi=True, doc="when to hand on nothing")
+    inhibit = InputPort(multi=True, doc="when to stop tokens")
 
     def fire(self) -> None:
         for tokens, inhibits in rounds(self.input, self.inhibit):
@@ -47,13 +47,13 @@ class Inhibit(ByChannel):
 
 
 class FirstOfInstant(Actor):
-    """Passes on the first token of each instant; those that come at the same time, also at later microsteps, are lost.
+    """Passes on the first token of each instant; others at the same time, also at later microsteps, are lost.
 
     Ptolemy: ``SuppressSimultaneousEvents``.
     """
 
     input = InputPort(doc="the stream")
-    output = OutputPort(doc="one token of each instant")
+    output = OutputPort(doc="the first token of each instant")
 
     def initialize(self) -> None:
         self._last: int | None = None
@@ -66,28 +66,28 @@ class FirstOfInstant(Actor):
 
 
 class Changes(Actor):
-    """Passes on the first number, and then each that differs by more than ``by`` from the one handed on before.
+    """Passes on the first number, and then each that differs by more than ``by`` from the last one passed on.
 
     Source: M. Miskowicz, Send-on-delta concept, Sensors 6, 2006.  Ptolemy: ``QuantizedSampler``.
     """
 
     input = InputPort(float, doc="the numbers")
-    output = OutputPort(float, doc="those that differ")
+    output = OutputPort(float, doc="the numbers that differ enough")
 
-    by = Parameter(float, 0.0, min=0, doc="how much a number may differ and still be held back")
+    by = Parameter(float, 0.0, min=0, doc="difference up to which a number is held back")
 
     def initialize(self) -> None:
         self._last: float | None = None
 
     def fire(self) -> None:
         for token in self.input.tokens:
-            if self._last is None or not abs(token - self._last) <= self.by:  # nan differs from all
+            if self._last is None or not abs(token - self._last) <= self.by:  # nan differs from every number
                 self._last = token
                 self.output.send(token)
 
 
 class Previous(Actor):
-    """Sends for each token the one that came before it; for the first ``initial``, or nothing if that is not given.
+    """Sends for each token the one before it; for the first one ``initial``, or nothing if that is left out.
 
     Ptolemy: ``Previous``.
     """
@@ -95,7 +95,7 @@ class Previous(Actor):
     input = InputPort(doc="the stream")
     output = OutputPort(doc="the stream, one token behind")
 
-    initial: Parameter[Any] = Parameter(object, None, doc="what is sent for the first token")
+    initial: Parameter[Any] = Parameter(object, None, doc="value sent for the first token")
 
     def initialize(self) -> None:
         self._before = self.initial
@@ -108,12 +108,13 @@ class Previous(Actor):
 
 
 class Register(MostRecent):
-    """Sends the latest token of each channel from before this tag whenever it is triggered, as often as that happens.
+    """Sends the latest token of each channel from before this tag whenever it is triggered.
 
-    The output does not depend on the input at once: the actor may stand in a loop.  Ptolemy: ``Register``.
+    The output does not depend on the input within the same tag, so the actor may be part of a loop.  Ptolemy:
+    ``Register``.
     """
 
-    output = OutputPort(multi=True, depends_on=("trigger",), doc="channel by channel what the input got before")
+    output = OutputPort(multi=True, depends_on=("trigger",), doc="the tokens from before this tag, channel by channel")
 
     def fire(self) -> None:
         self.send_latest()
@@ -121,12 +122,12 @@ class Register(MostRecent):
 
 
 class LatestOfAll(ByChannel):
-    """Sends the latest token of every channel whenever one comes on any of them.
+    """Sends the latest token of every channel whenever a token comes on any of them.
 
-    A channel on which no token has come yet sends ``initial``, or nothing if that is not given.  Ptolemy: ``Wire``.
+    A channel on which no token has come yet sends ``initial``, or nothing if that is left out.  Ptolemy: ``Wire``.
     """
 
-    initial: Parameter[Any] = Parameter(object, None, doc="what is sent for a channel before its first token")
+    initial: Parameter[Any] = Parameter(object, None, doc="value of a channel before its first token")
 
     def initialize(self) -> None:
         super().initialize()
@@ -142,19 +143,20 @@ class LatestOfAll(ByChannel):
 
 
 class BooleanSelect(Actor):
-    """Each ``control`` token lets the next token of ``true_input`` or of ``false_input`` pass, as it says.
+    """Each ``control`` token lets the next token of ``true_input`` or ``false_input`` pass.
 
-    Tokens wait until they are chosen, and control tokens until there is one for them, on each channel if there are
-    several.  If unread tokens are ``lost``, the latest control token holds, and what is not chosen is gone.
+    Tokens wait until they are chosen, and control tokens until the chosen input has a token, on each channel if there
+    are several.  If unread tokens are ``lost``, the latest control token applies, and tokens that are not chosen are
+    lost.
     Ptolemy: ``BooleanSelect``, with tokens lost ``BooleanMultiplexor``.
     """
 
-    true_input = InputPort(multi=True, keep=True, required=False, doc="what passes for a control token that is true")
-    false_input = InputPort(multi=True, keep=True, required=False, doc="what passes for one that is false")
-    control = InputPort(bool, keep=True, doc="which input is next")
-    output = OutputPort(multi=True, doc="what passes, channel by channel")
+    true_input = InputPort(multi=True, keep=True, required=False, doc="tokens that pass for a true control token")
+    false_input = InputPort(multi=True, keep=True, required=False, doc="tokens that pass for a false one")
+    control = InputPort(bool, keep=True, doc="which input is next: true or false")
+    output = OutputPort(multi=True, doc="the chosen tokens, channel by channel")
 
-    unread = Parameter(str, "kept", choices=("kept", "lost"), doc="what becomes of tokens that are not chosen")
+    unread = Parameter(str, "kept", choices=("kept", "lost"), doc="what happens to tokens that are not chosen")
 
     def check(self) -> None:
         self.true_input.keep = self.false_input.keep = self.control.keep = self.unread == "kept"
@@ -177,7 +179,7 @@ class BooleanSelect(Actor):
             self._control = None
 
     def _hand_on(self) -> None:
-        """Send what has come where the latest control token says."""
+        """Send the tokens of the input that the latest control token chose."""
         if self.control.present:
             self._control = self.control.value
         if self._control is not None:
@@ -188,15 +190,15 @@ class BooleanSelect(Actor):
 
 
 class Commutator(Actor):
-    """Passes on what comes at the channels of its input in turn, ``block`` tokens of each; tokens wait for their turn.
+    """Passes on tokens from the channels of its input in turn, ``block`` from each; tokens wait for their turn.
 
     Ptolemy: ``Commutator``, ``SingleTokenCommutator`` (``waits: false``).
     """
 
-    input = InputPort(multi=True, doc="a channel for each connection, in their order")
+    input = InputPort(multi=True, doc="a channel for each connection, in order")
     output = OutputPort(doc="the tokens in turn")
 
-    block = Parameter(int, 1, min=1, doc="how many tokens a channel sends in its turn, as soon as it has them")
+    block = Parameter(int, 1, min=1, doc="number of tokens that a channel sends in its turn, when it has them all")
     waits = Parameter(bool, True, doc="whether the others wait while a channel in its turn has too few tokens")
 
     def initialize(self) -> None:
@@ -216,14 +218,14 @@ class Commutator(Actor):
 
 
 class Sequencer(Actor):
-    """Hands tokens on in the order of their numbers, which count up from ``first``; each waits until it is its turn.
+    """Passes on tokens in the order of their numbers, which count up from ``first``; each waits for its turn.
 
-    The k-th token has the k-th number; one whose number has had its turn is lost.
+    The k-th token has the k-th number; a token whose number has already had its turn is lost.
     Ptolemy: ``Sequencer``, where the number is called ``sequenceNumber``.
     """
 
     input = InputPort(keep=True, doc="the tokens")
-    number = InputPort(int, keep=True, doc="the place of each in the sequence")
+    number = InputPort(int, keep=True, doc="the number of each token in the sequence")
     output = OutputPort(doc="the tokens in the order of their numbers")
 
     first = Parameter(int, 0, doc="the first number")
@@ -242,16 +244,18 @@ class Sequencer(Actor):
 
 
 class Default(Actor):
-    """Passes on what comes at ``preferred``, and otherwise, if nothing does, what comes at ``alternate``.
+    """Passes on the token at ``preferred``, or, if there is none, the one at ``alternate``.
 
     Ptolemy: ``Default``.
     """
 
-    preferred = InputPort(doc="what goes before")
-    alternate = InputPort(doc="what is handed on where nothing comes with it at 'preferred'")
-    output = OutputPort(ptolemy={"depends_on": ("preferred",)}, doc="one or the other")
+    preferred = InputPort(doc="tokens that take precedence")
+    alternate = InputPort(doc="tokens that pass if none comes at 'preferred' at the same tag")
+    output = OutputPort(ptolemy={"depends_on": ("preferred",)}, doc="the preferred or the alternate token")
 
-    both = Parameter(bool, False, ptolemy=True, doc="whether what comes at 'alternate' follows, at the same tag")
+    both = Parameter(
+        bool, False, ptolemy=True, doc="whether a token at 'alternate' follows the preferred one, at the same tag"
+    )
 
     def fire(self) -> None:
         if self.both:
@@ -264,12 +268,12 @@ class Default(Actor):
 
 
 class IsPresent(ByChannel):
-    """Sends, for each channel, whether it has a token, whenever any of them has one.
+    """Sends for each channel whether it has a token, whenever any channel has one.
 
     Ptolemy: ``IsPresent``.
     """
 
-    output = OutputPort(bool, multi=True, doc="channel by channel whether there is a token")
+    output = OutputPort(bool, multi=True, doc="whether there is a token, channel by channel")
 
     def fire(self) -> None:
         for (tokens,) in rounds(self.input):

@@ -24,27 +24,27 @@ from .matching import taken
 
 
 class Queue(Actor):
-    """Keeps tokens, first in, first out, and lets one go for each trigger.
+    """Keeps tokens, first in, first out, and releases one for each trigger.
 
-    At one tag tokens come in before triggers let them out.  With ``one_at_a_time``, as in Ptolemy, a firing takes one
-    token and one trigger, of which all channels together are one, and tells ``size`` at its end, changed or not; one
-    trigger waits at most; ``output`` does not depend on ``input`` at once, though a token may pass at once.  What comes
-    together with a trigger to a full queue counts in ``size`` there, and is lost; what comes on another channel of
-    ``trigger`` than the first alone waits for the next firing.  Ptolemy: ``Queue``.
+    At one tag, tokens come in before triggers release them.  With ``one_at_a_time``, as in Ptolemy, a firing takes one
+    token and one trigger (all channels together count as one), and sends ``size`` at its end, changed or not; at most
+    one trigger waits; ``output`` does not depend on ``input`` within the same tag, although a token may pass at once.
+    A token that comes to a full queue together with a trigger is included in ``size``, and lost; a trigger that comes
+    only on a channel other than the first waits for the next firing.  Ptolemy: ``Queue``.
     """
 
-    input = InputPort(doc="what comes in")
-    trigger = InputPort(multi=True, required=False, doc="lets the first token go; does nothing if there is none")
-    output = OutputPort(ptolemy={"depends_on": ("trigger",)}, doc="the tokens in the order in which they came")
-    size = OutputPort(int, doc="how many tokens are in it, whenever that changes")
-    rejected = OutputPort(depends_on=("input",), doc="the tokens that found it full")
+    input = InputPort(doc="tokens to keep")
+    trigger = InputPort(multi=True, required=False, doc="releases the first token; does nothing if there is none")
+    output = OutputPort(ptolemy={"depends_on": ("trigger",)}, doc="the tokens in order of arrival")
+    size = OutputPort(int, doc="number of tokens in the queue, whenever it changes")
+    rejected = OutputPort(depends_on=("input",), doc="tokens that found the queue full")
 
     capacity: Parameter[int | None] = Parameter(
-        int, None, min=1, doc="how many tokens it holds; any number if left out"
+        int, None, min=1, doc="most tokens that the queue holds; unlimited if left out"
     )
     persistent_trigger = Parameter(bool, False, doc="whether a trigger that finds no token waits for the next one")
     one_at_a_time = Parameter(
-        bool, False, ptolemy=True, doc="whether a firing takes one token and one trigger, and tells size once"
+        bool, False, ptolemy=True, doc="whether a firing takes one token and one trigger, and sends size once"
     )
 
     def check(self) -> None:
@@ -75,7 +75,7 @@ class Queue(Actor):
             self._triggers = 0
 
     def _take(self, tokens: list[Any], is_triggered: bool) -> None:
-        """Take a token, if there is one, and let one go."""
+        """Take a token, if there is one, and release one."""
         is_full = self.capacity is not None and len(self._tokens) >= self.capacity
         size = len(self._tokens) + (bool(tokens) and (is_triggered or not is_full))
         if (is_triggered or (self._triggers and tokens)) and size:
@@ -93,20 +93,21 @@ class Queue(Actor):
 
 
 class SharedQueue(Actor):
-    """One line for several: a channel of ``trigger`` asks for a token, and gets it by the channel of ``output``.
+    """One queue for several consumers: a channel of ``trigger`` requests a token, and gets it on the same channel of
+    ``output``.
 
-    Each has asked for one at the start.  A token goes to the first that waits; if nobody does it is kept, first in,
-    first out.  At one tag those who ask come before what comes in.  Ptolemy: ``SharedQueue``.
+    Each consumer has requested one at the start.  A token goes to the first waiting consumer; if none waits, it is
+    kept, first in, first out.  At one tag, requests are handled before tokens come in.  Ptolemy: ``SharedQueue``.
     """
 
-    input = InputPort(doc="what comes in")
-    trigger = InputPort(multi=True, required=False, doc="asks for a token, by channel")
-    output = OutputPort(multi=True, doc="a channel for each who asks, in the order of the triggers")
-    size = OutputPort(int, doc="how many tokens are in it, behind each firing")
-    rejected = OutputPort(depends_on=("input",), doc="the tokens that found it full")
+    input = InputPort(doc="tokens to keep")
+    trigger = InputPort(multi=True, required=False, doc="requests a token for its channel")
+    output = OutputPort(multi=True, doc="a channel for each consumer, in the order of the triggers")
+    size = OutputPort(int, doc="number of tokens in the queue, after each firing")
+    rejected = OutputPort(depends_on=("input",), doc="tokens that found the queue full")
 
     capacity: Parameter[int | None] = Parameter(
-        int, None, min=1, doc="how many tokens it holds; any number if left out"
+        int, None, min=1, doc="most tokens that the queue holds; unlimited if left out"
     )
 
     def initialize(self) -> None:
@@ -137,50 +138,53 @@ class SharedQueue(Actor):
 
 
 class Server(Actor):
-    """Serves tokens in the order of their arrival, ``servers`` of them at a time, and sends each when it is done.
+    """Serves tokens in the order of their arrival, ``servers`` of them at a time, and sends each when its service ends.
 
-    The service time of a token is settled when it arrives: ``service_time`` at that tag, or drawn from
-    ``distribution``.  At one tag tokens that are done leave before others come in.  In Kendall's notation
-    G/G/servers/capacity.  The output does not depend on the input at once: the actor may stand in a loop.
+    The service time of a token is determined when it arrives: ``service_time`` at that tag, or drawn from
+    ``distribution``.  At one tag, served tokens leave before others come in.  In Kendall's notation
+    G/G/servers/capacity.  The output does not depend on the input within the same tag, so the actor may be part of a
+    loop.
 
-    With ``one_at_a_time`` and a single server, as in Ptolemy, a firing takes one token and lets one go whose time is
-    over, and tells ``size`` at its end, changed or not.  Ptolemy: ``Server``.
+    With ``one_at_a_time`` and a single server, as in Ptolemy, a firing takes one token and releases one whose service
+    has ended, and sends ``size`` at its end, changed or not.  Ptolemy: ``Server``.
     """
 
-    input = InputPort(doc="what is to be served")
-    output = OutputPort(depends_on=(), doc="each token when its service is over")
-    # What comes in is dealt with when its service time is known, so what is said of it waits for both.
-    size = OutputPort(int, depends_on=("input", "service_time"), doc="how many are in it, whenever that changes")
-    rejected = OutputPort(depends_on=("input", "service_time"), doc="the tokens that found no place")
+    input = InputPort(doc="tokens to serve")
+    output = OutputPort(depends_on=(), doc="each token when its service ends")
+    # A token is handled when its service time is known, so these outputs wait for both inputs.
+    size = OutputPort(
+        int, depends_on=("input", "service_time"), doc="number of tokens that wait or are served, whenever it changes"
+    )
+    rejected = OutputPort(depends_on=("input", "service_time"), doc="tokens that found no place")
 
-    service_time = PortParameter(float, 1.0, unit="s", min=0, doc="how long a service takes")
+    service_time = PortParameter(float, 1.0, unit="s", min=0, doc="duration of a service")
     distribution: Parameter[Distribution | None] = Parameter(
-        Distribution, None, unit="s", doc="what service times are drawn from, in place of service_time"
+        Distribution, None, unit="s", doc="distribution of service times, instead of service_time"
     )
     servers: Parameter[int | None] = Parameter(
-        int, 1, min=1, optional=True, doc="how many are served at a time; any number if null"
+        int, 1, min=1, optional=True, doc="number of tokens served at a time; unlimited if null"
     )
     capacity: Parameter[int | None] = Parameter(
-        int, None, min=1, doc="how many may wait and be served in all; any number if left out"
+        int, None, min=1, doc="most tokens that may wait or be served; unlimited if left out"
     )
     one_at_a_time = Parameter(
-        bool, False, ptolemy=True, doc="whether a firing takes one token and lets one go, and tells size once"
+        bool, False, ptolemy=True, doc="whether a firing takes one token and releases one, and sends size once"
     )
 
     def check(self) -> None:
         if self.capacity is not None and (self.servers is None or self.capacity < self.servers):
-            servers = "any number of" if self.servers is None else self.servers
+            servers = "unlimited" if self.servers is None else self.servers
             raise ParameterError(
-                f"capacity: {self.capacity} is less than {servers} servers; it counts those that are served as well"
+                f"capacity: {self.capacity} is less than 'servers' ({servers}), but it includes tokens in service"
             )
         if self.distribution is not None and self.distribution.token_type not in (int, float):
-            raise ParameterError(f"distribution: {type(self.distribution).__name__} does not give numbers alone")
+            raise ParameterError(f"distribution: {type(self.distribution).__name__} gives values other than numbers")
 
     def initialize(self) -> None:
-        self._served: Pending[tuple[Any, float]] = Pending(self)  # a token, and what is left of its time
+        self._served: Pending[tuple[Any, float]] = Pending(self)  # a token, and its remaining time
         self._waiting: deque[tuple[Any, float]] = deque()
-        self._size = 0  # those that wait and those that are served
-        self._free: int | None = None  # when the one is done that is served, one at a time
+        self._size = 0  # tokens that wait or are served
+        self._free: int | None = None  # when the present service ends, one at a time
         self._rest = 0.0
 
     def fire(self) -> None:
@@ -207,7 +211,7 @@ class Server(Actor):
             self.size.send(self._size)
 
     def _take(self, token: Any) -> None:
-        """Take a token, if there is one, and let one go whose time is over."""
+        """Take a token, if there is one, and release one whose service has ended."""
         if token is not ABSENT and self.capacity is not None and len(self._waiting) >= self.capacity:
             self.rejected.send(token)
         elif token is not ABSENT:
@@ -224,7 +228,8 @@ class Server(Actor):
             self._rest = time - to_seconds(to_nanoseconds(time))
 
     def _serve(self, token: Any, time: float) -> None:
-        # What whole nanoseconds leave over is added to the next service, or it would add up while the server is busy.
+        # The rounding to whole nanoseconds is added to the next service, or it would accumulate while the server is
+        # busy.
         rest = time - to_seconds(to_nanoseconds(time))
         self._served.put((token, rest), time)
 

@@ -1,4 +1,4 @@
-"""What comes to a port as numbers to calculate with, which have to be finite."""
+"""Tokens as numbers for calculations, which must be finite."""
 
 from __future__ import annotations
 
@@ -11,19 +11,19 @@ from .core import EpicycleError, InputPort, brief, counted
 
 
 def finite_number(port: InputPort[Any], token: Any) -> float:
-    """The token of a port as a float; raises ``EpicycleError`` if it is no finite number."""
+    """The token of a port as a float; raises ``EpicycleError`` if it is not a finite number."""
     if isinstance(token, (float, int, np.integer, np.floating)) and not isinstance(token, bool):
         number = float(token)
         if math.isfinite(number):
             return number
-    raise EpicycleError(f"{port.path} is {brief(token)}, which is not a finite number")
+    raise EpicycleError(f"{port.path} got {brief(token)}, expected a finite number")
 
 
 def finite_numbers(port: InputPort[Any], token: Any, length: int) -> list[float]:
-    """The token of a port as so many floats; a number is a list of one."""
+    """The token of a port as a given number of floats; a number is a list of one."""
     if length == 1 and np.ndim(token) == 0:
         return [finite_number(port, token)]
     items = token.tolist() if isinstance(token, np.ndarray) else token
     if not isinstance(items, (list, tuple)) or len(items) != length:
-        raise EpicycleError(f"{port.path} is {brief(token)}, which is not a list of {counted(length, 'number')}")
+        raise EpicycleError(f"{port.path} got {brief(token)}, expected a list of {counted(length, 'number')}")
     return [finite_number(port, each) for each in items]

@@ -27,20 +27,20 @@ class ReplayError(EpicycleError):
 class Replay(Actor):
     """Sends the rows of a CSV or Parquet table, each at its time.
 
-    A table with one value column gives bare tokens, and an empty cell gives none; with several columns a token is a
-    mapping from column to value, an empty cell None.  Rows with equal times come in successive microsteps.  The file
-    lies in or below the folder of the YAML file that names it.
+    A table with one value column gives plain values, and nothing for an empty cell; with several columns, a token is a
+    mapping from column to value, with None for an empty cell.  Rows with equal times come at successive microsteps.
+    The file must be in or below the folder of the YAML file that names it.
     """
 
     output = OutputPort(doc="the value of a row, or a mapping of its values")
 
     file = Parameter(Path, doc="a .csv file with a header line, or a .parquet file")
-    time = Parameter(str, "time", doc="the column of times, in s, ascending from 0 on")
-    columns: Parameter[Any] = texts_parameter(None, doc="the columns to send; all but the time if left out")
+    time = Parameter(str, "time", doc="the column of times, in s, ascending and >= 0")
+    columns: Parameter[Any] = texts_parameter(None, doc="the columns to send; all except the time if left out")
 
     def check(self) -> None:
         if self.file.suffix.lower() not in (".csv", ".parquet"):
-            raise ParameterError(f"file: {self.file.name!r} ends neither in .csv nor in .parquet")
+            raise ParameterError(f"file: {self.file.name!r} must end in .csv or .parquet")
 
     def initialize(self) -> None:
         self._times, self._values = self._read()
@@ -70,14 +70,14 @@ class Replay(Actor):
             raise self._error(str(error.strerror)) from None
         names = list(dict.fromkeys(table.column_names))
         if len(names) != table.num_columns:
-            raise self._error(f"two columns have the same name: {', '.join(table.column_names)}")
+            raise self._error(f"two of its columns have the same name: {', '.join(table.column_names)}")
         columns = [name for name in names if name != self.time] if self.columns is None else list(self.columns)
         for name in (self.time, *columns):
             if name not in names:
                 guess = did_you_mean(name, names)
-                raise self._error(f"there is no column {name!r}{guess}; columns: {', '.join(names)}")
+                raise self._error(f"it has no column {name!r}{guess}; columns: {', '.join(names)}")
         if not columns:
-            raise self._error(f"there is no column of values beside {self.time!r}")
+            raise self._error(f"it has no column of values, only {self.time!r}")
         times = self._check_times(table.column(self.time).to_pylist())
         values = [table.column(name).to_pylist() for name in columns]
         if len(columns) == 1:
@@ -89,7 +89,7 @@ class Replay(Actor):
         for row, time in enumerate(times, 1):
             if isinstance(time, bool) or not isinstance(time, (int, float)) or not math.isfinite(time) or time < 0:
                 shown = "empty" if time is None else repr(time)
-                raise self._error(f"row {row}: {self.time} is {shown}, not a time in s from 0 on")
+                raise self._error(f"row {row}: {self.time} is {shown}, expected a time in s >= 0")
             if result and to_nanoseconds(time) < result[-1]:
                 raise self._error(f"row {row}: {self.time} is {time!r}, which is before the row above")
             result.append(to_nanoseconds(time))

@@ -1,4 +1,4 @@
-"""Where tokens end: Recorder, Display, Histogram, Test, Stop."""
+"""Sinks of tokens: Recorder, Display, Histogram, Test, Stop."""
 
 from __future__ import annotations
 
@@ -29,15 +29,15 @@ _DISPLAY = logging.getLogger("epicycle.display")
 
 
 class Recorder(Actor):
-    """Keeps what comes, for Python to read after the run: ``simulation["path"].tokens``.
+    """Keeps tokens, for Python to read after the run: ``simulation["path"].tokens``.
 
     In a model file ``run: {record: [port]}`` does the same without an actor.  Ptolemy: ``Recorder``.
     """
 
-    input = InputPort(multi=True, doc="what is kept")
+    input = InputPort(multi=True, doc="tokens to keep")
 
     capacity: Parameter[int | None] = Parameter(
-        int, None, min=0, doc="how many of the latest tokens are kept; all if left out"
+        int, None, min=0, doc="number of latest tokens to keep; all if left out"
     )
 
     def initialize(self) -> None:
@@ -65,16 +65,16 @@ class Recorder(Actor):
 
 
 class Display(Actor):
-    """Writes a line for each token: time, own path, and the token.
+    """Writes a line for each token: the time, the path of the actor, and the token.
 
-    Lines go to the logger ``epicycle.display``: on the command line they appear on standard error, so that ``--json``
-    stays readable for programs.  Where nobody listens to the logger, as in a plain Python session, they are printed.
-    Ptolemy: ``Display``, ``Discard`` with a face.
+    Lines go to the logger ``epicycle.display``: on the command line they appear on standard error, so that programs can
+    read the output of ``--json``.  If the logger has no handler, as in a plain Python session, they are printed.
+    Ptolemy: ``Display``.
     """
 
-    input = InputPort(multi=True, doc="what is shown")
+    input = InputPort(multi=True, doc="tokens to show")
 
-    title = Parameter(str, "", doc="what stands in the line in place of the path")
+    title = Parameter(str, "", doc="text in the line instead of the path")
 
     def fire(self) -> None:
         for token in self.input.tokens:
@@ -88,17 +88,18 @@ class Display(Actor):
 class Histogram(Actor):
     """Counts how many tokens fall into each of ``bins`` equal intervals from ``low`` to ``high``.
 
-    A bin holds its lower bound and not its upper one; the last holds both.  What lies outside is counted apart.
-    Python reads ``counts``, ``edges``, ``below`` and ``above`` after the run.  Ptolemy: ``HistogramPlotter``.
+    A bin includes its lower bound and not its upper one; the last bin includes both.  Numbers outside are counted
+    separately.  Python reads ``counts``, ``edges``, ``below`` and ``above`` after the run.  Ptolemy:
+    ``HistogramPlotter``.
     """
 
-    input = InputPort(float, multi=True, doc="what is counted")
-    trigger = InputPort(required=False, doc="asks for the counts")
-    output: OutputPort[Any] = OutputPort(list[int], doc="the counts of the bins so far, for each trigger")
+    input = InputPort(float, multi=True, doc="numbers to count")
+    trigger = InputPort(required=False, doc="requests the counts")
+    output: OutputPort[Any] = OutputPort(list[int], doc="counts of the bins so far, for each trigger")
 
-    low = Parameter(float, doc="where the first bin begins")
-    high = Parameter(float, doc="where the last bin ends")
-    bins = Parameter(int, 20, min=1, max=1_000_000, doc="how many bins there are")
+    low = Parameter(float, doc="lower bound of the first bin")
+    high = Parameter(float, doc="upper bound of the last bin")
+    bins = Parameter(int, 20, min=1, max=1_000_000, doc="number of bins")
 
     def check(self) -> None:
         if not -math.inf < self.low < self.high < math.inf:
@@ -112,13 +113,13 @@ class Histogram(Actor):
     def fire(self) -> None:
         for token in self.input.tokens:
             if math.isnan(token):
-                raise EpicycleError("nan belongs into no bin")
+                raise EpicycleError("nan belongs to no bin")
             if token < self.low:
                 self.below += 1
             elif token > self.high:
                 self.above += 1
             else:
-                # The edges decide, not a division, whose rounding could put an edge into the wrong bin.
+                # Compared with the edges: a division could put an edge into the wrong bin by rounding.
                 place = int(np.searchsorted(self.edges, token, side="right")) - 1
                 self.counts[min(place, self.bins - 1)] += 1
         if self.trigger.present:
@@ -126,38 +127,40 @@ class Histogram(Actor):
 
 
 class Test(Actor):
-    """Compares what comes with what is expected, in order, and ends the run with an error where they differ.
+    """Compares tokens with expected values, in order, and ends the run with an error if they differ.
 
-    Numbers may differ by ``tolerance``, also within lists and fields; everything else must be equal, but for ``null``,
-    which stands for anything.  Values that are missing at the end of the run are an error, too, and so is a token too
-    many, unless more may ``follow``.  With ``together``, each value is a list of what comes together, a token on each
-    channel.  Ptolemy: ``Test``, ``NonStrictTest``.
+    Numbers may differ by ``tolerance``, also within lists and fields; everything else must be equal, except ``null``,
+    which matches anything.  Missing values at the end of the run are also an error, and so is a surplus token, unless
+    more may ``follow``.  With ``together``, each value is a list of tokens that come together, one on each channel.
+    Ptolemy: ``Test``, ``NonStrictTest``.
     """
 
-    __test__: ClassVar[bool] = False  # for pytest, which would take it for a class of tests
+    __test__: ClassVar[bool] = False  # for pytest, which would treat it as a class of tests
 
-    input = InputPort(multi=True, doc="what is compared")
-    output = OutputPort(bool, doc="with each token, if somebody listens, whether all values have come by now")
+    input = InputPort(multi=True, doc="tokens to compare")
+    output = OutputPort(bool, doc="whether all values have come, sent with each token if connected")
 
-    values: Parameter[Any] = Parameter(object, shape=(None,), doc="what is expected, in order")
+    values: Parameter[Any] = Parameter(object, shape=(None,), doc="expected values, in order")
     times: Parameter[Any] = array_parameter(
-        (None,), None, unit="s", doc="when it is expected, a time for each value; not compared if left out"
+        (None,), None, unit="s", doc="expected time of each value; not compared if left out"
     )
-    tolerance = Parameter(float, 1e-9, min=0, doc="by how much a number, or a time in s, may differ")
-    complete = Parameter(bool, True, doc="whether all values must have come when the run ends")
-    together = Parameter(bool, False, doc="whether a value is a list, of a token on each channel")
-    follow = Parameter(bool, False, ptolemy=True, doc="whether other tokens may come after those that are expected")
-    lenient = Parameter(
-        bool, False, ptolemy=True, doc="whether a number is as good as its text, and NaN as good as any number"
-    )
+    tolerance = Parameter(float, 1e-9, min=0, doc="largest difference of a number, or of a time in s")
+    complete = Parameter(bool, True, doc="whether all values must have come by the end of the run")
+    together = Parameter(bool, False, doc="whether a value is a list with a token for each channel")
+    follow = Parameter(bool, False, ptolemy=True, doc="whether further tokens may follow the expected ones")
+    lenient = Parameter(bool, False, ptolemy=True, doc="whether a number matches its text, and NaN matches any number")
 
     def check(self) -> None:
         if self.times is not None and len(self.times) != len(self.values):
-            raise ParameterError(f"{counted(len(self.times), 'time')} for {counted(len(self.values), 'value')}")
+            raise ParameterError(
+                f"times: {counted(len(self.times), 'time')} for {counted(len(self.values), 'value')}; give one for each"
+            )
         if self.together:
             for index, value in enumerate(self.values):
                 if not isinstance(value, (list, tuple)):
-                    raise ParameterError(f"values: value {index} is {value!r}, no list of a token on each channel")
+                    raise ParameterError(
+                        f"values: value {index} is {value!r}, expected a list with a token for each channel"
+                    )
 
     def initialize(self) -> None:
         self._seen = 0
@@ -169,7 +172,7 @@ class Test(Actor):
             return
         for (tokens,) in rounds(self.input):
             if ABSENT in tokens and self._seen < len(self.values):
-                raise EpicycleError(f"for value {self._seen} no token came on channel {tokens.index(ABSENT)}")
+                raise EpicycleError(f"no token came for value {self._seen} on channel {tokens.index(ABSENT)}")
             self._compare(tokens)
 
     def _compare(self, token: Any) -> None:
@@ -183,7 +186,7 @@ class Test(Actor):
             return
         self._seen += 1
         if index >= len(self.values):
-            raise EpicycleError(f"token {index} is {token!r}, but only {len(self.values)} are expected")
+            raise EpicycleError(f"token {index} is {token!r}, expected only {counted(len(self.values), 'token')}")
         expected = self.values[index]
         if not _alike(token, expected, self.tolerance, self.lenient):
             raise EpicycleError(f"token {index} is {token!r}, expected {expected!r}{self._within()}")
@@ -198,13 +201,13 @@ class Test(Actor):
     def wrapup(self) -> None:
         if self.complete and self._seen < len(self.values):
             raise EpicycleError(
-                f"{self._seen} of {counted(len(self.values), 'expected token')} came, the next was to be "
+                f"{self._seen} of {counted(len(self.values), 'expected token')} came; the next should have been "
                 f"{self.values[self._seen]!r}"
             )
 
 
 def _alike(token: Any, expected: Any, tolerance: float, lenient: bool) -> bool:
-    """Whether a token is what is expected; lists, arrays and fields are compared item by item."""
+    """Whether a token is as expected; lists, arrays and fields are compared item by item."""
     if expected is None:
         return True
     if isinstance(token, (np.ndarray, np.generic)):
@@ -229,13 +232,13 @@ def _alike(token: Any, expected: Any, tolerance: float, lenient: bool) -> bool:
             if math.isnan(token) or math.isnan(expected):
                 return lenient
             return token - tolerance <= expected <= token + tolerance
-        except OverflowError:  # whole numbers may be longer than any other
+        except OverflowError:  # whole numbers may be too large for a float
             return False
     return bool(token == expected)
 
 
 def _is_text_of(text: str, value: Any) -> bool:
-    """Whether a text is a truth value or a number as Java writes it."""
+    """Whether a text is a truth value or a number as written by Java."""
     if isinstance(value, bool):
         return text == ("true" if value else "false")
     if isinstance(value, int):
@@ -247,7 +250,7 @@ def _is_text_of(text: str, value: Any) -> bool:
 
 
 class Stop(Actor):
-    """Ends the run with the tag at which a true token comes; what belongs to that tag is still done.
+    """Ends the run with the tag at which a true token comes; that tag is completed.
 
     In a model file ``run: {stop_when: port}`` does the same without an actor.  Ptolemy: ``Stop``.
     """

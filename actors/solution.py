@@ -1,9 +1,9 @@
-"""Solution: the solution of an ODE from one discontinuity on, and where guard functions cross zero along it.
+"""Solution: the solution of an ODE after a discontinuity, and the zero crossings of guard functions along it.
 
-The steps, and with them every digit, do not depend on when somebody looks at the solution.  Between the points at
-which a function is evaluated, anything may hide; where nobody has said how long a step may be, interval arithmetic
-tells where nothing does.  There steps are as long as the tolerances allow, and guards are not looked at; elsewhere
-the solution and its guards are sampled within ``WINDOW``.
+The steps, and with them every digit, do not depend on when the solution is evaluated.  Between the points at which a
+function is evaluated, anything may hide; if no longest step is given, interval arithmetic finds where nothing does.
+There, steps are as long as the tolerances allow, and guards are not checked; elsewhere the solution and its guards are
+sampled within ``WINDOW``.
 """
 
 from __future__ import annotations
@@ -20,20 +20,20 @@ from .core import EpicycleError
 from .integration import STEPPERS, Bounds, Derivative, Limits, Piece, State
 
 WINDOW: Final = 1.0  # s, within which things may hide
-CELLS: Final = 8  # a window is searched for changes of sign in so many parts
+CELLS: Final = 8  # parts of a window in which changes of sign are searched
 LONGEST: Final = 1e6  # s, of a step
 _HALVINGS: Final = 12
-_NOISE: Final = 1e-11  # what counts as zero beside the value at the far end of a cell
+_NOISE: Final = 1e-11  # relative to the value at the far end of a cell, this counts as zero
 _MAX_PATIENCE: Final = 64
 _PRECISION: Final = sys.float_info.epsilon
-_BISECTIONS: Final = 200  # more than bisection alone needs to find a root
+_BISECTIONS: Final = 200  # more steps than bisection alone needs to find a root
 
 
 @dataclass
 class Guard:
-    """A function whose zero crossings count; ``side`` is the sign that it had last, 0 where that is open.
+    """A function whose zero crossings count; ``side`` is its last sign, 0 if undecided.
 
-    ``bounds`` are what the function lies between, from a time to another, for states between bounds.
+    ``bounds`` gives the bounds of the function from one time to another, for states between bounds.
     """
 
     value: Callable[[float, State], float]
@@ -48,17 +48,18 @@ class Guard:
 
 
 class Crossing(NamedTuple):
-    """Where guards cross zero first: the time, and for each that does, its number and the side it crosses to."""
+    """The first zero crossing of guards: the time, and for each guard that crosses, its number and the side it crosses
+    to."""
 
     time: float
     sides: dict[int, int]
 
 
 class Solution:
-    """A solution that starts at time 0 and is extended as far as it is asked for, or searched to the first crossing.
+    """A solution that starts at time 0 and is extended on request, or searched up to the first crossing.
 
-    ``rates`` are the derivatives of the states at a time, ``bounds`` what they lie between, for times and states
-    between bounds.  Without ``max_step``, a step is longer than ``WINDOW`` only if nothing can hide in it.
+    ``rates`` gives the derivatives of the states at a time, ``bounds`` their bounds for times and states between
+    bounds.  Without ``max_step``, a step is longer than ``WINDOW`` only if nothing can hide in it.
     """
 
     def __init__(
@@ -75,31 +76,33 @@ class Solution:
         self._rates, self._bounds = rates, bounds
         self._watched = max_step is None
         self._window = WINDOW if max_step is None else max_step
-        self._patience, self._taken = 1, 0  # so many steps must be taken before longer ones are tried; so many were
+        self._patience, self._taken = 1, 0  # steps to take before longer ones are tried; steps taken
         self._stepper = STEPPERS[method](rates, state, Limits(*tolerance, LONGEST if max_step is None else max_step))
         self._guards = guards
         self._start = state
         self._piece: Piece | None = None
-        self._before: Piece | None = None  # a look at the past may reach back by a fraction of a nanosecond
-        self._ahead: list[tuple[float, float, list[int]]] = []  # what is to be searched for which guards, the next last
+        self._before: Piece | None = None  # a request for the past may reach back by a fraction of a nanosecond
+        self._ahead: list[
+            tuple[float, float, list[int]]
+        ] = []  # parts still to be searched, with their guards; the next one last
         self._turns: list[tuple[float, float, Guard, int]] = []  # from, to, and the side of a guard before
         self.searched = 0.0
         self.crossing: Crossing | None = None
 
     @property
     def end(self) -> float:
-        """How far the solution is known."""
+        """The time up to which the solution is known."""
         return self._stepper.time
 
     def extend(self) -> None:
-        """Take one step; raises ``EpicycleError`` if there is none to take."""
+        """Take one step; raises ``EpicycleError`` if no step is possible."""
         start = self.end
         self._before = self._piece or self._before
         self._piece = None
         if not self._advance():
             raise EpicycleError(
-                f"the solution cannot be continued beyond {start:.9g} s from here: "
-                "Required step size is less than spacing between numbers."
+                f"the solution cannot be continued beyond {start:.9g} s from here: the required step is shorter than "
+                "the spacing between numbers"
             )
         if self._guards:
             self._ahead.append((start, self.end, list(range(len(self._guards)))))
@@ -116,7 +119,7 @@ class Solution:
         return piece.at(time)
 
     def _latest(self) -> Piece:
-        """The solution along the latest step, which costs something and is computed when it is asked for."""
+        """The solution along the latest step, computed on request because that takes time."""
         if self._piece is None:
             self._piece = self._stepper.piece()
         return self._piece
@@ -132,7 +135,7 @@ class Solution:
             self._taken += 1
             if before is None or self.end - before.time <= WINDOW or not self._hides(before.time):
                 break
-            # Where that is so, it is likely to stay so: a longer step is tried less and less often.
+            # Then it is likely to stay so: a longer step is tried less and less often.
             length = self.end - before.time
             self._stepper, self._piece = before, None
             self._limit(length / 4.0)
@@ -147,10 +150,10 @@ class Solution:
         self._stepper.limits = replace(self._stepper.limits, max_step=longest)
 
     def _hides(self, start: float) -> bool:
-        """Whether a derivative may be far from all that the latest step has made of it.
+        """Whether a derivative may be far from all its values in the latest step.
 
-        That is its values at both ends, also with the states at the corners of their bounds, and the slopes of the
-        solution between.  To look within the step would be wrong: what is seen there, the stepper may have missed.
+        These are its values at both ends, also with the states at the corners of their bounds, and the slopes of the
+        solution between.  Points within the step do not count: the stepper may have missed what happens there.
         """
         end, piece = self.end, self._latest()
         bounds = piece.bounds(start, end)
@@ -175,12 +178,12 @@ class Solution:
     # -- crossings ------------------------------------------------------------------------------------------------
 
     def search(self, time: float) -> None:
-        """Search for the first crossing up to a time, or a little further."""
+        """Search for the first crossing up to a time, or a little beyond."""
         while self.crossing is None and self.searched < time:
             self.look()
 
     def look(self) -> None:
-        """Search the next part of the solution, a step if need be: a window, or more where no guard can cross."""
+        """Search the next part of the solution, taking a step if needed: a window, or more where no guard can cross."""
         if not self._ahead:
             self.extend()
         left, right, numbers = self._ahead.pop()
@@ -200,14 +203,14 @@ class Solution:
         self.searched = right
 
     def rewind(self, time: float) -> None:
-        """Give guards the sides that they have at a time, which the search has passed: the solution is left there."""
+        """Give guards their sides at a time that the search has passed, where the solution is left."""
         for left, right, guard, side in reversed(self._turns):
             if right > time:
                 guard.side = side if left >= time else self._sign(guard, time) or side
         self._turns.clear()
 
     def _turn(self, guard: Guard, side: int, left: float, right: float) -> None:
-        """Take a guard to a side on which it is after a part of the search."""
+        """Set the side of a guard after a part of the search."""
         if guard.side != side:
             self._turns.append((left, right, guard, guard.side))
             guard.side = side
@@ -237,7 +240,8 @@ class Solution:
         for number, (before, after, _) in sides.items():
             guard = self._guards[number]
             sign = self._sign(guard, time)
-            # Rounding may put one of two equal roots a hair behind the other: what has crossed by now is here, too.
+            # Rounding may put one of two equal roots slightly after the other: include every guard that has crossed
+            # by now.
             if number in found and (found[number] == time or sign == after):
                 crossed[number] = after
             elif number not in found:
@@ -245,16 +249,16 @@ class Solution:
         return Crossing(time, crossed)
 
     def _side(self, guard: Guard, left: float, right: float) -> tuple[int, int, tuple[float, float] | None]:
-        """The side of a guard before and after a cell, and between which times it crosses, if it does."""
+        """The sides of a guard before and after a cell, and the times between which it crosses, if it does."""
         before, after = guard.side, self._sign(guard, right)
         if before == 0:
-            # It starts at zero, as after a bounce. It may go to one side and be back on the other within the cell.
+            # It starts at zero, as after a bounce. It may go to one side and end on the other within the cell.
             inner = self._excursion(guard, left, right, after)
             return (before, after, None) if inner is None else (-after, after, inner)
         return (before, before, None) if after in (0, before) else (before, after, (left, right))
 
     def _excursion(self, guard: Guard, left: float, right: float, after: int) -> tuple[float, float] | None:
-        """Where a guard that starts at zero and ends on a side has been on the other one before."""
+        """Where a guard that starts at zero and ends on one side was on the other side before."""
         if after == 0:
             return None
         noise = _NOISE * abs(self._value(guard, right))
@@ -281,7 +285,7 @@ class Solution:
 
 
 def root(function: Callable[[float], float], left: float, right: float, least: float = 1e-15) -> float:
-    """Where a function that has different signs at both ends is zero, to the last bits or to ``least``.
+    """The zero of a function with different signs at both ends, to the last bits or to ``least``.
 
     T. R. Chandrupatla, Adv. Eng. Softw. 28 (1997) 145-149: inverse quadratic interpolation where three points allow
     it, bisection elsewhere.

@@ -1,4 +1,4 @@
-"""Where tokens begin: Clock, PoissonClock and SingleEvent of their own accord, and Random, for triggers."""
+"""Sources of tokens: Clock, PoissonClock and SingleEvent, and Random for triggers."""
 
 from __future__ import annotations
 
@@ -25,24 +25,26 @@ from .core import (
 )
 from .distributions import Distribution
 from .generators import Generator
-from .triggered import times as _times  # by the name that a native form knows Random with
+from .triggered import times as _times  # by the name that the native form of Random uses
 
 
 class _Ticking(Actor):
-    """What clocks share: a counted series of tokens up to a stop time."""
+    """The common part of clocks: a counted series of tokens up to a stop time."""
 
-    output = OutputPort(doc="the values in turn; without values the number of the tick, from 0")
+    output = OutputPort(doc="the values in turn; without values, the number of the tick, from 0")
 
-    values: Parameter[Any] = Parameter(object, None, shape=(None,), doc="what the ticks send, over and over")
+    values: Parameter[Any] = Parameter(
+        object, None, shape=(None,), doc="values of the ticks, used in turn and repeated"
+    )
     stop_time: Parameter[float | None] = Parameter(
-        float, None, unit="s", min=0, doc="the time after which there are no more ticks"
+        float, None, unit="s", min=0, doc="time after which there are no more ticks"
     )
 
-    _ends_late = False  # whether its last tick is the first behind stop_time
+    _ends_late = False  # whether its last tick is the first one after stop_time
 
     def check(self) -> None:
         if self.values is not None and not self.values:
-            raise ParameterError("values: the list is empty, there is nothing to send")
+            raise ParameterError("values: the list is empty; give at least one value")
         self.output.type = int if self.values is None else token_type(self.values)
 
     @property
@@ -53,7 +55,7 @@ class _Ticking(Actor):
         self.output.send(tick if self.values is None else self.values[tick % len(self.values)])
 
     def _wake_at(self, time: int) -> Wake | None:
-        """The wake-up for the next tick at ``time`` ns, if there still is one."""
+        """The wake-up for the next tick at ``time`` ns, if there is another one."""
         if self.stop_time is not None and time > to_nanoseconds(self.stop_time) and not self._ends_late:
             return None
         return self.context.wake(self, time)
@@ -63,29 +65,31 @@ class Clock(_Ticking):
     """Ticks at fixed times without drift: in cycle k at ``offset + k * period`` plus each of ``offsets``.
 
     Times are counted in whole nanoseconds from the start of the run, or from the latest ``start`` token if that port
-    is connected.  Ticks of one time, be it of equal offsets or of one that is the whole period, come in successive
-    microsteps.  After an infinite period there is no other.  A new period counts from the next cycle on, or
-    ``at once``: for the wait from the last tick of a cycle to the next, unless it would be over already.
+    is connected.  Ticks at the same time, from equal offsets or from an offset equal to the period, come at successive
+    microsteps.  After an infinite period there is no further cycle.  A new period applies from the next cycle on, or
+    ``at once``: already to the wait from the last tick of a cycle to the next, unless that would be over by then.
 
-    With ``trigger`` connected, the first tick is sent, and then those for which a trigger has come since the tick
-    before, or comes with them; the others are left out.  Ptolemy: ``DiscreteClock``; with ``new_period: at once`` and
+    With ``trigger`` connected, the first tick is sent, and then those for which a trigger has come since the previous
+    tick, or comes with them; the others are left out.  Ptolemy: ``DiscreteClock``; with ``new_period: at once`` and
     ``late_trigger`` its ``Clock``.
     """
 
     is_source: ClassVar[bool] = True
 
-    start = InputPort(required=False, doc="begins a first cycle; if connected, nothing else does")
-    stop = InputPort(required=False, doc="ends the ticking until the next start")
-    trigger = InputPort(multi=True, required=False, doc="lets the next tick be sent; all are, if not connected")
+    start = InputPort(required=False, doc="starts the cycles; if connected, there are none before")
+    stop = InputPort(required=False, doc="stops the ticks until the next start")
+    trigger = InputPort(multi=True, required=False, doc="enables the next tick; if not connected, all are enabled")
 
     period = PortParameter(float, unit="s", above=0, doc="length of a cycle, rounded to whole nanoseconds")
     offset = Parameter(float, 0.0, unit="s", min=0, doc="time from the start to the first cycle")
-    offsets = array_parameter((None,), [0.0], unit="s", min=0, doc="when each cycle ticks, in order")
-    cycles: Parameter[int | None] = Parameter(int, None, min=1, doc="how many cycles there are; no end if left out")
-    new_period = Parameter(str, "next cycle", choices=("next cycle", "at once"), doc="from when on a new period counts")
-    reset_period = Parameter(bool, False, ptolemy=True, doc="whether a start gives back the period of the model")
+    offsets = array_parameter((None,), [0.0], unit="s", min=0, doc="times of the ticks in a cycle, ascending")
+    cycles: Parameter[int | None] = Parameter(int, None, min=1, doc="number of cycles; unlimited if left out")
+    new_period = Parameter(
+        str, "next cycle", choices=("next cycle", "at once"), doc="from when on a new period applies"
+    )
+    reset_period = Parameter(bool, False, ptolemy=True, doc="whether a start restores the period given in the model")
     late_trigger = Parameter(
-        bool, False, doc="whether a trigger still lets a tick be sent that was left out at an earlier microstep"
+        bool, False, doc="whether a trigger still enables a tick that was left out at an earlier microstep"
     )
 
     def check(self) -> None:
@@ -111,7 +115,7 @@ class Clock(_Ticking):
             self._wake = self._wake_at(self._next)
 
     def _begin(self) -> None:
-        """Lay the first cycle from now on."""
+        """Begin the first cycle now."""
         self._cycle = self._before = self.tag.time + to_nanoseconds(self.offset)
         self._tick = 0
         self._may_tick = True
@@ -156,7 +160,8 @@ class Clock(_Ticking):
         self._wake = None
 
     def _lay_anew(self, due: bool) -> bool:
-        """Let the next cycle begin a new period after the one before, if it waits for its begin; whether it is due."""
+        """Let the next cycle begin a new period after the previous one, if it has not begun; returns whether it is
+        due."""
         begin = self._after(self._before)
         if self._tick == 0 or self._tick % len(self._offsets) or begin < self.tag.time:
             return due
@@ -168,12 +173,12 @@ class Clock(_Ticking):
         return False
 
     def _after(self, begin: int) -> int:
-        """When the cycle begins that follows one that began then."""
-        # Counted in integers, so that no rounding adds up over a long run.
+        """When the cycle after one with the given begin starts."""
+        # Counted in integers, so that no rounding accumulates over a long run.
         return NEVER if math.isinf(self.period) else begin + to_nanoseconds(self.period)
 
     def _pass(self) -> None:
-        """Tick, and wait for the next."""
+        """Tick, and wait for the next tick."""
         if self._may_tick or not self.trigger.width:
             self._send(self._tick)
         else:
@@ -189,22 +194,22 @@ class Clock(_Ticking):
 class PoissonClock(_Ticking):
     """Ticks at random: the times between ticks are independent and exponentially distributed.
 
-    A trigger lets one come at once, from which the time to the next one is drawn.  With ``one_at_a_time``, as in
-    Ptolemy, triggers that come together let a tick come each, and the last tick of all is the first at ``stop_time`` or
-    behind it.  Ptolemy: ``PoissonClock``.
+    A trigger causes a tick at once, from which the time to the next one is drawn.  With ``one_at_a_time``, as in
+    Ptolemy, each of several triggers that come together causes a tick, and the very last tick is the first one at or
+    after ``stop_time``.  Ptolemy: ``PoissonClock``.
     """
 
     is_source: ClassVar[bool] = True
 
-    trigger = InputPort(multi=True, required=False, doc="lets a tick come at once")
+    trigger = InputPort(multi=True, required=False, doc="causes a tick at once")
 
     mean_interval = Parameter(float, 1.0, unit="s", above=0, doc="mean time between two ticks")
     fire_at_start = Parameter(bool, True, doc="whether the first tick comes at the start")
     generator: Parameter[Generator | None] = Parameter(
-        Generator, None, doc="another program's generator, if it is to give the numbers"
+        Generator, None, doc="generator of another program to use for the numbers"
     )
     one_at_a_time = Parameter(
-        bool, False, ptolemy=True, doc="whether a tick comes for each trigger, and a last one at stop_time or behind it"
+        bool, False, ptolemy=True, doc="whether each trigger causes a tick, and a last one comes at or after stop_time"
     )
 
     def check(self) -> None:
@@ -222,7 +227,8 @@ class PoissonClock(_Ticking):
     def _interval(self) -> int:
         if self._numbers is None:
             return to_nanoseconds(self.random.exponential(self.mean_interval))
-        # What whole nanoseconds leave over is added to the next, or it would add up against the other program.
+        # The rounding to whole nanoseconds is added to the next wait, or the difference to the other program would
+        # accumulate.
         interval = self._numbers.exponential(self.mean_interval) + self._rest
         self._rest = interval - to_seconds(to_nanoseconds(interval))
         return to_nanoseconds(interval)
@@ -238,7 +244,7 @@ class PoissonClock(_Ticking):
         self._wake = self._wake_at(self.tag.time + self._interval())
 
     def _fire_for_triggers(self) -> None:
-        """What it does where triggers let ticks come, or the last one comes late."""
+        """The firing where triggers cause ticks, or the last tick comes late."""
         ticks = self._ticks() if self.trigger.width else 1
         if self._is_over or not ticks:
             return
@@ -254,22 +260,22 @@ class PoissonClock(_Ticking):
         self._wake = self._wake_at(self.tag.time + interval)
 
     def _ticks(self) -> int:
-        """How many ticks come now, where triggers let them come."""
+        """The number of ticks now, where triggers cause them."""
         if self.one_at_a_time:
             return max(1, len(list(rounds(self.trigger))))
         return int(self.stop_time is None or self.tag.time <= to_nanoseconds(self.stop_time))
 
 
 class SingleEvent(Actor):
-    """Sends one token at one time.
+    """Sends one token at a given time.
 
     Ptolemy: ``SingleEvent``.
     """
 
     output = OutputPort(doc="the value")
 
-    time = Parameter(float, 0.0, unit="s", min=0, doc="when it is sent")
-    value: Parameter[Any] = Parameter(object, True, doc="what is sent")
+    time = Parameter(float, 0.0, unit="s", min=0, doc="when to send it")
+    value: Parameter[Any] = Parameter(object, True, doc="the token to send")
 
     def check(self) -> None:
         self.output.type = token_type([self.value])
@@ -286,17 +292,17 @@ class SingleEvent(Actor):
 
 
 class Random(Actor):
-    """Sends a token drawn from ``distribution`` for each trigger, independent of all others.
+    """Sends a token drawn from ``distribution`` for each trigger, independently of all others.
 
     Ptolemy: ``Gaussian``, ``Uniform``, ``ColtExponential``, ``Bernoulli``, ``DiscreteRandomSource`` and others.
     """
 
     trigger = InputPort(multi=True, doc="when to send")
-    output = OutputPort(doc="the token drawn")
+    output = OutputPort(doc="the drawn token")
 
-    distribution: Parameter[Distribution] = Parameter(Distribution, doc="what is drawn from")
+    distribution: Parameter[Distribution] = Parameter(Distribution, doc="the distribution to draw from")
     generator: Parameter[Generator | None] = Parameter(
-        Generator, None, doc="another program's generator, if it is to give the numbers"
+        Generator, None, doc="generator of another program to use for the numbers"
     )
 
     def check(self) -> None:
@@ -310,12 +316,13 @@ class Random(Actor):
 
 
 class VaryingRandom(Random):
-    """A ``Random`` whose distribution changes in the run: some of its parameters have inputs of their names.
+    """A ``Random`` whose distribution changes during the run: some of its parameters have inputs with their names.
 
-    What came there last counts; before, what the distribution says.  Ptolemy: the ports of ``Gaussian`` and the others.
+    Their latest tokens are used; before the first ones, the parameters of the distribution.  Ptolemy: the ports of
+    ``Gaussian`` and the others.
     """
 
-    varying = texts_parameter(doc="parameters of the distribution that have inputs")
+    varying = texts_parameter(doc="names of the parameters that have inputs")
 
     def own_ports(self) -> dict[str, InputPort[Any] | OutputPort[Any]]:
         known = declared_parameters(type(self.distribution))

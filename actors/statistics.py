@@ -1,7 +1,7 @@
 """Statistics of the latest tokens: MovingAverage, MovingStatistics.
 
-Sums are kept as exact fractions, so that what leaves the window leaves no rounding error behind: after a million
-tokens the mean is as good as if the window were summed afresh.
+Sums are kept as exact fractions, so that values leaving the window leave no rounding error: after a million tokens the
+mean is as exact as if the window were summed again.
 """
 
 from __future__ import annotations
@@ -16,18 +16,18 @@ from .core import Actor, EpicycleError, InputPort, OutputPort, Parameter, Parame
 
 
 class _Window(Actor):
-    """What these actors share: the window, and the exact sums over it."""
+    """The common part of these actors: the window, and the exact sums over it."""
 
     input = InputPort(float, doc="the numbers")
 
-    size: Parameter[int | None] = Parameter(int, None, min=1, doc="how many of the latest tokens count")
+    size: Parameter[int | None] = Parameter(int, None, min=1, doc="number of latest tokens in the window")
     span: Parameter[float | None] = Parameter(
-        float, None, unit="s", min=0, doc="how old a token may be to count; a token of exactly this age still does"
+        float, None, unit="s", min=0, doc="largest age of a token in the window, inclusive"
     )
 
     def check(self) -> None:
         if self.size is None and self.span is None:
-            raise ParameterError("give the window: 'size', a number of tokens, or 'span', a time, or both")
+            raise ParameterError("give a window: 'size', a number of tokens, or 'span', a time, or both")
 
     def initialize(self) -> None:
         self._times: deque[int] = deque()
@@ -35,9 +35,9 @@ class _Window(Actor):
         self._sum = Fraction(0)
 
     def _enter(self, value: float) -> None:
-        """Take a token into the window, and out of it those that it pushes out."""
+        """Take a token into the window, and remove those that it displaces."""
         if not math.isfinite(value):
-            raise EpicycleError(f"{value!r} has no place in a statistic")
+            raise EpicycleError(f"{value!r} is not a finite number, and cannot be part of a statistic")
         now = self.tag.time
         self._times.append(now)
         self._values.append(value)
@@ -60,14 +60,14 @@ class _Window(Actor):
 class MovingAverage(_Window):
     """The mean of the latest tokens, correctly rounded.
 
-    It is sent for each token; until the window is full, the mean is over what has come so far.
+    It is sent for each token; until the window is full, it is over the tokens so far.
     Ptolemy: ``MovingAverage``; over a span without end and ``whole``, ``Average``.
     """
 
-    reset = InputPort(required=False, doc="a token that is true empties the window, before the tag is counted")
+    reset = InputPort(required=False, doc="a true token empties the window, before the tokens of the tag are added")
     output = OutputPort(float, ptolemy={"type": Any}, doc="the mean")
 
-    whole = Parameter(bool, False, doc="whether the mean of whole numbers is one, too, cut off towards zero")
+    whole = Parameter(bool, False, doc="whether the mean of whole numbers is rounded to a whole number, towards zero")
 
     def fire(self) -> None:
         if any(token is True for token in self.reset.tokens):
@@ -79,21 +79,21 @@ class MovingAverage(_Window):
 
 
 class MovingStatistics(_Window):
-    """Mean, standard deviation, least and greatest of the latest tokens; sent for each token.
+    """Mean, standard deviation, minimum and maximum of the latest tokens; sent for each token.
 
     ``std`` is the sample standard deviation ``sqrt(sum((x - mean)^2) / (n - 1))``, sent from two tokens on.
     """
 
     mean = OutputPort(float, doc="the mean")
-    std = OutputPort(float, doc="the sample standard deviation; nothing while there is one token only")
+    std = OutputPort(float, doc="the sample standard deviation, sent from two tokens on")
     min = OutputPort(float, ptolemy={"type": Any}, doc="the least")
     max = OutputPort(float, ptolemy={"type": Any}, doc="the greatest")
-    number = OutputPort(int, doc="how many tokens are in the window")
+    number = OutputPort(int, doc="number of tokens in the window")
 
     def initialize(self) -> None:
         super().initialize()
         self._squares = Fraction(0)
-        # (number of the token, value): what is no longer the extreme of anything that will be asked is dropped.
+        # (number of the token, value): values that can no longer be the extreme of a window are dropped.
         self._least: deque[tuple[int, float]] = deque()
         self._greatest: deque[tuple[int, float]] = deque()
         self._entered = 0
@@ -126,7 +126,7 @@ class MovingStatistics(_Window):
 
 
 def root(square: Fraction) -> float:
-    """The square root of a fraction whose own size may be beyond all floats; infinite if the root is, too."""
+    """The square root of a fraction that may be too large for a float; infinite if the root is, too."""
     shift = (square.numerator.bit_length() - square.denominator.bit_length()) // 2
     scaled = square / Fraction(4) ** shift  # close to 1
     try:

@@ -1,11 +1,11 @@
-"""Tests of an actor by itself: tokens in at given times, and what it sends, without a model around it.
+"""Tests of a single actor without a model: tokens in at given times, and the tokens that it sends.
 
 >>> harness = Harness(Scale("scale", factor=3))
 >>> harness.run(until=2.0, input=[(0.5, 1.0), (1.5, 2.0)])
 >>> harness.sent["output"]
 [(0.5, 3.0), (1.5, 6.0)]
 
-``epicycle.aspects.testing`` has what tests of aspects need.
+``epicycle.aspects.testing`` has tools for tests of aspects.
 """
 
 from __future__ import annotations
@@ -19,12 +19,13 @@ from .core import Actor, Streams, Tag, Wake, to_nanoseconds
 
 
 class Harness:
-    """A run in which there is one actor, reactive or a process; its time begins at 0 s.
+    """A run of one actor, reactive or a process; its time begins at 0 s.
 
-    ``sent``: what the actor has sent, as (seconds, token) by output port.  ``channels``: the channel of each, None for
-    all of them.  ``wakes``: the wake-ups that are still to come.  ``stopped``: why the actor has ended the run, if so.
+    ``sent``: the tokens that the actor has sent, as (seconds, token) by output port.  ``channels``: the channel of
+    each, None for all channels.  ``wakes``: the pending wake-ups.  ``stopped``: the reason if the actor has ended the
+    run.
 
-    Ports that need not be connected are not, unless ``widths`` says how many connections they have or a token comes.
+    Optional ports are not connected, unless ``widths`` gives their number of connections or a token comes.
     """
 
     def __init__(self, actor: Actor, *, seed: int = 1, widths: Mapping[str, int] | None = None) -> None:
@@ -55,27 +56,27 @@ class Harness:
         return self.tag.time
 
     def wake(self, actor: Actor, time: int) -> Wake:
-        """What the actor asks for with ``wake_in`` and ``wake_at``."""
+        """Called by ``wake_in`` and ``wake_at`` of the actor."""
         tag = Tag(time, 1) if time > self.tag.time else Tag(self.tag.time, self.tag.microstep + 1)
         self.wakes.append(Wake(tag))
         return self.wakes[-1]
 
     def stop(self, reason: str) -> None:
-        """What the actor asks for with ``context.stop``."""
+        """Called by the actor to end the run."""
         self.stopped = reason
 
     def fire(self, seconds: float, microstep: int = 1, **tokens: Any) -> None:
         """Fire once at a tag, with a token for each of these inputs; wake-ups of this tag are due.
 
-        A list of tokens goes to the channels of a port that takes several connections, one each, None left out; what is
-        no list goes to the first.
+        A list of tokens goes to the channels of a port with several connections, one each, except None; anything else
+        goes to the first channel.
         """
         self._fire(Tag(to_nanoseconds(seconds), microstep), tokens.items())
 
     def run(self, until: float, **inputs: Iterable[tuple[float, Any]]) -> None:
         """Let time pass up to and including ``until`` s: fire for these tokens, (seconds, token) by port, and wake-ups.
 
-        A token stands for several in the same way as for ``fire``; those of one time are there at the same tag.
+        A list of tokens is distributed as in ``fire``; tokens with the same time arrive at the same tag.
         """
         coming: dict[int, list[tuple[str, Any]]] = {}
         for name, feed in inputs.items():
@@ -118,9 +119,9 @@ class Harness:
             port.clear()
 
     def tokens(self, port: str) -> list[Any]:
-        """What one port has sent, without the times."""
+        """The tokens that one port has sent, without the times."""
         return [token for _, token in self.sent[port]]
 
     def last(self, port: str) -> Any:
-        """What one port has sent last."""
+        """The latest token of one port."""
         return self.sent[port][-1][1]

@@ -1,4 +1,4 @@
-"""What is done with texts: TextFunction."""
+"""Actors on texts: TextFunction."""
 
 from __future__ import annotations
 
@@ -33,20 +33,20 @@ _NAMES = ("text", "other", "new")
 class TextFunction(Actor):
     """Applies a function to texts whenever one of its inputs gets a token; each input keeps its latest token.
 
-    ``lower``, ``upper`` and ``trim`` are of ``text`` alone.  ``equals``, ``contains``, ``starts with`` and
-    ``ends with`` tell whether it does so with ``other``, ``find`` and ``find last`` where that is in it, from 0, or -1.
-    ``replace`` and ``replace first`` put ``new`` in its place, ``split`` gives the parts between.
+    ``lower``, ``upper`` and ``trim`` use only ``text``.  ``equals``, ``contains``, ``starts with`` and ``ends with``
+    compare it with ``other``; ``find`` and ``find last`` send the position of ``other`` in it, from 0, or -1.
+    ``replace`` and ``replace first`` replace ``other`` by ``new``, ``split`` gives the parts between occurrences.
     Ptolemy: ``StringCompare``, ``StringFunction``, ``StringIndexOf``, ``StringMatches`` and ``StringReplace`` of plain
     texts.
     """
 
     output: OutputPort[Any] = OutputPort(str, doc="the result")
 
-    function = Parameter(str, choices=tuple(FUNCTIONS), doc="what is done")
-    ignore_case = Parameter(bool, False, doc="whether capital letters count as small ones, in both texts")
+    function = Parameter(str, choices=tuple(FUNCTIONS), doc="the function to apply")
+    ignore_case = Parameter(bool, False, doc="whether upper and lower case are the same, in both texts")
     text = PortParameter(str, "", doc="the text")
-    other = PortParameter(str, "", doc="what it is compared with, or what is looked for in it")
-    new = PortParameter(str, "", doc="what is put in the place of what is found")
+    other = PortParameter(str, "", doc="text to compare with, or to find")
+    new = PortParameter(str, "", doc="replacement for the text found")
 
     def check(self) -> None:
         self.output.type = _TYPES.get(self.function, str)
@@ -64,12 +64,12 @@ class TextFunction(Actor):
             if self.ignore_case:
                 text, other = text.lower(), other.lower()
             if self.function.startswith("replace") and other and text.count(other) * len(new) > MAX_TEXT:
-                raise EpicycleError(f"the text becomes longer than {counted(MAX_TEXT, 'character')}")
+                raise EpicycleError(f"the result is longer than {counted(MAX_TEXT, 'character')}")
             self.output.send(FUNCTIONS[self.function](text, other, new))
 
     def _checked(self, token: Any) -> str:
         if not isinstance(token, str):
             raise EpicycleError(f"{token!r} is not a text")
         if len(token) > MAX_TEXT:
-            raise EpicycleError(f"a text of more than {counted(MAX_TEXT, 'character')} is too long")
+            raise EpicycleError(f"the text is longer than {counted(MAX_TEXT, 'character')}")
         return token

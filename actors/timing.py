@@ -24,13 +24,13 @@ from .core import (
 class TimeDelay(Actor):
     """Sends each token after a delay; with delay 0 at the next microstep.
 
-    A token is delayed by what ``delay`` is at its own tag, so one may overtake another.  The output does not depend
-    on the inputs at once: the actor may stand in a loop.  With ``steps`` a token keeps its microstep, and those that
-    are due at one time leave one by one, at successive microsteps.  Ptolemy: ``TimeDelay``, ``TimedDelay``,
+    A token is delayed by the value of ``delay`` at its tag, so one may overtake another.  The output does not depend on
+    the inputs within the same tag, so the actor may be part of a loop.  With ``steps``, a token keeps its microstep,
+    and tokens due at the same time leave one by one, at successive microsteps.  Ptolemy: ``TimeDelay``, ``TimedDelay``,
     ``VariableDelay``.
     """
 
-    input = InputPort(doc="what is delayed")
+    input = InputPort(doc="tokens to delay")
     output = OutputPort(depends_on=(), doc="each token after its delay")
 
     delay = PortParameter(float, 1.0, unit="s", min=0, doc="how long each token is held")
@@ -47,10 +47,10 @@ class TimeDelay(Actor):
 
 
 class _Steps:
-    """What a delay holds that keeps microsteps: as in Ptolemy, where an actor has a firing for each token that comes.
+    """The tokens of a delay that keeps microsteps, as in Ptolemy, where an actor fires once for each token.
 
-    In each of them one leaves at most that is due, and what is left is looked at again at the next microstep.  Of those
-    that are to leave at one time, a new one is the last, or the first if its microstep is below that of the very last.
+    In each firing, at most one due token leaves; the others are tried again at the next microstep.  Among tokens that
+    leave at the same time, a new one is the last, or the first if its microstep is below that of the last.
     """
 
     def __init__(self, actor: TimeDelay) -> None:
@@ -68,7 +68,7 @@ class _Steps:
         line.insert(place, (tag, token))
 
     def due(self) -> list[Any]:
-        """Take out what leaves now."""
+        """Take out the tokens that leave now."""
         now, line, found = self._actor.tag, self._line, list[Any]()
         most = max(1, len(self._actor.input.tokens))
         while line and line[0][0] <= now and len(found) < most:
@@ -79,31 +79,32 @@ class _Steps:
 
 
 class _Timing(Actor):
-    """What timers share: they tell that a time is over by sending a value."""
+    """The common part of timers: they send a value when a time is over."""
 
-    input = InputPort(float, doc="after how many s to send")
+    input = InputPort(float, doc="time until the value is sent, in s")
     output = OutputPort(depends_on=(), doc="the value, when the time is over")
 
-    value: Parameter[Any] = Parameter(object, True, doc="what is sent")
+    value: Parameter[Any] = Parameter(object, True, doc="the value to send")
 
     def check(self) -> None:
         self.output.type = token_type([self.value])
 
 
 class Timer(_Timing):
-    """Sends a value after the number of seconds in each token; any number of tokens may wait at the same time.
+    """Sends a value after the number of seconds in each token; any number of times may run in parallel.
 
-    With ``one_at_a_time``, as in Ptolemy, a firing sends one value; what is due as well follows in the next microsteps.
+    With ``one_at_a_time``, as in Ptolemy, a firing sends one value; others due at the same time follow at the next
+    microsteps.
     Ptolemy: ``Timer``.
     """
 
     one_at_a_time = Parameter(
-        bool, False, ptolemy=True, doc="whether values of one time leave in successive microsteps"
+        bool, False, ptolemy=True, doc="whether values due at the same time leave at successive microsteps"
     )
 
     def initialize(self) -> None:
         self._running: Pending[None] = Pending(self)
-        self._ends: list[int] = []  # of those that run one at a time, ascending
+        self._ends: list[int] = []  # ascending, when values are sent one at a time
 
     def fire(self) -> None:
         if self.one_at_a_time:
@@ -129,20 +130,20 @@ class Timer(_Timing):
 
     def _checked(self, delay: float) -> float:
         if delay < 0:
-            raise ValueError(f"{self.input.path} is {delay:g} s: a timer cannot run for less than no time")
+            raise ValueError(f"{self.input.path} is {delay:g} s, but a timer needs a time >= 0")
         return delay
 
 
 class ResettableTimer(_Timing):
     """Sends a value after the number of seconds in the latest token.
 
-    A further token before that starts the time again, a negative one stops it.  A token at the very tag at which the
-    time is over comes too late to stop that.  If it is not ``preemptive``, times run one after the other: each begins
-    when the one before it is over, and a negative token takes back the one that waits last, or else the one that runs.
+    Another token before that restarts the time, a negative one stops it.  A token at the very tag at which the time is
+    over comes too late to stop it.  If it is not ``preemptive``, times run one after the other: each begins when the
+    previous one is over, and a negative token cancels the last waiting one, or else the running one.
     Ptolemy: ``ResettableTimer``, ``NonInterruptibleTimer`` (not preemptive).
     """
 
-    preemptive = Parameter(bool, True, doc="whether a token starts the time again; if not, it waits until that is over")
+    preemptive = Parameter(bool, True, doc="whether a token restarts the time; if not, it waits until the time is over")
 
     def initialize(self) -> None:
         self._wake: Wake | None = None
@@ -178,8 +179,8 @@ class WaitingTime(Actor):
     """
 
     waiter = InputPort(doc="what waits")
-    waited_for = InputPort(doc="what ends the waiting of all that wait")
-    output = OutputPort(float, doc="how long each has waited, in s, in the order in which they came")
+    waited_for = InputPort(doc="ends the waiting of all waiting tokens")
+    output = OutputPort(float, doc="waiting time of each token in s, in order of arrival")
 
     def initialize(self) -> None:
         self._since: list[int] = []
@@ -194,16 +195,17 @@ class WaitingTime(Actor):
 
 
 class TimeCompare(Actor):
-    """Sends by how much a token of ``second`` comes after one of ``first``: the one after its first, and so on.
+    """Sends the time between a token of ``first`` and one of ``second``: between the first tokens, the second ones, and
+    so on.
 
     Ptolemy: ``TimeCompare``, where the ports are called ``input1`` and ``input2``.
     """
 
-    first = InputPort(doc="from when on time is taken")
-    second = InputPort(doc="up to when it is taken")
-    output = OutputPort(float, doc="the time of the second less that of the first, in s")
+    first = InputPort(doc="the start of each time")
+    second = InputPort(doc="the end of each time")
+    output = OutputPort(float, doc="time of the second minus time of the first, in s")
 
-    nonnegative = Parameter(bool, False, doc="whether tokens of 'second' that came before their first are passed over")
+    nonnegative = Parameter(bool, False, doc="whether to skip tokens of 'second' that came before their first")
 
     def initialize(self) -> None:
         self._firsts: deque[int] = deque()
@@ -225,8 +227,8 @@ class TimeGap(Actor):
     Ptolemy: ``TimeGap``.
     """
 
-    input = InputPort(doc="the tokens between which time is taken")
-    output = OutputPort(float, doc="time since the token before, in s")
+    input = InputPort(doc="tokens whose time differences are sent")
+    output = OutputPort(float, doc="time since the previous token, in s")
 
     def initialize(self) -> None:
         self._last: Tag | None = None

@@ -1,4 +1,4 @@
-"""Trajectory: how named states go on in model time, by formulas, from one discontinuity to the next."""
+"""Trajectory: the development of named states in model time, by formulas, from one discontinuity to the next."""
 
 from __future__ import annotations
 
@@ -19,9 +19,8 @@ _AHEAD: Final = 64  # parts of a step that are searched for crossings at once
 class Trajectory:
     """The present solution for some states, whose ``rates`` are formulas over them, over ``held`` values and ``time``.
 
-    ``begin`` starts a solution; whoever does so again, because something has changed, keeps the same guards.
-    ``held`` is shared: what changes in it counts from the next beginning on.  ``also`` are names for the time since a
-    moment (ns).
+    ``begin`` starts a solution; a further ``begin``, after a change, keeps the same guards.  ``held`` is shared:
+    changes in it take effect at the next ``begin``.  ``also`` are names for the time since a moment (ns).
     """
 
     def __init__(
@@ -37,7 +36,7 @@ class Trajectory:
         self._solver = solver
 
     def watch(self, formula: Formula, what: str, *, rising: bool = True, falling: bool = True) -> Guard:
-        """Look for the zero crossings of a formula, which messages call ``what``."""
+        """Search for the zero crossings of a formula, called ``what`` in messages."""
 
         def value(at: float, state: State) -> float:
             return number_of(formula, self.values(at, state), what)
@@ -47,7 +46,8 @@ class Trajectory:
         return guard
 
     def begin(self, time: int, fraction: float, state: State) -> None:
-        """Start a solution at ``time`` ns plus a fraction of a nanosecond in s: no rounding adds up over crossings."""
+        """Start a solution at ``time`` ns plus a fraction of a nanosecond in s, so that no rounding accumulates over
+        crossings."""
         self.time, self.fraction = time, fraction
         self.solution = Solution(self._rates, self._bounds_of_rates, state, self.guards, **self._solver)
 
@@ -59,25 +59,25 @@ class Trajectory:
     # -- time -----------------------------------------------------------------------------------------------------
 
     def elapsed(self, time: int) -> float:
-        """Seconds since the solution's start, which may lie ahead by a fraction of a nanosecond."""
+        """Seconds since the start of the solution, which may be later by a fraction of a nanosecond."""
         return max(0.0, (time - self.time) / NANOSECONDS_PER_SECOND - self.fraction)
 
     def moment(self, at: float) -> int:
-        """The nanosecond that is nearest to a time of the present solution."""
+        """The nanosecond nearest to a time of the present solution."""
         return self.time + round((self.fraction + at) * NANOSECONDS_PER_SECOND)
 
     def _at(self, at: float, since: int = 0) -> float:
-        """The time in the model at a time of the present solution, counted from a moment."""
+        """The model time at a time of the present solution, counted from a moment."""
         return (self.time - since) / NANOSECONDS_PER_SECOND + (self.fraction + at)
 
     def next_look(self, time: int) -> int:
-        """When (ns) to look again: at the next crossing or, while none is in sight, where the search for it ends."""
+        """When (ns) to check again: at the next crossing or, while none is in sight, where the search for it ends."""
         solution, parts = self.solution, 0
         while solution.crossing is None and self.moment(solution.searched) <= time:
             solution.look()
             parts += 1
             if parts > _MAX_STEPS:
-                raise EpicycleError(f"the solver takes more than {_MAX_STEPS:,} steps within a nanosecond")
+                raise EpicycleError(f"the solver took more than {_MAX_STEPS:,} steps within a nanosecond")
         while solution.crossing is None and solution.searched < solution.end and parts < _AHEAD:
             solution.look()
             parts += 1
@@ -86,7 +86,7 @@ class Trajectory:
     # -- values ---------------------------------------------------------------------------------------------------
 
     def values(self, at: float, state: State) -> dict[str, Any]:
-        """What expressions know at a time of the present solution."""
+        """The names that expressions can use at a time of the present solution, with their values."""
         names = {**self._held, **dict(zip(self.names, state, strict=True))}
         names["time"] = self._at(at)
         for name, since in self._also.items():
@@ -94,7 +94,7 @@ class Trajectory:
         return names
 
     def signs(self, at: float, state: State) -> list[int]:
-        """On which sides the guards are."""
+        """The sides of the guards."""
         return [sign_of(guard.value(at, state)) for guard in self.guards]
 
     def _rates(self, at: float, state: State) -> State:
@@ -109,14 +109,14 @@ class Trajectory:
         return [bounds_of(formula, known) for formula in self._formulas.values()]
 
     def _known_bounds(self, left: float, right: float, states: Sequence[Bounds]) -> dict[str, Bounds]:
-        """What the names in expressions lie between, from one time of the present solution to another."""
+        """The bounds of the names in expressions, from one time of the present solution to another."""
         known = {name: (value, value) for name, value in self._held.items() if isinstance(value, (int, float))}
         known |= {name: (self._at(left, since), self._at(right, since)) for name, since in self._also.items()}
         return {**known, **dict(zip(self.names, states, strict=True)), "time": (self._at(left), self._at(right))}
 
 
 def number_of(formula: Formula, names: Mapping[str, Any], what: str) -> float:
-    """The value of a formula, which must be a number; ``what`` it is of, for messages."""
+    """The value of a formula, which must be a number; messages call it ``what``."""
     try:
         result = formula(names)
     except EpicycleError as error:

@@ -1,6 +1,6 @@
-"""What answers a trigger: Const, Ramp, Sequence, Pulse, CurrentTime, CurrentMicrostep.
+"""Actors that answer triggers: Const, Ramp, Sequence, Pulse, CurrentTime, CurrentMicrostep.
 
-Triggers that come together, one at each connection, are one trigger, but for CurrentTime.
+Triggers that come together, one at each connection, count as one, except for CurrentTime.
 """
 
 from __future__ import annotations
@@ -23,22 +23,22 @@ from .core import (
 
 
 def times(trigger: InputPort[Any]) -> int:
-    """How often to answer at this tag."""
+    """The number of answers at this tag."""
     return len(trigger.tokens) if trigger.width <= 1 else len(list(rounds(trigger)))
 
 
 class _Answering(Actor):
-    """What sources have in common that answer triggers, as often as they may."""
+    """The common part of sources that answer triggers, with a limit."""
 
     trigger = InputPort(multi=True, doc="when to send")
 
-    limit: Parameter[int | None] = Parameter(int, None, min=1, doc="how many answers there are; no end if left out")
+    limit: Parameter[int | None] = Parameter(int, None, min=1, doc="number of answers; unlimited if left out")
 
     def initialize(self) -> None:
         self._answers = 0
 
     def answers(self) -> int:
-        """How often to answer at this tag."""
+        """The number of answers at this tag."""
         wanted = times(self.trigger) if self.trigger.width or self.trigger.required else 1
         if self.limit is not None:
             wanted = min(wanted, self.limit - self._answers)
@@ -49,7 +49,7 @@ class _Answering(Actor):
 class Const(_Answering):
     """Sends the same value for each trigger; once at the start if ``trigger`` is not connected.
 
-    The distribution that gives the same value always is ``Constant``.  Ptolemy: ``Const``.
+    The distribution that always gives the same value is ``Constant``.  Ptolemy: ``Const``.
     """
 
     is_source: ClassVar[bool] = True
@@ -57,7 +57,7 @@ class Const(_Answering):
     trigger = InputPort(multi=True, required=False, doc="when to send; once at the start if not connected")
     output = OutputPort(doc="the value")
 
-    value: Parameter[Any] = Parameter(object, 1, doc="what is sent")
+    value: Parameter[Any] = Parameter(object, 1, doc="the value to send")
 
     def check(self) -> None:
         self.output.type = token_type([self.value])
@@ -73,25 +73,27 @@ class Const(_Answering):
 
 
 class Ramp(_Answering):
-    """Counts triggers: sends ``init`` for the first, and then ``step`` more for each.
+    """Counts triggers: sends ``init`` for the first one, and ``step`` more for each further one.
 
-    The numbers are integers if ``init`` and ``step`` are; then what comes for them must be one, too.
+    The numbers are integers if ``init`` and ``step`` are; tokens at these ports must then be integers, too.
     Ptolemy: ``Ramp``.
     """
 
     output = OutputPort(float, doc="the number")
 
-    init: PortParameter[float] = PortParameter(int | float, 0, doc="the first number, and the next one if it comes")
-    step: PortParameter[float] = PortParameter(int | float, 1, doc="what is added from one to the next")
-    late_step = Parameter(bool, False, ptolemy=True, doc="whether a step counts behind the next number, not before it")
+    init: PortParameter[float] = PortParameter(int | float, 0, doc="the first number; a token sets the next one")
+    step: PortParameter[float] = PortParameter(int | float, 1, doc="difference between successive numbers")
+    late_step = Parameter(
+        bool, False, ptolemy=True, doc="whether a new step takes effect after the next number, not before"
+    )
 
     def check(self) -> None:
         self.output.type = int if isinstance(self.init, int) and isinstance(self.step, int) else float
 
     def initialize(self) -> None:
         super().initialize()
-        self._last: float | None = None  # before the first, and when another one has come for it
-        self._step: float = 0  # behind the last number
+        self._last: float | None = None  # before the first number, and when a token has set the next one
+        self._step: float = 0  # after the last number
 
     def fire(self) -> None:
         if self.inputs["init"].present:
@@ -101,14 +103,14 @@ class Ramp(_Answering):
             self._last, self._step = self.init if self._last is None else self._last + step, self.step
             if self.output.type is int and not isinstance(self._last, int):
                 raise EpicycleError(
-                    f"init and step are whole numbers, and so is what is sent, but a step of {self.step!r} has come; "
-                    f"write 'init: {self.init:.1f}' for numbers that are not whole"
+                    f"init and step are whole numbers, but a step of {self.step!r} came; write 'init: "
+                    f"{self.init:.1f}' to allow fractions"
                 )
             self.output.send(self._last)
 
 
 class Sequence(Actor):
-    """Sends the next of its values for each trigger, and nothing once all are used.
+    """Sends the next of its values for each trigger, and nothing when all are used.
 
     If ``enable`` is connected, a value is sent only at a tag at which it is true; without ``trigger``, each true
     token of ``enable`` is a trigger.  Ptolemy: ``Sequence``.
@@ -116,15 +118,17 @@ class Sequence(Actor):
 
     trigger = InputPort(multi=True, required=False, doc="when to send")
     enable = InputPort(bool, required=False, doc="whether to send")
-    output = OutputPort(doc="the values in turn")
+    output = OutputPort(doc="the values, in order")
 
-    values: Parameter[Any] = Parameter(object, shape=(None,), doc="what is sent")
-    repeat = Parameter(bool, False, doc="whether to begin again after the last value")
-    hold = Parameter(bool, False, doc="whether the last value is sent again and again when all are used up")
+    values: Parameter[Any] = Parameter(object, shape=(None,), doc="the values to send, in order")
+    repeat = Parameter(bool, False, doc="whether to start again after the last value")
+    hold = Parameter(bool, False, doc="whether to repeat the last value when all are used")
 
     def check(self) -> None:
         if self.repeat and self.hold:
-            raise ParameterError("repeat and hold cannot both be true: after the last value comes the first, or itself")
+            raise ParameterError(
+                "repeat and hold cannot both be true: after the last value comes either the first or the last one again"
+            )
         self.output.type = token_type(self.values)
 
     def initialize(self) -> None:
@@ -149,23 +153,25 @@ class Sequence(Actor):
 
 
 class Pulse(_Answering):
-    """Sends a value at certain triggers, counted from 0, and a zero like it at all others.
+    """Sends a value at certain triggers, counted from 0, and a zero of the same kind at all others.
 
-    A zero is 0, 0.0, false, an empty text, or a list of zeros, or fields of them.  Ptolemy: ``Pulse``.
+    A zero is 0, 0.0, false, an empty text, or a list or record of zeros.  Ptolemy: ``Pulse``.
     """
 
     output = OutputPort(doc="a value, or zero")
 
-    values: Parameter[Any] = Parameter(object, [1, 0], shape=(None,), doc="what is sent")
-    indexes: Parameter[Any] = Parameter(object, [0, 1], shape=(None,), doc="at which triggers, ascending")
+    values: Parameter[Any] = Parameter(object, [1, 0], shape=(None,), doc="the values to send, in order")
+    indexes: Parameter[Any] = Parameter(
+        object, [0, 1], shape=(None,), doc="numbers of the triggers for the values, ascending"
+    )
     repeat = Parameter(bool, False, doc="whether to count from 0 again after the last value")
 
     def check(self) -> None:
         count = [each for each in self.indexes if isinstance(each, int) and not isinstance(each, bool) and each >= 0]
         if len(count) != len(self.indexes) or count != sorted(set(count)):
-            raise ParameterError(f"indexes: {list(self.indexes)} is not an ascending list of whole numbers from 0 on")
+            raise ParameterError(f"indexes: {list(self.indexes)} is not an ascending list of whole numbers >= 0")
         if not self.values:
-            raise ParameterError("values: the list is empty, there is nothing to send")
+            raise ParameterError("values: the list is empty; give at least one value")
         if len(self.values) != len(self.indexes):
             raise ParameterError(
                 f"values: {counted(len(self.values), 'value')} for {len(self.indexes)} of 'indexes'; give one for each"
@@ -181,7 +187,7 @@ class Pulse(_Answering):
         for _ in range(self.answers()):
             if self._place == len(self.values) and self.repeat:
                 self._count = self._place = 0
-                if self.indexes[0] > 0:  # as there: the trigger that begins anew is answered only by a value
+                if self.indexes[0] > 0:  # as in Ptolemy: the trigger that starts again is answered only by a value
                     self._count = 1
                     continue
             if self._place < len(self.values) and self._count == self.indexes[self._place]:
@@ -193,14 +199,14 @@ class Pulse(_Answering):
 
 
 def _zero(value: Any) -> Any:
-    """What is nothing, of the kind of a value."""
+    """The zero of the kind of a value."""
     if isinstance(value, Mapping):
         return {name: _zero(each) for name, each in value.items()}
     return [_zero(each) for each in value] if isinstance(value, (list, tuple)) else type(value)()
 
 
 class CurrentTime(Actor):
-    """Sends the present time for each trigger, those that come together included.
+    """Sends the present time for each trigger, also for each of several that come together.
 
     Ptolemy: ``CurrentTime``.
     """

@@ -1,7 +1,7 @@
 """Variables of a model, which change by events: Variable, SetVariable.
 
-Whatever is to go by one reads its output ``value``: a ``PortParameter`` over a connection, any other parameter by an
-aspect ``Replace`` that stands there.  So each change has a tag, and is in the log.
+To use a variable, read its output ``value``: a ``PortParameter`` over a connection, any other parameter by an aspect
+``Replace`` attached to it.  So each change has a tag and is in the log.
 """
 
 from __future__ import annotations
@@ -12,17 +12,17 @@ from .core import Actor, InputPort, OutputPort, Parameter, Pending
 
 
 class Variable(Actor):
-    """A value that may change: the latest token is its value from the next microstep on, and is sent then.
+    """A value that may change: a token becomes its value at the next microstep, and is sent then.
 
-    Of tokens that come at one tag, the last counts.  Whoever fires at the tag at which it is set still finds the value
-    before, in whatever order; without ``delayed`` the new one counts at once.  Until something comes, who reads it goes
-    by what the model gives.  Ptolemy: a ``Parameter`` that ``SetVariable`` sets.
+    Of several tokens at one tag, the last is used.  Actors that fire at the tag of the change still see the old value,
+    in any order; without ``delayed``, the new value takes effect at once.  Until a token comes, readers use the values
+    given in the model.  Ptolemy: a ``Parameter`` that ``SetVariable`` sets.
     """
 
-    input = InputPort(multi=True, doc="what it is set to")
+    input = InputPort(multi=True, doc="the value to set")
     value = OutputPort(depends_on=(), doc="the new value")
 
-    delayed = Parameter(bool, True, doc="whether a new value counts from the next microstep on, or at once")
+    delayed = Parameter(bool, True, doc="whether a new value takes effect at the next microstep, or at once")
 
     def check(self) -> None:
         self.value.depends_on = () if self.delayed else ("input",)
@@ -40,19 +40,19 @@ class Variable(Actor):
 
 
 class SetVariable(Actor):
-    """Hands what comes to a ``Variable``, and tells what this is worth at the tag of the setting.
+    """Passes tokens to a ``Variable``, and sends the value of the variable at the tag of the change.
 
-    That is the value before, which a ``Replace`` gives to the parameter ``value``; if the variable is not ``delayed``,
-    it is the new one.  Where several set one variable, they do so in the order in which they fire.
+    That is the old value, which a ``Replace`` gives to the parameter ``value``; if the variable is not ``delayed``, it
+    is the new one.  Several actors set one variable in the order of their firings.
     Ptolemy: ``SetVariable``.
     """
 
-    input = InputPort(doc="what the variable is set to")
+    input = InputPort(doc="the value to set")
     variable = OutputPort(doc="the same, for the variable")
-    output = OutputPort(doc="what the variable is worth; nothing if that is not known")
+    output = OutputPort(doc="value of the variable; nothing if unknown")
 
-    value: Parameter[Any] = Parameter(object, None, doc="what the variable is worth")
-    delayed = Parameter(bool, True, doc="whether the variable is worth what it is set to from the next microstep on")
+    value: Parameter[Any] = Parameter(object, None, doc="value of the variable")
+    delayed = Parameter(bool, True, doc="whether the variable takes the new value at the next microstep")
 
     def fire(self) -> None:
         for token in self.input.tokens:

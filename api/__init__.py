@@ -1,4 +1,4 @@
-"""Epicycle from Python: load, run, study and compare models, draw and save what comes of them.
+"""Epicycle from Python: load, run, study and compare models, draw and save the results.
 
 >>> import epicycle
 >>> results = epicycle.run("mm1", seed=3, set={"load": 0.9})
@@ -58,8 +58,8 @@ __all__ = [
     "view",
 ]
 
-# Where each name is found on first use: `import epicycle` must not wait for NumPy and networkx.  A new call
-# is a line here and above.
+# Where to find each name on first use: `import epicycle` must not wait for NumPy and networkx. A new call needs a line
+# here and above.
 _HOMES = {
     "EpicycleError": "actors",
     **dict.fromkeys(("Model", "ModelError", "Results", "Simulation", "StudyResults", "open_study"), "runner"),
@@ -90,7 +90,7 @@ _FOLDERS = ("actors", "aspects", "runner")
 def __getattr__(name: str) -> Any:
     if name in _HOMES:
         return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
-    if name in _FOLDERS:  # `epicycle.actors.Clock` without an import of its own
+    if name in _FOLDERS:  # `epicycle.actors.Clock` without a separate import
         return import_module(f"{__name__}.{name}")
     if name == "__version__":
         return import_module(f"{__name__}.runner.provenance").version_of("epicycle")

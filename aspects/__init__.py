@@ -1,4 +1,4 @@
-"""What can be woven around a model: aspects, and the join points that they act at."""
+"""Aspects, which are woven around a model, and the join points at which they act."""
 
 from typing import TYPE_CHECKING
 

@@ -1,4 +1,4 @@
-"""Disturbances of communication: they stand at input ports, and decide whether, when and how a message arrives."""
+"""Disturbances of communication: they attach to input ports, and decide whether, when and how a message arrives."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ DROP, DELAY = "drop", "delay"
 class PacketLoss(RandomLoss, CommunicationAspect):
     """Drops each message with a fixed probability, independently per receiver and message (Bernoulli).
 
-    It is to messages what ``MeasurementFailure`` is to measurements; for bursts of losses, see ``GilbertElliott``.
+    The counterpart of ``MeasurementFailure`` for messages; for bursts of losses, see ``GilbertElliott``.
     Event: ``dropped``.  Paper: the communication error of the disturbance level, section III.A.
     """
 
@@ -32,9 +32,10 @@ class PacketLoss(RandomLoss, CommunicationAspect):
 class GilbertElliott(RandomLoss, CommunicationAspect):
     """Drops messages in bursts: a channel that is good or bad, and changes between the two from message to message.
 
-    In the stationary law the channel is bad with probability p / (p + r); it stays bad for 1 / r messages in the mean
-    and good for 1 / p.  The mean loss is (p * loss_bad + r * loss_good) / (p + r).  A loss of 25 % in bursts of four:
-    ``r: 0.25, p: 0.0833``.  Event: ``dropped``.  Source: Gilbert, Bell Syst. Tech. J. 39, 1960; Elliott, 42, 1963.
+    In the stationary state, the channel is bad with probability p / (p + r); it stays bad for 1 / r messages on
+    average, and good for 1 / p.  The mean loss is (p * loss_bad + r * loss_good) / (p + r).  A loss of 25 % in bursts
+    of four: ``r: 0.25, p: 0.0833``.  Event: ``dropped``.  Source: Gilbert, Bell Syst. Tech. J. 39, 1960; Elliott, 42,
+    1963.
     """
 
     p = Parameter(float, min=0.0, max=1.0, unit="1", doc="probability that a good channel turns bad, per message")
@@ -48,17 +49,17 @@ class GilbertElliott(RandomLoss, CommunicationAspect):
 
 
 class Latency(CommunicationAspect):
-    """Delays each message by ``delay`` and a random part: ``jitter`` times what is drawn from the distribution.
+    """Delays each message by ``delay`` and a random part: ``jitter`` times a value drawn from the distribution.
 
     uniform: ``delay`` + U(-jitter, jitter); normal: ``delay`` + N(0, jitter^2); exponential: ``delay`` + Exp(mean
-    ``jitter``); all cut off at 0.  One value is drawn for every message, whatever the jitter.
-    Unless ``reordering`` is allowed, a message waits for the one before it.  Event: ``delayed``, with the seconds.
+    ``jitter``); all limited to >= 0.  One value is drawn for every message, whatever the jitter.
+    Unless ``reordering`` is allowed, a message waits for the previous one.  Event: ``delayed``, with the seconds.
     """
 
     events: ClassVar[tuple[str, ...]] = ("delayed",)
 
     delay = Parameter(float, 0.0, min=0.0, unit="s", doc="fixed part of the delay")
-    jitter = Parameter(float, 0.0, min=0.0, unit="s", doc="size of the random part, see the distribution")
+    jitter = Parameter(float, 0.0, min=0.0, unit="s", doc="size of the random part, in the sense of the distribution")
     distribution = LawParameter(LAWS, "uniform", doc="law of the random part, in units of the jitter")
     reordering = Parameter(bool, False, doc="whether a message may overtake an earlier one")
 
@@ -83,8 +84,8 @@ class Duplicate(CommunicationAspect):
     events: ClassVar[tuple[str, ...]] = ("duplicated",)
 
     probability = Parameter(float, min=0.0, max=1.0, unit="1", doc="probability that a message is duplicated")
-    copies = Parameter(int, 1, min=1, max=1000, doc="how many further times it is delivered")
-    spacing = Parameter(float, 0.0, min=0.0, unit="s", doc="time between the copies; 0 is the next microstep")
+    copies = Parameter(int, 1, min=1, max=1000, doc="number of additional deliveries")
+    spacing = Parameter(float, 0.0, min=0.0, unit="s", doc="time between copies; 0 is the next microstep")
 
     def pass_token(self, token: Any, point: JoinPoint) -> None:
         point.forward(token)
@@ -95,15 +96,15 @@ class Duplicate(CommunicationAspect):
 
 
 class Reorder(CommunicationAspect):
-    """Holds a message back until later ones have overtaken it, with a fixed probability.
+    """With a fixed probability, holds a message back until later ones have overtaken it.
 
-    A message that is still held when the run ends is never delivered.  Events: ``held``, ``released``.
+    A message still held at the end of the run is never delivered.  Events: ``held``, ``released``.
     """
 
     events: ClassVar[tuple[str, ...]] = ("held", "released")
 
     probability = Parameter(float, min=0.0, max=1.0, unit="1", doc="probability that a message is held back")
-    overtaken_by = Parameter(int, 1, min=1, doc="how many later messages pass before it is delivered")
+    overtaken_by = Parameter(int, 1, min=1, doc="number of later messages that pass before it is delivered")
 
     def pass_token(self, token: Any, point: JoinPoint) -> None:
         held: list[list[Any]] = point.memory.setdefault("held", [])  # [messages still to pass, token]
@@ -123,16 +124,18 @@ class Reorder(CommunicationAspect):
 class Corrupt(CommunicationAspect):
     """Damages the numbers in a message, with a fixed probability.
 
-    gaussian: adds N(0, deviation^2) to each.  bit_flip: turns one random bit of the 64 of each; what is not finite
-    then is up to the receiver.  Event: ``corrupted``, with the new message.
+    gaussian: adds N(0, deviation^2) to each.  bit_flip: flips one random bit of the 64 of each; results that are not
+    finite are left to the receiver.  Event: ``corrupted``, with the new message.
     """
 
     events: ClassVar[tuple[str, ...]] = ("corrupted",)
 
     probability = Parameter(float, min=0.0, max=1.0, unit="1", doc="probability that a message is damaged")
-    kind = Parameter(str, GAUSSIAN, choices=(GAUSSIAN, BIT_FLIP), doc="what happens to a number")
+    kind = Parameter(str, GAUSSIAN, choices=(GAUSSIAN, BIT_FLIP), doc="how a number is damaged")
     deviation = Parameter(float, 1.0, min=0.0, doc="standard deviation of the error, in the number's own unit")
-    fields = texts_parameter((), doc="fields of the message that can be damaged; none: all numbers but its time")
+    fields = texts_parameter(
+        (), doc="fields of the message that can be damaged; if left out, all numbers except its time"
+    )
 
     def pass_token(self, token: Any, point: JoinPoint) -> None:
         hit = point.random.random() < self.probability
@@ -150,30 +153,30 @@ class Corrupt(CommunicationAspect):
 
 
 def _flip(numbers: NDArray[np.float64], random: Stream) -> NDArray[np.float64]:
-    """Each number with one bit of its IEEE 754 form turned."""
+    """Each number with one bit of its IEEE 754 form flipped."""
     bits = np.left_shift(np.uint64(1), random.integers(0, 64, numbers.shape, dtype=np.uint64))
     return (numbers.view(np.uint64) ^ bits).view(np.float64)
 
 
 class Throttle(CommunicationAspect):
-    """Lets through at most ``rate`` messages a second in the long run, and ``burst`` at once (token bucket).
+    """Lets through at most ``rate`` messages per second in the long run, and ``burst`` at once (token bucket).
 
-    The bucket holds ``burst`` permits, is full at first and gains ``rate`` of them a second; each message takes one.
-    What comes to an empty bucket is dropped (policing) or waits for its permit in order (shaping).
+    The bucket holds ``burst`` permits, is full at the start and gains ``rate`` per second; each message takes one. A
+    message that finds the bucket empty is dropped (policing) or waits for its permit in order (shaping).
     Events: ``dropped``; ``delayed``, with the seconds.
     """
 
     events: ClassVar[tuple[str, ...]] = ("dropped", "delayed")
 
-    rate = Parameter(float, above=0, unit="1/s", doc="messages a second")
+    rate = Parameter(float, above=0, unit="1/s", doc="messages per second")
     burst = Parameter(int, 1, min=1, doc="messages that may pass at once")
-    excess = Parameter(str, DROP, choices=(DROP, DELAY), doc="what happens to a message beyond that")
+    excess = Parameter(str, DROP, choices=(DROP, DELAY), doc="what happens to a message above these limits")
 
     def pass_token(self, token: Any, point: JoinPoint) -> None:
-        # Permits below zero are promised to messages that wait.
+        # Permits below zero are reserved for waiting messages.
         permits, since = point.memory.get("permits", (float(self.burst), point.now))
         permits = min(float(self.burst), permits + (point.now - since) * self.rate)
-        if permits >= 1.0 - 1e-9:  # rounding must not cost a message that comes exactly on time
+        if permits >= 1.0 - 1e-9:  # rounding must not drop a message that comes exactly on time
             point.memory["permits"] = (permits - 1.0, point.now)
             point.forward(token)
         elif self.excess == DROP:

@@ -34,7 +34,7 @@ class Bias(_Bias):
     def __init__(self, *, by: _Number, fields: _Texts = ..., from_: _Number = ..., until: _Number | None = ..., every: _Number | None = ..., when: str | PortFormula | None = ...) -> None: ...
 
 class Bus(_Bus):
-    """Carries one message at a time, whatever its port: a server with one queue, by priority and not preemptive."""
+    """Carries one message at a time for all its ports: a server with one queue, by priority and not preemptive."""
     def __init__(self, *, factor: _Number, steps: bool = ..., medium: str | None = ..., message_length: _Number = ..., number_length: _Number = ..., length_field: str | None = ..., priority: _Number = ..., priority_field: str | None = ..., capacity: _Whole | None = ..., overflow: Literal['newest', 'oldest'] = ..., from_: _Number = ..., until: _Number | None = ..., every: _Number | None = ..., when: str | PortFormula | None = ...) -> None: ...
 
 class ClockDrift(_ClockDrift):
@@ -54,7 +54,7 @@ class Count(_Count):
     def __init__(self, *, by: str | PortFormula | None = ..., from_: _Number = ..., until: _Number | None = ..., every: _Number | None = ..., when: str | PortFormula | None = ...) -> None: ...
 
 class CrashRestart(_CrashRestart):
-    """Stops actors, and starts them again when they are repaired: at given times, or at random, or both."""
+    """Stops actors, and starts them again when they are repaired: at given times, at random, or both."""
     def __init__(self, *, times: _Row = ..., mtbf: _Number | None = ..., repair: _Number | Distribution | abc.Mapping[str, object] = ..., state: Literal['lost', 'kept'] = ..., tokens: Literal['lost', 'kept'] = ..., from_: _Number = ..., until: _Number | None = ..., every: _Number | None = ..., when: str | PortFormula | None = ...) -> None: ...
 
 class Drift(_Drift):
@@ -78,7 +78,7 @@ class Latency(_Latency):
     def __init__(self, *, delay: _Number = ..., jitter: _Number = ..., distribution: Literal['uniform', 'normal', 'exponential'] | Distribution | abc.Mapping[str, object] = ..., reordering: bool = ..., from_: _Number = ..., until: _Number | None = ..., every: _Number | None = ..., when: str | PortFormula | None = ...) -> None: ...
 
 class MeasurementFailure(_MeasurementFailure):
-    """Suppresses measurements with a fixed probability, before anybody receives them."""
+    """Suppresses measurements with a fixed probability, before any receiver."""
     def __init__(self, *, probability: _Number, burst: _Number | None = ..., spare_first: bool = ..., from_: _Number = ..., until: _Number | None = ..., every: _Number | None = ..., when: str | PortFormula | None = ...) -> None: ...
 
 class Noise(_Noise):
@@ -98,7 +98,7 @@ class Outage(_Outage):
     def __init__(self, *, sender: str | PortFormula | None = ..., groups: abc.Mapping[str, _Texts], from_: _Number = ..., until: _Number | None = ..., every: _Number | None = ..., when: str | PortFormula | None = ...) -> None: ...
 
 class Outlier(_Outlier):
-    """Adds an occasional gross error N(0, deviation^2), to each number independently."""
+    """Adds an occasional gross error N(0, deviation^2), independently to each number."""
     def __init__(self, *, probability: _Number, deviation: _Number, fields: _Texts = ..., from_: _Number = ..., until: _Number | None = ..., every: _Number | None = ..., when: str | PortFormula | None = ...) -> None: ...
 
 class PacketLoss(_PacketLoss):
@@ -114,7 +114,7 @@ class Processor(_Processor):
     def __init__(self, *, policy: Literal['fcfs', 'priority', 'edf'] = ..., preemptive: bool = ..., time: _Number | Distribution | abc.Mapping[str, object] | abc.Mapping[str, _Number | Distribution | abc.Mapping[str, object]] = ..., times: abc.Mapping[str, _Number | Distribution | abc.Mapping[str, object] | abc.Mapping[str, _Number | Distribution | abc.Mapping[str, object]]] = ..., priorities: abc.Mapping[str, _Number] = ..., deadlines: abc.Mapping[str, _Number] = ..., from_: _Number = ..., until: _Number | None = ..., every: _Number | None = ..., when: str | PortFormula | None = ...) -> None: ...
 
 class Quantise(_Quantise):
-    """Rounds to the nearest multiple of a step, ties to the even one; 0 rounds nothing."""
+    """Rounds to the nearest multiple of a step, ties to the even one; with 0, nothing is rounded."""
     def __init__(self, *, step: _Number, fields: _Texts = ..., from_: _Number = ..., until: _Number | None = ..., every: _Number | None = ..., when: str | PortFormula | None = ...) -> None: ...
 
 class RadioMedium(_RadioMedium):
@@ -126,11 +126,11 @@ class RangeLoss(_RangeLoss):
     def __init__(self, *, sender: str | PortFormula | None = ..., range: _Number, exponent: _Number = ..., shadowing: _Number = ..., correlation: _Number | None = ..., positions: _Texts, from_: _Number = ..., until: _Number | None = ..., every: _Number | None = ..., when: str | PortFormula | None = ...) -> None: ...
 
 class Reorder(_Reorder):
-    """Holds a message back until later ones have overtaken it, with a fixed probability."""
+    """With a fixed probability, holds a message back until later ones have overtaken it."""
     def __init__(self, *, probability: _Number, overtaken_by: _Whole = ..., from_: _Number = ..., until: _Number | None = ..., every: _Number | None = ..., when: str | PortFormula | None = ...) -> None: ...
 
 class Replace(_Replace):
-    """Replaces what passes, of whatever kind, by an expression of it, of the time and of what ports have sent last."""
+    """Replaces tokens of any kind by an expression over the token, the time and the latest tokens of ports."""
     def __init__(self, *, to: str | PortFormula, from_: _Number = ..., until: _Number | None = ..., every: _Number | None = ..., when: str | PortFormula | None = ...) -> None: ...
 
 class Saturate(_Saturate):
@@ -138,17 +138,17 @@ class Saturate(_Saturate):
     def __init__(self, *, low: _Number = ..., high: _Number = ..., fields: _Texts = ..., from_: _Number = ..., until: _Number | None = ..., every: _Number | None = ..., when: str | PortFormula | None = ...) -> None: ...
 
 class SkipFiring(_SkipFiring):
-    """Skips each firing with a fixed probability, independently: what came for it is lost."""
+    """Skips each firing with a fixed probability, independently: its tokens are lost."""
     def __init__(self, *, probability: _Number, wakes: bool = ..., from_: _Number = ..., until: _Number | None = ..., every: _Number | None = ..., when: str | PortFormula | None = ...) -> None: ...
 
 class StuckAt(_StuckAt):
-    """Repeats the last good measurement while the sensor is stuck, with the time of the one that it should be."""
+    """Repeats the last good measurement while the sensor is stuck, with the time of the one that it replaces."""
     def __init__(self, *, p: _Number, r: _Number = ..., from_: _Number = ..., until: _Number | None = ..., every: _Number | None = ..., when: str | PortFormula | None = ...) -> None: ...
 
 class Throttle(_Throttle):
-    """Lets through at most `rate` messages a second in the long run, and `burst` at once (token bucket)."""
+    """Lets through at most `rate` messages per second in the long run, and `burst` at once (token bucket)."""
     def __init__(self, *, rate: _Number, burst: _Whole = ..., excess: Literal['drop', 'delay'] = ..., from_: _Number = ..., until: _Number | None = ..., every: _Number | None = ..., when: str | PortFormula | None = ...) -> None: ...
 
 class Transform(_Transform):
-    """Replaces each number by an expression of it, of the time and of what ports have sent last."""
+    """Replaces each number by an expression over it, the time and the latest tokens of ports."""
     def __init__(self, *, to: str | PortFormula, fields: _Texts = ..., from_: _Number = ..., until: _Number | None = ..., every: _Number | None = ..., when: str | PortFormula | None = ...) -> None: ...

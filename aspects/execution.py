@@ -1,4 +1,4 @@
-"""Disturbances of execution: firings that take time, or share a processor, or do not happen, and crashes."""
+"""Disturbances of execution: firings that take time, share a processor or do not happen, and crashes."""
 
 from __future__ import annotations
 
@@ -40,37 +40,37 @@ LOST, KEPT = "lost", "kept"
 class ExecutionTime(ExecutionAspect):
     """Makes the firings of an actor take time: it fires at the end, with the tokens from the beginning.
 
-    A firing takes ``scale`` * (``time`` + the next of the measured ``times``), if there is something to do in it: at
-    ports that do not trigger an actor it only takes note of tokens, which costs nothing.  With a ``time`` for each port
-    that costs something, ``{trigger: 60 ms, peer_plans: 1 ms}``, a firing takes the longest of those of the ports at
-    which tokens came.  An actor does one thing after the other: what falls due meanwhile waits for its turn, or is
-    skipped; a firing for a wake-up, or in which nothing takes time, always waits, for an actor that misses a wake-up
-    may never ask for the next.
+    A firing takes ``scale`` * (``time`` + the next of the measured ``times``), if the actor has work: tokens at ports
+    that do not trigger it are only stored, which costs no time.  With a ``time`` for each port that costs time,
+    ``{trigger: 60 ms, peer_plans: 1 ms}``, a firing takes the longest of those of the ports at which tokens came.  An
+    actor does one thing after another: a firing that falls due meanwhile waits for its turn, or is skipped.  A firing
+    for a wake-up, or one that takes no time, always waits, because an actor that misses a wake-up may never request the
+    next.
 
-    With ``measure`` nothing is delayed.  Instead the time that each firing takes to compute here and now is recorded as
-    the signal ``NAME@ACTOR``, and the ``signals.parquet`` of that run can be given as ``times`` from then on: the run
-    that measures has the log of a run without the aspect, and each that takes the times from a file is reproducible.
-    The times of an actor are taken in their order, and again from the first one when they are used up.
+    With ``measure``, nothing is delayed.  Instead, the actual computing time of each firing is recorded as the signal
+    ``NAME@ACTOR``, and the ``signals.parquet`` of that run can be given as ``times`` to later runs.  The measuring run
+    has the log of a run without the aspect, and each run that takes the times from a file is reproducible. The times of
+    an actor are used in order, and again from the first when they are used up.
     Events: ``delayed``, with the seconds from when the firing fell due, and ``skipped``.
     """
 
     events: ClassVar[tuple[str, ...]] = ("delayed", "skipped")
 
     time = FiringTimeParameter(
-        0.0, doc="execution time of a firing, or a distribution of it; or {port: time} for each input port that costs"
+        0.0, doc="execution time of a firing, or a distribution; or {port: time} for each input port that costs time"
     )
     times: Parameter[Path | None] = Parameter(
         Path,
         None,
-        doc="file of measured times, .csv or .parquet: column value (s), and signal (NAME@ACTOR) if not for all actors",
+        doc="file of measured times, .csv or .parquet: column value (s), and signal (NAME@ACTOR) unless for all actors",
     )
     measure = Parameter(bool, False, doc="whether to measure and record execution times, and delay nothing")
-    scale = Parameter(float, 1.0, min=0.0, unit="1", doc="how many times slower the processor is than what was given")
-    busy = Parameter(str, WAIT, choices=(WAIT, SKIP), doc="what becomes of a firing while another takes its time")
+    scale = Parameter(float, 1.0, min=0.0, unit="1", doc="factor by which the processor is slower than the given times")
+    busy = Parameter(str, WAIT, choices=(WAIT, SKIP), doc="what happens to a firing that falls due during another one")
 
     def check(self) -> None:
         if self.measure and (self.time != 0.0 or self.times is not None):
-            raise EpicycleError("it cannot measure execution times where they are given: leave one or the other out")
+            raise EpicycleError("it cannot measure execution times that are given; leave out 'measure', or the times")
         self._measured = None if self.times is None else _MeasuredTimes(self.times)
 
     def schedule(self, job: Job, point: ActorPoint) -> None:
@@ -88,7 +88,7 @@ class ExecutionTime(ExecutionAspect):
         self._occupy(job, point, to_nanoseconds(self.scale * seconds))
 
     def pass_by(self, job: Job, point: ActorPoint) -> None:
-        self._occupy(job, point, 0)  # though it still waits for those before it
+        self._occupy(job, point, 0)  # although it still waits for those before it
 
     def forget(self, point: ActorPoint) -> None:
         point.memory.pop("free", None)
@@ -109,32 +109,32 @@ class ExecutionTime(ExecutionAspect):
 
 
 class _MeasuredTimes:
-    """A file of execution times (s): the signals of a run, or a table with a column ``value`` for all actors alike."""
+    """A file of execution times (s): the signals of a run, or a table with a column ``value`` for all actors."""
 
     def __init__(self, file: Path) -> None:
         if file.suffix.lower() not in (".csv", ".parquet"):
-            raise EpicycleError(f"times: {file.name!r} ends neither in .csv nor in .parquet")
+            raise EpicycleError(f"times: {file.name!r} must end in .csv or .parquet")
         self.file = file
 
     def of(self, actor: str, number: int) -> float:
-        """The time of an actor's firing of that number, from 0 on; raises ``EpicycleError``."""
+        """The time of an actor's firing with a number, from 0; raises ``EpicycleError``."""
         times = self._times.get("") or self._times.get(actor)
         if times is None:
             raise self._error(
-                f"it has no times of {actor}{did_you_mean(actor, self._times)}; it has those of "
+                f"it has no times of {actor}{did_you_mean(actor, self._times)}; it has times of "
                 f"{', '.join(self._times) or 'no actor'}"
             )
         return times[number % len(times)]
 
     @cached_property
     def _times(self) -> dict[str, list[float]]:
-        """The times of each actor; under no name, if they are for all."""
+        """The times of each actor; under an empty name if they are for all."""
         try:
             table = read_table(self.file)
         except OSError as error:
             raise self._error(str(error.strerror)) from None
         if "value" not in table.column_names:
-            raise self._error(f"there is no column 'value'; columns: {', '.join(table.column_names)}")
+            raise self._error(f"it has no column 'value'; columns: {', '.join(table.column_names)}")
         values = table.column("value").to_pylist()
         is_for_all = "signal" not in table.column_names
         names = [""] * len(values) if is_for_all else map(str, table.column("signal").to_pylist())
@@ -144,7 +144,7 @@ class _MeasuredTimes:
             if not at and not is_for_all:
                 continue  # another signal
             if isinstance(value, bool) or not isinstance(value, (int, float)) or not 0 <= value < float("inf"):
-                raise self._error(f"row {row}: {value!r} is not a time in s from 0 on")
+                raise self._error(f"row {row}: {value!r} is not a time in s >= 0")
             found.setdefault(actor, []).append(float(value))
         if is_for_all and not found:
             raise self._error("it has no rows")
@@ -155,17 +155,17 @@ class _MeasuredTimes:
 
 
 class SkipFiring(ExecutionAspect):
-    """Skips each firing with a fixed probability, independently: what came for it is lost.
+    """Skips each firing with a fixed probability, independently: its tokens are lost.
 
-    An actor that asks for its next wake-up whenever it wakes up would sleep for ever after one that is skipped; so
-    a firing for which a wake-up is due always happens, unless ``wakes`` says that it may be skipped as well.
+    An actor that requests its next wake-up in each firing would sleep for ever after a skipped one.  So a firing with a
+    due wake-up always happens, unless ``wakes`` allows skipping it as well.
     Event: ``skipped``.
     """
 
     events: ClassVar[tuple[str, ...]] = ("skipped",)
 
     probability = Parameter(float, min=0.0, max=1.0, unit="1", doc="probability that a firing is skipped")
-    wakes = Parameter(bool, False, doc="whether firings for a wake-up may be skipped, too")
+    wakes = Parameter(bool, False, doc="whether firings for a wake-up may also be skipped")
 
     def schedule(self, job: Job, point: ActorPoint) -> None:
         skipped = point.random.random() < self.probability
@@ -178,18 +178,17 @@ class SkipFiring(ExecutionAspect):
 class Processor(ExecutionAspect):
     """One processor for all its actors: each of their firings needs it for some time.
 
-    An actor fires when the time that its firing needs has been worked off, with the tokens that came at the beginning.
-    As in ``ExecutionTime``, tokens of which it only takes note cost nothing, and times may be given by input port.
-    fcfs: firings go in the order in which they fell due.  priority: the actor with the smallest number goes first; an
-    actor without one, last.  edf: the firing goes first whose deadline comes first.  Among equals it is again the
-    order in which they fell due, by the tag and within a tag by the firing order of the model.  With ``preemptive``, a
-    more urgent firing interrupts the one that goes on, which later continues where it was; what falls due at the
-    instant at which a firing begins is asked first in any case.  Times are those of the model, whatever clocks the
-    actors have.
+    An actor fires when the processor has spent the time of its firing, with the tokens from the beginning. As in
+    ``ExecutionTime``, tokens that are only stored cost no time, and times may be given by input port.  fcfs: firings go
+    in the order in which they fell due.  priority: the actor with the smallest number goes first; actors without a
+    number go last.  edf: the firing with the earliest deadline goes first.  Equals go in the order in which they fell
+    due, by tag, and within a tag by the firing order of the model.  With ``preemptive``, a more urgent firing
+    interrupts the running one, which later continues where it was; firings that fall due at the very instant at which
+    another begins are always considered first.  Times are those of the model, whatever clocks the actors have.
 
     Events: ``delayed``, when it fires, with the seconds since it fell due (its response time); ``preempted``, with the
     seconds that it still needs; ``missed``, when it fires after its deadline, with the seconds that it is late.
-    Reported: ``utilisation``, the share of the time from 0 to the end in which it works; ``mean_response`` and
+    Reported: ``utilisation``, the share of the time from 0 to the end in which it is busy; ``mean_response`` and
     ``max_response`` over the firings that took place.
 
     For periodic tasks with fixed priorities the longest response R of a task is the least solution of
@@ -203,15 +202,15 @@ class Processor(ExecutionAspect):
     in_model_time: ClassVar[bool] = True
     is_processor: ClassVar[bool] = True
 
-    policy = Parameter(str, FCFS, choices=(FCFS, PRIORITY, EDF), doc="which of the firings that are due goes first")
-    preemptive = Parameter(bool, True, doc="whether a more urgent firing interrupts the one that goes on")
+    policy = Parameter(str, FCFS, choices=(FCFS, PRIORITY, EDF), doc="which of the due firings goes first")
+    preemptive = Parameter(bool, True, doc="whether a more urgent firing interrupts the running one")
     time = FiringTimeParameter(
-        0.0, doc="time that a firing needs, or a distribution, or {port: time}, for actors not named in times"
+        0.0, doc="execution time of a firing, or a distribution, or {port: time}, for actors not named in times"
     )
     times = ByActorParameter(
         FiringTimeParameter(),
         words="times or distributions",
-        doc="time that a firing needs (s), by actor: {pattern: time, distribution, or {port: time}}",
+        doc="execution time of a firing (s), by actor: {pattern: time, distribution, or {port: time}}",
     )
     priorities = ByActorParameter(
         Parameter(float, unit="1"), doc="priority by actor, the smallest most urgent: {pattern: number}"
@@ -231,7 +230,7 @@ class Processor(ExecutionAspect):
             self._core(point).arrive(self._task(job, point, to_nanoseconds(seconds)), preemptive=self.preemptive)
 
     def pass_by(self, job: Job, point: ActorPoint) -> None:
-        # It takes no time, but has to stay behind the earlier ones of its actor.
+        # It takes no time, but must stay after the earlier ones of its actor.
         core = self._core(point)
         if core.has_any(point):
             core.arrive(self._task(job, point, 0), preemptive=self.preemptive)
@@ -266,7 +265,7 @@ class Processor(ExecutionAspect):
         return _Firing(urgency, job, point, duration, deadline)
 
     def _of(self, name: str, point: ActorPoint) -> Any:
-        """What a parameter by actor says of this one."""
+        """The value of a parameter by actor for this one."""
         if name not in point.memory:
             point.memory[name] = ByActorParameter.of(getattr(self, name), point.selected(name), point.owner)
         return point.memory[name]
@@ -287,23 +286,23 @@ class _Firing(Task):
 
 
 class CrashRestart(ExecutionAspect):
-    """Stops actors, and starts them again when they are repaired: at given times, or at random, or both.
+    """Stops actors, and starts them again when they are repaired: at given times, at random, or both.
 
-    What it is aimed at crashes as a whole: a composite with all the actors in it.  The time from a repair to the next
-    failure is exponentially distributed with mean ``mtbf``; the share of time in which it works, its availability, is
-    then mtbf / (mtbf + mean of ``repair``) in the long run.  A failure that falls into a time at which the aspect is
-    not active does not happen.  Times are those of the model.
+    Its target crashes as a whole: a composite with all the actors in it.  The time from a repair to the next failure is
+    exponentially distributed with mean ``mtbf``; its availability, the share of time in which it works, is then mtbf /
+    (mtbf + mean of ``repair``) in the long run.  Failures do not happen while the aspect is not active.  Times are
+    those of the model.
 
-    With the state ``lost`` everything is gone that the actors knew and had begun, their wake-ups included, and after
-    the repair they begin again, as in ``initialize`` before the first tag; their random streams go on.  Actors that
-    stand for physics, which does not crash with the software, are better left out (``!robot.vehicle``).  With the state
-    ``kept`` they go on where they were: what had begun, and wake-ups that fell due meanwhile, are executed at once.
-    A process that waits for an event of SimPy's own, such as a resource, is not held up by a crash that keeps the
-    state.  ``tokens`` that come meanwhile are lost, or kept until the repair.
+    With the state ``lost``, actors lose their state, unfinished work and wake-ups.  After the repair they start again,
+    as in ``initialize`` before the first tag; their random streams continue.  Leave out actors that represent physics,
+    which does not crash with the software (``!robot.vehicle``).  With the state ``kept``, they continue where they
+    were: unfinished work, and wake-ups that fell due meanwhile, are executed at once. A process that waits for an event
+    of SimPy, such as a resource, is not delayed by a crash that keeps the state.  ``tokens`` that come meanwhile are
+    lost, or kept until the repair.
 
-    Events: ``crashed``; ``restarted``, with the seconds that it was down; ``skipped``, a firing for whose tokens nobody
-    was there.  Reported: ``availability``, over the time from 0 to the end of the run.  In a run that has no stop time
-    random failures go on until ``until``, and without that for ever.
+    Events: ``crashed``; ``restarted``, with the seconds that it was down; ``skipped``, a firing whose tokens came while
+    it was down.  Reported: ``availability``, over the time from 0 to the end of the run.  In a run without a stop time,
+    random failures continue until ``until``, or without that for ever.
     """
 
     events: ClassVar[tuple[str, ...]] = ("crashed", "restarted", "skipped")
@@ -312,11 +311,15 @@ class CrashRestart(ExecutionAspect):
 
     times = array_parameter((None,), (), unit="s", min=0.0, doc="when it crashes")
     mtbf: Parameter[float | None] = Parameter(
-        float, None, above=0, unit="s", doc="mean time from a repair to the next failure; none: no random failures"
+        float,
+        None,
+        above=0,
+        unit="s",
+        doc="mean time from a repair to the next failure; no random failures if left out",
     )
     repair = DurationParameter(0.0, doc="how long it is down: a time or a distribution")
-    state = Parameter(str, LOST, choices=(LOST, KEPT), doc="what becomes of the actors' state")
-    tokens = Parameter(str, LOST, choices=(LOST, KEPT), doc="what becomes of tokens that come while it is down")
+    state = Parameter(str, LOST, choices=(LOST, KEPT), doc="what happens to the actors' state")
+    tokens = Parameter(str, LOST, choices=(LOST, KEPT), doc="what happens to tokens that come while it is down")
 
     def begin(self, unit: Unit) -> None:
         unit.memory["life"] = life = _Life()
@@ -330,7 +333,7 @@ class CrashRestart(ExecutionAspect):
         self._await_failure(unit)
 
     def schedule(self, job: Job, point: ActorPoint) -> None:
-        point.forward(job)  # while it is down, jobs do not come here
+        point.forward(job)  # while it is down, no jobs come here
 
     def report(self, shared: dict[Any, Any], end: int) -> dict[str, float | None]:
         lives: list[_Life] = shared.get("units", [])
@@ -353,7 +356,7 @@ class CrashRestart(ExecutionAspect):
                 self._await_failure(unit)
 
     def _crash(self, unit: Unit) -> None:
-        """Let it crash, if that can be now."""
+        """Let it crash, if it can crash now."""
         life: _Life = unit.memory["life"]
         is_active = self.is_due(unit.tag.time) and (self.when is None or bool(unit.value_of(self.when)))
         if life.since is not None or not is_active:
@@ -386,12 +389,12 @@ class CrashRestart(ExecutionAspect):
 
 @dataclass
 class _Life:
-    """How one unit has fared; times in ns."""
+    """The history of one unit; times in ns."""
 
     crashes: int = 0
-    down: int = 0  # before the crash that is not repaired
-    since: int | None = None  # when that was
+    down: int = 0  # before the crash not yet repaired
+    since: int | None = None  # the time of that crash
 
     def down_until(self, end: int) -> int:
-        """How long it was down in all, before ``end``, which is not before the present."""
+        """How long it was down in total before ``end``, which is not before the present."""
         return self.down + (0 if self.since is None else end - self.since)

@@ -1,4 +1,4 @@
-"""Disturbances of measurement: they stand at output ports, and decide what a sensor seems to have measured."""
+"""Disturbances of measurement: they attach to output ports, and decide what a sensor seems to have measured."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from .core import JoinPoint, LawParameter, MeasurementAspect, RandomLoss, altere
 
 
 class _Laplace(Distribution):
-    """Exponential to both sides, with mean 0 and variance 1."""
+    """Exponential on both sides, with mean 0 and variance 1."""
 
     def draw(self, random: Stream) -> float:
         return random.laplace(scale=math.sqrt(0.5))
@@ -31,11 +31,11 @@ Numbers = NDArray[np.float64]
 
 
 class MeasurementFailure(RandomLoss, MeasurementAspect):
-    """Suppresses measurements with a fixed probability, before anybody receives them.
+    """Suppresses measurements with a fixed probability, before any receiver.
 
     Without ``burst`` each fails independently (Bernoulli), as messages are lost by ``PacketLoss``.  With it, failures
-    come in runs of that mean length: a sensor that fails and works like the channel of ``GilbertElliott`` with
-    r = 1 / burst and p = r * probability / (1 - probability).
+    come in runs of that mean length: the sensor behaves like the channel of ``GilbertElliott`` with r = 1 / burst and p
+    = r * probability / (1 - probability).
     Event: ``failed``.  Paper: the sensor error of the disturbance level, section III.A.
     """
 
@@ -43,14 +43,14 @@ class MeasurementFailure(RandomLoss, MeasurementAspect):
 
     probability = Parameter(float, min=0.0, max=1.0, unit="1", doc="probability that a measurement fails")
     burst: Parameter[float | None] = Parameter(
-        float, None, unit="1", min=1.0, doc="mean number of failures in a row; none: independent failures"
+        float, None, unit="1", min=1.0, doc="mean number of failures in a row; independent failures if left out"
     )
 
     def check(self) -> None:
         if self.burst is not None and self.probability > self.burst / (self.burst + 1.0):
             raise EpicycleError(
-                f"a failure probability of {self.probability:g} cannot come in runs of {self.burst:g} in the mean: "
-                f"a working sensor works for one measurement at least; burst must be "
+                f"failures with probability {self.probability:g} cannot come in runs of {self.burst:g} on average: "
+                f"a working sensor works for at least one measurement; burst must be "
                 + ("infinite" if self.probability == 1.0 else f">= {self.probability / (1.0 - self.probability):g}")
             )
 
@@ -62,17 +62,17 @@ class MeasurementFailure(RandomLoss, MeasurementAspect):
 
 
 class StuckAt(MeasurementAspect):
-    """Repeats the last good measurement while the sensor is stuck, with the time of the one that it should be.
+    """Repeats the last good measurement while the sensor is stuck, with the time of the one that it replaces.
 
-    From measurement to measurement a working sensor gets stuck with probability ``p`` and a stuck one comes free with
-    probability ``r``, as the channel of ``GilbertElliott`` turns bad and recovers; the first measurement is always
-    good.  Event: ``replaced``, with the old measurement.
+    At each measurement, a working sensor gets stuck with probability ``p`` and a stuck one recovers with probability
+    ``r``, like the channel of ``GilbertElliott``; the first measurement is always good.  Event: ``replaced``, with the
+    old measurement.
     """
 
     events: ClassVar[tuple[str, ...]] = ("replaced",)
 
     p = Parameter(float, min=0.0, max=1.0, unit="1", doc="probability of getting stuck, per measurement")
-    r = Parameter(float, 0.0, min=0.0, max=1.0, unit="1", doc="probability of coming free, per measurement")
+    r = Parameter(float, 0.0, min=0.0, max=1.0, unit="1", doc="probability of recovering, per measurement")
 
     def pass_token(self, token: Any, point: JoinPoint) -> None:
         stuck = point.memory.setdefault("bad", False)
@@ -90,17 +90,17 @@ class StuckAt(MeasurementAspect):
 class Alteration(MeasurementAspect):
     """Base of the aspects that replace the numbers in a measurement, or a parameter: write ``alter``.
 
-    Event: ``replaced``, with the new measurement.  A measurement that stays the same leaves no trace.
+    Event: ``replaced``, with the new measurement.  A measurement that does not change leaves no trace.
     """
 
     events: ClassVar[tuple[str, ...]] = ("replaced",)
     alters_parameters: ClassVar[bool] = True
 
-    fields = texts_parameter((), doc="fields of the measurement that are altered; none: all numbers but its time")
+    fields = texts_parameter((), doc="fields of the measurement to alter; if left out, all numbers except its time")
 
     @abstractmethod
     def alter(self, numbers: Numbers, point: JoinPoint) -> Numbers:
-        """What the numbers of one field (flat) become; called once a field, in their order."""
+        """The new numbers of one field (flat); called once per field, in order."""
 
     def pass_token(self, token: Any, point: JoinPoint) -> None:
         changed = False
@@ -120,7 +120,7 @@ class Alteration(MeasurementAspect):
 
 
 class Noise(Alteration):
-    """Adds independent random errors: ``deviation`` times what is drawn from the distribution.
+    """Adds independent random errors: ``deviation`` times a value drawn from the distribution.
 
     normal, uniform and laplace are laws with mean 0 and variance 1, so ``deviation`` is the standard deviation.
     """
@@ -143,7 +143,7 @@ class Bias(Alteration):
 
 
 class Drift(Alteration):
-    """Adds an error that grows: ``rate`` * t + ``walk`` * W(t), each number with a Wiener process W of its own.
+    """Adds an error that grows: ``rate`` * t + ``walk`` * W(t), with an independent Wiener process W for each number.
 
     t is counted from the first measurement; the variance of the random part is ``walk``^2 * t.
     """
@@ -161,7 +161,7 @@ class Drift(Alteration):
         start: float = point.memory.setdefault("start", point.now)
         step: float = point.now - point.memory.get("last", point.now)
         point.memory["field"] = field + 1
-        place = (field, numbers.size)  # tokens of another size have errors of their own
+        place = (field, numbers.size)  # tokens of another size have separate errors
         walked: Numbers = point.memory.get(place, np.zeros(numbers.shape))
         walked = walked + math.sqrt(step) * point.random.normal(size=numbers.shape)
         point.memory[place] = walked
@@ -169,9 +169,9 @@ class Drift(Alteration):
 
 
 class Transform(Alteration):
-    """Replaces each number by an expression of it, of the time and of what ports have sent last.
+    """Replaces each number by an expression over it, the time and the latest tokens of ports.
 
-    NaN stays as it is, and so do all numbers as long as one of the ports has sent nothing.
+    NaN is not changed, nor is any number until all the ports have sent a token.
     """
 
     to = PortFormulaParameter(
@@ -187,17 +187,17 @@ class Transform(Alteration):
             if each is None:  # a port that has sent nothing
                 return numbers
             if isinstance(each, bool) or not isinstance(each, (int, float)):
-                raise EpicycleError(f"{self.to.source!r} gives {each!r}, which is no number")
+                raise EpicycleError(f"{self.to.source!r} gives {each!r}, which is not a number")
         result = numbers.copy()
         result[known] = new
         return result
 
 
 class Replace(MeasurementAspect):
-    """Replaces what passes, of whatever kind, by an expression of it, of the time and of what ports have sent last.
+    """Replaces tokens of any kind by an expression over the token, the time and the latest tokens of ports.
 
-    At a parameter it lets it go by a variable of the model: ``to: limit.value + 1``.  Nothing is replaced as long as
-    one of the ports has sent nothing, and NaN stays as it is.  Event: ``replaced``, with the new value.
+    At a parameter, it can give it the value of a variable of the model: ``to: limit.value + 1``.  Nothing is replaced
+    until all the ports have sent a token, and NaN is not changed.  Event: ``replaced``, with the new value.
     """
 
     events: ClassVar[tuple[str, ...]] = ("replaced",)
@@ -206,7 +206,7 @@ class Replace(MeasurementAspect):
 
     to = PortFormulaParameter(
         given=("value", "time"),
-        doc="expression over what passes (value), the time in s (time) and ports, such as value and switch.output",
+        doc="expression over the token (value), the time in s (time) and ports, such as value and switch.output",
     )
 
     def pass_token(self, token: Any, point: JoinPoint) -> None:
@@ -221,7 +221,7 @@ class Replace(MeasurementAspect):
 
 
 class Outlier(Alteration):
-    """Adds an occasional gross error N(0, deviation^2), to each number independently."""
+    """Adds an occasional gross error N(0, deviation^2), independently to each number."""
 
     probability = Parameter(float, min=0.0, max=1.0, unit="1", doc="probability that a number is an outlier")
     deviation = Parameter(float, min=0.0, doc="standard deviation of the gross error, in the number's own unit")
@@ -232,7 +232,7 @@ class Outlier(Alteration):
 
 
 class Quantise(Alteration):
-    """Rounds to the nearest multiple of a step, ties to the even one; 0 rounds nothing."""
+    """Rounds to the nearest multiple of a step, ties to the even one; with 0, nothing is rounded."""
 
     step = Parameter(float, min=0.0, doc="size of the step, in the number's own unit")
 
@@ -248,7 +248,7 @@ class Saturate(Alteration):
 
     def check(self) -> None:
         if self.low > self.high:
-            raise EpicycleError(f"low {self.low:g} is above high {self.high:g}")
+            raise EpicycleError(f"low is {self.low:g} and high is {self.high:g}: low must not be above high")
 
     def alter(self, numbers: Numbers, point: JoinPoint) -> Numbers:
         return np.clip(numbers, self.low, self.high)

@@ -1,4 +1,4 @@
-"""Observation: aspects that stand at any port, look at what passes, and change neither a token nor its time."""
+"""Observation: aspects that attach to any port, observe tokens, and change neither a token nor its time."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from epicycle.actors.expression import PortFormulaParameter, text_of
 from .core import TOKEN, JoinPoint, ObservationAspect
 
 NOTE, STOP, FAIL = "note", "stop", "fail"
-MOST_VALUES = 100  # that Count tells apart: the summary is for people
+MOST_VALUES = 100  # distinguished by Count: the summary is for people
 
 
 class InvariantError(EpicycleError):
-    """An invariant that a model must keep, and has not kept."""
+    """A model has violated an invariant."""
 
 
 class Probe(ObservationAspect):
@@ -30,8 +30,8 @@ class Probe(ObservationAspect):
 class Count(ObservationAspect):
     """Counts the tokens that pass, in the summary only: the log does not grow.
 
-    Event: ``counted``; with ``by`` also ``counted VALUE`` for each value of the expression; after the hundredth all
-    further values are ``counted others``.
+    Event: ``counted``; with ``by`` also ``counted VALUE`` for each value of the expression; after a hundred values, all
+    others are ``counted others``.
     """
 
     events: ClassVar[tuple[str, ...]] = ("counted",)
@@ -39,7 +39,8 @@ class Count(ObservationAspect):
     by = PortFormulaParameter(
         None,
         given=(TOKEN,),
-        doc="expression over the passing token and ports whose values are told apart, such as token.kind or token > 3",
+        doc="expression over the passing token and ports; each of its values is counted separately, such as "
+        "token.kind or token > 3",
     )
 
     def observe(self, token: Any, point: JoinPoint) -> None:
@@ -56,9 +57,9 @@ class Count(ObservationAspect):
 class Assert(ObservationAspect):
     """Checks an invariant for every token that passes.
 
-    The invariant is not checked as long as one of the ports in it has sent nothing.  Event: ``violated``.
-    At the first violation ``on_violation: stop`` ends the run, after the present tag, with what came of it;
-    ``fail`` ends it with an ``InvariantError``.
+    The invariant is not checked until all the ports in it have sent a token.  Event: ``violated``.  At the first
+    violation, ``on_violation: stop`` ends the run after the present tag, with results; ``fail`` ends it with an
+    ``InvariantError``.
     """
 
     events: ClassVar[tuple[str, ...]] = ("violated",)
@@ -68,7 +69,10 @@ class Assert(ObservationAspect):
         doc="expression over the passing token and ports, such as token.speed <= 8 and main.state.position[0] < 20",
     )
     on_violation = Parameter(
-        str, NOTE, choices=(NOTE, STOP, FAIL), doc="what a violation leads to besides the event: nothing, or the end"
+        str,
+        NOTE,
+        choices=(NOTE, STOP, FAIL),
+        doc="effect of a violation in addition to the event: nothing, or the end of the run",
     )
 
     def observe(self, token: Any, point: JoinPoint) -> None:

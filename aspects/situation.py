@@ -1,6 +1,6 @@
-"""Disturbances that depend on where bodies are and who they are: distance, range, line of sight, partition.
+"""Disturbances that depend on the positions and identities of bodies: distance, range, line of sight, partition.
 
-A body is known by the output port that sends where it is: ``main.state`` stands for whatever belongs to ``main``.  Such
+A body is identified by the output port that sends its position: ``main.state`` represents everything in ``main``.  Such
 a port sends positions in m, as arrays, lists or (on a line) numbers, or tokens with such a field ``position``.
 """
 
@@ -29,38 +29,38 @@ Position = list[float]
 
 
 class SituationError(EpicycleError):
-    """Something of which cannot be told where or who it is."""
+    """The position or identity of something is unknown."""
 
 
 class _SenderParameter(PortFormulaParameter):
-    """Who sent a message."""
+    """The sender of a message."""
 
     def __init__(self) -> None:
         super().__init__(
             None,
             given=(TOKEN,),
-            doc="expression for the path of who sent the message, such as token.robot; none: whose port the connection "
-            "leaves",
+            doc="expression for the path of the sender, such as token.robot; if left out, the owner of the port that "
+            "the connection leaves",
         )
 
 
 def _sender(token: Any, sender: PortFormula | None, point: JoinPoint) -> str:
-    """The path of who sent a token, by a ``_SenderParameter``."""
+    """The path of the sender of a token, by a ``_SenderParameter``."""
     if sender is None:
         return point.source.rpartition(".")[0]
     path = point.value_of(sender, token=token)
     if not isinstance(path, str) or not path:
-        raise SituationError(f"sender: {sender.source} is {path!r}, but the path of the sender is needed")
+        raise SituationError(f"sender: {sender.source} gives {path!r}, expected the path of the sender")
     return path
 
 
 class _SituatedLoss(LossAspect):
-    """A loss that depends on where bodies are."""
+    """A loss that depends on the positions of bodies."""
 
-    positions = PortsParameter(doc="output ports that send where the bodies are, one for each")
+    positions = PortsParameter(doc="output ports that send the positions of the bodies, one for each")
 
     def body(self, path: str, point: JoinPoint) -> str:
-        """The port of the body to which a path belongs: the one whose own path has most of its segments in common."""
+        """The port of the body to which a path belongs: the one whose own path shares the most segments with it."""
         known: dict[str, str] = point.memory.setdefault("bodies", {})
         if path not in known:
             ports = _ports(point, "positions")
@@ -68,8 +68,8 @@ class _SituatedLoss(LossAspect):
             most = max(common.values(), default=0)
             nearest = [port for port in ports if common[port] == most > 0]
             if len(nearest) != 1:
-                several = f"several ports tell where it may be: {', '.join(nearest)}"
-                none = f"no port tells where it is; 'positions' selects {', '.join(ports) or 'none'}"
+                several = f"several ports could send its position: {', '.join(nearest)}"
+                none = f"no port sends its position; 'positions' selects {', '.join(ports) or 'none'}"
                 raise SituationError(f"{path}: {several if nearest else none}")
             known[path] = nearest[0]
         return known[path]
@@ -78,13 +78,13 @@ class _SituatedLoss(LossAspect):
 class RangeLoss(_SituatedLoss, CommunicationAspect):
     """Drops messages from far away: log-distance path loss with log-normal shadowing.
 
-    At the distance d from sender to receiver the received power is 10 * exponent * log10(range / d) + X dB above what
-    the receiver needs, with X ~ N(0, shadowing^2); below 0 dB the message is lost.  So the loss at d is
+    At the distance d from sender to receiver the received power is 10 * exponent * log10(range / d) + X dB above the
+    level that the receiver needs, with X ~ N(0, shadowing^2); below 0 dB the message is lost.  So the loss at d is
     Phi(10 * exponent * log10(d / range) / shadowing): half of the messages at ``range``, and a sharp edge there without
-    shadowing.  X is new for every message, or with ``correlation`` changes as the two ends move: from one message to
-    the next over this way by rho = exp(-moved / correlation), moved being the metres that both moved together.
-    Before the places of both are known, messages pass.  Event: ``dropped``.  Source: Rappaport, Wireless
-    Communications, 2nd ed., section 4.9; correlation: Gudmundson, Electronics Letters 27, 1991.
+    shadowing.  X is new for every message; with ``correlation``, it changes as the two ends move: successive values
+    have the correlation exp(-moved / correlation), where moved is the sum of the distances that both moved. Until both
+    positions are known, messages pass.  Event: ``dropped``.  Source: Rappaport, Wireless Communications, 2nd ed.,
+    section 4.9; correlation: Gudmundson, Electronics Letters 27, 1991.
     """
 
     sender = _SenderParameter()
@@ -94,7 +94,11 @@ class RangeLoss(_SituatedLoss, CommunicationAspect):
     )
     shadowing = Parameter(float, 4.0, min=0.0, unit="1", doc="standard deviation of the received power, in dB")
     correlation: Parameter[float | None] = Parameter(
-        float, None, above=0, unit="m", doc="way over which shadowing changes; none: from message to message"
+        float,
+        None,
+        above=0,
+        unit="m",
+        doc="distance over which shadowing changes; if left out, from message to message",
     )
 
     def loses(self, token: Any, point: JoinPoint) -> bool:
@@ -110,7 +114,7 @@ class RangeLoss(_SituatedLoss, CommunicationAspect):
         return bool(margin + self.shadowing * draw < 0.0)
 
     def _correlated(self, draw: float, ends: Position, links: dict[str, tuple[float, Position]], sender: str) -> float:
-        """A standard normal number that has to do with the last one of this link."""
+        """A standard normal number, correlated with the previous one of this link."""
         assert self.correlation is not None
         if sender in links:
             last, before = links[sender]
@@ -123,13 +127,13 @@ class RangeLoss(_SituatedLoss, CommunicationAspect):
 
 
 class _SightLoss(_SituatedLoss, MeasurementAspect):
-    """A sensor, where the body is to which it belongs, and its target: write ``hides``."""
+    """Base of failures by position: a sensor at its body, and its target: write ``hides``."""
 
-    target = PortsParameter(single=True, doc="output port that sends where the target is")
+    target = PortsParameter(single=True, doc="output port that sends the position of the target")
 
     @abstractmethod
     def hides(self, sensor: Position, target: Position, others: Iterable[Position]) -> bool:
-        """Whether the sensor does not see the target; ``others`` are where all other bodies are."""
+        """Whether the sensor does not see the target; ``others`` are the positions of all other bodies."""
 
     def loses(self, token: Any, point: JoinPoint) -> bool:
         own, targets = self.body(point.owner, point), _ports(point, "target")
@@ -143,13 +147,13 @@ class _SightLoss(_SituatedLoss, MeasurementAspect):
 class OutOfRange(_SightLoss):
     """Makes measurements fail while the target is out of the sensor's range.
 
-    The sensor is where the body is to which it belongs.  Before both places are known, measurements pass.  It is to
-    measurements what a ``RangeLoss`` without shadowing is to messages.  Event: ``failed``.
+    The sensor is at the position of its body.  Until both positions are known, measurements pass.  The counterpart of
+    ``RangeLoss`` without shadowing for measurements.  Event: ``failed``.
     """
 
     events: ClassVar[tuple[str, ...]] = ("failed",)
 
-    range = Parameter(float, min=0.0, unit="m", doc="greatest distance that can be measured")
+    range = Parameter(float, min=0.0, unit="m", doc="longest distance that can be measured")
 
     def hides(self, sensor: Position, target: Position, others: Iterable[Position]) -> bool:
         return elementary.distance(sensor, target) > self.range
@@ -158,8 +162,8 @@ class OutOfRange(_SightLoss):
 class Occlusion(_SightLoss):
     """Makes measurements fail while another body blocks the line of sight.
 
-    Every body that ``positions`` names but the sensor's own and the target is opaque within ``radius``: it occludes
-    what it is nearer to than that, of the straight line from sensor to target.  Event: ``occluded``.
+    Every body in ``positions``, except the sensor's own and the target, is opaque within ``radius``: it occludes the
+    target if it is nearer than that to the straight line from sensor to target.  Event: ``occluded``.
     """
 
     events: ClassVar[tuple[str, ...]] = ("occluded",)
@@ -173,7 +177,7 @@ class Occlusion(_SightLoss):
 class Outage(LossAspect, CommunicationAspect):
     """Splits a network: drops every message from a member of one group to a member of another.
 
-    Who is in several groups talks with all of them; who is in none hears, and is heard by, everybody.  ``from``,
+    Members of several groups talk with all of them; an actor in no group hears, and is heard by, all others.  ``from``,
     ``until`` and ``every`` say when.  Event: ``dropped``.
     """
 
@@ -186,7 +190,7 @@ class Outage(LossAspect, CommunicationAspect):
         return bool(sender and receiver and not sender & receiver)
 
     def _groups_of(self, path: str, point: JoinPoint) -> frozenset[str]:
-        """The groups that an actor or composite, or what it stands in, belongs to."""
+        """The groups of an actor or composite, or of one that contains it."""
         known: dict[str, frozenset[str]] = point.memory.setdefault("groups", {})
         if path not in known:
             segments = path.split(".")
@@ -206,14 +210,16 @@ def _ports(point: JoinPoint, parameter: str) -> list[str]:
 
 
 def _position(port: str, point: JoinPoint) -> Position | None:
-    """Where a body is, by what its port has sent last; None before that."""
+    """The position of a body from the latest token of its port; None before the first."""
     token = operand(point.latest(port))
     if token is None:
         return None
     position = token.get("position") if isinstance(token, dict) else token
     position = [position] if _is_number(position) else position
     if not (isinstance(position, list) and position and all(_is_number(each) for each in position)):
-        raise SituationError(f"{port} sends no position: numbers, or a token with such a field 'position'")
+        raise SituationError(
+            f"{port} does not send a position: expected numbers, or a token with such a field 'position'"
+        )
     return [float(each) for each in position]
 
 
@@ -222,13 +228,13 @@ def _is_number(value: object) -> bool:
 
 
 def _common(path: str, other: str) -> int:
-    """How many segments two paths begin with in common."""
+    """The number of leading segments that two paths have in common."""
     pairs = zip(path.split("."), other.split("."), strict=False)
     return len(list(takewhile(lambda pair: pair[0] == pair[1], pairs)))
 
 
 def _distance(place: Position, start: Position, end: Position) -> float:
-    """From a place to the segment between two others."""
+    """The distance from a point to the segment between two others."""
     along = [b - a for a, b in zip(start, end, strict=True)]
     length = elementary.total(step * step for step in along)
     there = elementary.total((x - a) * step for x, a, step in zip(place, start, along, strict=True))

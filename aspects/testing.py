@@ -1,8 +1,8 @@
-"""Tests that an aspect does not interfere with what it is not woven on: for anyone's aspects, on anyone's models.
+"""Tests that an aspect does not interfere with anything outside its join points, for any aspects and models.
 
-Each function runs a model a few times and raises an ``AssertionError`` that says which event of the log was the first
-to differ.  How to run it is told by a *trial*: a function that weaves aspects around a model in addition to its own,
-runs it, and returns the records of the event log.  ``epicycle.runner.Trial`` makes one of a model:
+Each function runs a model a few times and raises an ``AssertionError`` that names the first event of the log that
+differs.  A *trial* says how to run the model: a function that weaves aspects around the model in addition to its own,
+runs it, and returns the records of the event log.  ``epicycle.runner.Trial`` makes one from a model:
 
 >>> trial = Trial("collision_avoidance", until=2.0)
 >>> def test_offset():
@@ -10,13 +10,13 @@ runs it, and returns the records of the event log.  ``epicycle.runner.Trial`` ma
 ...     assert_removal_moves_nothing(Offset(by=0.3), trial, at="**.measurement")
 ...     assert_streams_are_its_own(Offset(by=0.3), trial, at="**.measurement")
 
-Where no token passes the aspect a test shows nothing, and fails for that reason.
+If no token passes the aspect, a test shows nothing, and fails for that reason.
 """
 
 from __future__ import annotations
 
 import copy
-import random  # noqa: TID251 (to see that nobody uses it)
+import random  # noqa: TID251 (to check that it is not used)
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -38,7 +38,7 @@ P = TypeVar("P", bound=JoinPoint)
 
 @dataclass(frozen=True)
 class Woven:
-    """An aspect, its name, and the pointcuts where it is to stand."""
+    """An aspect, its name, and the pointcuts to which it attaches."""
 
     name: str
     aspect: Aspect
@@ -46,11 +46,11 @@ class Woven:
 
 
 class Event(Protocol):
-    """A record of the event log, as ``Record`` of ``epicycle.runner`` is one."""
+    """A record of the event log, such as ``Record`` of ``epicycle.runner``."""
 
     @property
     def actor(self) -> str:
-        """The actor or composite at whose port it took place."""
+        """The actor or composite at whose port it happened."""
 
     @property
     def port(self) -> str:
@@ -61,7 +61,7 @@ class Event(Protocol):
         """The name of the aspect that acted, empty for a send."""
 
     def encoded(self, *, microstep: bool = True) -> bytes:
-        """All of it, to the bit; with ``microstep`` false but for that."""
+        """The whole record, to the bit; without the microstep if ``microstep`` is false."""
 
 
 class RunModel(Protocol):
@@ -71,7 +71,7 @@ class RunModel(Protocol):
 
 
 def assert_silent_at_zero(aspect: Aspect, trial: RunModel, at: str | Sequence[str] = "**") -> None:
-    """With a strength of zero the event log is, to the bit, the one of the model without the aspect.
+    """With a strength of zero, the event log is, to the bit, that of the model without the aspect.
 
     ``aspect`` is made with that strength: ``Noise(deviation=0)``.
     """
@@ -82,11 +82,11 @@ def assert_silent_at_zero(aspect: Aspect, trial: RunModel, at: str | Sequence[st
 
 
 def assert_observes_only(aspect: Aspect, trial: RunModel, at: str | Sequence[str] = "**") -> None:
-    """The event log without the aspect's own events is, to the bit, the one of the model without the aspect."""
+    """The event log without the aspect's own events is, to the bit, that of the model without the aspect."""
     visits = _Visits(aspect)
     log = [event for event in trial(Woven(NAME, visits.aspect, at)) if event.aspect != NAME]
     visits.demand_some(at)
-    what = f"{aspect!r} at {at} does more than to observe"
+    what = f"{aspect!r} at {at} does more than observe"
     _compare(what, trial(), "without it", log, "with it, its own events left out")
 
 
@@ -95,40 +95,40 @@ def assert_removal_moves_nothing(
 ) -> None:
     """Adding or removing the aspect moves no random stream of an actor or of an aspect of the model or ``beside`` it.
 
-    The aspect is woven at full strength and decides on every token, but what it decides is not done: each token goes on
-    as it came.  So nothing of the log may differ, unless the aspect draws from a stream that is not its own, changes a
-    token in place, or reaches into the model in another way.  (Microsteps are not compared: what the aspect does later
-    takes some, and moves those of SimPy processes at that time.)
+    The aspect is woven at full strength and decides on every token, but its decisions are not carried out: each token
+    passes unchanged.  So the log may not differ, unless the aspect draws from a stream that is not its own, changes a
+    token in place, or affects the model in another way.  (Microsteps are not compared: delayed actions of the aspect
+    take some, and move those of SimPy processes at that time.)
     """
     visits = _Visits(aspect, acts=False, tells=False)
     log = trial(Woven(NAME, visits.aspect, at), *beside)
     visits.demand_some(at)
-    what = f"{aspect!r} at {at} moves what is not its own, though none of its decisions was carried out"
+    what = f"{aspect!r} at {at} changes more than its own events, although none of its decisions was carried out"
     _compare(what, trial(*beside), "without it", log, "with it", microstep=False)
 
 
 def assert_streams_are_its_own(aspect: Aspect, trial: RunModel, at: str | Sequence[str] = "**") -> None:
-    """Each join point has a random stream of its own, which nothing moves, and no randomness comes from elsewhere.
+    """Each join point has its own random stream, which nothing moves, and no randomness comes from elsewhere.
 
-    No two join points share a stream; at each one, the stream, and what the aspect decides, stay the same when the
-    aspect stands at half of them, beside another one of its kind.  (Decisions may depend on other join points if the
-    aspect keeps something in ``point.shared``.)  The generators of ``random`` and NumPy that are shared by all stay
-    untouched, and the same aspect decides the same in a second run.
+    No two join points share a stream; at each one, the stream and the decisions of the aspect stay the same when it is
+    attached to half of them, beside another one of its kind.  (Decisions may depend on other join points if the aspect
+    uses ``point.shared``.)  The global generators of ``random`` and NumPy are not used, and the same aspect decides the
+    same in a second run.
     """
     before = _shared_generators()
     alone = _Visits(aspect, acts=False)
     acts = _acts(trial(Woven(NAME, alone.aspect, at)))
     alone.demand_some(at)
     if _shared_generators() != before:
-        raise AssertionError(f"{aspect!r} draws from a generator that is shared by all: it has point.random")
+        raise AssertionError(f"{aspect!r} draws from a global generator; use point.random")
 
     once, again = trial(Woven(NAME, aspect, at)), trial(Woven(NAME, aspect, at))
-    _compare(f"{aspect!r} at {at} acts in another way in a second run", once, "the first", again, "the second")
+    _compare(f"{aspect!r} at {at} acts differently in a second run", once, "the first", again, "the second")
 
     ports: dict[str, str] = {}  # by the state of their streams
     for port, stream in alone.streams.items():
         if stream in ports:
-            raise AssertionError(f"{aspect!r} has one random stream for {ports[stream]} and {port}")
+            raise AssertionError(f"{aspect!r} has the same random stream for {ports[stream]} and {port}")
         ports[stream] = port
 
     half = list(alone.streams)[::2]
@@ -136,30 +136,32 @@ def assert_streams_are_its_own(aspect: Aspect, trial: RunModel, at: str | Sequen
     acts_of_half = _acts(trial(Woven(OTHER, beside.aspect, at), Woven(NAME, here.aspect, half)))
     for port in half:
         if here.streams.get(port) != alone.streams[port]:
-            raise AssertionError(f"{aspect!r}: its random stream at {port} depends on where else it stands")
+            raise AssertionError(f"{aspect!r}: its random stream at {port} depends on where else it is attached")
     if shared := set(beside.streams.values()) & set(alone.streams.values()):
-        raise AssertionError(f"{aspect!r} shares the random stream at {ports[shared.pop()]} with another of its kind")
+        raise AssertionError(
+            f"{aspect!r} shares the random stream at {ports[shared.pop()]} with another one of its kind"
+        )
     if not alone.shares:
-        what = f"{aspect!r}: what it decides at a port depends on where else it stands"
+        what = f"{aspect!r}: what it decides at a port depends on where else it is attached"
         acts = [event for event in acts if ".".join(filter(None, (event.actor, event.port))) in half]
         _compare(what, acts, f"at {at}", acts_of_half, "at half of that")
 
 
 def assert_order_of_unrelated_aspects_is_free(first: Woven, second: Woven, trial: RunModel) -> None:
-    """Two aspects that stand at different ports can be declared in either order: the event log is the same."""
+    """Two aspects at different ports can be declared in either order: the event log is the same."""
     visits = _Visits(first.aspect), _Visits(second.aspect)
     woven = Woven(first.name, visits[0].aspect, first.at), Woven(second.name, visits[1].aspect, second.at)
     log = trial(*woven)
     for each, one in zip(visits, (first, second), strict=True):
         each.demand_some(one.at)
     if common := [port for port in visits[0].streams if port in visits[1].streams]:
-        raise AssertionError(f"{first.name} and {second.name} both stand at {common[0]}, so their order matters")
+        raise AssertionError(f"{first.name} and {second.name} are both attached to {common[0]}, so their order matters")
     what = f"{first.aspect!r} and {second.aspect!r} depend on the order of their declaration"
     _compare(what, log, f"{first.name} first", trial(*reversed(woven)), f"{second.name} first")
 
 
 def _shared_generators() -> str:
-    state = np.random.get_state(legacy=False)  # noqa: NPY002 (to see that nobody uses it)
+    state = np.random.get_state(legacy=False)  # noqa: NPY002 (to check that it is not used)
     return repr((random.getstate(), state["state"]["key"].tolist(), state["state"]["pos"]))
 
 
@@ -182,9 +184,9 @@ def _compare(
 
 
 class _Visits:
-    """An aspect that is watched: what passes it, and the random streams that it meets.
+    """A monitored aspect: what passes it, and the random streams that it uses.
 
-    With ``acts`` false nothing that it decides is done: each token goes on as it came, at once.  With ``tells`` false
+    With ``acts`` false, its decisions are not carried out: each token passes unchanged, at once.  With ``tells`` false,
     it leaves no trace in the log and the results.
     """
 
@@ -197,7 +199,7 @@ class _Visits:
         self._acts = acts
         self._mutes = (*(() if acts else ("forward", "stop")), *(() if tells else ("act", "count", "record")))
         self._points: dict[JoinPoint, JoinPoint] = {}
-        # Each run has a copy of the original, and tells this of it.
+        # Each run has a copy of the original, which reports here.
         decides = "pass_token" if isinstance(aspect, PortAspect) else "schedule"
         if isinstance(aspect, JoinPointAspect):
             setattr(self.aspect, decides, partial(self._pass, aspect, decides))
@@ -209,14 +211,14 @@ class _Visits:
         """Raise ``AssertionError`` if nothing has passed."""
         if self.count == 0:
             raise AssertionError(
-                f"nothing has passed {self._original!r} at {at}, so nothing is shown: let it run longer"
+                f"nothing has passed {self._original!r} at {at}, so the test shows nothing: let the model run longer"
             )
 
     def _begin(self, original: ExecutionAspect, unit: Unit) -> None:
         original.begin(self._muted(unit, () if self._acts else ("suspend", "resume", "kill", "restart")))
 
     def _pass(self, original: Aspect, method: str, passing: Any, point: JoinPoint) -> None:
-        """Let the aspect do what it does with a token or a firing."""
+        """Let the aspect handle a token or a firing."""
         if method != "pass_by":
             self.count += 1
             if point.port not in self.streams:

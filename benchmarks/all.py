@@ -1,7 +1,7 @@
-"""All benchmarks that have a goal, into benchmarks/RESULTS.md: `python -m benchmarks.all [NAME ...]`, or `make bench`.
+"""All benchmarks with a goal, into benchmarks/RESULTS.md: `python -m benchmarks.all [NAME ...]`, or `make bench`.
 
-Each part runs in a process of its own, one after the other, so that none warms or fills the other's memory.  Let the
-machine do nothing else meanwhile.
+Each part runs in its own process, one after another, so that none warms or fills another's memory.  Keep the machine
+otherwise idle.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ PACKAGES = ("numpy", "numba", "casadi", "scipy", "filterpy", "simpy", "networkx"
 
 
 def machine() -> str:
-    """What all this was measured on."""
+    """The machine and versions used."""
     name = platform.processor() or platform.machine()
     cpuinfo = Path("/proc/cpuinfo")
     if cpuinfo.exists():
@@ -47,7 +47,7 @@ def part(name: str) -> str:
     for row in module.rows():
         print(f"{name}: {row.work}, {row.peer}: {row.result}", file=sys.stderr, flush=True)
         rows.append(row)
-    works: dict[str, dict[str, None]] = {}  # by how they were measured; each once
+    works: dict[str, dict[str, None]] = {}  # by method of measurement; each once
     for row in rows:
         works.setdefault(row.how, {})[row.work] = None
     notes = [f"- {'; '.join(named)}: {how}." for how, named in works.items()]
@@ -83,8 +83,8 @@ def main() -> None:
     told = ", ".join(f"{each:.2f}" for each in paces)
     head = (
         f"# Benchmarks\n\nWritten by `make bench` in {minutes:.0f} min.\n\n{machine()}\n\n"
-        f"3,000,000 turns of a loop in Python took {told} s of CPU before and after the parts: ratios hold whatever "
-        "the machine's pace, times and what is measured against them do not.\n"
+        f"3,000,000 turns of a loop in Python took {told} s of CPU before and after the parts: "
+        "ratios do not depend on the machine's pace; times, and ratios to fixed times, do.\n"
     )
     report = "\n".join([head, *sections])
     print(report)

@@ -1,18 +1,18 @@
-"""What aspects cost where they do nothing: `python -m benchmarks.aspects [--rounds 200]`.
+"""The cost of aspects that do nothing: `python -m benchmarks.aspects [--rounds 200]`.
 
 A chain of actors runs beside another part that carries one token.  Compared with the same model without aspects:
 
-- again: the same model, which tells how far chance goes;
+- again: the same model, which shows the effect of chance;
 - off: ten aspects that are declared and disabled (`enabled: false`);
-- nowhere: ten whose pointcut selects the ports of a replica of which there are none;
-- elsewhere: one that stands at a port of the other part;
-- around: one that stands at an actor of the other part;
-- asleep: one at a port of the chain that is never active (`from` is after the end), which costs a look at the time;
+- nowhere: ten whose pointcut selects the ports of an array without instances;
+- elsewhere: one at a port of the other part;
+- around: one at an actor of the other part;
+- asleep: one at a port of the chain that is never active (`from` is after the end), which costs a check of the time;
 - here: one at a port of the chain that passes every token.
 
-In each round all of them run, one after the other, each time beginning with another.  Printed are the ratios of user
-CPU time (median over the rounds of the ratio within a round, with the 95 % interval of that median, and best to best)
-and the number of calls of functions that a run makes, which is the same every time: what does not grow with the run is
+In each round, all of them run in turn, each round starting with a different one.  Printed are the ratios of user CPU
+time (median over the rounds of the ratio within a round, with the 95 % interval of that median, and best to best) and
+the number of calls of functions that a run makes, which is the same every time: what does not grow with the run is
 spent before and after it.
 """
 
@@ -80,7 +80,7 @@ def user_seconds(model: Model) -> float:
 
 
 def calls(model: Model) -> int:
-    """How many functions are called in one run, Python's and C's."""
+    """The number of calls of Python and C functions in one run."""
     simulation, count = Simulation(model), 0
 
     def note(frame: FrameType, event: str, argument: Any) -> None:

@@ -1,10 +1,10 @@
-"""What a study says about its claims, as Markdown, for docs/paper.md.
+"""The verdicts of a study on its claims, as Markdown for docs/paper.md.
 
     python benchmarks/claims.py results/table_1 [--into docs/paper.md [--place NAME]]
 
 Prints a table of the claims with their verdicts, and the guideline; or, where claims are judged for each level of
-something as in ``readings``, a table of verdicts by level.  ``--into`` puts it in the place of what stands between
-``<!-- NAME: begin -->`` and ``<!-- NAME: end -->`` in a file, where NAME is that of the study if no other is given.
+something as in ``readings``, a table of verdicts by level.  ``--into`` replaces the text between ``<!-- NAME: begin
+-->`` and ``<!-- NAME: end -->`` in a file, where NAME is that of the study if no other is given.
 """
 
 from __future__ import annotations
@@ -52,7 +52,7 @@ def head(cells: list[str]) -> Iterator[str]:
 
 
 def about(results: StudyResults) -> str:
-    """What was run, when, and with what."""
+    """The runs, their date and versions."""
     counts = results.counts()
     seeds = results.plan.study.seed
     when = results.manifest["date"].partition("T")[0]
@@ -94,7 +94,7 @@ def claims(found: list[Judgement]) -> Iterator[str]:
 
 
 def by_level(found: list[Judgement]) -> Iterator[str]:
-    """One line for each level of what the claims are judged for, the best first."""
+    """One line for each level that the claims are judged for, the best first."""
     standings = ranked(found)
     yield from head(["", "no", "in means", "yes", *(each.name for each in standings[0].judgements)])
     for standing in standings:
@@ -130,7 +130,7 @@ def text(results: StudyResults) -> str:
     if judged and judged[0].where:
         parts.append(
             "A cell says whether a claim is reproduced (yes), not reproduced (no) or undecided (open), how many of its "
-            "comparisons are\nconfirmed/undecided/reversed, and how many point where the claim says, by chance or not."
+            "comparisons are\nconfirmed/undecided/reversed, and how many point the claimed way, by chance or not."
         )
         parts.append("\n".join(by_level(judged)))
         return "\n\n".join(parts)

@@ -1,6 +1,6 @@
 """The controllers: `python -m benchmarks.controllers [--problems 1000]`.
 
-- The horizon problem of eqs. (2)-(5): problems that the solver was given in runs of collision_avoidance, without
+- The horizon problem of eqs. (2)-(5): problems that the solver received in runs of collision_avoidance, without
   disturbance and at 50 %, with none to four observers, solved by ours and by the programs of ``programs.py``.
 - The unscented Kalman filter against FilterPy's, on the same measurements.
 - The whole scenario against the authors' own model, and what compiling costs once.
@@ -27,22 +27,22 @@ from epicycle.runner import Results, Simulation, load_model
 
 PROBLEMS = 1000
 ROUNDS = 5
-SEEDS = (0, 1)  # of each of the ten conditions that problems are recorded from
+SEEDS = (0, 1)  # for each of the ten conditions with recorded problems
 BETTER = 1e-3  # relative, or absolute below 1: objectives nearer than this are equal
-KEPT = 1e-4  # m; peers keep constraints to their own tolerances
-AUTHORS = 155.0 / 10.0  # s of CPU for a second of model time, on two cores like those that all this was made for
+KEPT = 1e-4  # m; peers keep constraints within their own tolerances
+AUTHORS = 155.0 / 10.0  # s of CPU for a second of model time, on two cores like those used here
 OURS = "ours"
 MS = 1e-3, "ms"
 LOCAL = (
-    "the problem is not convex, and each solver ends in the optimum that it comes to first, on this side of the "
-    "obstacle or on the other"
+    "the problem is not convex, and each solver ends in the first optimum that it reaches, on either side of "
+    "the obstacle"
 )
 
 Recorded = tuple[Any, np.ndarray, Barrier]
 
 
 def record(count: int) -> list[Recorded]:
-    """Problems with their starts and whose they are, evenly from runs under all conditions."""
+    """Problems with their starts and actors, evenly from runs under all conditions."""
     found: list[Recorded] = []
     solve = Barrier.solve
 
@@ -64,7 +64,7 @@ def record(count: int) -> list[Recorded]:
 
 
 def seconds(work: Callable[[], Any]) -> tuple[float, Any]:
-    """What a call takes, and returns."""
+    """The time and the result of a call."""
     before = time.perf_counter()
     result = work()
     return time.perf_counter() - before, result
@@ -103,8 +103,8 @@ def horizon_problems(count: int) -> Iterator[Row]:
         built.add(shape_of(problem))
     results = {name: [median(each) for each in rounds] for name, rounds in times.items()}
     reason = (
-        "a solve of ours is timed right after the peers', with nothing of it in the processor's caches, which takes "
-        "longer than the solve; one solve of ours after the other is told below"
+        "a solve of ours is timed right after the peers', with cold processor caches, which costs more than "
+        "the solve itself; consecutive solves of ours are shown above"
     )
     for name, goal in zip(PEERS, (400.0, 100.0, None), strict=True):
         yield compare("horizon problem, one solve", results, name, OURS, how=how, goal=goal, unit=MS, reason=reason)
@@ -112,7 +112,7 @@ def horizon_problems(count: int) -> Iterator[Row]:
         median(seconds(lambda p=problem, s=starts: barrier.solve(p, s))[0] for problem, starts, _ in problems)
         for _ in range(ROUNDS)
     ]
-    how = "the same, but all of ours one after the other, after the peers"
+    how = "the same, but all of ours in a row, after the peers"
     for name in PEERS:
         yield compare("horizon problem, ours in a row", results, name, OURS, how=how, unit=MS)
     for name, found in cases.items():
@@ -125,7 +125,7 @@ def horizon_problems(count: int) -> Iterator[Row]:
 
 
 def stops() -> Iterator[Row]:
-    """What a looser stop saves."""
+    """The savings from a looser stop."""
     problems = record(PROBLEMS)
     names = "a gap of 1e-5", "the scenario's stop"
     steps = {
@@ -160,7 +160,7 @@ def filters() -> Iterator[Row]:
     transition = ukf.constant_velocity(0.1)
     observers = random.uniform(-20.0, 30.0, size=(steps, count, 2))
     values = np.array([12.0, 0.0]) - observers + random.normal(size=observers.shape)
-    # As likely in all directions: FilterPy is given the covariance that ours works out from there.
+    # Equally likely in all directions: FilterPy gets the covariance that ours computes from this.
     kinds, deviations = np.full((steps, count, 1), ukf.RELATIVE_POSITION), np.full((steps, count, 2), 1.5)
     measurements = np.concatenate([kinds, observers, values, deviations], axis=2)
     stacked = 1.5 * 1.5 * np.eye(2 * count)

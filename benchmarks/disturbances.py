@@ -1,12 +1,12 @@
-"""What each packaged disturbance does to the paper's scenario.
+"""The effect of each packaged disturbance on the paper's scenario.
 
     python benchmarks/disturbances.py [NAME ...] [--runs 10] [--observers 3] [--first-seed 0] [--jobs 2]
         [--set PATH=VALUE ...]
 
-Prints a Markdown table with a line for the scenario as it is and one for each disturbance: mean arrival time with its
-standard error, runs that did not arrive in 30 s (counted apart, never averaged in), the mean over the runs of the
-smallest distance to the obstacle, runs in which it was below 2 m, the same between robots, the mean way of the main
-robot, and the mean number of its plans that broke a constraint.  Seeds count from --first-seed, the same for all.
+Prints a Markdown table with a line for the unchanged scenario and one for each disturbance: mean arrival time with its
+standard error, runs that did not arrive in 30 s (counted separately, never averaged in), the mean over the runs of the
+smallest distance to the obstacle, runs in which it was below 2 m, the same between robots, the mean path length of the
+main robot, and the mean number of its plans that broke a constraint.  Seeds count from --first-seed, the same for all.
 """
 
 from __future__ import annotations

@@ -25,7 +25,7 @@ from epicycle.actors.core.elementary.in_numba import register
 
 Points = tuple[NDArray[np.float64], ...]
 LONG = np.finfo(np.longdouble).eps < 1e-18
-WORST = 300  # points of each function that mpmath looks at
+WORST = 300  # points of each function that mpmath checks
 TRUTH: dict[str, Any] = {
     "exp": mpmath.exp, "log": mpmath.log, "log1p": mpmath.log1p, "expm1": mpmath.expm1, "sin": mpmath.sin,
     "cos": mpmath.cos, "tan": mpmath.tan, "asin": mpmath.asin, "acos": mpmath.acos, "atan": mpmath.atan,
@@ -33,7 +33,7 @@ TRUTH: dict[str, Any] = {
     "tanh": mpmath.tanh, "log2": lambda x: mpmath.log(x, 2), "log10": mpmath.log10,
 }  # fmt: skip
 UFUNCS = {"asin": "arcsin", "acos": "arccos", "atan": "arctan", "atan2": "arctan2", "pow": "power"}
-TYPICAL = {  # where each is usually asked, for the time
+TYPICAL = {  # usual arguments of each, for the time
     "exp": (-3.0, 3.0), "log": (0.0, 100.0), "log1p": (-0.9, 9.0), "expm1": (-1.0, 1.0), "asin": (-1.0, 1.0),
     "acos": (-1.0, 1.0), "pow": (0.0, 10.0), "log2": (0.0, 100.0), "log10": (0.0, 100.0),
 }  # fmt: skip
@@ -111,14 +111,14 @@ def compiled_by(library: Any, name: str, arguments: int) -> Callable[..., NDArra
 
 
 def error(name: str, at: tuple[float, ...], value: float) -> float:
-    """How many units in the last place a value is off."""
+    """The error of a value in units in the last place."""
     with mpmath.workprec(1300 if name in ("sin", "cos", "tan") else 200):
         truth = TRUTH[name](*map(mpmath.mpf, at))
         return float(abs(mpmath.mpf(value) - truth) / math.ulp(float(truth)))
 
 
 def worst(name: str, at: Points, values: NDArray[np.float64]) -> tuple[float, tuple[float, ...]]:
-    """The worst error, and where."""
+    """The worst error and its place."""
     chosen: Any = range(len(values))
     if LONG:
         truth = getattr(np, UFUNCS.get(name, name))(*(x.astype(np.longdouble) for x in at))

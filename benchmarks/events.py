@@ -9,8 +9,8 @@ SimPy's events:
 
 Packaged models of queues, with all that they record and measure, are run by both cores in turns.
 
-Ours checks nothing less than in any run: firing order, event log and its digest are there.  No SimPy program has them.
-Ours runs twice: as it is, and with native forms off, which is how actors in plain Python run, those of users, too.
+Ours omits nothing: it has firing order, event log and digest, which the SimPy programs lack.  It runs twice: unchanged,
+and without native forms, as actors in plain Python run, including those of users.
 """
 
 from __future__ import annotations
@@ -73,8 +73,8 @@ STORES = "SimPy, Stores"
 QUEUES = {"mm1": "", "mg1": "", "mm1 under the highest load of waiting_time": "load=0.9"}
 GOALS = {"compiled": (20.0, 20.0, 10.0), "python": (1.6, 1.6, 0.9)}
 OF_PLAIN = (8.0, 8.0, 2.5)
-OF_USERS = (5.0, 5.0, 2.0)  # without native forms the library's actors are plain Python, as theirs
-REASON = "docs/performance.md says what a hop and a job consist of"
+OF_USERS = (5.0, 5.0, 2.0)  # without native forms, the library's actors are plain Python, like those of users
+REASON = "docs/performance.md explains the parts of a hop and a job"
 
 Events = Generator[simpy.Event, Any, None]
 
@@ -118,11 +118,11 @@ class Stores:
         return cpu_seconds(lambda: self.environment.run(self.stop + 1e-6))
 
     def start(self, process: Events) -> None:
-        """Begin a process."""
+        """Start a process."""
         self.environment.process(process)
 
     def sink(self, source: simpy.Store) -> Events:
-        """Takes whatever comes."""
+        """Takes all tokens."""
         while True:
             yield source.get()
             self.done += 1
@@ -192,7 +192,7 @@ class Callbacks(Stores):
         callbacks.append(call)
 
     def count(self, token: Any) -> None:
-        """Take whatever comes."""
+        """Take a token."""
         self.done += 1
 
 
@@ -257,7 +257,7 @@ def seconds_of(name: str, setting: str) -> float:
 
 
 def by_core(core: str, name: str, setting: str) -> Callable[[], float]:
-    """The same in a process that has one of the cores."""
+    """The same in a process with one of the cores."""
     words = [sys.executable, "-m", "benchmarks.events", "--model", name, "--set", setting]
 
     def run() -> float:
@@ -334,8 +334,8 @@ def comparisons(rounds: int) -> Iterator[Row]:
 if __name__ == "__main__":
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     options.add_argument("--rounds", type=int, default=5)
-    options.add_argument("--model", help="only say how long a run of a packaged model takes (s)")
-    options.add_argument("--set", default="", help="what is set in it")
+    options.add_argument("--model", help="only print how long a run of a packaged model takes (s)")
+    options.add_argument("--set", default="", help="a setting for this model")
     options.add_argument("--against-stores", action="store_true", help="only compare this core with SimPy's Stores")
     given = options.parse_args()
     if given.against_stores:

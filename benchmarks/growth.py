@@ -1,7 +1,7 @@
 """How the cost of a run grows: `python -m benchmarks.growth [--rounds 3]`.
 
-- actors: a clock and a pipeline of 10 to 100,000 scales, through which as many tokens go that each model makes the same
-  number of hops; the same of SimPy's processes with Stores, whose cost grows with the working set alone, too;
+- actors: a clock and a pipeline of 10 to 100,000 scales, with as many tokens as give each model the same number of
+  hops; the same with SimPy processes and Stores, whose cost also grows with the working set;
 - robots: 1 to 64 observers in the collision avoidance scenario;
 - memory: what a recorded number takes, once a million of them are recorded, and an actor of a pipeline.
 """
@@ -31,7 +31,7 @@ ACTORS = (10, 100, 1_000, 10_000, 100_000)
 HOPS = 200_000
 ROBOTS = (1, 4, 16, 64)
 NUMBERS = 1_000_000
-WEIGHED = 3_000  # actors of the pipeline whose memory is looked at
+WEIGHED = 3_000  # actors of the pipeline whose memory is measured
 
 PIPELINE = """\
 model: pipeline
@@ -50,8 +50,8 @@ run: {{stop: {stop} ms, record: [clock.output]}}
 """
 
 CACHES = (
-    "a hop takes the same instructions in every pipeline, but in large ones a token finds nothing of the next actor, "
-    "whose size is told below, in the processor's caches"
+    "a hop takes the same instructions in every pipeline, but in large ones the next actor, whose size the table has, "
+    "is not in the processor's caches"
 )
 
 Events = Generator[simpy.Event, Any, None]
@@ -66,7 +66,7 @@ def model(text: str, **values: object) -> Model:
 
 
 def seconds_of(model: Model, until: float | None = None) -> float:
-    """The CPU time of one run after its first tag, at which everything is looked at for the first time."""
+    """The CPU time of one run after its first tag, which touches everything for the first time."""
     simulation = Simulation(model)
     simulation.step()
     return cpu_seconds(lambda: simulation.run(until=until))
@@ -91,7 +91,7 @@ def seconds_of_processes(size: int) -> float:
     environment.process(clock())
     for source, to in zip(stores, [*stores[1:], None], strict=True):
         environment.process(scale(source, to))
-    environment.run(0.5)  # who waits has begun to
+    environment.run(0.5)  # every process has started to wait
     return cpu_seconds(environment.run)
 
 
@@ -106,15 +106,15 @@ CONTENDERS = {"ours": seconds_of_ours, "SimPy": seconds_of_processes}
 
 
 def alone(contender: str, size: int) -> float:
-    """What a contender takes in a process of its own; in a used one a model lies scattered in what others left."""
+    """The time of a contender in a new process; in a used one, a model is scattered over memory that others left."""
     command = [sys.executable, "-m", "benchmarks.growth", "--contender", contender, "--size", str(size)]
     return float(subprocess.run(command, cwd=ROOT, check=True, stdout=subprocess.PIPE, text=True).stdout)
 
 
 def actors(rounds: int) -> Iterator[Row]:
-    """Pipelines, and what their working set costs where there is nothing of ours."""
+    """Pipelines, and the cost of their working set without our code."""
     how = (
-        f"{rounds} rounds of {HOPS:,} hops each, taking turns, every time in a process of its own; CPU time of a run "
+        f"{rounds} rounds of {HOPS:,} hops each, taking turns, each in a new process; CPU time of a run "
         "after its first tag, after another run"
     )
     for contender, work, limit in (
@@ -126,7 +126,7 @@ def actors(rounds: int) -> Iterator[Row]:
 
 
 def _grown(work: str, took: dict[str, list[float]], limit: float | None, how: str) -> Iterator[Row]:
-    """What a hop takes in pipelines of all sizes, against the smallest."""
+    """The time of a hop in pipelines of all sizes, against the smallest."""
     first = took[str(ACTORS[0])]
     for size in ACTORS[1:]:
         mine = took[str(size)]

@@ -16,7 +16,7 @@ from statistics import median
 class Row:
     """One line of the table; ``how`` says in one line how the figure was made, ``is_met`` is None without a goal.
 
-    ``reason`` says why the goal is out of reach, by figures of the same table; it is told where the goal is not met.
+    ``reason`` says why the goal is out of reach, by figures of the same table; it is shown where the goal is not met.
     """
 
     work: str
@@ -43,13 +43,13 @@ def of_the_pace(work: str, took: float, unit: str, paces: Iterable[float]) -> st
     """The reason why a time misses its goal: the pace at which it was measured, and what it is at the best one."""
     loop = median(paces)
     return (
-        f"{work}: times hang on the machine's pace; a loop of Python took {loop:.2f} s of CPU before and after this, "
+        f"{work}: times depend on the machine's pace; a loop in Python took {loop:.2f} s of CPU before and after this, "
         f"and takes {AT_BEST:g} s at best, at which this would be {took * AT_BEST / loop:.3g} {unit}"
     )
 
 
 def cpu_seconds(work: Callable[[], object]) -> float:
-    """The CPU time of this process that a call takes; what lies about is collected before it."""
+    """The CPU time of a call in this process, after collecting garbage."""
     gc.collect()
     before = time.process_time()
     work()
@@ -57,7 +57,7 @@ def cpu_seconds(work: Callable[[], object]) -> float:
 
 
 def take_turns(contenders: dict[str, Callable[[], float]], rounds: int) -> dict[str, list[float]]:
-    """What each contender returns, once in each round; each round begins with another, and the first only warms up."""
+    """What each contender returns, once per round; rounds start with different ones, and the first only warms up."""
     results: dict[str, list[float]] = {name: [] for name in contenders}
     order = list(contenders)
     for number in range(rounds + 1):
@@ -70,7 +70,7 @@ def take_turns(contenders: dict[str, Callable[[], float]], rounds: int) -> dict[
 
 
 def ratios(results: dict[str, list[float]], peer: str, ours: str) -> list[float]:
-    """How many times as long as ours a peer took, in each round."""
+    """The ratio of a peer's time to ours in each round."""
     return [theirs / own for theirs, own in zip(results[peer], results[ours], strict=True)]
 
 

@@ -1,4 +1,4 @@
-"""The horizon problem as programs for CasADi's IPOPT and fatrop and for SciPy's SLSQP, each as it likes it best.
+"""The horizon problem as programs for CasADi's IPOPT and fatrop and for SciPy's SLSQP, each in its best form.
 
 All are given in closed form with exact first derivatives, the interior-point methods with exact second ones, too.
 f6's max(0, d - Dmax) is a variable t >= 0 with t >= d - Dmax a step.  IPOPT and fatrop have the states as variables and
@@ -53,7 +53,7 @@ def numbers_of(problem: HorizonProblem, bounds: Array) -> Array:
 
 
 def shape_of(problem: HorizonProblem) -> tuple[int, ...]:
-    """What tells one program from another."""
+    """The shape that distinguishes programs."""
     steps, points = len(problem.tube_radius), len(problem.sigma_weights)
     return steps, len(problem.obstacle_mean), len(problem.peer_mean), points, problem.objective
 
@@ -120,7 +120,7 @@ def cost(known: Symbols, objective: int, s: int, steps: int, x: Any, y: Any) -> 
 
 @functools.lru_cache
 def staged(solver: str, steps: int, obstacles: int, peers: int, points: int, objective: int) -> Any:
-    """A program of CasADi with the structure that fatrop wants, and which of its constraints are equalities."""
+    """A CasADi program with the structure that fatrop needs, and which of its constraints are equalities."""
     known = symbols(steps, obstacles, peers, points)
     value, period = known.value, known.value["period"]
     states = [cs.SX.sym(f"x{s}", 4) for s in range(steps)]
@@ -234,13 +234,13 @@ PEERS: dict[str, Solve] = {
 }
 
 
-# --- what a plan is worth ------------------------------------------------------------------------------
+# --- the value of a plan ------------------------------------------------------------------------------
 
 
 def bounds_of(problem: HorizonProblem, controls: Array, slack: float = 1e-4) -> Array:
-    """What a peer may violate f3-f5 by: nothing where they can be kept, else what a plan with least violation does.
+    """The permitted violation of f3-f5 by a peer: none where they can be kept, else that of the least violating plan.
 
-    ``slack`` is what ours allows itself beyond that; with much less fatrop goes in circles for ever.
+    ``slack`` is what ours allows itself beyond that; with much less, fatrop loops for ever.
     """
     found = violations(problem, controls)
     return np.pad(np.where(found > 1e-6, found + slack, 0.0), ((0, 0), (2, 0)))  # steps 1 and 2 are decided before

@@ -1,7 +1,7 @@
 """How long it takes to start: `python -m benchmarks.start [--rounds 9]`.
 
-A model of two actors and ten firings is validated and run in processes of their own, with warm caches; wall-clock time,
-as a person waits it, and CPU time.  What Python takes to start and import NumPy is told for comparison.
+A model of two actors and ten firings is validated and run in separate processes, with warm caches; wall-clock time, for
+which a person waits, and CPU time.  The time for Python to start and import NumPy is shown for comparison.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """The paper's study: `python -m benchmarks.studies [--replications 20]`.
 
-Runs of all 60 conditions of table_1 are made by `epicycle study`, in two processes and in one, and with the core that
-is not compiled; wall-clock time, as a person waits it.
+Runs of all 60 conditions of table_1 are made by `epicycle study`, in two processes and in one, and with the Python
+core; wall-clock time, for which a person waits.
 """
 
 from __future__ import annotations

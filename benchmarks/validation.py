@@ -1,7 +1,7 @@
 """How long it takes to validate large models: `python benchmarks/validation.py`.
 
-Prints the size of each model and the user CPU time of `epicycle validate` in a process of its own, start-up included:
-the best of three.
+Prints the size of each model and the user CPU time of `epicycle validate` in a new process, start-up included: the best
+of three.
 """
 
 from __future__ import annotations
@@ -68,7 +68,7 @@ def flat(actors: int) -> str:
 
 
 def replicated(count: int) -> str:
-    """A model of a few lines that stands for `count` instances of a composite of two actors."""
+    """A model of a few lines with `count` instances of a composite of two actors."""
     return f"""\
 model: replicated
 parameters: {{n: {count}}}

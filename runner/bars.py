@@ -1,4 +1,4 @@
-"""How far something is: a bar on a terminal or in a notebook, and nothing elsewhere."""
+"""Progress: a bar on a terminal or in a notebook, and nothing elsewhere."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ from .printing import console
 if TYPE_CHECKING:
     from rich.console import Console
 
-Show: TypeAlias = Callable[[float, float | None, str], None]  # how much is done, of how much, and that in words
+Show: TypeAlias = Callable[[float, float | None, str], None]  # how much is done, of how much, and the same in words
 
-SOON = 0.5  # s after which a bar is worth its place where many short things may follow each other
-_OFTEN = 0.1  # s between two changes of a notebook
+SOON = 0.5  # s before a bar appears, where many short tasks may follow each other
+_OFTEN = 0.1  # s between two updates in a notebook
 
 
 @contextmanager
 def bar(name: str, *, after: float = 0.0, terminal: Console | None = None) -> Iterator[Show | None]:
-    """What shows a bar, ``after`` s at the earliest; None where there is nobody to see it."""
+    """A function that shows a bar, after at least ``after`` s; None where nobody would see it."""
     terminal = terminal or console(stderr=True)
     if not in_notebook() and not terminal.is_terminal:
         yield None
@@ -60,7 +60,7 @@ def _on_terminal(name: str, words: str, terminal: Console) -> Iterator[Show]:
 
 @contextmanager
 def _in_notebook(name: str) -> Iterator[Show]:
-    """Plain HTML that is written again in its place, so that no widgets need be installed; it goes at the end."""
+    """Plain HTML that is rewritten in place, so that no widgets are needed; it is removed at the end."""
     from .html import tag
 
     notebook: Any = import_module("IPython.display")

@@ -1,4 +1,4 @@
-"""The command line: a thin face over ``commands``, and the exit codes."""
+"""The command line: a thin layer over ``commands``, and the exit codes."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from .printing import complain, complain_traceback, open_streams
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run one command; the exit code: 0 done, 1 the run failed, 2 bad input, 3 a monitor is broken."""
-    if arguments is None:  # as a program, not called by one
+    if arguments is None:  # run as a program, not called by one
         return leave(_run(sys.argv[1:], is_program=True))
     return _run(arguments, is_program=False)
 
@@ -35,18 +35,18 @@ def _run(arguments: Sequence[str], *, is_program: bool) -> int:
     except ImportError as error:
         if error.name != "EPICYCLE_CORE":
             raise
-        print(f"error: {error}", file=sys.stderr)  # what complains otherwise imports the same
+        print(f"error: {error}", file=sys.stderr)  # otherwise, complaining imports the same modules
         return BAD_INPUT
 
     try:
         with seldom_collecting():
             code: int = options.run(options)
-        sys.stdout.flush()  # here, where it can be told that it fails
+        sys.stdout.flush()  # here, where a failure can be reported
         return code
     except EpicycleError as error:
         if options.debug:
             complain_traceback(error)
-        from .engine import ActorError, LoopError  # here, for many commands do without the engine
+        from .engine import ActorError, LoopError  # here, because many commands do not need the engine
         from .text import ModelError
 
         complain(str(error) if isinstance(error, ModelError) else f"error: {error}")
@@ -64,7 +64,7 @@ def _run(arguments: Sequence[str], *, is_program: bool) -> int:
 
 
 class _Version(argparse.Action):
-    """Tells the version, and which core runs, which only the actors know."""
+    """Prints the version and the core, which only the actors know."""
 
     def __init__(self, option_strings: Sequence[str], dest: str, **given: Any) -> None:
         super().__init__(option_strings, dest, nargs=0, **given)
@@ -82,17 +82,17 @@ class _Version(argparse.Action):
 
 
 def parser(arguments: Sequence[str] = ()) -> argparse.ArgumentParser:
-    """What reads arguments: all commands, with the options of those that they may name, as these take long to make."""
+    """The parser for all commands; only those that arguments may name get their options, which take long to make."""
     top = argparse.ArgumentParser(
-        prog="epicycle", description="Discrete-event simulation of actor models that are written in YAML."
+        prog="epicycle", description="Discrete-event simulation of actor models written in YAML."
     )
-    top.add_argument("--version", action=_Version, help="show the version, and which core makes the runs")
+    top.add_argument("--version", action=_Version, help="show the version and the core that makes the runs")
     commands = top.add_subparsers(required=True, metavar="COMMAND")
     for each in COMMANDS:
         command = commands.add_parser(each.name, help=each.summary, description=each.description)
         for add in each.options if each.name in arguments else ():
             add(command)
-        command.add_argument("--debug", action="store_true", help="show the whole traceback of an error")
+        command.add_argument("--debug", action="store_true", help="show the full traceback of an error")
         command.set_defaults(run=each.run, imports=each.imports)
     return top
 

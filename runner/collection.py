@@ -1,4 +1,4 @@
-"""The garbage collector, and when it is only in the way."""
+"""When the garbage collector only costs time."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from contextlib import contextmanager
 
 @contextmanager
 def without_collection() -> Iterator[None]:
-    """Keep the garbage collector from looking through a model again and again while it grows: all of it is kept."""
+    """Keep the garbage collector from scanning a growing model again and again: all of it is kept."""
     was_enabled = gc.isenabled()
     gc.disable()
     try:
@@ -22,9 +22,9 @@ def without_collection() -> Iterator[None]:
 
 @contextmanager
 def importing(*, for_good: bool) -> Iterator[None]:
-    """Look for no garbage among what modules are made of; ``for_good``: nor later on, and when the process ends.
+    """Do not search modules for garbage; with ``for_good``, neither later nor when the process ends.
 
-    A command takes a sixth less time so.  It is for programs alone, which have nothing but modules then.
+    This saves a command a sixth of its time.  Only programs use it, which hold nothing but modules at that point.
     """
     with without_collection():
         yield
@@ -34,11 +34,10 @@ def importing(*, for_good: bool) -> Iterator[None]:
 
 @contextmanager
 def seldom_collecting() -> Iterator[None]:
-    """Look for garbage less often: for a program of ours, most of whose objects stay to its end, and while a run lasts.
+    """Collect garbage less often: in our own programs, most of whose objects stay to the end, and during a run.
 
-    What a run makes is gone before it counts among what lives long, of which the
-    compiled numerics have brought 150,000 objects: to look through them takes as long as a run.  The threshold is one
-    for all threads, so those beside the main one leave it alone.
+    The objects of a run are freed before they join the long-lived ones, to which the compiled numerics add 150,000:
+    scanning these takes as long as a run.  All threads share the threshold, so only the main thread changes it.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -52,6 +51,6 @@ def seldom_collecting() -> Iterator[None]:
 
 
 def keep_for_good() -> None:
-    """Never look again for garbage among what is there now: for a process that makes one run after the other."""
+    """Never search the present objects for garbage again: for a process that makes one run after another."""
     gc.collect()
     gc.freeze()

@@ -1,4 +1,4 @@
-"""A page of HTML from nested elements; whatever is text is escaped, and what would hide in it is shown."""
+"""A page of HTML from nested elements; text is escaped, and hidden characters in it are shown."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _VOID = frozenset({"img", "meta", "br"})
 
 
 class Html(str):
-    """Text that is HTML already."""
+    """Text that is already HTML."""
 
     __slots__ = ()
 
@@ -23,7 +23,7 @@ Content: TypeAlias = "str | Html | Iterable[Content] | None"
 
 
 def html(content: Content) -> Html:
-    """Escape what is text; what is HTML stays, lists are put together, and None is nothing."""
+    """Escape text, keep HTML, join lists; None is empty."""
     if content is None:
         return Html("")
     if isinstance(content, Html):
@@ -49,7 +49,7 @@ def table(
     class_: str | None = None,
     scopes: bool = True,
 ) -> Html:
-    """A table whose first ``names`` columns are what the others are about; ``scopes``: it says so to screen readers."""
+    """A table whose first ``names`` columns are headers of its rows; with ``scopes``, screen readers know them."""
 
     def heading(cell: Content, scope: str) -> Html:
         return tag("th", cell, scope=scope if scopes else None)
@@ -65,17 +65,17 @@ def table(
 def wide_table(
     head: Iterable[Content], rows: Iterable[Iterable[Content]], *, names: int = 1, class_: str | None = None
 ) -> Html:
-    """A table that is scrolled by itself where the page is narrower."""
+    """A table with its own scroll bar where the page is narrower."""
     return tag("div", table(head, rows, names=names, class_=class_), class_="scroll", tabindex="0")
 
 
 def note(text: str) -> Html:
-    """A paragraph that explains."""
+    """A paragraph of explanation."""
     return tag("p", text, class_="note")
 
 
 def page(title: str, style: str, *content: Content, script: str = "") -> str:
-    """A whole document, which loads nothing from anywhere: a browser runs this script and no other."""
+    """A whole document, which loads nothing: a browser runs this script and no other."""
     may = {"default-src": "'none'", "img-src": "data:", "style-src": _hashed(style), "base-uri": "'none'"}
     may |= {"script-src": _hashed(script)} if script else {}
     policy = "; ".join(f"{what} {where}" for what, where in may.items())
@@ -92,5 +92,5 @@ def page(title: str, style: str, *content: Content, script: str = "") -> str:
 
 
 def _hashed(text: str) -> str:
-    """How a policy says that this text may stand in a page."""
+    """The hash by which a content security policy allows this text in a page."""
     return f"'sha256-{base64.b64encode(hashlib.sha256(text.encode()).digest()).decode()}'"

@@ -1,4 +1,4 @@
-"""Ctrl-C, held back until nothing is half done."""
+"""Ctrl-C, held back until no work is half done."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _PATIENCE = 0.2  # s
 
 @contextmanager
 def held() -> Iterator[None]:
-    """Let Ctrl-C wait, which would leave half a line or a broken file."""
+    """Make Ctrl-C wait where it would leave half a line or a broken file."""
     before = _handler()
     if before is None:
         yield
@@ -31,13 +31,13 @@ def held() -> Iterator[None]:
 
 @contextmanager
 def between_steps(interrupt: Callable[[], None]) -> Iterator[None]:
-    """Make Ctrl-C end a run between two of its steps, so that what was recorded and counted is whole.
+    """Make Ctrl-C end a run between two of its steps, so that records and counts are complete.
 
-    ``interrupt`` sees to it that the next step raises ``KeyboardInterrupt`` instead.  A step that takes longer than
-    0.2 s is broken off where it is.
+    ``interrupt`` makes the next step raise ``KeyboardInterrupt`` instead.  A step that takes longer than 0.2 s is
+    interrupted.
     """
     before = _handler()
-    if before is not signal.default_int_handler:  # somebody has taken Ctrl-C for something else
+    if before is not signal.default_int_handler:  # somebody else handles Ctrl-C
         yield
         return
     again = partial(signal.pthread_kill, threading.get_ident(), signal.SIGINT)
@@ -54,13 +54,13 @@ def between_steps(interrupt: Callable[[], None]) -> Iterator[None]:
         yield
     finally:
         late.cancel()
-        with suppress(KeyboardInterrupt, RuntimeError):  # that is coming just now; it was not started
+        with suppress(KeyboardInterrupt, RuntimeError):  # its signal arrives just now; the timer was not started
             late.join()
         signal.signal(signal.SIGINT, before)
 
 
 def _handler() -> Callable[[int, Any], Any] | None:
-    """What handles Ctrl-C, if that may be changed here."""
+    """The handler of Ctrl-C, if it may be changed here."""
     if threading.current_thread() is not threading.main_thread():
         return None
     handler = signal.getsignal(signal.SIGINT)

@@ -1,4 +1,4 @@
-"""The end of a process that a model may have filled with threads of its own."""
+"""The end of a process in which a model may have started threads."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ import threading
 import time
 from contextlib import suppress
 
-PATIENCE = 1.0  # s that threads have to come to their end
+PATIENCE = 1.0  # s that threads have to finish
 
 
 def leave(code: int) -> int:
-    """``code``, to be handed on; if a thread of the run would keep Python from ending, the process ends all the same.
+    """Return ``code``; if a thread of the run would keep Python from ending, end the process anyway.
 
-    Python waits for threads when it ends, and tells those of executors to end; so it is watched from a daemon thread.
+    At its end, Python waits for threads and asks those of executors to stop, so a daemon thread watches it.
     """
     if _others():
         threading.Thread(target=_end, args=(code,), daemon=True).start()
@@ -26,8 +26,8 @@ def _end(code: int) -> None:
     if not (left := _others()):
         return
     names = ", ".join(each.name for each in left[:3]) + (", ..." if len(left) > 3 else "")
-    with suppress(OSError, ValueError):  # there may be nobody any more who would read it
-        print(f"threads that the run has started are still at work, and are ended: {names}", file=sys.stderr)
+    with suppress(OSError, ValueError):  # the reader may be gone
+        print(f"threads that the run started are still running and are ended: {names}", file=sys.stderr)
     for stream in (sys.stdout, sys.stderr):
         with suppress(AttributeError, OSError, ValueError):
             stream.flush()
@@ -35,5 +35,5 @@ def _end(code: int) -> None:
 
 
 def _others() -> list[threading.Thread]:
-    """The threads for which Python would wait."""
+    """The threads that Python would wait for."""
     return [each for each in threading.enumerate() if each is not threading.main_thread() and not each.daemon]

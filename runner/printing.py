@@ -1,6 +1,6 @@
-"""Printing: the one way on which text reaches a terminal, clean whatever a model or a run has put into it.
+"""Printing: the one path by which text reaches a terminal, cleaned of whatever a model or a run has put into it.
 
-What is heavy is imported when it is needed: ``epicycle --help`` comes by here, too.
+Heavy modules are imported when needed, because ``epicycle --help`` prints, too.
 """
 
 from __future__ import annotations
@@ -17,19 +17,19 @@ if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
 
-WIDTH = 120  # of what goes into a pipe, which has none of its own; the usual 80 would fold tables
+WIDTH = 120  # width of output to a pipe, which has none; the usual 80 would fold tables
 
 
 def open_streams() -> None:
-    """Make the standard streams such that printing never fails for their sake.
+    """Prepare the standard streams so that printing to them never fails.
 
-    One that was closed before we started leads nowhere, and a character that its encoding lacks becomes an escape.
+    A stream closed before we started discards its output, and a character missing in an encoding becomes an escape.
     """
     for name, mode in (("stdin", "r"), ("stdout", "w"), ("stderr", "w")):
         if getattr(sys, name) is None:
             setattr(sys, name, open(os.devnull, mode))  # noqa: SIM115
     for stream in (sys.stdout, sys.stderr):
-        with suppress(AttributeError):  # somebody may have put something simpler in its place
+        with suppress(AttributeError):  # somebody may have replaced it with something simpler
             stream.reconfigure(errors="backslashreplace")  # type: ignore[union-attr]
 
 
@@ -41,14 +41,14 @@ def tell(text: str) -> None:
 
 
 def complain(text: str) -> None:
-    """Say what went wrong."""
+    """Print what went wrong."""
     from epicycle.actors import readable
 
     print(readable(text), file=sys.stderr, flush=True)
 
 
 def complain_traceback(error: BaseException) -> None:
-    """Show through which lines of code an exception came, or the one that an error of ours tells of."""
+    """Show the traceback of an exception, or of the one that an error of ours reports."""
     import traceback
 
     from epicycle.actors import visible_lines
@@ -67,7 +67,7 @@ def tell_json(value: object, *, indent: int | None = None) -> None:
 
 
 def tell_json_text(text: str) -> None:
-    """Print what is JSON already, exactly: what a terminal would obey or cannot show is escaped as JSON does it."""
+    """Print JSON text exactly; characters that a terminal would obey or cannot show are escaped as in JSON."""
     if not text.isprintable():
         text = "".join(each if each.isprintable() or each == "\n" else _escape(each) for each in text)
     encoding = getattr(sys.stdout, "encoding", None) or "utf-8"
@@ -87,7 +87,7 @@ codecs.register_error("epicycle.json", _escape_error)
 
 
 def console(*, stderr: bool = False) -> Console:
-    """A console of rich's for tables and bars: texts are texts, never markup, and clean."""
+    """A console of rich for tables and bars: texts are never markup, and are clean."""
     from rich.console import Console
     from rich.segment import Segment
 
@@ -105,7 +105,7 @@ def console(*, stderr: bool = False) -> Console:
 
 
 def columns(head: Iterable[str], rows: Iterable[Iterable[str]], *, whole: Container[str] = ()) -> Table:
-    """A table of rich's without lines; columns whose titles are ``whole`` are not broken."""
+    """A table of rich without rules; columns whose titles are in ``whole`` are not wrapped."""
     from rich.table import Table
     from rich.text import Text
 
@@ -119,7 +119,7 @@ def columns(head: Iterable[str], rows: Iterable[Iterable[str]], *, whole: Contai
 
 @contextmanager
 def notices(terminal: Console) -> Iterator[None]:
-    """Show what the loggers of Epicycle say: what takes long, and the lines of ``Display``."""
+    """Show what the loggers of Epicycle report: notices of long operations, and the lines of ``Display``."""
     import logging
 
     from rich.logging import RichHandler

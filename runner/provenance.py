@@ -1,4 +1,4 @@
-"""What results were made with: versions, machine, revision."""
+"""What results were made with: versions, machine and revision."""
 
 from __future__ import annotations
 
@@ -15,18 +15,18 @@ PACKAGES = ("epicycle", "simpy", "numpy", "scipy", "numba", "filterpy", "network
 
 
 def version_of(package: str) -> str | None:
-    """The version of an installed package; None if it is not there, or is run from its folder."""
+    """The version of an installed package; None if it is missing, or is run from its folder."""
     try:
         found = distribution(package)
     except PackageNotFoundError:
         return None
-    # Its field alone: all of them with the description take ten times as long.
+    # Only this field: reading all of them with the description takes ten times as long.
     field = re.search(r"^Version: *(\S+)", found.read_text("METADATA") or "", re.M)
     return field[1] if field is not None else found.version
 
 
 def versions() -> dict[str, str | None]:
-    """The versions of Python and of all that takes part in a run."""
+    """The versions of Python and of everything that takes part in a run."""
     found = {"python": platform.python_version(), "platform": sys.platform}
     return {**found, **{package: version_of(package) for package in PACKAGES}}
 
@@ -37,7 +37,7 @@ def machine() -> dict[str, Any]:
 
 
 def git_revision(folder: Path) -> str | None:
-    """The revision of the repository in which a folder lies, with a + for changes; None without one."""
+    """The revision of the repository that contains a folder, with a + for changes; None without a repository."""
     try:
         revision, changes = (
             subprocess.run(

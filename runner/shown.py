@@ -1,4 +1,4 @@
-"""Values as people and programs are shown them: in words, in one short line, to the digits that count, as JSON."""
+"""Values as shown to people and programs: in words, in one short line, to their significant digits, as JSON."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ SHORT = 100  # characters of a value in one line
 
 
 def in_words(value: object, *, digits: int = 6, nothing: str = "none") -> str:
-    """A value as people write it: yes or no, numbers to some digits; those of more digits to six."""
+    """A value as people write it: yes or no, numbers to some digits, long ones to six."""
     if value is None:
         return nothing
     if isinstance(value, bool):
@@ -42,7 +42,7 @@ def short(value: Any) -> str:
 
 
 def json_line(value: Any, widest: int) -> str:
-    """Plain data as JSON on one line, its numbers to six digits, and not too much of it."""
+    """Plain data as JSON on one line, with numbers to six digits, cut if too long."""
     text = json.dumps(six_digits(value), ensure_ascii=False)
     return text if len(text) <= widest else f"{text[: widest - 3]}..."
 
@@ -61,12 +61,12 @@ def six_digits(value: Any) -> Any:
 
 
 def finite(value: Any) -> Any:
-    """Plain data as JSON can have it: with None for what is no finite number."""
+    """Plain data that JSON can represent: None replaces numbers that are not finite."""
     return mapped(value, lambda number: number if math.isfinite(number) else None)
 
 
 def mapped(value: Any, change: Callable[[float], object]) -> Any:
-    """Plain data with each float in it changed."""
+    """Plain data with each of its floats changed."""
     if isinstance(value, dict):
         return {key: mapped(item, change) for key, item in value.items()}
     if isinstance(value, (list, tuple)):

@@ -1,7 +1,7 @@
-"""Student's t distribution, the same in every bit on every machine: nothing but + - * / and square roots.
+"""Student's t distribution, the same to the bit on every machine: only + - * / and square roots.
 
 The tail is the incomplete beta function I_x(n/2, 1/2) at x = n / (n + t^2), by its continued fraction (Abramowitz and
-Stegun 26.5.8, 26.7.1); a quantile is where the tail crosses what is asked for.
+Stegun 26.5.8, 26.7.1); a quantile is where the tail crosses the given probability.
 """
 
 from __future__ import annotations
@@ -10,16 +10,16 @@ import math
 from functools import lru_cache
 
 _SQRT_PI = 1.7724538509055160273
-_RECURSIVE = 200  # degrees of freedom up to which the gamma functions' ratio is multiplied up
+_RECURSIVE = 200  # degrees of freedom up to which the ratio of gamma functions is multiplied out
 
 
 def student_tail(t: float, freedom: int) -> float:
-    """The probability that Student's variable with so many degrees of freedom (from 1 up) is greater than ``t``."""
+    """The probability that Student's variable with these degrees of freedom (at least 1) is greater than ``t``."""
     if math.isnan(t):
         return math.nan
     if t < 0:
         return 1.0 - student_tail(-t, freedom)
-    if t > 1e150:  # whose square is beyond all floats
+    if t > 1e150:  # its square exceeds the range of floats
         return 0.0
     square = t * t
     near, far = square / (freedom + square), freedom / (freedom + square)

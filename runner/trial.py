@@ -1,4 +1,4 @@
-"""Trial: a model that is run again and again, each time with other aspects, as ``epicycle.aspects.testing`` asks."""
+"""Trial: a model that is run repeatedly, each time with different aspects, for ``epicycle.aspects.testing``."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from .engine import Record, Simulation
 
 
 class Trial:
-    """Runs a model with some aspects woven in addition to its own, and returns the records of the event log.
+    """Runs a model with aspects in addition to its own, and returns the records of the event log.
 
-    ``model`` is one that was loaded or built, or what ``load_model`` takes, with ``options`` for it; ``until`` is the
-    stop time (s), ``seed`` that of all runs.  The run without further aspects is made once.
+    ``model`` is a loaded or built model, or what ``load_model`` takes, with its ``options``; ``until`` is the stop time
+    (s), ``seed`` the seed of all runs.  The run without further aspects is made only once.
 
     >>> assert_silent_at_zero(Noise(deviation=0), Trial("mm1", until=50.0))
     """
@@ -29,7 +29,7 @@ class Trial:
         self._plain: list[Record] | None = None
 
     def __call__(self, *woven: Woven) -> list[Record]:
-        """The records of a run with these aspects, declared after the model's own and in this order."""
+        """The records of a run with these aspects, declared after those of the model and in this order."""
         if woven:
             return self._run(woven)
         if self._plain is None:

@@ -12,7 +12,7 @@ import pytest
 import epicycle
 from epicycle.runner import bars
 
-NOTEBOOK = Path(__file__).parents[1] / "docs" / "tutorial" / "12_notebook.ipynb"
+NOTEBOOK = Path(__file__).parents[1] / "docs" / "tutorial" / "14_notebook.ipynb"
 
 
 def test_the_notebook_of_the_tutorials_runs(tmp_path: Path) -> None:

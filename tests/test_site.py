@@ -17,11 +17,14 @@ import yaml
 import epicycle
 import epicycle.runner
 from epicycle.runner.catalogue import packaged_models
+from website.reference import FOLDER, reference
 
 ROOT = Path(__file__).parents[1]
 CONFIG = ROOT / "website" / "mkdocs.yml"
 ABOVE = {"index.md": "README.md", "contributing.md": "CONTRIBUTING.md", "changelog.md": "CHANGELOG.md"}
-MADE = {"gallery/index.md", "tutorial/12_notebook.md"}  # by what website/ does
+REFERENCE = (ROOT / "docs" / "reference.md").read_text(encoding="utf-8")
+SPLIT = reference(REFERENCE)
+MADE = {"gallery/index.md", "tutorial/14_notebook.md", *(f"{FOLDER}/{name}" for name in SPLIT.pages)}  # by website/
 
 
 def pages(nav: list[Any]) -> Iterator[str]:
@@ -35,6 +38,28 @@ def test_nav_names_every_document_once() -> None:
     documents = [path.relative_to(ROOT / "docs").as_posix() for path in (ROOT / "docs").rglob("*.md")]
     named = list(pages(yaml.safe_load(CONFIG.read_text(encoding="utf-8"))["nav"]))
     assert sorted(named) == sorted([*documents, *ABOVE, *MADE])
+
+
+def test_the_pages_of_the_reference_have_all_of_it_once() -> None:
+    def entries(text: str) -> list[str]:
+        return sorted(line.lstrip("# ") for line in text.splitlines() if re.match("##+ ", line))
+
+    whole = [
+        each for each in entries(REFERENCE) if each not in ("Actors", "Aspects", "Keys", "Monitors")
+    ]  # with their own pages
+    assert sorted(each for page in SPLIT.pages.values() for each in entries(page)) == whole
+    lines = {line for line in REFERENCE.splitlines() if line and not line.startswith(("#", "**", "| ["))}
+    assert lines - set("\n".join([SPLIT.overview, *SPLIT.pages.values()]).splitlines()) == set()
+
+
+def test_links_to_the_reference_lead_to_its_pages() -> None:
+    assert SPLIT.linked("[](../reference.md#clock) [](reference.md#keys) [](reference.md) [](#clock)") == (
+        "[](../reference/sources.md#clock) [](reference/keys.md#keys) [](reference.md) [](#clock)"
+    )
+    assert "| [Clock](reference/sources.md#clock) | " in SPLIT.overview
+    assert "| [Histogram](sinks.md#histogram) | " in SPLIT.pages["sinks.md"]  # a figure has the same name
+    with pytest.raises(ValueError, match=r"^no purpose lists other$"):
+        reference("# R\n\n## Actors\n\n**A.** B.\n\n| [C](#c) | d |\n\n### C\n\n### Other\n")
 
 
 def headings(path: Path) -> set[str]:

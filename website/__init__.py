@@ -1,1 +1,1 @@
-"""The site: `make docs` builds it, see mkdocs.yml; and `python -m website.pictures` makes the README's picture anew."""
+"""The site: `make docs` builds it, see mkdocs.yml; `python -m website.pictures` renews the README's picture."""

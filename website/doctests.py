@@ -1,4 +1,4 @@
-"""Shows the doctests of docstrings as Python, wherever they stand."""
+"""Shows doctests anywhere in docstrings as Python."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ import griffe
 
 
 class Doctests(griffe.Extension):
-    """Fences every doctest, as Markdown takes `>>>` for a quotation in a quotation."""
+    """Fences every doctest, because Markdown reads `>>>` as nested quotations."""
 
     def on_object(self, *, obj: griffe.Object, **_: Any) -> None:
-        """Change the docstring of what griffe has read."""
+        """Change the docstring of an object that griffe has read."""
         if obj.docstring is not None:
             obj.docstring.value = re.sub(
                 r"^>>> .*(?:\n(?!\s*$).*)*", r"```pycon\n\g<0>\n```", obj.docstring.value, flags=re.M

@@ -1,4 +1,4 @@
-"""The gallery: each packaged model is run once, drawn and shown, and a page tells what came of it."""
+"""The gallery: each packaged model is run once and drawn, and gets a page with its results."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from epicycle.runner.show.outcome import shown
 from epicycle.runner.show.view import Recording, write_page
 from epicycle.runner.text import Problems
 
-UNTIL = {"mg1": 1000.0, "mm1": 1000.0, "switched_network": 0.2}  # s; of long runs, what a page can show event by event
+UNTIL = {"mg1": 1000.0, "mm1": 1000.0, "switched_network": 0.2}  # s; as much as a page can show in full
 
 _INDEX = """# Gallery
 
@@ -66,7 +66,7 @@ epicycle view {name}{options}
 
 
 class Exhibit(NamedTuple):
-    """What the gallery shows of a model."""
+    """The page of a model."""
 
     name: str
     doc: str
@@ -75,7 +75,7 @@ class Exhibit(NamedTuple):
 
 
 def exhibits(folder: Path) -> list[Exhibit]:
-    """Run every packaged model; what is drawn lies in a folder for each."""
+    """Run every packaged model; its drawings are in a folder for each."""
     return [_exhibit(name, path, folder / name) for name, path in sorted(packaged_models().items())]
 
 

@@ -1,4 +1,4 @@
-"""What MkDocs asks for while it builds the site: pages from files outside docs/, and the gallery."""
+"""What MkDocs calls while it builds the site: pages from files outside docs/, and the gallery."""
 
 from __future__ import annotations
 
@@ -12,14 +12,16 @@ from mkdocs.structure.files import File, Files, InclusionLevel
 
 from website.gallery import exhibits, index
 from website.notebook import page as notebook_page
+from website.reference import FOLDER, reference
 
 ROOT = Path(__file__).parents[1]
-PARTS = ROOT / "site-parts"  # what is made on the way; mkdocs.yml names it, too
+PARTS = ROOT / "site-parts"  # temporary files; mkdocs.yml names the folder, too
 ABOVE = {"README.md": "index.md", "CONTRIBUTING.md": "contributing.md", "CHANGELOG.md": "changelog.md"}
+REFERENCE = reference((ROOT / "docs" / "reference.md").read_text(encoding="utf-8"))
 
 
 def on_startup(*, command: str, dirty: bool) -> None:
-    """Make the package as mkdocstrings looks for it: `epicycle`, with our folders in it."""
+    """Lay out the package as mkdocstrings expects it: `epicycle`, with our folders in it."""
     del command, dirty
     shutil.rmtree(PARTS, ignore_errors=True)
     package = PARTS / "epicycle"
@@ -30,9 +32,13 @@ def on_startup(*, command: str, dirty: bool) -> None:
 
 
 def on_files(files: Files, *, config: Any) -> Files:
-    """Add the documents above docs/, and the gallery."""
+    """Add the documents above docs/, the pages of the reference, and the gallery."""
     for source, page in ABOVE.items():
         files.append(File.generated(config, page, content=as_page((ROOT / source).read_text(encoding="utf-8"))))
+    files.remove(files.src_uris["reference.md"])
+    files.append(File.generated(config, "reference.md", content=REFERENCE.overview))
+    for name, content in REFERENCE.pages.items():
+        files.append(File.generated(config, f"{FOLDER}/{name}", content=content))
     for notebook in sorted((ROOT / "docs").rglob("*.ipynb")):
         place = notebook.relative_to(ROOT / "docs").as_posix()
         files.remove(files.src_uris[place])
@@ -42,7 +48,7 @@ def on_files(files: Files, *, config: Any) -> Files:
     files.append(File.generated(config, "gallery/index.md", content=index(shown)))
     for each in shown:
         shown_page = File.generated(config, f"gallery/{each.name}.md", content=each.page)
-        shown_page.inclusion = InclusionLevel.NOT_IN_NAV  # the gallery's first page leads there
+        shown_page.inclusion = InclusionLevel.NOT_IN_NAV  # the gallery's first page links to it
         files.append(shown_page)
         for made in sorted((PARTS / "gallery" / each.name).iterdir()):
             place = f"gallery/{each.name}/{made.name}"
@@ -51,22 +57,22 @@ def on_files(files: Files, *, config: Any) -> Files:
 
 
 def on_post_build(config: Any) -> None:
-    """Remove what was made on the way."""
+    """Remove temporary files."""
     shutil.rmtree(PARTS, ignore_errors=True)
 
 
 def as_page(document: str) -> str:
-    """A document of the root with the links that it has as a page of the site."""
+    """A document of the root folder with its links adapted to its place on the site."""
     for source, page in ABOVE.items():
         document = document.replace(f"]({source}", f"]({page}")
     return linked(re.sub(r"\]\(docs/", "](", document))
 
 
 def on_page_markdown(markdown: str, **_: Any) -> str:
-    """A notebook is a page like all others."""
+    """Adapt the links of a page."""
     return linked(markdown)
 
 
 def linked(document: str) -> str:
-    """The document with links to the pages that notebooks become."""
-    return re.sub(r"(\]\([\w./-]+)\.ipynb\)", r"\1.md)", document)
+    """The document with links to the pages made from notebooks, and to those of the reference."""
+    return REFERENCE.linked(re.sub(r"(\]\([\w./-]+)\.ipynb\)", r"\1.md)", document))

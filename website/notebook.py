@@ -1,4 +1,4 @@
-"""A page from a notebook: its cells are run, and what each shows stands below it."""
+"""A page from a notebook: its cells are run, with the output of each below it."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def _run(source: str, names: dict[str, Any]) -> str:
     tree = ast.parse(source)
     last = tree.body.pop() if tree.body and isinstance(tree.body[-1], ast.Expr) else None
     value, printed = None, io.StringIO()
-    with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(io.StringIO()):  # which shows progress
+    with contextlib.redirect_stdout(printed), contextlib.redirect_stderr(io.StringIO()):  # it shows progress
         exec(compile(tree, "notebook", "exec"), names)
         if isinstance(last, ast.Expr):
             value = eval(compile(ast.Expression(last.value), "notebook", "eval"), names)
@@ -35,11 +35,11 @@ def _run(source: str, names: dict[str, Any]) -> str:
 
 
 def _shown(value: Any) -> str:
-    """As a notebook shows it, in one line: Markdown ends a block of HTML at an empty one."""
+    """Output as a notebook shows it, without empty lines, which would end a block of HTML in Markdown."""
     for form in ("_repr_html_", "_repr_svg_"):
         found = getattr(value, form, lambda: None)()
         if found is not None:
-            drawing = found[found.find("<svg") :] if form == "_repr_svg_" else found  # without what stands before it
+            drawing = found[found.find("<svg") :] if form == "_repr_svg_" else found  # without anything before it
             return f'<div class="output">{" ".join(drawing.split())}</div>'
     return "" if value is None else _text(repr(value))
 

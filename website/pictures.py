@@ -1,6 +1,6 @@
-"""Makes the README's picture anew: `python -m website.pictures`, with the development tools and a Chromium.
+"""Renews the README's picture: `python -m website.pictures`, with the development tools and a Chromium.
 
-It is the page of `epicycle view collision_avoidance --disturb wifi_burst` at the moment at which a plan is lost.
+It shows the page of `epicycle view collision_avoidance --disturb wifi_burst` at the moment when a plan is lost.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ LOST = """() => (({state, views}) => {
   views.chart.scrollBy(views.chart.rows().at.get(loss.actor) * 19 - 60);
   views.chart.paint();
   return views.chart.hits.find(([, , what]) => what.record === loss.record).slice(0, 2);
-})(epicycle)"""  # where in the sequence chart the first plan after 2.2 s stands that the main robot did not get
+})(epicycle)"""  # the place in the sequence chart of the first plan after 2.2 s that the main robot did not get
 
 
 def screenshot(page: Path) -> bytes:

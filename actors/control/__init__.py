@@ -1,4 +1,4 @@
-"""Control: linear systems, filters and controllers that are driven by tokens, and what limits them."""
+"""Control: linear systems, filters and controllers driven by tokens, and nonlinear elements."""
 
 from .filters import Butterworth, DiscreteFilter, FilterDesign, FirstOrder
 from .limits import DeadZone, Hysteresis, Limiter, Quantizer

@@ -1,4 +1,4 @@
-"""Filters of sampled signals: DiscreteFilter, and laws by which its coefficients are designed."""
+"""Filters of sampled signals: DiscreteFilter, and designs for its coefficients."""
 
 from __future__ import annotations
 
@@ -11,24 +11,24 @@ from ..readings import finite_number
 from .linear import polynomials
 from .matrices import Vector
 
-Section = tuple[Vector, Vector]  # numerator and denominator, equally long; the denominator begins with 1
+Section = tuple[Vector, Vector]  # numerator and denominator, of the same length; the denominator begins with 1
 
 
 class FilterDesign(Configurable):
-    """Base of the designs: what the coefficients of a filter follow from."""
+    """Base of the designs, from which the coefficients of a filter follow."""
 
     def sections(self) -> list[Section]:
-        """The filters that make it up, one behind the other."""
+        """The sections of the filter, in series."""
         raise NotImplementedError(f"{type(self).__name__} has no sections()")
 
 
 class FirstOrder(FilterDesign):
-    """A lag of first order, ``1 / (T s + 1)``, for an input that is held from sample to sample: exponential smoothing.
+    """A first-order lag, ``1 / (T s + 1)``, for an input held from sample to sample: exponential smoothing.
 
     ``y[k] = y[k-1] + (1 - exp(-period / T)) (u[k] - y[k-1])``.
     """
 
-    time_constant = Parameter(float, unit="s", above=0, doc="T, in which 63 % of a step are made")
+    time_constant = Parameter(float, unit="s", above=0, doc="T, after which 63 % of a step is reached")
     period = Parameter(float, unit="s", above=0, doc="time between two samples")
 
     def sections(self) -> list[Section]:
@@ -37,16 +37,17 @@ class FirstOrder(FilterDesign):
 
 
 class Butterworth(FilterDesign):
-    """The flattest low pass or high pass: half the power passes at the cutoff frequency, at 20 dB a decade and order.
+    """The low pass or high pass with the flattest passband: half the power passes at the cutoff.
 
-    By the bilinear transform, with the cutoff frequency exact; in sections of second order, which keep their digits.
+    Beyond it, attenuation grows by 20 dB per decade and order.  By the bilinear transform, with the exact cutoff
+    frequency, in second-order sections, which are numerically accurate.
     Source: A. V. Oppenheim and R. W. Schafer, Discrete-Time Signal Processing, 3rd ed., sections 6.3 and 7.3.
     """
 
-    cutoff = Parameter(float, unit="Hz", above=0, doc="where half of the power passes")
+    cutoff = Parameter(float, unit="Hz", above=0, doc="the frequency at which half the power passes")
     period = Parameter(float, unit="s", above=0, doc="time between two samples")
-    order = Parameter(int, 2, min=1, max=40, doc="how steep it is")
-    passes = Parameter(str, "low", choices=("low", "high"), doc="which frequencies pass")
+    order = Parameter(int, 2, min=1, max=40, doc="the order: 20 dB per decade each")
+    passes = Parameter(str, "low", choices=("low", "high"), doc="whether low or high frequencies pass")
 
     def check(self) -> None:
         if self.cutoff * self.period >= 0.5:
@@ -72,16 +73,16 @@ class Butterworth(FilterDesign):
 
 
 class DiscreteFilter(Actor):
-    """A linear filter of a sampled signal: each token in gives one token out, whatever the time between.
+    """A linear filter of a sampled signal: each token in gives one token out, at any times.
 
     ``a0 y[k] = b0 u[k] + b1 u[k-1] + ... - a1 y[k-1] - ...`` with ``numerator`` b and ``denominator`` a, as in
-    ``scipy.signal.lfilter``.  Without a denominator it is a FIR filter: ``numerator: [0.25, 0.5, 0.25]``.  In place of
-    them, a ``design`` says what the filter is to do: ``{type: Butterworth, cutoff: 5 Hz, period: 10 ms}``.  Direct form
-    II transposed (Oppenheim and Schafer, section 6.3).  Ptolemy: ``IIR``, ``FIR``.
+    ``scipy.signal.lfilter``.  Without a denominator it is a FIR filter: ``numerator: [0.25, 0.5, 0.25]``.  Instead, a
+    ``design`` can specify the filter: ``{type: Butterworth, cutoff: 5 Hz, period: 10 ms}``.  Direct form II transposed
+    (Oppenheim and Schafer, section 6.3).  Ptolemy: ``IIR``, ``FIR``.
     """
 
     input = InputPort(float, doc="the samples")
-    reset = InputPort(required=False, doc="begins again, before the samples of the tag")
+    reset = InputPort(required=False, doc="restarts the filter, before the samples of the tag")
     output = OutputPort(float, depends_on=("input", "reset"), doc="the filtered samples")
 
     numerator: Parameter[Any] = array_parameter((None,), None, doc="coefficients of u[k], u[k-1], ...")
@@ -89,26 +90,28 @@ class DiscreteFilter(Actor):
         (None,), None, doc="coefficients of y[k], y[k-1], ...; [1] if left out"
     )
     design: Parameter[FilterDesign | None] = Parameter(
-        FilterDesign, None, doc="what the coefficients follow from, in place of numerator and denominator"
+        FilterDesign, None, doc="a design that gives the coefficients, instead of numerator and denominator"
     )
     start = Parameter(
         str, "zero", choices=("zero", "settled"),
-        doc="what was before the first sample: nothing, or that sample for ever",
+        doc="the input before the first sample: zero, or that sample for ever",
     )  # fmt: skip
 
     def check(self) -> None:
         given = self.numerator is not None or self.denominator is not None
         if given == (self.design is not None):
-            raise ParameterError("give either 'numerator' and 'denominator' or a 'design'")
+            raise ParameterError("give either a 'numerator' (and 'denominator') or a 'design'")
         self._sections = self.design.sections() if self.design is not None else [self._section()]
         if self.start == "settled" and any(total(below) == 0.0 for _, below in self._sections):
-            raise ParameterError("start: a filter that adds up without end never settles (its denominator's sum is 0)")
+            raise ParameterError(
+                "start: a filter that integrates never settles (the coefficients of its denominator add up to 0)"
+            )
 
     def _section(self) -> Section:
         above, below = ([1.0] if each is None else each.tolist() for each in (self.numerator, self.denominator))
         leading = len(above)
         above, below = polynomials(above, below)
-        above = [0.0] * (leading - len(above)) + above  # which polynomials strips; here they are delays
+        above = [0.0] * (leading - len(above)) + above  # which NumPy's polynomials strip; here they are delays
         longest = max(len(above), len(below))
         return above + [0.0] * (longest - len(above)), below + [0.0] * (longest - len(below))
 
@@ -125,11 +128,11 @@ class DiscreteFilter(Actor):
             for (above, below), memory in zip(self._sections, self._memories, strict=True):
                 sample = _filtered(sample, above, below, memory)
             if not math.isfinite(sample):
-                raise EpicycleError("what comes out has grown beyond all numbers: the filter is unstable")
+                raise EpicycleError("the output has grown too large for a float: the filter is unstable")
             self.output.send(sample)
 
     def _first(self, sample: float) -> list[Vector]:
-        """What the sections remember before the first sample."""
+        """The memory of the sections before the first sample."""
         memories = []
         for above, below in self._sections:
             memory = [0.0] * len(above)
@@ -144,7 +147,7 @@ class DiscreteFilter(Actor):
 
 
 def _filtered(sample: float, above: Vector, below: Vector, memory: Vector) -> float:
-    """The next sample; the last entry of the memory is always 0."""
+    """Filter the next sample; the last entry of the memory is always 0."""
     out = above[0] * sample + memory[0]
     for place in range(1, len(above)):
         memory[place - 1] = above[place] * sample - below[place] * out + memory[place]

@@ -1,4 +1,4 @@
-"""What signals go through that is not linear: Limiter, Quantizer, DeadZone and Hysteresis."""
+"""Nonlinear elements in the path of a signal: Limiter, Quantizer, DeadZone and Hysteresis."""
 
 from __future__ import annotations
 
@@ -11,26 +11,26 @@ from ..readings import finite_number
 class Limiter(Actor):
     """Limits a signal and its rates of change: an actuator's saturation and slew.
 
-    Each token gives the value that is nearest to it within the limits and within reach of what was sent before, as far
-    as the time since then allows.  While the output is still on its way, a ``trigger`` sends how far it has come.
-    Without ``initial`` the first token is within reach wherever it is.  Ptolemy: ``Limiter``.
+    Each token gives the nearest value that is within the limits and that the output can reach, at the given rates, in
+    the time since the value sent before.  While the output is still moving, a ``trigger`` sends its present value.
+    Without ``initial``, the first token can always be reached.  Ptolemy: ``Limiter``.
     """
 
-    input = InputPort(float, doc="the signal, held from token to token")
-    trigger = InputPort(required=False, doc="asks for the output at other times")
+    input = InputPort(float, doc="the signal, held between tokens")
+    trigger = InputPort(required=False, doc="requests the output at other times")
     output = OutputPort(float, doc="the limited signal")
 
     low = Parameter(float, -math.inf, doc="the lowest value")
     high = Parameter(float, math.inf, doc="the highest value")
-    rising: Parameter[float | None] = Parameter(float, None, min=0, doc="fastest rise, per s; any if left out")
+    rising: Parameter[float | None] = Parameter(float, None, min=0, doc="fastest rise, per s; unlimited if left out")
     falling: Parameter[float | None] = Parameter(
-        float, None, min=0, doc="fastest fall, per s and without a sign; any if left out"
+        float, None, min=0, doc="fastest fall, per s, as a positive number; unlimited if left out"
     )
     initial: Parameter[float | None] = Parameter(float, None, doc="the output before the first token")
 
     def check(self) -> None:
         if self.low > self.high:
-            raise ParameterError(f"low is {self.low:g} and high is {self.high:g}: low may not be above high")
+            raise ParameterError(f"low is {self.low:g} and high is {self.high:g}: low must not be above high")
         if self.initial is not None and not self.low <= self.initial <= self.high:
             raise ParameterError(f"initial: {self.initial:g} is not within {self.low:g} and {self.high:g}")
 
@@ -57,24 +57,28 @@ class Limiter(Actor):
 
 
 class Quantizer(Actor):
-    """Rounds a signal to steps, as a converter from analog to digital does.
+    """Rounds a signal to steps, as an analog-to-digital converter does.
 
-    Of two steps that are equally near, the even one counts.  As a disturbance of what is there: the aspect
-    ``Quantise``.  Ptolemy: ``Quantizer``.
+    Of two equally near steps, the even one is taken.  To disturb an existing signal, use the aspect ``Quantise``.
+    Ptolemy: ``Quantizer``.
     """
 
     input = InputPort(float, doc="the signal")
-    output = OutputPort(float, doc="the step that it is rounded to")
+    output = OutputPort(float, doc="the rounded signal")
 
     step = Parameter(float, above=0, doc="size of a step")
-    offset = Parameter(float, 0.0, doc="where one of the steps lies")
-    rounding = Parameter(str, "nearest", choices=("nearest", "down", "up"), doc="which step is taken")
+    offset = Parameter(float, 0.0, doc="the value of one of the steps")
+    rounding = Parameter(
+        str, "nearest", choices=("nearest", "down", "up"), doc="which of the neighbouring steps is taken"
+    )
 
     def fire(self) -> None:
         for token in self.input.tokens:
             place = (finite_number(self.input, token) - self.offset) / self.step
             if not math.isfinite(place) or math.isinf(self.step):
-                raise EpicycleError(f"{brief(token)} cannot be counted in steps of {self.step:g}")
+                raise EpicycleError(
+                    f"{brief(token)} is too large or not a number, and cannot be rounded to steps of {self.step:g}"
+                )
             if self.rounding == "nearest":
                 number = round(place)
             else:
@@ -83,20 +87,20 @@ class Quantizer(Actor):
 
 
 class DeadZone(Actor):
-    """Outputs zero between two values, and beyond them the excess: play, or a valve that overlaps.
+    """Outputs zero between two values, and the excess beyond them: play, or a valve with overlap.
 
     Source: J.-J. Slotine and W. Li, Applied Nonlinear Control, 1991, section 5.2.
     """
 
     input = InputPort(float, doc="the signal")
-    output = OutputPort(float, doc="0 within the zone, the distance from it beyond")
+    output = OutputPort(float, doc="0 within the zone; outside it, the distance from the zone")
 
     low = Parameter(float, doc="lower end of the zone")
     high = Parameter(float, doc="upper end of the zone")
 
     def check(self) -> None:
         if self.low > self.high:
-            raise ParameterError(f"low is {self.low:g} and high is {self.high:g}: low may not be above high")
+            raise ParameterError(f"low is {self.low:g} and high is {self.high:g}: low must not be above high")
 
     def fire(self) -> None:
         for token in self.input.tokens:
@@ -113,7 +117,7 @@ class Hysteresis(Actor):
 
     input = InputPort(float, doc="the signal")
     output = OutputPort(float, doc="'on' or 'off', for each token")
-    switched = OutputPort(bool, doc="whether it is on, when that changes")
+    switched = OutputPort(bool, doc="whether it is on, sent when that changes")
 
     upper = Parameter(float, doc="at or above this it switches on")
     lower = Parameter(float, doc="at or below this it switches off")

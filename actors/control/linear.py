@@ -1,4 +1,4 @@
-"""Linear systems that are driven by tokens: StateSpace and TransferFunction."""
+"""Linear systems driven by tokens: StateSpace and TransferFunction."""
 
 from __future__ import annotations
 
@@ -28,28 +28,28 @@ from ..core.elementary import total
 from ..readings import finite_numbers
 from .matrices import Exponential, Matrix, Vector, applied
 
-_LARGEST: Final = 100  # states and inputs of one system, whose exponential takes a second then
-_KEPT: Final = 64  # solutions for times between events, which are mostly the same few
+_LARGEST: Final = 100  # states and inputs of one system; at this limit, its exponential takes a second
+_KEPT: Final = 64  # solutions for times between events, mostly the same few times
 
 
 class _LinearSystem(Actor):
-    """What they share: x' = A x + B u, y = C x + D u from event to event, or from step to step."""
+    """The common part: x' = A x + B u, y = C x + D u from event to event, or from step to step."""
 
-    input: InputPort[Any] = InputPort(doc="u, held from token to token: a number, or an array of several")
-    trigger = InputPort(doc="asks for the output; with 'sampled' it is also what makes a step")
+    input: InputPort[Any] = InputPort(doc="u, held between tokens: a number, or an array of several")
+    trigger = InputPort(doc="requests the output; with 'sampled', it also makes a step")
     output: OutputPort[Any] = OutputPort(
         depends_on=("trigger",),
         doc="y at the time of each trigger: a number, or an array; where u acts on y directly (d), it depends on "
-        "'input' at once, too",
+        "'input' within the same tag",
     )
 
     sampled = Parameter(
-        bool, False, doc="whether it makes a step at each trigger, x[k+1] = A x[k] + B u[k], or follows time"
+        bool, False, doc="whether it makes a step at each trigger, x[k+1] = A x[k] + B u[k], instead of following time"
     )
 
     @abstractmethod
     def _matrices(self) -> tuple[Matrix, Matrix, Matrix, Matrix]:
-        """A, B, C and D; raises ``ParameterError`` if they are none."""
+        """A, B, C and D; raises ``ParameterError`` if they are invalid."""
 
     @abstractmethod
     def _start(self) -> tuple[Vector, Vector]:
@@ -63,11 +63,11 @@ class _LinearSystem(Actor):
         self._start()
         if not self.sampled:
             # C. F. Van Loan, Computing Integrals Involving the Matrix Exponential, IEEE Trans. Automat. Contr. 23
-            # (1978): the exponential of [A B; 0 0] also holds what a constant input does.
+            # (1978): the exponential of [A B; 0 0] also contains the effect of a constant input.
             if len(self._a) + self._width > _LARGEST:
                 raise ParameterError(
                     f"{counted(len(self._a), 'state')} and {counted(self._width, 'input')} are more than {_LARGEST} "
-                    "together: their exponentials would take long; give several systems, or 'sampled' ones"
+                    f"in total, and the matrix exponential would take long; use several systems, or 'sampled' ones"
                 )
             whole = [[*row, *more] for row, more in zip(self._a, self._b, strict=True)]
             self._growth = Exponential([*whole, *([[0.0] * (len(whole) + self._width)] * self._width)])
@@ -98,12 +98,12 @@ class _LinearSystem(Actor):
         """Let an input act from now on."""
         if self.sampled:
             self._used = given if self._since == now else self._used
-        elif given != self._held:  # the same again does not bend the solution
+        elif given != self._held:  # the same value again does not change the solution
             self._state, self._since = self._at(now), now
         self._held = given
 
     def _at(self, now: int) -> Vector:
-        """The state now, from where the input changed last: looks at it leave no trace."""
+        """The state now, computed from where the input last changed: requests leave no trace."""
         assert self._since is not None
         elapsed = now - self._since
         if elapsed == 0:
@@ -123,7 +123,7 @@ class _LinearSystem(Actor):
     def _bounded(self, state: Vector) -> Vector:
         if all(map(math.isfinite, state)):
             return state
-        raise EpicycleError("the state has grown beyond all numbers: the system is unstable, end the run before")
+        raise EpicycleError("the state has grown too large for a float: the system is unstable; end the run earlier")
 
 
 def _read_only(numbers: Vector) -> Any:
@@ -137,7 +137,7 @@ def _type(width: int) -> Any:
 
 
 class _MatrixParameter(Parameter[Any]):
-    """Rows of numbers, equally long."""
+    """Rows of numbers, all of the same length."""
 
     def __init__(self, default: Any = REQUIRED, *, doc: str) -> None:
         super().__init__(float, default, shape=(None, None), doc=doc)
@@ -146,7 +146,7 @@ class _MatrixParameter(Parameter[Any]):
         if isinstance(value, (list, tuple)):
             lengths = {len(row) if isinstance(row, (list, tuple, np.ndarray)) else -1 for row in value}
             if len(lengths) > 1 and -1 not in lengths:
-                raise ParameterError(f"{brief(value)} is no matrix: its rows are not equally long")
+                raise ParameterError(f"{brief(value)} is not a matrix: its rows differ in length")
         return super().convert(value)
 
 
@@ -157,13 +157,13 @@ class StateSpace(_LinearSystem):
 
         mass: {type: StateSpace, a: [[0, 1], [-4, -0.4]], b: [[0], [1]], c: [[1, 0]], initial: [1, 0]}
 
-    The input holds its value between two tokens, so the solution is exact: that of the matrix exponential, from
-    where the input changed last.  It does not depend on when it is looked at, and has the same bits on every processor.
-    Numbers are bare, in the units that the model chooses, time in s.
+    The input holds its value between tokens, so the solution is exact: it is computed by the matrix exponential from
+    where the input last changed.  It does not depend on when it is requested, and has the same bits on every processor.
+    Numbers have no units: the model chooses them; time is in s.
 
-    Without D the output does not depend on the input at once, and the actor may stand in a loop without delay.  With
-    ``sampled``, it makes a step at each trigger: ``x[k+1] = A x[k] + B u[k]``, with the input of the time of the
-    trigger.  Ptolemy: ``LinearStateSpace``, and with ``sampled`` ``LinearDifferenceEquationSystem``.
+    Without D, the output does not depend on the input within the same tag, so the actor may be part of a loop without
+    delay.  With ``sampled``, it makes a step at each trigger: ``x[k+1] = A x[k] + B u[k]``, with the input at the time
+    of the trigger.  Ptolemy: ``LinearStateSpace``, and with ``sampled`` ``LinearDifferenceEquationSystem``.
     """
 
     a = _MatrixParameter(doc="A, n x n")
@@ -176,7 +176,7 @@ class StateSpace(_LinearSystem):
     def _matrices(self) -> tuple[Matrix, Matrix, Matrix, Matrix]:
         a, b = _rows("a", self.a), _rows("b", self.b)
         size = len(a)
-        _check_shape("a", a, (size, size), "it is square")
+        _check_shape("a", a, (size, size), "it must be square")
         width = len(b[0]) if b else 0
         _check_shape("b", b, (size, max(width, 1)), f"a row for each of {counted(size, 'state')}")
         c = [[float(i == j) for j in range(size)] for i in range(size)] if self.c is None else _rows("c", self.c)
@@ -193,31 +193,31 @@ class StateSpace(_LinearSystem):
 
 
 class TransferFunction(_LinearSystem):
-    """A linear system of one input and one output by its transfer function, such as ``2 / (s^2 + 0.4 s + 4)``.
+    """A linear system with one input and one output, given by its transfer function, such as ``2 / (s^2 + 0.4 s + 4)``.
 
         plant: {type: TransferFunction, numerator: [2], denominator: [1, 0.4, 4]}
 
-    Coefficients are those of descending powers of s, or of z with ``sampled``.  The input holds its value between two
-    tokens, so the solution is exact; what is said of it at ``StateSpace`` is so here, too.  ``initial`` are the output
-    and its derivatives at the start (with ``sampled``, the output and those of the next steps) as they are while the
-    input is 0.  Where the numerator has fewer coefficients than the denominator, the output does not depend on the
-    input at once, and the actor may stand in a loop without delay.  A dead time is a ``delay:`` of the connection.
+    Coefficients are those of descending powers of s, or of z with ``sampled``.  The solution is exact, as described for
+    ``StateSpace``.  ``initial`` holds the output and its derivatives at the start (with ``sampled``, the output and its
+    values at the next steps) for zero input.  Where the numerator has fewer coefficients than the denominator, the
+    output does not depend on the input within the same tag, so the actor may be part of a loop without delay.  For a
+    dead time, give the connection a ``delay:``.
 
     The states are those of the observable canonical form (T. Kailath, Linear Systems, 1980, section 2.1).
     Ptolemy: ``ContinuousTransferFunction``.
     """
 
-    numerator = array_parameter((None,), (1.0,), doc="coefficients of the numerator, the highest power first")
-    denominator = array_parameter((None,), doc="coefficients of the denominator, the highest power first")
-    initial = array_parameter((None,), (), doc="output and its derivatives at the start; those left out are 0")
+    numerator = array_parameter((None,), (1.0,), doc="coefficients of the numerator, highest power first")
+    denominator = array_parameter((None,), doc="coefficients of the denominator, highest power first")
+    initial = array_parameter((None,), (), doc="the output and its derivatives at the start; those left out are 0")
     held = Parameter(float, 0.0, doc="the input before its first token")
 
     def _matrices(self) -> tuple[Matrix, Matrix, Matrix, Matrix]:
         above, below = polynomials(self.numerator, self.denominator)
         if len(above) > len(below):
             raise ParameterError(
-                f"numerator: its degree is {len(above) - 1}, that of the denominator {len(below) - 1}: a system that "
-                "differentiates its input cannot follow one that jumps"
+                f"numerator: its degree {len(above) - 1} is above that of the denominator, {len(below) - 1}: the "
+                f"system would differentiate its input, which jumps"
             )
         above = [0.0] * (len(below) - len(above)) + above
         order, direct = len(below) - 1, above[0]
@@ -229,7 +229,9 @@ class TransferFunction(_LinearSystem):
     def _start(self) -> tuple[Vector, Vector]:
         order, given = len(self._a), _row("initial", self.initial)
         if len(given) > order:
-            raise ParameterError(f"initial: {counted(len(given), 'value')} for a system of order {order}")
+            raise ParameterError(
+                f"initial: {counted(len(given), 'value')}, expected at most {order}, the order of the system"
+            )
         given += [0.0] * (order - len(given))
         below = [1.0, *(-row[0] for row in self._a)]
         # y and its derivatives are x1, x2 - a1 x1, ..., so x2 is y' + a1 y, and so on.
@@ -238,10 +240,10 @@ class TransferFunction(_LinearSystem):
 
 
 def polynomials(numerator: Any, denominator: Any) -> tuple[Vector, Vector]:
-    """The coefficients of a quotient whose denominator begins with 1; the numerator without leading zeros."""
+    """The coefficients divided by the leading one of the denominator; the numerator without leading zeros."""
     below = _row("denominator", denominator)
     if not below or below[0] == 0.0:
-        raise ParameterError("denominator: its first coefficient, that of the highest power, may not be 0 or missing")
+        raise ParameterError("denominator: the first coefficient, that of the highest power, must not be 0 or missing")
     above = list(dropwhile(lambda each: each == 0.0, _row("numerator", numerator)))
     return [each / below[0] for each in above], [each / below[0] for each in below]
 
@@ -249,7 +251,7 @@ def polynomials(numerator: Any, denominator: Any) -> tuple[Vector, Vector]:
 def _row(name: str, values: Iterable[float]) -> Vector:
     row = [float(each) for each in values]
     if not all(map(math.isfinite, row)):
-        raise ParameterError(f"{name}: {row} are not all finite")
+        raise ParameterError(f"{name}: the numbers {row} are not all finite")
     return row
 
 

@@ -11,11 +11,11 @@ from ..core.elementary import total
 Vector = list[float]
 Matrix = list[Vector]
 
-_GROUP: Final = 4  # so many powers are computed; the others are products with the last of them
+_GROUP: Final = 4  # powers computed directly; the others are products with the last of them
 # 1 / k!, up to 16, which leaves 1e-20 of a matrix of norm 1/2.
 _INVERSE: Final = tuple(1.0 / math.factorial(k) for k in range(4 * _GROUP + 1))
-_ROUNDS: Final = 100  # of balancing; a few do
-_GAIN: Final = 0.95  # what a round must make of row and column to count
+_ROUNDS: Final = 100  # rounds of balancing; a few suffice
+_GAIN: Final = 0.95  # a round that reduces row and column by less does not count
 
 
 def applied(matrix: Sequence[Sequence[float]], vector: Sequence[float]) -> Vector:
@@ -36,12 +36,12 @@ def product(left: Matrix, right: Matrix) -> Matrix:
 
 
 class Exponential:
-    """exp(A t) - 1 for one matrix A and any times t.
+    """exp(A t) - 1 for one matrix A and any time t.
 
     Scaling and squaring with a Taylor polynomial: C. Moler and C. Van Loan, Nineteen Dubious Ways to Compute the
-    Exponential of a Matrix, SIAM Review 45 (2003), method 3.  Squared is what exceeds 1, so that slow motions keep
-    their digits beside fast ones.  A is balanced before, by powers of two: B. Parlett and C. Reinsch, Balancing a
-    Matrix for Calculation of Eigenvalues and Eigenvectors, Numer. Math. 13 (1969).
+    Exponential of a Matrix, SIAM Review 45 (2003), method 3.  What exceeds 1 is squared, so that slow motions keep
+    their digits beside fast ones.  A is balanced first, by powers of two: B. Parlett and C. Reinsch, Balancing a Matrix
+    for Calculation of Eigenvalues and Eigenvectors, Numer. Math. 13 (1969).
     """
 
     def __init__(self, matrix: Sequence[Sequence[float]]) -> None:
@@ -79,7 +79,7 @@ class Exponential:
 
 
 def balanced(matrix: Sequence[Sequence[float]]) -> tuple[Matrix, Vector]:
-    """D^-1 A D with rows and columns of like size, and the diagonal of D, powers of two."""
+    """D^-1 A D with rows and columns of similar size, and the diagonal of D, powers of two."""
     rows = [[float(each) for each in row] for row in matrix]
     size, scales = range(len(rows)), [1.0] * len(rows)
     for _ in range(_ROUNDS):
@@ -101,10 +101,10 @@ def balanced(matrix: Sequence[Sequence[float]]) -> tuple[Matrix, Vector]:
 
 
 def _balance(column: float, row: float) -> float:
-    """The power of two by which a column grows, and its row gets smaller, until they are alike, or 1 at most."""
+    """The power of two by which a column grows, and its row shrinks, until they are similar, or 1 at most."""
     if column == row == 0.0:
         return 1.0
-    if 0.0 in (column, row):  # inputs have empty rows, what nothing depends on has an empty column
+    if 0.0 in (column, row):  # inputs have empty rows; a state that nothing depends on has an empty column
         exponent = math.frexp(row)[1] if row else -math.frexp(column)[1]
         return math.ldexp(1.0, exponent if (exponent > 0) == (row > 0.0) else 0)
     return math.ldexp(1.0, (math.frexp(row)[1] - math.frexp(column)[1]) // 2)

@@ -1,4 +1,4 @@
-"""PID: the controller that most loops have."""
+"""PID: the controller of most loops."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from ..core import (
 from ..core.elementary import exp, expm1
 from ..readings import finite_number
 
-# What the gains are called elsewhere.
+# Other names of the gains.
 _REFUSED = {
     symbol: f"PID has no parameter {symbol!r}: {where}"
     for symbols, where in {
@@ -33,7 +33,7 @@ _REFUSED = {
 
 
 class _Sample(NamedTuple):
-    """What the derivative knows of a sample."""
+    """What the derivative needs to know about a sample."""
 
     time: int  # ns
     signal: float
@@ -43,35 +43,44 @@ class _Sample(NamedTuple):
 class PID(Actor):
     """A controller with a proportional, an integral and a derivative part, which acts at each measurement.
 
-    ``u = P + I + D + feedforward``, cut off at ``low`` and ``high``, with ``P = Kp (b r - y)``, ``dI/dt = Ki (r - y)``
-    and ``D = Kd d(c r - y)/dt`` behind a lag of ``filter_time``; r is the setpoint, y the measurement.  From a gain K
-    and times Ti and Td: ``proportional: K``, ``integral: K / Ti``, ``derivative: K * Td``.  Measurements may come at
-    any times: from one to the next the error holds for I, unless ``integration`` says ``trapezoid``, and the signal
-    runs straight for D (ramp equivalence), which is right for any lag, none included.
+    ``u = P + I + D + feedforward``, limited to ``low`` and ``high``, with ``P = Kp (b r - y)``, ``dI/dt = Ki (r - y)``
+    and ``D = Kd d(c r - y)/dt`` filtered by a lag of ``filter_time``; r is the setpoint, y the measurement.  For a gain
+    K and times Ti and Td, give ``proportional: K``, ``integral: K / Ti``, ``derivative: K * Td``.  Measurements may
+    come at any time.  Between them, I takes the error as constant, unless ``integration`` is ``trapezoid``, and D takes
+    the signal as linear (ramp equivalence), which is right for any lag, including none.
 
-    Anti-windup: with ``clamping`` I stands still while it drives the output further beyond a limit; with
-    ``back_calculation`` it is drawn back with ``tracking_time``, so that the output returns to the limit.  What the
-    actuator really does may come to ``tracking``; how the output differs from that then counts in place of the limits.
+    Anti-windup: with ``clamping``, I is held while it would drive the output further beyond a limit; with
+    ``back_calculation``, it is drawn back with time constant ``tracking_time``, so that the output returns to the
+    limit.  The actuator's actual output can be connected to ``tracking``; its difference from the controller's output
+    then takes the place of the limits.
 
-    Bumpless: while ``automatic`` is false the output is ``manual``, and I follows, so that control goes on from there;
-    when gains change, I makes up for the jump of P.  Both need an integral part.
+    Bumpless transfer: while ``automatic`` is false, the output is ``manual`` and I follows it, so that control resumes
+    from there; when gains change, I compensates the jump of P.  Both need an integral part.
 
-    The output does not depend on ``tracking`` at once, which may stand in a loop without delay.
+    The output does not depend on ``tracking`` within the same tag, so that connection may be part of a loop without
+    delay.
     Source: K. J. Åström and T. Hägglund, Advanced PID Control, 2006, chapters 3 and 13; K. J. Åström and B. Wittenmark,
     Computer-Controlled Systems, 3rd ed., table 8.1.  Ptolemy: ``PID``.
     """
 
     refused: ClassVar[Mapping[str, str]] = _REFUSED
 
-    measurement = InputPort(float, doc="y; an output is sent for each")
-    feedforward = InputPort(float, required=False, triggers=False, doc="added to the output from the next one on")
-    tracking = InputPort(float, required=False, triggers=False, doc="the output of the actuator, where it is measured")
-    automatic = InputPort(bool, required=False, triggers=False, doc="whether it controls; true until a token comes")
+    measurement = InputPort(float, doc="y; an output is sent for each token")
+    feedforward = InputPort(float, required=False, triggers=False, doc="added to the output, from the next output on")
+    tracking = InputPort(
+        float, required=False, triggers=False, doc="the actual output of the actuator, if it is measured"
+    )
+    automatic = InputPort(
+        bool, required=False, triggers=False, doc="whether the controller is active; true until a token comes"
+    )
     manual = InputPort(
-        float, required=False, triggers=False, doc="the output while it does not; the last one until a token comes"
+        float,
+        required=False,
+        triggers=False,
+        doc="the output while the controller is inactive; its last output until a token comes",
     )
     reset = InputPort(
-        required=False, triggers=False, doc="sets I back and forgets the slope, before the measurement of the tag"
+        required=False, triggers=False, doc="resets I and forgets the slope, before the measurement of the tag"
     )
     output = OutputPort(
         float,
@@ -83,14 +92,14 @@ class PID(Actor):
     )  # fmt: skip
     error = OutputPort(float, depends_on=("measurement", "setpoint"), doc="r - y, for each measurement")
 
-    setpoint = PortParameter(float, 0.0, doc="r, what y is to be")
+    setpoint = PortParameter(float, 0.0, doc="r, the desired value of y")
     proportional = PortParameter(float, 1.0, doc="Kp")
     integral = PortParameter(float, 0.0, doc="Ki, in 1/s times the unit of Kp")
     derivative = PortParameter(float, 0.0, doc="Kd, in s times the unit of Kp")
     integration = Parameter(
-        str, "hold", choices=("hold", "trapezoid"), doc="what the error does between two measurements, for I"
+        str, "hold", choices=("hold", "trapezoid"), doc="how the error is taken between two measurements, for I"
     )
-    filter_time = Parameter(float, 0.0, unit="s", min=0, doc="time constant of the lag behind the derivative")
+    filter_time = Parameter(float, 0.0, unit="s", min=0, doc="time constant of the lag on the derivative")
     setpoint_weight = Parameter(float, 1.0, unit="1", doc="b, the share of the setpoint in the proportional part")
     derivative_weight = Parameter(float, 0.0, unit="1", doc="c, the share of the setpoint in the derivative part")
     low = Parameter(float, -math.inf, doc="the lowest output")
@@ -105,14 +114,16 @@ class PID(Actor):
     )  # fmt: skip
     initial = Parameter(float, 0.0, doc="I at the start and after a reset")
     late_reset = Parameter(
-        bool, False, ptolemy=True, doc="whether a reset counts behind the measurement of the tag, not before it"
+        bool, False, ptolemy=True, doc="whether a reset takes effect after the measurement of its tag, not before"
     )
 
     def check(self) -> None:
         if self.low > self.high:
-            raise ParameterError(f"low is {self.low:g} and high is {self.high:g}: low may not be above high")
+            raise ParameterError(f"low is {self.low:g} and high is {self.high:g}: low must not be above high")
         if self.tracking_time is not None and self.anti_windup != "back_calculation":
-            raise ParameterError(f"tracking_time: it goes with anti_windup: back_calculation, not {self.anti_windup}")
+            raise ParameterError(
+                f"tracking_time: it is for 'anti_windup: back_calculation', but anti_windup is {self.anti_windup}"
+            )
 
     def initialize(self) -> None:
         self._gains = self._present_gains()
@@ -120,17 +131,17 @@ class PID(Actor):
         self._weighted = 0.0  # b r - y, of the latest measurement
         self._wanted = self._sent = 0.0  # the latest output without limits, and with them
         self._added = 0.0
-        self._done: float | None = None  # what the actuator does
-        self._given: float | None = None  # by hand
+        self._done: float | None = None  # the actuator's output
+        self._given: float | None = None  # the manual output
         self._is_automatic = True
         self._forget()
 
     def _forget(self) -> None:
         self._sum = self.initial  # I
-        self._since: int | None = None  # up to when the error has been added up
-        self._weight = 0.0  # of the next error in I, less that of the one before, if it runs straight between them
+        self._since: int | None = None  # the time up to which the error has been integrated
+        self._weight = 0.0  # of the next error in I, less that of the one before, if the error is linear between them
         self._latest: _Sample | None = None
-        self._before: _Sample | None = None  # the latest one of an earlier time
+        self._before: _Sample | None = None  # the latest sample of an earlier time
 
     def _present_gains(self) -> tuple[float, float, float]:
         return self.proportional, self.integral, self.derivative
@@ -159,7 +170,7 @@ class PID(Actor):
             self._forget()
 
     def _add_up(self) -> None:
-        """Bring I to the present time, over which the error and the output have been held."""
+        """Bring I to the present time; the error and the output have been constant since."""
         elapsed = 0.0 if self._since is None else to_seconds(self.tag.time - self._since)
         self._since = self.tag.time
         if elapsed == 0.0 or self._latest is None or not self._is_automatic:
@@ -203,7 +214,7 @@ class PID(Actor):
         self.error.send(self._error)
 
     def _derived(self, signal: float) -> float:
-        """D, with the signal running straight to here from the latest sample of an earlier time."""
+        """D, with the signal linear from the latest sample of an earlier time."""
         now, latest = self.tag.time, self._latest
         if latest is not None and latest.time < now:
             self._before = latest

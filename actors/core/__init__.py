@@ -1,4 +1,4 @@
-"""What every actor is made of: ports, parameters, time, random streams, and the firing contract."""
+"""The parts of every actor: ports, parameters, time, random streams, and the firing contract."""
 
 from . import elementary, paths
 from .actor import Actor, Context, declared_ports, has_own_ports

@@ -1,30 +1,31 @@
-"""Actor: what stands in a model graph, and the contract between it and the director.
+"""Actor: a node of a model graph, and the contract between it and the director.
 
 The firing contract
 -------------------
-A director brings every actor through ``initialize``, any number of ``fire`` and ``wrapup``, in this order.
+A director calls ``initialize``, then ``fire`` any number of times, then ``wrapup`` of every actor.
 
-``initialize`` is called once, before time starts.  An actor sets up its state here and may ask for wake-ups: one
-asked for at once comes at the first tag of the run, (start, 1).  Ports hold nothing yet, and nothing may be sent.
+``initialize`` is called once, before time starts.  An actor sets up its state here and may request wake-ups: one
+requested for the present time comes at the first tag of the run, (start, 1).  Ports hold nothing yet, and nothing may
+be sent.
 
 ``fire`` is called at a tag at which a token is present at an input or a wake-up is due.  When it is called, every
-actor upstream (along connections without delay, and outputs that depend on their inputs at once) has finished with
-this tag: all tokens of the tag are there, and an absent token will not come.  So it is called once per tag; only an
-actor with an output that does not depend on an input at once is called for the tokens of such inputs by themselves.
-In ``fire`` an actor may read its inputs (``port.present``, ``port.value``, ``port.tokens``), send any number of
-tokens, change its state and ask for wake-ups.  Tokens that it does not read are gone when it returns, unless the port
-keeps them (``InputPort(keep=True)``, ``port.get()``).  A token that it sends is received within the same tag unless
-the connection has a delay.
+actor upstream (along connections without delay, and outputs that depend on inputs within the same tag) has finished
+with this tag: all tokens of the tag are there, and an absent token will not come.  So it is called once per tag; only
+an actor with an output that does not depend on some input within the tag is called separately for the tokens of such
+inputs.  In ``fire`` an actor may read its inputs (``port.present``, ``port.value``, ``port.tokens``), send any number
+of tokens, change its state and request wake-ups.  Tokens that it does not read are dropped when it returns, unless the
+port keeps them (``InputPort(keep=True)``, ``port.get()``).  A token that it sends is received within the same tag
+unless the connection has a delay.
 
-``wake_in(seconds)`` and ``wake_at(seconds)`` ask for a firing later: a wake-up for the present time comes at the
-same time, one microstep on; one in the future at microstep 1.  Asking for the past means now.  A ``Wake`` can be
-cancelled; asking twice for one tag fires once.
+``wake_in(seconds)`` and ``wake_at(seconds)`` request a later firing: a wake-up for the present time comes at the same
+time, one microstep on; one in the future at microstep 1.  A request for the past means now.  A ``Wake`` can be
+cancelled; two requests for one tag give one firing.
 
 ``wrapup`` is called once after the last tag, also when the run failed.  Nothing may be sent.
 
 An actor keeps all its state in itself, draws random numbers from ``random`` alone, and never looks at another actor:
-so it cannot know which aspects stand around it, and a run is a function of model and seed.  Each run has actors of its
-own, copies of those in the model, and a snapshot of a run has copies of these.
+so it cannot know which aspects are attached to it, and a run is a function of model and seed.  Each run has its own
+actors, copies of those in the model, and a snapshot of a run has copies of these.
 """
 
 from __future__ import annotations
@@ -43,7 +44,7 @@ from .tag import Tag, to_nanoseconds, to_seconds
 
 
 class Context(Protocol):
-    """What the engine offers to an actor of a running model."""
+    """The interface that the engine offers to an actor of a running model."""
 
     @property
     def tag(self) -> Tag:
@@ -73,19 +74,19 @@ class Context(Protocol):
 
 
 class _NoContext:
-    """What an actor sees of a run when it is part of none."""
+    """The context of an actor that is not part of a run."""
 
     def __init__(self, actor: Actor) -> None:
         self._actor = actor
 
     def __getattr__(self, name: str) -> Any:
-        if name.startswith("__"):  # Python itself asks, to copy it for example
+        if name.startswith("__"):  # Python itself reads these, for example to copy
             raise AttributeError(name)
         raise RuntimeError(f"{self._actor.path} is not part of a running model")
 
 
 class _SourceByPorts:
-    """What ``Actor.is_source`` is for a class that does not say: what has no inputs can only be woken by itself."""
+    """``Actor.is_source`` of a class that does not declare it: an actor without inputs can only be woken by itself."""
 
     def __get__(self, instance: object, owner: type[Actor]) -> bool:
         ports = declared_ports(owner).values()
@@ -106,13 +107,13 @@ class Actor(Configurable):
     ...             self.output.send(self.factor * token)
     """
 
-    # Whether the actor drives itself with wake-ups; if not, an instance without any input never fires.  It follows from
-    # the class's having no input beside parameters; one that has inputs and starts by itself says True.
+    # Whether the actor drives itself with wake-ups; if not, an instance without any input never fires.  The default is
+    # true for classes without inputs other than parameters; a class with inputs that starts by itself sets True.
     is_source: ClassVar[bool] = cast(bool, _SourceByPorts())
 
     @property
     def is_endless(self) -> bool:
-        """Whether it is known to drive itself for ever, so that a run has to be ended by something else."""
+        """Whether it is known to drive itself for ever, so that something else must end a run."""
         return False
 
     def __init__(self, path: str, **parameters: object) -> None:
@@ -139,17 +140,17 @@ class Actor(Configurable):
         self.check()
 
     def own_ports(self) -> dict[str, InputPort[Any] | OutputPort[Any]]:
-        """Ports that this instance has beside those of its class, by name; they follow from its parameters.
+        """Ports of this instance in addition to those of its class, by name; they follow from its parameters.
 
-        They are found in ``inputs`` and ``outputs``, not as attributes, so their names are free.
+        They are in ``inputs`` and ``outputs`` and not attributes, so they may have any name.
         """
         return {}
 
     def _add_own(self, name: str, port: InputPort[Any] | OutputPort[Any]) -> None:
         if not name.isidentifier() or not name.isascii():
-            raise PortError(f"{name!r} cannot be the name of a port: use letters, digits and _, no digit first")
+            raise PortError(f"{name!r} cannot be the name of a port: use letters, digits and _, and no digit first")
         if name in self.inputs or name in self.outputs:
-            raise PortError(f"there would be two ports called {name!r}")
+            raise PortError(f"there would be two ports named {name!r}")
         port.name = name
         bound = port.bind(self)
         if isinstance(bound, InputPort):
@@ -158,7 +159,7 @@ class Actor(Configurable):
             self.outputs[name] = bound
 
     def twin(self, known: dict[int, Any]) -> Self:
-        """Engine: the beginning of a copy that is part of no run: its ports.  ``known`` gets what is copied, by id."""
+        """Engine: begin a copy that is not part of a run, with its ports.  ``known`` receives the copies, by id."""
         made = object.__new__(type(self))
         made.path = self.path
         for side in (self.inputs, self.outputs):
@@ -168,13 +169,14 @@ class Actor(Configurable):
         return made
 
     def follow_ptolemy(self) -> None:
-        """Engine: what was not given, and the ports, are as they are in Ptolemy, where the declarations say how."""
+        """Engine: parameters that were not given, and the ports, become as in Ptolemy, where the declarations say
+        how."""
         Configurable.follow_ptolemy(self)
         for port in (*self.inputs.values(), *self.outputs.values()):
             port.follow_ptolemy()
 
     def move(self, path: str) -> None:
-        """Engine: the actor gets its full path in the model that it is added to."""
+        """Engine: set the full path in the model that the actor is added to."""
         self.path = path
         for port in (*self.inputs.values(), *self.outputs.values()):
             port.path = f"{path}.{port.name}"
@@ -183,7 +185,7 @@ class Actor(Configurable):
         """Called once before the first tag."""
 
     def fire(self) -> None:
-        """Called at each tag at which there is something to do; see the firing contract."""
+        """Called at each tag with a token or a wake-up for the actor; see the firing contract."""
         raise NotImplementedError(f"{type(self).__name__} has no fire()")
 
     def wrapup(self) -> None:
@@ -192,8 +194,9 @@ class Actor(Configurable):
     def restart(self) -> None:
         """Called when the actor starts again in the middle of a run, after a crash that cost it its state.
 
-        Its wake-ups have been cancelled then, and its random streams go on.  It begins as before the first tag, by
-        ``initialize``; an actor whose wake-ups keep to times counted from the start of the run looks which are over.
+        Its wake-ups have been cancelled by then, and its random streams continue.  The default is to start as before
+        the first tag, by ``initialize``; an actor with wake-ups at fixed times of the run must skip those that are
+        over.
         """
         for port in self.inputs.values():
             if isinstance(port, ParameterPort):
@@ -203,7 +206,7 @@ class Actor(Configurable):
         self.initialize()
 
     def halt(self) -> None:
-        """Called when a crash costs the actor its state: nothing that it has begun may go on."""
+        """Called when a crash costs the actor its state: nothing that it has begun may continue."""
 
     def enter(self, context: Context) -> None:
         """Engine: the actor becomes part of a run."""
@@ -225,21 +228,21 @@ class Actor(Configurable):
 
     @property
     def random(self) -> Stream:
-        """The actor's own random stream."""
+        """The actor's random stream."""
         return self.random_stream("")
 
     def random_stream(self, purpose: str) -> Stream:
-        """A random stream of the actor's for one purpose, independent of all others."""
+        """A random stream of the actor for one purpose, independent of all others."""
         if purpose not in self._streams:
             self._streams[purpose] = self.context.streams.of(self.path, purpose)
         return self._streams[purpose]
 
     def wake_in(self, delay: float) -> Wake:
-        """Ask to be fired after ``delay`` seconds."""
+        """Request a firing after ``delay`` seconds."""
         return self.context.wake(self, self.context.time + to_nanoseconds(delay))
 
     def wake_at(self, time: float) -> Wake:
-        """Ask to be fired at ``time`` seconds."""
+        """Request a firing at ``time`` seconds."""
         return self.context.wake(self, to_nanoseconds(time))
 
 
@@ -247,13 +250,13 @@ _declared: WeakKeyDictionary[type, Mapping[str, InputPort[Any] | OutputPort[Any]
 
 
 def has_own_ports(cls: type[Actor]) -> bool:
-    """Whether instances of an actor class may have ports that the class does not tell."""
+    """Whether instances of an actor class may have ports that the class does not declare."""
     return cls.own_ports is not Actor.own_ports
 
 
 def declared_ports(cls: type) -> Mapping[str, InputPort[Any] | OutputPort[Any]]:
     """The ports of an actor class by name, those of its bases first."""
-    if (known := _declared.get(cls)) is not None:  # asked for every instance of a class
+    if (known := _declared.get(cls)) is not None:  # called for every instance of a class
         return known
     found: dict[str, InputPort[Any] | OutputPort[Any]] = {}
     for base in reversed(cls.__mro__):

@@ -1,4 +1,4 @@
-# Types for C; what everything is for is said in authoring.py.
+# Types for C; authoring.py documents everything.
 
 from epicycle.actors.core.order cimport Line
 

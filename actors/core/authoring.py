@@ -1,7 +1,7 @@
-"""What authors of actors need again and again: tokens that belong together, and work that waits for its time.
+"""Common needs of authors of actors: tokens that belong together, and work that waits for its time.
 
-The k-th tokens of all channels form the k-th round, so that with one token per channel and tag there is one round.
-This is what Ptolemy does, where an actor takes one token per channel and is fired again for the rest.
+The k-th tokens of all channels form the k-th round, so one token per channel and tag gives one round. In Ptolemy,
+accordingly, an actor takes one token per channel and is fired again for the rest.
 """
 
 from __future__ import annotations
@@ -27,25 +27,25 @@ def rounds(*ports: InputPort[Any]) -> Iterator[list[list[Any]]]:
 
 
 def present(tokens: Sequence[Any]) -> list[Any]:
-    """The tokens that are there."""
+    """The tokens without ``ABSENT``."""
     return [token for token in tokens if token is not ABSENT]
 
 
 class Latest:
     """Keeps the latest token of each of several single inputs, for actors that need all of them at once.
 
-    With ``hold`` an input that is silent in a round counts with its latest token; without, a round in which one is
-    silent gives nothing.
+    With ``hold``, an input without a token in a round has its latest token; otherwise, a round in which an input lacks
+    a token gives nothing.
     """
 
     def __init__(self, ports: Sequence[InputPort[Any]], *, hold: bool) -> None:
-        # An optional input that nothing is connected to stays out of it.
+        # An optional input without connections is left out.
         self._ports = [port for port in ports if port.width]
         self._hold = hold
         self._tokens: dict[str, Any] = {}
 
     def rounds(self) -> Iterator[dict[str, Any]]:
-        """For each round in which every connected input has a value, the values by the names of the ports."""
+        """The values by the names of the ports, for each round in which every connected input has one."""
         for entries in rounds(*self._ports):
             if not self._hold:
                 self._tokens.clear()
@@ -57,7 +57,7 @@ class Latest:
 
 
 class Pending(Generic[T]):
-    """Values that wait for their time: ``put`` them in ``fire``, and take those whose time has come with ``due``."""
+    """Values that wait for their time: ``put`` them in ``fire``, and take those that are due with ``due``."""
 
     __slots__ = ("_actor", "_line")
 

@@ -1,4 +1,4 @@
-"""Choices among several, and vectors of random numbers; made as ``laws`` makes single numbers."""
+"""Random choices, and vectors of random numbers, drawn in the same way as the single numbers of ``laws``."""
 
 from __future__ import annotations
 
@@ -11,17 +11,17 @@ from .laws import Bits, beta, between, binomial, standard_normal
 
 
 def cumulated(weights: Sequence[float]) -> list[float]:
-    """The sums of weights up to each; raises ``ValueError`` where they are no weights."""
+    """The cumulated sums of weights; raises ``ValueError`` if they are not weights."""
     sums = list(accumulate(weights))
     if not sums or not all(weight >= 0.0 for weight in weights) or not 0.0 < sums[-1] < math.inf:
-        raise ValueError(f"weights {list(weights)} are not all 0 or more with a finite sum above 0")
+        raise ValueError(f"weights {list(weights)}: expected numbers >= 0 with a finite sum > 0")
     return sums
 
 
 def weighted(bits: Bits, sums: Sequence[float]) -> int:
-    """An index, as likely as its weight; ``sums`` are ``cumulated``."""
+    """An index with a probability in proportion to its weight; ``sums`` are ``cumulated``."""
     place = bisect_right(sums, between(bits) * sums[-1])
-    # Rounding may have reached the whole sum, which lies beyond the last weight that is not 0.
+    # Rounding may have reached the whole sum, which is beyond the last weight above 0.
     return place if place < len(sums) else bisect_right(sums, math.nextafter(sums[-1], 0.0))
 
 
@@ -29,10 +29,10 @@ def without_replacement(bits: Bits, count: int, wanted: int, weights: Sequence[f
     """Different indices, in the order in which they are drawn."""
     possible = count if weights is None else sum(weight > 0.0 for weight in weights)
     if wanted > possible:
-        raise ValueError(f"{wanted} different elements are asked for, and there are {possible}")
+        raise ValueError(f"cannot choose {wanted} different elements of {possible}")
     drawn: list[int] = []
     if weights is None:
-        moved: dict[int, int] = {}  # of a shuffle whose untouched places are not written down
+        moved: dict[int, int] = {}  # of a shuffle that stores only the places that changed
         for last in range(count - 1, count - 1 - wanted, -1):
             place = bits.below(last + 1)
             drawn.append(moved.get(place, place))
@@ -46,18 +46,18 @@ def without_replacement(bits: Bits, count: int, wanted: int, weights: Sequence[f
 
 
 def multinomial(bits: Bits, n: int, weights: Sequence[float]) -> list[int]:
-    """How often each outcome comes: one binomial number after the other, of what is left."""
+    """How often each outcome comes: binomial numbers, one after the other, of the remaining trials."""
     share, counts = 1.0, []
     for weight in weights[:-1]:
         counts.append(binomial(bits, n, min(1.0, weight / share)) if n and weight else 0)
         n, share = n - counts[-1], share - weight
         if share < -1e-12 or weight < 0.0:
-            raise ValueError(f"pvals {list(weights)} are no probabilities, or add up to more than 1")
+            raise ValueError(f"pvals {list(weights)}: expected probabilities that add up to at most 1")
     return [*counts, n]
 
 
 def dirichlet(bits: Bits, shapes: Sequence[float]) -> list[float]:
-    """Shares that add up to 1: each is a beta share of what the ones before it have left."""
+    """Shares that add up to 1: each is a beta-distributed share of the remainder."""
     left, shares = 1.0, []
     rests = list(accumulate(reversed(shapes)))[::-1]
     for shape, rest in zip(shapes[:-1], rests[1:], strict=True):
@@ -68,7 +68,7 @@ def dirichlet(bits: Bits, shapes: Sequence[float]) -> list[float]:
 
 
 def square_root(covariance: Sequence[Sequence[float]]) -> list[list[float]]:
-    """A lower triangle L with L L^T the covariance (Cholesky); a direction without variance gets zeros."""
+    """A lower triangle L with L L^T the covariance (Cholesky); zeros for a direction without variance."""
     size = len(covariance)
     if any(len(row) != size for row in covariance):
         raise ValueError("cov is not square")

@@ -1,4 +1,5 @@
-"""Files that others name are read only if they are regular ones: a pipe may never answer, and a device never end."""
+"""Files named by models and users are read only if they are regular files: a pipe may never answer, and a device never
+end."""
 
 from __future__ import annotations
 
@@ -18,7 +19,7 @@ _KINDS = (
 
 
 def irregular(path: str | Path) -> str:
-    """What there is in place of a regular file, such as ``a folder, not a file``; empty if there is one.
+    """What a path is if not a regular file, such as ``a folder, not a file``; empty for a regular file.
 
     Raises ``OSError``, as for a file that is not there.
     """
@@ -27,12 +28,12 @@ def irregular(path: str | Path) -> str:
 
 @contextmanager
 def open_regular(path: str | Path) -> Iterator[BinaryIO]:
-    """Open a file to read its bytes, without ever waiting for somebody else.
+    """Open a file to read its bytes, without ever waiting for another process.
 
-    Raises ``OSError``; if there is something else than a regular file, its ``strerror`` says what.
+    Raises ``OSError``; for anything other than a regular file, its ``strerror`` says what it is.
     """
     _check(os.stat(path), path)
-    # It may be another one by now.
+    # The path may be another file by now.
     with open(path, "rb", opener=lambda name, flags: os.open(name, flags | getattr(os, "O_NONBLOCK", 0))) as file:
         _check(os.fstat(file.fileno()), path)
         yield file

@@ -1,4 +1,4 @@
-# Types for C; what everything is for is said in laws.py.
+# Types for C; laws.py documents everything.
 
 cimport cython
 from libc.math cimport sqrt

@@ -1,8 +1,8 @@
 # cython: binding=True
-"""Laws of random numbers: each makes a value of random bits, by + - * /, square roots and ``elementary`` alone.
+"""Laws of random numbers: each turns random bits into a value, by + - * /, square roots and ``elementary`` alone.
 
 Where the inverse of a law's distribution function has a closed form, a value is the inverse at one uniform number: it
-takes one word of the stream and grows with it.  The others draw until a value is accepted.
+uses one word of the stream and increases with it.  The others draw until a value is accepted.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ from .elementary import acos, cos, exp, expm1, log, log1p, tan
 from .elementary import pow as power_of
 
 _STEP: Final = 1 / 2**52
-_LARGEST: Final = 2**63 - 1  # what fits an integer of 64 bits
+_LARGEST: Final = 2**63 - 1  # the range of a 64-bit integer
 
 
 class Bits(Protocol):
-    """Where random bits come from."""
+    """A source of random bits."""
 
     def word(self) -> int:
         """64 random bits."""
@@ -38,13 +38,13 @@ def between(bits: Bits) -> float:
 def _not_negative(**parameters: float) -> None:
     for name, value in parameters.items():
         if not value >= 0.0:
-            raise ValueError(f"{name} = {value:g} is not 0 or more")
+            raise ValueError(f"{name} = {value:g} is not >= 0")
 
 
 def _positive(**parameters: float) -> None:
     for name, value in parameters.items():
         if not value > 0.0:
-            raise ValueError(f"{name} = {value:g} is not above 0")
+            raise ValueError(f"{name} = {value:g} is not > 0")
 
 
 def _probability(p: float) -> None:
@@ -144,7 +144,7 @@ def weibull(bits: Bits, a: float) -> float:
 
 
 def pareto(bits: Bits, a: float) -> float:
-    """Lomax (Pareto II) with shape ``a``, from 0 on; add 1 for the classical law from 1 on."""
+    """Lomax (Pareto II) over [0, inf) with shape ``a``; add 1 for the classical Pareto law over [1, inf)."""
     _positive(a=a)
     return expm1(standard_exponential(bits) / a)
 
@@ -176,7 +176,7 @@ def logistic(bits: Bits, loc: float = 0.0, scale: float = 1.0) -> float:
 
 
 def gumbel(bits: Bits, loc: float = 0.0, scale: float = 1.0) -> float:
-    """Gumbel's law of greatest values."""
+    """Gumbel's law of largest values."""
     _not_negative(scale=scale)
     return loc - scale * log(-log(between(bits)))
 
@@ -187,9 +187,9 @@ def standard_cauchy(bits: Bits) -> float:
 
 
 def triangular(bits: Bits, left: float, mode: float, right: float) -> float:
-    """Triangular over [left, right] with its top at ``mode``."""
+    """Triangular over [left, right] with its peak at ``mode``."""
     if not left <= mode <= right:
-        raise ValueError(f"left = {left:g}, mode = {mode:g} and right = {right:g} are not in order")
+        raise ValueError(f"left = {left:g}, mode = {mode:g} and right = {right:g} are not in ascending order")
     share, width = between(bits), right - left
     if share * width <= mode - left:
         return left + sqrt(share * width * (mode - left))
@@ -197,9 +197,9 @@ def triangular(bits: Bits, left: float, mode: float, right: float) -> float:
 
 
 def geometric(bits: Bits, p: float) -> int:
-    """How many trials it takes until one of probability ``p`` succeeds: 1, 2, ..."""
+    """The number of trials with probability ``p`` until one succeeds: 1, 2, ..."""
     if not 0.0 < p <= 1.0:
-        raise ValueError(f"p = {p:g} is not above 0 and at most 1")
+        raise ValueError(f"p = {p:g} is not > 0 and <= 1")
     share = between(bits)
     return 1 if p == 1.0 else min(1 + math.floor(log1p(-share) / log1p(-p)), _LARGEST)
 
@@ -229,7 +229,7 @@ def standard_gamma(bits: Bits, shape: float) -> float:
 
 
 def gamma(bits: Bits, shape: float, scale: float = 1.0) -> float:
-    """Gamma with mean ``shape * scale``; with a whole shape it is Erlang's law."""
+    """Gamma with mean ``shape * scale``; Erlang's law for a whole shape."""
     if not scale >= 0.0:
         _not_negative(scale=scale)
     return scale * standard_gamma(bits, shape)
@@ -244,14 +244,14 @@ def chisquare(bits: Bits, df: float) -> float:
 def beta(bits: Bits, a: float, b: float) -> float:
     """Beta over [0, 1] with mean ``a / (a + b)``.
 
-    Source: M. D. Jöhnk, Metrika 8, 1964, for small parameters; else a share of two gammas.
+    Source: M. D. Jöhnk, Metrika 8, 1964, for small parameters; otherwise the share of one of two gammas.
     """
     _positive(a=a, b=b)
     if a > 1.0 or b > 1.0:
         x = standard_gamma(bits, a)
         return x / (x + standard_gamma(bits, b))
     while True:
-        # Logarithms, as the powers may all be too small for a float.
+        # Logarithms, as all the powers may be too small for a float.
         x, y = log(between(bits)) / a, log(between(bits)) / b
         if exp(x) + exp(y) <= 1.0:
             top = max(x, y)
@@ -275,7 +275,7 @@ def vonmises(bits: Bits, mu: float, kappa: float) -> float:
     Source: Best and Fisher, Efficient Simulation of the von Mises Distribution, 1979.
     """
     _not_negative(kappa=kappa)
-    if kappa > 1e6:  # normal to all digits that count, while the ratios below lose theirs
+    if kappa > 1e6:  # normal to all significant digits, while the ratios below lose theirs
         return math.remainder(mu + standard_normal(bits) / sqrt(kappa), 2.0 * math.pi)
     if kappa < 1e-8:
         return math.remainder(mu + math.pi * (2.0 * between(bits) - 1.0), 2.0 * math.pi)
@@ -301,9 +301,9 @@ def wald(bits: Bits, mean: float, scale: float) -> float:
 
 
 def poisson(bits: Bits, lam: float = 1.0) -> int:
-    """How many events of a Poisson process come, if ``lam`` do on the average.
+    """Poisson: the number of events, with mean ``lam``.
 
-    Source for large ones: W. Hörmann, Insurance: Mathematics and Economics 12, 1993 (PTRS).
+    Source for large means: W. Hörmann, Insurance: Mathematics and Economics 12, 1993 (PTRS).
     """
     if not 0.0 <= lam <= 1e18:
         raise ValueError(f"lam = {lam:g} is not between 0 and 1e18")
@@ -331,9 +331,9 @@ def poisson(bits: Bits, lam: float = 1.0) -> int:
 
 
 def binomial(bits: Bits, n: int, p: float) -> int:
-    """How many of ``n`` trials of probability ``p`` succeed.
+    """Binomial: how many of ``n`` trials with probability ``p`` succeed.
 
-    Source for large ones: W. Hörmann, J. Statistical Computation and Simulation 46, 1993 (BTRS).
+    Source for large means: W. Hörmann, J. Statistical Computation and Simulation 46, 1993 (BTRS).
     """
     n = int(n)
     if not 0 <= n <= _LARGEST:
@@ -366,7 +366,7 @@ def binomial(bits: Bits, n: int, p: float) -> int:
 
 
 def negative_binomial(bits: Bits, n: float, p: float) -> int:
-    """How many trials of probability ``p`` fail before the ``n``-th success."""
+    """Negative binomial: how many trials with probability ``p`` fail before the ``n``-th success."""
     _positive(n=n, p=p)
     _probability(p)
     return poisson(bits, gamma(bits, n, (1.0 - p) / p))
@@ -404,7 +404,7 @@ def _few(k: int) -> float:
 
 
 def _stirling(k: int) -> float:
-    """log(k!) less Stirling's formula for it, for k > 0."""
+    """log(k!) minus Stirling's formula for it, for k > 0."""
     if k < 16:
         return _few(k)
     square = float(k) * k

@@ -1,7 +1,7 @@
-"""What messages are made of: values, numbers and names as people read them, and the name that was probably meant.
+"""The parts of messages: values, numbers and names in readable form, and the name that was probably meant.
 
-What models, data and the code of others say comes through here before it stands in a message or on a terminal: nothing
-in it is obeyed by a terminal or hides, and there is never too much of it.
+Texts from models, data and foreign code pass through here before they appear in a message or on a terminal: no terminal
+obeys them, nothing in them is invisible, and they have a reasonable length.
 """
 
 from __future__ import annotations
@@ -16,19 +16,19 @@ import numpy as np
 LONGEST = 2_000  # characters of a line of a message
 _TAIL = 300
 _BRIEF = 60
-_MAX_NAME = 200  # comparing names takes quadratic time; nobody mistypes a name this long
+_MAX_NAME = 200  # comparing names takes quadratic time, and longer names are not typing errors
 _MAX_CANDIDATES = 2_000
 _MAX_COMPARED = 100
 
 
 def digits(number: float) -> str:
-    """A number as people write it: whole ones without an exponent, unless they get too long to be read."""
+    """A number as people write it: whole numbers without an exponent, unless that is too long to read."""
     in_full = float(number).is_integer() and abs(number) < (10**20 if type(number) is int else 1e15)
     return str(int(number)) if in_full else f"{float(number):g}"
 
 
 def brief(value: object) -> str:
-    """A value as Python writes it, or YAML where that differs; cut where it gets long."""
+    """A value as Python writes it, or as YAML does where that differs; cut if it is long."""
     if value is None or isinstance(value, bool):
         return {None: "null", True: "true", False: "false"}[value]
     if isinstance(value, int) and value.bit_length() > 10_000:  # which Python does not write
@@ -38,22 +38,22 @@ def brief(value: object) -> str:
 
 
 def cut(text: str) -> str:
-    """A text that stands within a line, of bearable length."""
+    """A text within a line, of reasonable length."""
     return text if len(text) <= _BRIEF else f"{text[: _BRIEF - 3]}..."
 
 
 def counted(number: int, noun: str) -> str:
-    """Return a number with what it counts: `0 ports`, `1 port`, `2,000 ports`."""
+    """A number with the noun it counts: `0 ports`, `1 port`, `2,000 ports`."""
     return f"{number:,} {noun}{'' if number == 1 else 's'}"
 
 
 def visible(text: str) -> str:
-    """A line with everything that a terminal would obey or hide written as an escape."""
+    """A line in which everything that a terminal would obey or hide is written as an escape."""
     return text if text.isprintable() else "".join(map(visible_character, text))
 
 
 def visible_character(character: str) -> str:
-    """One character in the same way: itself, or an escape."""
+    """One character in the same way: as it is, or as an escape."""
     return character if character.isprintable() else character.encode("unicode_escape").decode("ascii")
 
 
@@ -63,7 +63,7 @@ def visible_lines(text: str) -> str:
 
 
 def shortened(text: str, longest: int = LONGEST) -> str:
-    """A line of bearable length: its beginning and its end, and how much was left out between them."""
+    """A line of reasonable length: its beginning, how much was left out, and its end."""
     if len(text) <= longest:
         return text
     tail = min(_TAIL, longest // 4)
@@ -71,7 +71,8 @@ def shortened(text: str, longest: int = LONGEST) -> str:
 
 
 def abridged(name: str, longest: int) -> str:
-    """A name as it is if it is short, or else its beginning and a mark: two that begin alike stay two."""
+    """A short name unchanged; of a long one its beginning and a mark, so that two with the same beginning stay
+    different."""
     if len(name) <= longest:
         return name
     mark = hashlib.sha256(name.encode("utf-8", "surrogatepass")).hexdigest()[:6]
@@ -79,16 +80,16 @@ def abridged(name: str, longest: int) -> str:
 
 
 def readable(text: str) -> str:
-    """Text of several lines as it stands in a message: each of them visible and of bearable length."""
+    """Text of several lines for a message: each line visible and of reasonable length."""
     if len(text) <= LONGEST and text.isprintable():
         return text
     return "\n".join(visible(shortened(line)) for line in text.split("\n"))
 
 
 def nearest(name: str, candidates: Iterable[str], likeness: float = 0.6) -> str | None:
-    """Return the candidate that `name` was probably meant to be, or None if no one is near.
+    """The candidate that `name` was probably meant to be, or None if none is near.
 
-    `likeness`, from 0 to 1, is how near is near.
+    `likeness`, from 0 to 1, is the threshold.
     """
     if len(name) > _MAX_NAME:
         return None
@@ -106,13 +107,13 @@ def nearest(name: str, candidates: Iterable[str], likeness: float = 0.6) -> str 
 
 
 def _shared_ends(one: str, other: str) -> int:
-    """How many letters two names have in common at the start and at the end."""
+    """The number of letters that two names have in common at the start and at the end."""
     return _shared_start(one, other) + _shared_start(one[::-1], other[::-1])
 
 
 def _shared_start(one: str, other: str) -> int:
     low, high = 0, min(len(one), len(other))
-    while low < high:  # halved: letter by letter takes ten times as long
+    while low < high:  # by halving: letter by letter takes ten times as long
         middle = (low + high + 1) // 2
         if one[:middle] == other[:middle]:
             low = middle
@@ -122,6 +123,6 @@ def _shared_start(one: str, other: str) -> int:
 
 
 def did_you_mean(name: str, candidates: Iterable[str]) -> str:
-    """Return ", did you mean 'x'?" for the nearest candidate x, or nothing; to end a message with."""
+    """ ", did you mean 'x'?" for the nearest candidate x, or nothing; for the end of a message."""
     found = nearest(name, candidates)
     return "" if found is None else f", did you mean {found!r}?"

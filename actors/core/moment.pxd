@@ -1,4 +1,4 @@
-# Types for C; what everything is for is said in moment.py.
+# Types for C; moment.py documents everything.
 
 cimport cython
 

@@ -1,4 +1,4 @@
-"""Moments of a run, and the wake-ups that actors ask for."""
+"""Moments of a run, and the wake-ups that actors request."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from .tag import Tag, new_tag
 
 
 class When(Protocol):
-    """A tag, or what stands for one."""
+    """A tag, or an object that represents one."""
 
     @property
     def time(self) -> int: ...
@@ -17,7 +17,7 @@ class When(Protocol):
 
 
 class Moment:
-    """What stands for a tag: time (ns) and microstep, and more in classes that derive from it."""
+    """Represents a tag: time (ns) and microstep, and more in derived classes."""
 
     __slots__ = ("_tag", "microstep", "time")
 
@@ -35,7 +35,7 @@ class Moment:
 
 
 class Wake:
-    """A wake-up that an actor asked for: ``due`` becomes true at its tag; ``cancel()`` before that removes it."""
+    """A wake-up that an actor requested: ``due`` becomes true at its tag; ``cancel()`` before that removes it."""
 
     __slots__ = ("cancelled", "due", "microstep", "time")
 
@@ -50,17 +50,17 @@ class Wake:
         return new_tag(self.time, self.microstep)
 
     def move(self, when: When) -> None:
-        """Engine: tell another tag."""
+        """Engine: set another tag."""
         self.time = when.time
         self.microstep = when.microstep
 
     def cancel(self) -> None:
-        """Ask the director to forget it."""
+        """Cancel the wake-up."""
         self.cancelled = True
 
 
 def new_wake(time: int, microstep: int) -> Wake:
-    """A wake-up, without a detour through its class."""
+    """Make a wake-up, without the detour through its class."""
     wake = Wake.__new__(Wake)
     wake.time, wake.microstep = time, microstep
     wake.due = wake.cancelled = False

@@ -1,4 +1,4 @@
-# Types for C; what everything is for is said in order.py.
+# Types for C; order.py documents everything.
 
 cimport cython
 from epicycle.actors.core.moment cimport Moment, Wake

@@ -1,6 +1,6 @@
-"""Heaps: numbers, times and what is to be done at them, values and the wake-ups that they wait for.
+"""Heaps: of numbers, of times with the work due at them, and of values with the wake-ups that they wait for.
 
-Compiled, where a compiler was there (``order.pyx``).
+Compiled (``order.pyx``) if a compiler was available.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ NEVER = 2**63 - 1  # ns
 
 
 class Ranks:
-    """Whole numbers, of which the least comes first; with ``posts``, the one that comes first there."""
+    """Whole numbers, the smallest first; with ``posts``, the one that is first there."""
 
     __slots__ = ("content", "posts")
 
@@ -26,19 +26,19 @@ class Ranks:
 
     @property
     def size(self) -> int:
-        """How many there are."""
+        """The number of entries."""
         return len(self.content)
 
     def push(self, rank: int) -> None:
-        """Put one in."""
+        """Add an entry."""
         if self.posts is not None:
             self.posts.push(rank)
-            self.content.append(rank)  # so many there are; which, the posts know
+            self.content.append(rank)  # their number; the posts know which
         else:
             heappush(self.content, rank)
 
     def pop(self) -> int:
-        """Take the least one out."""
+        """Remove the smallest one."""
         if self.posts is not None:
             self.content.pop()
             return self.posts.pop()
@@ -46,7 +46,7 @@ class Ranks:
 
 
 class Times:
-    """What is to be done at the first microstep of times to come."""
+    """The work due at the first microstep of future times."""
 
     __slots__ = ("_heap", "content")
 
@@ -56,7 +56,7 @@ class Times:
 
     @property
     def size(self) -> int:
-        """How many there are."""
+        """The number of entries."""
         return len(self.content)
 
     def first(self) -> int:
@@ -64,21 +64,21 @@ class Times:
         return self._heap[0] if self._heap else NEVER
 
     def at(self, time: int) -> Any:
-        """What is to be done at a time, if there is something."""
+        """The work due at a time, if any."""
         return self.content.get(time)
 
     def add(self, instant: When) -> None:
-        """Put in a time that was not there."""
+        """Add a new time."""
         heappush(self._heap, instant.time)
         self.content[instant.time] = instant
 
     def pop(self) -> Any:
-        """Take the earliest out."""
+        """Remove the earliest time."""
         return self.content.pop(heappop(self._heap))
 
 
 class Line:
-    """Values that wait for wake-ups, in the order of these, and of their entry where they are for the same tag."""
+    """Values that wait for wake-ups, in the order of these, and in the order of entry for the same tag."""
 
     __slots__ = ("content", "number")
 
@@ -91,7 +91,7 @@ class Line:
         return len(self.content)
 
     def push(self, wake: Wake, value: Any) -> None:
-        """Put one in."""
+        """Add an entry."""
         heappush(self.content, (wake.time, wake.microstep, self.number, wake, value))
         self.number += 1
 
@@ -100,5 +100,5 @@ class Line:
         return bool(self.content) and self.content[0][3].due
 
     def pop(self) -> Any:
-        """Take the first out."""
+        """Remove the first one."""
         return heappop(self.content)[4]

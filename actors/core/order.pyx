@@ -1,5 +1,5 @@
 # cython: language_level=3, boundscheck=False, wraparound=False, cdivision=True
-"""What order.py does, in C: heaps of numbers and structures, and a table of times with open addressing."""
+"""The same as order.py, in C: heaps of numbers and structures, and a table of times with open addressing."""
 
 from cpython.mem cimport PyMem_Free, PyMem_Malloc, PyMem_Realloc
 
@@ -89,7 +89,7 @@ cdef class Times:
     def content(self, instants):
         while self.size:
             self.pop()
-        for time, instant in instants:  # which need not know its time yet
+        for time, instant in instants:  # which may not know its time yet
             self.put_in(time, instant)
 
     cdef long long first(self):
@@ -166,7 +166,7 @@ cdef class Times:
         self.instants[number] = None
         self.free[self.unused] = number
         self.unused += 1
-        # Those behind move up, so that no search ends too soon.
+        # Later entries move up, so that no search ends too soon.
         below = place
         while True:
             below = (below + 1) & self.mask
@@ -261,7 +261,7 @@ cdef class Line:
         return self.size > 0 and (<Wake>self.wakes[self.heap[0].place]).due
 
     cdef bint is_before(self, long long time, long microstep) noexcept:
-        """Whether the first waits for this tag, or for one before it."""
+        """Whether the first waits for this tag, or for an earlier one."""
         cdef Item* heap = self.heap
         if not self.size:
             return False
@@ -273,7 +273,7 @@ cdef class Line:
         cdef Py_ssize_t place = 0, below, found
         cdef object value
         if not self.size:
-            raise IndexError("there is nothing in the line")
+            raise IndexError("the line is empty")
         found = heap[0].place
         self.size -= 1
         last = heap[self.size]

@@ -1,4 +1,4 @@
-# Types for C; what everything is for is said in parameter.py.
+# Types for C; parameter.py documents everything.
 
 
 cdef class Parameter:

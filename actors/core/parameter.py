@@ -23,9 +23,9 @@ T = TypeVar("T")
 
 
 class ParameterError(EpicycleError):
-    """A value that a parameter does not take; the message says what it takes.
+    """A value that a parameter does not accept; the message says what it accepts.
 
-    ``keys`` lead to what is wrong within a mapping, or within a list; ``of_key``: it is the last key itself.
+    ``keys`` lead to the wrong part of a mapping or list; ``of_key``: the last key itself is wrong.
     """
 
     def __init__(self, message: str, keys: tuple[str | int, ...] = (), *, of_key: bool = False) -> None:
@@ -42,7 +42,7 @@ class _Required:
 
 
 class _Same:
-    """What a parameter is in Ptolemy that is the same there."""
+    """The default in Ptolemy of a parameter that has the same one there."""
 
     def __repr__(self) -> str:
         return "the same"
@@ -50,7 +50,7 @@ class _Same:
 
 REQUIRED: Any = _Required()
 SAME: Any = _Same()
-_EXACT = 2**53  # up to which all whole numbers are floats
+_EXACT = 2**53  # up to here, all whole numbers are exact as floats
 _WORDS: dict[Any, str] = {
     float: "number",
     int | float: "number",
@@ -63,19 +63,19 @@ _WORDS: dict[Any, str] = {
 
 
 class Parameter(Generic[T]):
-    """A declared parameter: reads as its value on an instance, as itself on the class.
+    """A declared parameter: on an instance it reads as its value, on the class as itself.
 
     ``type`` is ``float``, ``int``, ``bool``, ``str``, ``Path``, ``object`` (any value that YAML can write, for tokens)
-    or a ``Configurable`` class (then the value is a mapping with a ``type`` key that names one of its subclasses).
-    A number may come as text with a unit (``"8 m/s"``); it is converted to ``unit``, which is ``"1"`` for a pure
-    number.  A parameter without one has the unit of the tokens, and what has a unit is converted to SI
-    units; the ``unit`` of a ``Configurable`` class is that of the parameters in it that have none of their own.
-    ``shape`` makes it an array of floats, ``(2,)`` a pair, ``(None, 2)`` rows of pairs; or, with ``str`` and
-    ``object``, ``(None,)`` a tuple.  ``int | float`` is a number that stays an integer if it is one.
-    A text is one of ``choices``; ``renamed`` tells the present names of former ones.
-    Numbers are ``min`` or more, or else greater than ``above``, and ``max`` or less.
-    A parameter that takes values of several kinds names one parameter for each kind as its ``forms``.
-    ``ptolemy`` is the default under a director with ``like: ptolemy``, if that is another one.
+    or a ``Configurable`` class (the value is then a mapping with a ``type`` key that names one of its subclasses).  A
+    number may come as text with a unit (``"8 m/s"``); it is converted to ``unit``, which is ``"1"`` for a pure number.
+    A parameter without a unit has that of the tokens, and a value with a unit is converted to SI units; the ``unit`` of
+    a ``Configurable`` class applies to the parameters in it that have none.  ``shape`` makes it an array of floats:
+    ``(2,)`` a pair, ``(None, 2)`` rows of pairs; with ``str`` and ``object``, ``(None,)`` is a tuple.  ``int | float``
+    is a number that stays an integer if it is one.
+    A text is one of ``choices``; ``renamed`` gives the present names of former ones.
+    Numbers are at least ``min``, or else greater than ``above``, and at most ``max``.
+    A parameter that accepts values of several kinds has one parameter for each kind as its ``forms``.  ``ptolemy`` is
+    the default under a director with ``like: ptolemy``, if it differs.
     """
 
     def __init__(
@@ -110,28 +110,28 @@ class Parameter(Generic[T]):
         self.forms: tuple[Parameter[Any], ...] = ()
 
     def __set_name__(self, owner: type, name: str) -> None:
-        self.name = name.rstrip("_")  # `from_` is the parameter 'from': keywords of Python are no names in it
+        self.name = name.rstrip("_")  # `from_` is the parameter 'from', as keywords of Python cannot be names
 
     @overload
     def __get__(self, instance: None, owner: type) -> Parameter[T]: ...
     @overload
     def __get__(self, instance: object, owner: type) -> T: ...
     def __get__(self, instance: object | None, owner: type) -> Parameter[T] | T:
-        # Values live in the instance's __dict__, which Python looks up before this; only the class gets here, and a
-        # parameter that is named like a keyword.
+        # Values are in the instance's __dict__, which Python looks up before this; only the class gets here, and a
+        # parameter named like a keyword.
         if instance is None:
             return self
         if self.name in instance.__dict__:
             value: T = instance.__dict__[self.name]
             return value
-        raise AttributeError(f"{owner.__name__}.{self.name} is read before it was set")
+        raise AttributeError(f"{owner.__name__}.{self.name} was read before it was set")
 
     def store(self, instance: object, value: T | None) -> None:
         """Give an instance its value."""
         setattr(instance, self.name, value)
 
     def value_in(self, instance: object) -> T | None:
-        """What an instance was given."""
+        """The value that an instance was given."""
         value: T | None = vars(instance).get(self.name)
         return value
 
@@ -142,17 +142,17 @@ class Parameter(Generic[T]):
 
     @cached_property
     def default_value(self) -> T | None:
-        """The default as it is stored in an instance."""
+        """The default as stored in an instance."""
         return self._stored(self.default)
 
     @property
     def differs(self) -> bool:
-        """Whether the default is another one in Ptolemy."""
+        """Whether the default differs in Ptolemy."""
         return self.ptolemy is not SAME
 
     @cached_property
     def ptolemy_value(self) -> T | None:
-        """The default in Ptolemy as it is stored in an instance."""
+        """The default in Ptolemy as stored in an instance."""
         return self._stored(self.ptolemy)
 
     def _stored(self, default: T | None) -> T | None:
@@ -171,7 +171,7 @@ class Parameter(Generic[T]):
         return f"list of {sizes} {word}s"
 
     def in_unit(self, unit: str) -> Parameter[T]:
-        """The same parameter, counted in this unit if it has none of its own."""
+        """The same parameter, in this unit if it has none."""
         if self.unit or self.type not in (float, int | float):
             return self
         changed = type(self).__new__(type(self))
@@ -223,7 +223,7 @@ class Parameter(Generic[T]):
         elif self.type is str:
             if isinstance(value, str):
                 if value in self.renamed:
-                    raise ParameterError(f"{value!r} is called {self.renamed[value]!r} now")
+                    raise ParameterError(f"{value!r} is now called {self.renamed[value]!r}")
                 if self.choices and value not in self.choices:
                     raise ParameterError(f"{value!r} is not {self._expected()}{did_you_mean(value, self.choices)}")
                 return value
@@ -254,7 +254,7 @@ class Parameter(Generic[T]):
         return int(value)
 
     def _read(self, text: str) -> float | None:
-        """The number that a text with a unit stands for; None if it is none."""
+        """The number of a text with a unit; None if it is not one."""
         if self.unit in ("", "1") and quantity(text) is None:
             return None
         if self.unit:
@@ -267,11 +267,11 @@ class Parameter(Generic[T]):
         if not self._holds(value, value):
             raise ParameterError(f"{digits(value)} is out of bounds, expected {self._expected()}")
         if self.above == 0 and self.unit == "s" and value < 1e-9:
-            raise ParameterError(f"{digits(value)} s is shorter than a nanosecond, which is the shortest time")
+            raise ParameterError(f"{digits(value)} s is shorter than a nanosecond, the shortest time")
         return value
 
     def _holds(self, low: float, high: float) -> bool:
-        """Whether all from one number to another is within bounds."""
+        """Whether all numbers from one to another are within bounds."""
         return (
             (self.min is None or low >= self.min)
             and (self.above is None or low > self.above)
@@ -288,7 +288,7 @@ class Parameter(Generic[T]):
         return array
 
     def _is_plain_row(self, value: object) -> bool:
-        """Whether this is a list of plain numbers within bounds: there may be very many, of which most lists are."""
+        """Whether this is a list of plain numbers within bounds: the common case, and lists may be long."""
         if self.shape != (None,) or self.type is not float or not isinstance(value, (list, tuple)):
             return False
         if not value or not {float, int}.issuperset(map(type, value)):
@@ -306,13 +306,13 @@ class Parameter(Generic[T]):
 
 
 class Configurable:
-    """Something with declared parameters: actors, aspects and the parts that they are made of."""
+    """Base of everything with declared parameters: actors, aspects and their parts."""
 
-    # Names that the YAML uses beside parameters, which no parameter may take.
+    # Keys that YAML uses beside parameters; no parameter may have these names.
     reserved: ClassVar[frozenset[str]] = frozenset({"type", "count", "priority", "tags"})
-    # What is said of names that one might take for parameters, and are none.
+    # Advice for names that might be mistaken for parameters.
     refused: ClassVar[Mapping[str, str]] = {}
-    # Attributes that its copies, for a run or a snapshot, have in common with it.
+    # Attributes that its copies, for a run or a snapshot, share with it.
     copies_share: ClassVar[tuple[str, ...]] = ()
 
     def __init__(self, **values: object) -> None:
@@ -320,13 +320,13 @@ class Configurable:
         self.check()
 
     def check(self) -> None:
-        """Called when each parameter is valid by itself; raises ``ParameterError`` where they do not go together.
+        """Called when each parameter is valid by itself; raises ``ParameterError`` if they do not fit together.
 
-        What follows from them may be set here: the type of a port for example.
+        Set here what follows from the parameters, such as the type of a port.
         """
 
     def follow_ptolemy(self) -> None:
-        """Engine: parameters that were not given have the defaults that they have in Ptolemy."""
+        """Engine: give parameters that were not set their defaults in Ptolemy."""
         given: frozenset[str] = vars(self).get("_configured", frozenset())
         changed = [each for name, each in declared_parameters(type(self)).items() if each.differs and name not in given]
         for parameter in changed:
@@ -343,9 +343,9 @@ class Configurable:
         for name in values:
             if name not in declared:
                 message = unknown_parameter(type(self), name)
-                comma = "" if message.endswith("?") else ","
+                mark = "" if message.endswith("?") else ";"
                 valid = ", ".join(declared) or "none"
-                raise ParameterError(f"{message}{comma} valid parameters: {valid}", (name,), of_key=True)
+                raise ParameterError(f"{message}{mark} valid parameters: {valid}", (name,), of_key=True)
         for name, parameter in declared.items():
             if name in values:
                 try:
@@ -362,10 +362,10 @@ class Configurable:
         super().__init_subclass__(**keywords)
         for name, value in vars(cls).items():
             if isinstance(value, Parameter) and name in cls.reserved:
-                raise TypeError(f"{cls.__name__}: a parameter may not be called {name!r}")
+                raise TypeError(f"{cls.__name__}: a parameter must not be named {name!r}")
 
     def __repr__(self) -> str:
-        """The parameters that are not left at their defaults."""
+        """The parameters that were given a value."""
         values = ", ".join(
             f"{name}={parameter.value_in(self)!r}"
             for name, parameter in declared_parameters(type(self)).items()
@@ -408,18 +408,18 @@ def variants(base: type) -> dict[str, type]:
 
 
 def build_variant(base: type, value: object, unit: str = "") -> object:
-    """Make one of the variants of ``base`` from a mapping with a ``type`` key; an instance passes through.
+    """Make one of the variants of ``base`` from a mapping with a ``type`` key; an instance is returned as it is.
 
-    Parameters of the variant that have no unit of their own count in ``unit``.
+    Parameters of the variant without a unit have the given ``unit``.
     """
     if isinstance(value, base):
         return value
     known = variants(base)
     valid = ", ".join(sorted(known))
     if not isinstance(value, Mapping):
-        raise ParameterError(f"{brief(value)} is not a mapping like {{type: ...}}, with one of {valid}")
+        raise ParameterError(f"{brief(value)} is not a mapping {{type: ...}} with one of the types {valid}")
     if "type" not in value:
-        raise ParameterError(f"{brief(value)} has no 'type', which is one of {valid}")
+        raise ParameterError(f"{brief(value)} has no 'type'; expected one of {valid}")
     name = value["type"]
     if not isinstance(name, str) or name not in known:
         raise ParameterError(f"{brief(name)} is not one of {valid}{did_you_mean(str(name), known)}", ("type",))
@@ -439,7 +439,7 @@ def _within(cls: type, name: str, error: ParameterError) -> ParameterError:
 
 
 def bounds_text(least: float | None, above: float | None, most: float | None, written: Callable[[float], str]) -> str:
-    """The bounds of a number as they stand behind it: `` >= 0``, `` > 0 and <= 1``."""
+    """The bounds of a number as they are written after it: `` >= 0``, `` > 0 and <= 1``."""
     ends = ((">=", least), (">", above), ("<=", most))
     told = " and ".join(f"{sign} {written(end)}" for sign, end in ends if end is not None)
     return f" {told}" if told else ""

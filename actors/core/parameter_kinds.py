@@ -36,9 +36,10 @@ def texts_parameter(default: object = REQUIRED, *, doc: str = "") -> Parameter[t
 
 
 class MappingParameter(Parameter[Any]):
-    """A parameter such as ``initial: {height: 10, speed: 0}``: names of the model's own, each with a value of ``item``.
+    """A parameter such as ``initial: {height: 10, speed: 0}``: names chosen by the model, each with a value of
+    ``item``.
 
-    Reads as a dict in the order in which the names are written.
+    Reads as a dict in the order of the names in the file.
     """
 
     def __init__(self, item: Parameter[Any], default: Any = REQUIRED, *, doc: str = "") -> None:

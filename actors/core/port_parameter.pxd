@@ -1,4 +1,4 @@
-# Types for C; what everything is for is said in port_parameter.py.
+# Types for C; port_parameter.py documents everything.
 
 cimport cython
 from epicycle.actors.core.parameter cimport Parameter

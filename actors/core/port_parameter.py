@@ -13,7 +13,7 @@ _NOTHING: Any = object()
 
 
 class ParameterPort(InputPort[T]):
-    """The port of a ``PortParameter``, which holds its value: remembers the latest token beyond its tag."""
+    """The port of a ``PortParameter``, which holds its value: it keeps the latest token beyond its tag."""
 
     __slots__ = ("_before", "_current", "_parameter", "_received", "given", "has_received")
 
@@ -31,15 +31,15 @@ class ParameterPort(InputPort[T]):
         bound.start_with(self.given)
 
     def start_with(self, value: T | None) -> None:
-        """Take the value that the model gives, which counts until a token comes."""
+        """Take the value given in the model, which is used until a token comes."""
         self.given: Any = value
         if not self.has_received:
             self.reset()
 
     def reset(self) -> None:
-        """Forget what came: the given value counts again."""
+        """Forget all tokens: the given value is used again."""
         self._current = self.given
-        self._received = self._before = _NOTHING  # before: what had come and not been read when the present tag began
+        self._received = self._before = _NOTHING  # before: the tokens not yet read when the present tag began
         self.has_received = False
 
     def receive(self, token: Any, channel: int) -> None:
@@ -59,14 +59,14 @@ class ParameterPort(InputPort[T]):
         self.has_received = True
 
     def settle(self, value: T | None) -> None:
-        """Let this be the value, which has been made of what was received."""
+        """Set the value, made from what was received."""
         self._current = value
         self._received = _NOTHING
 
     def current(self) -> T:
-        """The value at present: the latest token that came, or else the value given in the model."""
+        """The present value: the latest token, or else the value given in the model."""
         if self._received is not _NOTHING:
-            # Converted when it is read, so that a bad token is the receiver's error and not the sender's.
+            # Converted on reading, so that a bad token is the receiver's error and not the sender's.
             token, self._received = self._received, _NOTHING
             try:
                 self.settle(self._parameter.convert(token))
@@ -101,7 +101,7 @@ class PortParameter(Parameter[T]):
         return self.port_of(instance).current()
 
     def __set__(self, instance: Any, value: T) -> None:
-        raise AttributeError(f"{instance.path}.{self.name} changes by a token at its port alone")
+        raise AttributeError(f"{instance.path}.{self.name} can only be changed by a token at its port")
 
     def store(self, instance: Any, value: T | None) -> None:
         self.port_of(instance).start_with(value)

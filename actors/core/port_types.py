@@ -1,4 +1,4 @@
-"""Types of ports: what they are called, and which tokens may go where."""
+"""Types of ports: their names, and which tokens may go where."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def shaped(type: Any, shape: tuple[int | None, ...]) -> Any:
 
 
 def _shape(declared: Any) -> tuple[int | None, ...] | None:
-    """The shape that a type says, if it does."""
+    """The shape that a type declares, if any."""
     if typing.get_origin(declared) is not typing.Annotated:
         return None
     said = declared.__metadata__[0]
@@ -44,8 +44,8 @@ def type_name(declared: Any) -> str:
 def accepts(wanted: Any, given: Any) -> bool:
     """Whether every token of type ``given`` may enter a port of type ``wanted``; an int passes for a float.
 
-    ``Any`` is for actors that hand on what they get: it goes with everything.  An array of any length does not fit
-    where one length is wanted; one whose shape is not said at all goes with every shape.
+    ``Any`` is for actors that pass on what they get: it fits everything.  An array of any length does not fit where a
+    fixed length is required; an array without a declared shape fits every shape.
     """
     if wanted in (object, Any) or given is Any or wanted == given:
         return True
@@ -75,8 +75,8 @@ def _fits(wanted: tuple[int | None, ...] | None, given: tuple[int | None, ...] |
 
 
 def token_type(values: Iterable[object]) -> Any:
-    """The port type of given values: ``bool``, ``int``, ``float`` (ints count as such beside floats), ``str``, or a
-    union of these; any if there are others among them."""
+    """The port type of given values: ``bool``, ``int``, ``float`` (ints become floats beside floats), ``str``, or a
+    union of these; any type if there are others."""
     found = dict.fromkeys(type(value) for value in values)
     if not found or found.keys() - {bool, int, float, str}:
         return Any

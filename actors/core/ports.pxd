@@ -1,4 +1,4 @@
-# Types for C; what everything is for is said in ports.py.
+# Types for C; ports.py documents everything.
 
 cimport cython
 from epicycle.actors.core.primitives cimport empty

@@ -1,8 +1,8 @@
-"""Ports: the typed ends of wires.  Declared on an actor's class, bound to each of its instances.
+"""Ports: the typed ends of wires.  They are declared on an actor's class and bound to each instance.
 
-An input port holds the tokens of the present tag and nothing else: after the actor has fired they are gone.  One that
-keeps them (``keep``) holds all that have not been taken out yet.
-An output port hands a token on at once; who gets it, and through which delays and aspects, is the engine's matter.
+An input port holds only the tokens of the present tag: after the actor has fired they are gone.  One that keeps them
+(``keep``) holds all tokens until they are taken out. An output port passes a token on at once; the engine knows the
+receivers, delays and aspects.
 """
 
 from __future__ import annotations
@@ -29,16 +29,16 @@ _ANY: Any = Any
 
 
 class PortError(EpicycleError):
-    """A port was read or written in a way that its declaration or the model does not allow."""
+    """A port was used in a way that its declaration or the model does not allow."""
 
 
 class Way:
-    """Where a token goes on to."""
+    """The next place of a token."""
 
     __slots__ = ()
 
     def go(self, token: Any) -> None:
-        """Let a token go on."""
+        """Pass a token on."""
         raise NotImplementedError
 
 
@@ -53,7 +53,7 @@ class Emitter(Way):
 
 
 class _Told(Emitter):
-    """Hands what is sent to a function."""
+    """Passes sent tokens to a function."""
 
     __slots__ = ("function",)
 
@@ -65,7 +65,7 @@ class _Told(Emitter):
 
 
 class Port(Generic[T]):
-    """What both directions share: the declaration, and where the instance stands."""
+    """The common part of both directions: the declaration, and the place of the instance."""
 
     __slots__ = ("actor", "doc", "multi", "name", "path", "ptolemy", "type", "width")
 
@@ -101,12 +101,12 @@ class Port(Generic[T]):
         return bound
 
     def tell(self, bound: Any) -> None:
-        """Give what is declared to the port of an instance."""
+        """Copy the declaration to the port of an instance."""
         bound.type, bound.multi, bound.doc, bound.name = self.type, self.multi, self.doc, self.name
         bound.ptolemy, bound.width = self.ptolemy, 0
 
     def follow_ptolemy(self) -> None:
-        """Engine: the port is as it is in Ptolemy, where the declaration says how."""
+        """Engine: make the port as in Ptolemy, if the declaration says how."""
         for option, value in (self.ptolemy or {}).items():
             setattr(self, option, value)
 
@@ -115,28 +115,28 @@ class Port(Generic[T]):
 
 
 class Kept:
-    """Tokens that stay in a port: a line for each channel."""
+    """Tokens kept in a port: a queue for each channel."""
 
     __slots__ = ("count", "lines", "number")
 
     def __init__(self, width: int) -> None:
         self.lines: list[deque[tuple[int, Any]]] = [deque() for _ in range(max(width, 1))]
         self.count = 0
-        self.number = 0  # of the next one: they keep the order of their arrival
+        self.number = 0  # of the next token, for the order of arrival
 
     def put(self, token: Any, channel: int) -> None:
-        """Put one in."""
+        """Add a token."""
         self.lines[channel].append((self.number, token))
         self.number += 1
         self.count += 1
 
     def get(self, channel: int) -> Any:
-        """Take the first of a channel out."""
+        """Take out the first token of a channel."""
         self.count -= 1
         return self.lines[channel].popleft()[1]
 
     def in_order(self) -> list[tuple[int, Any, int]]:
-        """All in the order of their arrival: the number, the token, the channel."""
+        """All tokens in the order of arrival: number, token, channel."""
         found = [(number, token, channel) for channel, line in enumerate(self.lines) for number, token in line]
         found.sort(key=_number)
         return found
@@ -147,14 +147,14 @@ def _number(entry: tuple[int, Any, int]) -> int:
 
 
 class InputPort(Port[T]):
-    """Where tokens arrive: of any type if none is given.
+    """A port where tokens arrive: of any type if none is given.
 
     ``shape`` is that of a ``numpy`` array, as for parameters: ``(2,)`` a pair, ``(None, 2)`` rows of pairs.
-    ``required``: the model is wrong when nothing is connected to it.  ``multi``: any number of connections, each a
-    channel, in the order in which they are declared.  ``triggers``: a token makes the actor do its work; if not, the
-    actor only takes note of it, which takes no time, and works with it later.  ``keep``: a token stays until ``get``
-    takes it out; as long as a firing takes some out and leaves others, the actor fires again at the same tag.
-    ``ptolemy`` are the options that are others under a director with ``like: ptolemy``: ``ptolemy={"keep": True}``.
+    ``required``: a model is invalid if nothing is connected to it.  ``multi``: any number of connections, each a
+    channel, in the order in which they are declared.  ``triggers``: a token makes the actor do its work; if false, the
+    actor only stores it, which takes no time, and uses it later.  ``keep``: a token stays until ``get`` takes it out;
+    as long as a firing takes some out and leaves others, the actor fires again at the same tag.  ``ptolemy`` holds the
+    options that differ under a director with ``like: ptolemy``: ``ptolemy={"keep": True}``.
     """
 
     __slots__ = ("arrived", "channels", "keep", "kept", "required", "shown", "triggers")
@@ -162,10 +162,10 @@ class InputPort(Port[T]):
     direction = "input"
 
     if TYPE_CHECKING:
-        arrived: list[Any]  # since the actor fired last
-        channels: list[int] | None  # of these tokens, where there are several connections
-        kept: Kept | None  # what has come before them and stays, or was put in line to be taken out
-        shown: list[Any]  # the same as arrived, or nothing while they are hidden
+        arrived: list[Any]  # since the last firing
+        channels: list[int] | None  # of these tokens, if there are several connections
+        kept: Kept | None  # earlier tokens that are kept, or wait to be taken out
+        shown: list[Any]  # the same as arrived, or empty while they are hidden
 
     def __init__(
         self,
@@ -192,14 +192,14 @@ class InputPort(Port[T]):
 
     @property
     def present(self) -> bool:
-        """Whether a token has arrived at the present tag, or waits if the port keeps tokens."""
+        """Whether a token arrived at the present tag, or, if the port keeps tokens, waits."""
         return bool(self.shown) or (self.kept is not None and self.kept.count > 0 and self.shown is self.arrived)
 
     @property
     def value(self) -> T:
         """The token of the present tag, the latest if there are several; raises ``PortError`` if there is none."""
         if not self.present:
-            raise PortError(f"{self.path} has no token at this tag; ask 'present' before 'value'")
+            raise PortError(f"{self.path} has no token at this tag; check 'present' before reading 'value'")
         token: T = self.shown[-1] if self.shown else self.tokens[-1]
         return token
 
@@ -223,7 +223,7 @@ class InputPort(Port[T]):
         return result
 
     def waiting(self, channel: int = 0) -> int:
-        """How many tokens of a channel have not been taken out yet."""
+        """The number of tokens of a channel that have not been taken out."""
         if self.shown is not self.arrived:
             return 0
         if self.kept is None and self.width <= 1:
@@ -232,9 +232,9 @@ class InputPort(Port[T]):
         return 0 if self.kept is None or channel >= len(self.kept.lines) else len(self.kept.lines[channel])
 
     def get(self, channel: int = 0) -> T:
-        """Take out the first token of a channel, of a port that keeps them; raises ``PortError`` if there is none."""
+        """Take out the first token of a channel of a port that keeps tokens; raises ``PortError`` if there is none."""
         if not self.waiting(channel):
-            raise PortError(f"{self.path} has no token on channel {channel}; ask 'waiting' before 'get'")
+            raise PortError(f"{self.path} has no token on channel {channel}; check 'waiting' before calling 'get'")
         if self.kept is None and len(self.arrived) == 1:
             return self.arrived.pop()  # type: ignore[no-any-return]
         self.put_in_line()
@@ -251,13 +251,13 @@ class InputPort(Port[T]):
             self.channels.append(channel)
 
     def prepare(self) -> None:
-        """Make room: no token has come yet."""
+        """Reset the port: no token has come yet."""
         self.arrived = self.shown = []
         self.channels = None
         self.kept = None
 
     def clear(self) -> None:
-        """Engine: forget what has come."""
+        """Engine: forget the tokens that have come."""
         empty(self.arrived)
         if self.channels is not None:
             empty(self.channels)
@@ -265,11 +265,11 @@ class InputPort(Port[T]):
         self.shown = self.arrived
 
     def put_in_line(self) -> None:
-        """Engine: what has come stays."""
+        """Engine: keep the tokens that have come."""
         if not self.arrived:
             return
         if self.kept is None:
-            self.kept = Kept(self.width)  # for good: a port at which tokens have waited is likely to have more
+            self.kept = Kept(self.width)  # from now on: a port at which tokens have waited is likely to have more
         if self.channels is None:
             for token in self.arrived:
                 self.kept.put(token, 0)
@@ -281,27 +281,27 @@ class InputPort(Port[T]):
 
     @property
     def has_new(self) -> bool:
-        """Engine: whether something has come since the actor fired last."""
+        """Engine: whether a token has come since the last firing."""
         return bool(self.arrived)
 
     def take(self) -> tuple[list[Any], list[int]]:
-        """Engine: take out the tokens that have come since the actor fired last, as if they had not come yet."""
+        """Engine: take out the tokens that have come since the last firing, as if they had not come yet."""
         taken = self.arrived, self.channels or []
         self.arrived = self.shown = []
         self.channels = None
         return taken
 
     def give(self, taken: tuple[list[Any], list[int]]) -> None:
-        """Engine: show tokens that were taken out, behind those that the port keeps."""
+        """Engine: show tokens that were taken out, after those that the port keeps."""
         self.arrived = self.shown = list(taken[0])
         self.channels = list(taken[1]) or None
 
 
 class OutputPort(Port[T]):
-    """Where tokens leave: of any type if none is given.
+    """A port where tokens leave: of any type if none is given.
 
     ``depends_on`` names the inputs that a token may depend on within the same tag; ``None`` means all of them, ``()``
-    none (an actor that delays), which lets the port stand in a loop.  ``ptolemy`` is as for inputs.
+    none (an actor that delays), so that the port may be part of a loop.  ``ptolemy`` is as for inputs.
     """
 
     __slots__ = ("depends_on", "emitter")
@@ -330,12 +330,12 @@ class OutputPort(Port[T]):
         """Send a token at the present tag: to all channels, or to the one given."""
         if self.emitter is None:
             raise PortError(
-                f"{self.path or self.name} cannot send now: tokens are sent in fire() or run() of a running model"
+                f"{self.path or self.name} cannot send now: send tokens only in fire() or run() of a running model"
             )
         self.emitter.send(token, channel)
 
     def connect(self, emit: Emitter | Callable[..., None]) -> None:
-        """Engine: what ``send`` does from now on; a function is given token and channel."""
+        """Engine: set what ``send`` does from now on; a function is called with token and channel."""
         self.emitter = emit if isinstance(emit, Emitter) else _Told(emit)
 
     def disconnect(self) -> None:

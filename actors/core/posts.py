@@ -1,17 +1,17 @@
-"""Posts: ranks that are taken out in the order in which they were posted, as far as they are of one group."""
+"""Posts: ranks that are taken out in the order in which they were posted, within one group."""
 
 from __future__ import annotations
 
 from heapq import heappop, heappush
 
-Place = tuple[tuple[int, int], ...]  # of a rank: its group and what it is there, in each director from the outermost on
+Place = tuple[tuple[int, int], ...]  # of a rank: its group and its number there, in each director from the outermost in
 
 
 class Posts:
     """Ranks with groups.
 
-    What comes in a group of several may be a rank, or a director with groups of its own: of these, too, the first is
-    the one for which something was posted first, and it goes on until nothing is left in it.
+    A member of a group may be a rank, or a director with its own groups.  The director that was posted first is also
+    first, and continues until nothing is left in it.
     """
 
     __slots__ = ("_heap", "_number", "_numbers", "_open", "_waiting", "places")
@@ -19,10 +19,10 @@ class Posts:
     def __init__(self, places: tuple[Place, ...]) -> None:
         self.places = places
         self._heap: list[tuple[tuple[int, ...], int]] = []
-        self._number = 0  # of what was posted last
-        self._numbers: dict[int, int] = {}  # of what is in a group, that of its first post
-        self._waiting: dict[int, int] = {}  # how much is left in a director
-        self._open: Place = ()  # where what was taken out last is
+        self._number = 0  # of the last post
+        self._numbers: dict[int, int] = {}  # of the members of a group, the number of its first post
+        self._waiting: dict[int, int] = {}  # how many are left in a director
+        self._open: Place = ()  # where the last one taken out belongs
 
     def push(self, rank: int) -> None:
         """Post a rank."""
@@ -35,7 +35,7 @@ class Posts:
         heappush(self._heap, ((*key, place[-1][0], self._number), rank))
 
     def first(self) -> int:
-        """The rank that is next; -1 if there is none."""
+        """The next rank; -1 if there is none."""
         return self._heap[0][1] if self._heap else -1
 
     def pop(self) -> int:
@@ -49,13 +49,13 @@ class Posts:
         return rank
 
     def settle(self) -> None:
-        """A tag begins: what was done at the one before is over."""
+        """Begin a tag: the work of the previous one is over."""
         self._leave(())
         if not self._heap:
             self._number = 0
 
     def _leave(self, around: Place) -> None:
-        """Directors in which nothing is left are posted again the next time, except those that continue."""
+        """Directors in which nothing is left must be posted again, except those that continue."""
         for place in self._open:
             director = place[1]
             if place not in around and not self._waiting[director]:

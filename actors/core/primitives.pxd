@@ -1,4 +1,4 @@
-# Types for C; what everything is for is said in primitives.py.
+# Types for C; primitives.py documents everything.
 
 from libc.stdint cimport uint64_t
 

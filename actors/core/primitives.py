@@ -1,4 +1,4 @@
-"""What the core does all the time, and C has a shorter way for; compiled, where a compiler was there."""
+"""Frequent operations of the core with a faster way in C; compiled if a compiler was available."""
 
 from __future__ import annotations
 
@@ -6,10 +6,10 @@ from typing import Any, Final
 
 import numpy as np
 
-nearest: Final = round  # the nearest whole number, the even one of two
+nearest: Final = round  # the nearest whole number, of two the even one
 
 
-_MOST: Final = 64  # words taken from the generator at once, which costs a tenth of taking them one by one
+_MOST: Final = 64  # words taken from the generator at once, at a tenth of the cost of one by one
 
 
 class Words:
@@ -19,11 +19,11 @@ class Words:
 
     def __init__(self, bits: np.random.PCG64) -> None:
         self._bits = bits
-        self._ahead: list[int] = []  # words that have been taken already, the next one last
+        self._ahead: list[int] = []  # words taken in advance, the next one last
         self._block = 16
 
     def word(self) -> int:
-        """The next 64 random bits, as a number that is not negative."""
+        """The next 64 random bits, as a non-negative number."""
         if not self._ahead:
             self._block = min(2 * self._block, _MOST)
             self._ahead = self._bits.random_raw(self._block)[::-1].tolist()
@@ -31,10 +31,10 @@ class Words:
 
 
 def is_alone(thing: object) -> bool:
-    """Whether nobody else holds a thing that the caller has in a variable; Python does not look."""
+    """Whether an object in a variable of the caller has no other reference; Python does not check."""
     return False
 
 
 def empty(tokens: list[Any]) -> None:
-    """Take everything out of a list."""
+    """Empty a list."""
     tokens.clear()

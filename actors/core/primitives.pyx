@@ -1,5 +1,5 @@
 # cython: language_level=3, boundscheck=False, wraparound=False, cdivision=True
-"""What primitives.py does, in C."""
+"""The same as primitives.py, in C."""
 
 import copyreg
 
@@ -83,7 +83,7 @@ cdef class Words:
 
 
 cdef tuple reduced(thing):
-    """How pickle makes a thing of a class in C again: by its slots, as it does by itself in Python."""
+    """How pickle restores an object of a class in C: by its slots, as it does itself for a class in Python."""
     names = [name for base in type(thing).__mro__ for name in getattr(base, "__slots__", ())]
     return copyreg.__newobj__, (type(thing),), (None, {name: getattr(thing, name) for name in names})
 
@@ -93,7 +93,7 @@ cpdef bint is_alone(thing) noexcept:
 
 
 cdef int empty(list tokens) except -1:
-    """Of a list of one, the room stays: one will be there soon again."""
+    """A list of one element keeps its memory: it will have one again soon."""
     cdef PyObject* token
     if len(tokens) == 1:
         token = PyList_GET_ITEM(tokens, 0)

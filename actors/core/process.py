@@ -4,7 +4,7 @@
 condition, another process).  Waits and reads resume it as a firing, at the tag and in the order in which a reactive
 actor would fire; a SimPy event resumes it when SimPy does, and what it then sends is received at the next microstep
 of that time.  Tokens that arrive while it waits for something else queue up at the port until they are read; a read
-that lost a race (``read | wait``) or was interrupted takes no token unless it is waited for again.
+that lost a race (``read | wait``) or was interrupted takes no token unless the process waits for it again.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from .ports import InputPort
 
 
 class Process(Actor):
-    """Base of the actors that are written as a generator ``run()``."""
+    """Base of actors written as a generator ``run()``."""
 
     is_source: ClassVar[bool] = True
 
@@ -33,8 +33,8 @@ class Process(Actor):
 
     def initialize(self) -> None:
         self._waits: list[tuple[Wake, Event]] = []
-        # Weak, so that a read that nobody has waited for is forgotten as soon as the process has; one that is waited
-        # for is kept, for nobody else may know the process that waits.
+        # Weak, so that a read that nothing waits for is forgotten when the process drops it; one that is waited for
+        # is kept, because it may be the only reference to the waiting process.
         self._reads: list[tuple[str, ReferenceType[Event]]] = []
         self._awaited: set[Event] = set()
         self._queued: dict[str, deque[Any]] = {name: deque() for name in self.inputs}
@@ -49,7 +49,7 @@ class Process(Actor):
         except (GeneratorExit, KeyboardInterrupt):
             raise
         except BaseException as error:
-            self.failure = error  # SimPy raises a copy of it later, from which the actor cannot be told
+            self.failure = error  # SimPy raises a copy of it later, which does not show the actor
             raise
 
     def halt(self) -> None:
@@ -58,7 +58,7 @@ class Process(Actor):
             return
         if process.target.callbacks is not None:
             process.target.callbacks.remove(process._resume)
-        process._generator.close()  # which leaves its `with` blocks: a resource that it had or waited for is free
+        process._generator.close()  # which leaves its `with` blocks: a resource that it held or waited for is released
 
     @property
     def environment(self) -> Any:
@@ -72,7 +72,7 @@ class Process(Actor):
         return event
 
     def read(self, port: InputPort[Any]) -> Event:
-        """An event whose value is the port's next token: at once if one is queued, or else when it arrives."""
+        """An event whose value is the port's next token: immediately if one is queued, or else when it arrives."""
         event = Event(self.environment)
         queue = self._queued[port.name]
         if queue:
@@ -91,7 +91,7 @@ class Process(Actor):
             self._waits = [entry for entry in self._waits if not entry[0].due]
         for _, event in due:
             _settle(event, None)
-        # A resumed process may ask for the next token at once, so look again until no read can be served.
+        # A resumed process may request the next token at once, so repeat until no read can be served.
         while (entry := self._next_read()) is not None:
             name, event = entry
             _settle(event, self._queued[name].popleft())
@@ -99,7 +99,7 @@ class Process(Actor):
             raise self.failure
 
     def _next_read(self) -> tuple[str, Event] | None:
-        """Take the first read that a queued token can be given to."""
+        """Take the first read for which a token is queued."""
         if not self._reads:
             return None
         self._reads = [entry for entry in self._reads if entry[1]() is not None]
@@ -113,9 +113,9 @@ class Process(Actor):
 
 
 class _Listeners(list[Any]):
-    """The callbacks of a read, which remember that somebody has waited for it and does no longer.
+    """The callbacks of a read, which note when nothing waits for it any longer.
 
-    A condition and an interrupt take their callback away; without this, the read would swallow the next token.
+    A condition and an interrupt remove their callback; without this, the read would swallow the next token.
     """
 
     deserted = False

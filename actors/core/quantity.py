@@ -1,4 +1,4 @@
-"""Quantity: a number that remembers its unit, as long as it is calculated with in ways that keep one."""
+"""Quantity: a number that keeps its unit through calculations that have one."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any
 from .elementary import power as power_of
 from .units import UnitError, between, is_compound, parse_unit
 
-MAX_DEPTH = 100  # of lists and mappings in each other, in files and in what expressions make of them
+MAX_DEPTH = 100  # of nested lists and mappings, in files and in values of expressions
 
 
 def _compared(compare: Callable[[float, float], bool]) -> Callable[[Quantity, float], bool]:
@@ -19,11 +19,11 @@ def _compared(compare: Callable[[float, float], bool]) -> Callable[[Quantity, fl
 
 
 class Quantity(float):
-    """A float that is counted in ``unit``.
+    """A float in ``unit``.
 
-    Sums, differences, remainders and comparisons convert the other side, products, quotients and whole powers make a
-    new unit, a plain number takes the other side's unit.  Where no unit is asked for, ``si`` is the number.
-    Raises ``UnitError`` where units do not go together.
+    Sums, differences, remainders and comparisons convert the other side; products, quotients and whole powers make a
+    new unit; a plain number takes the other side's unit.  Where no unit is required, ``si`` is the number. Raises
+    ``UnitError`` if units do not fit together.
     """
 
     __slots__ = ("unit",)
@@ -43,7 +43,7 @@ class Quantity(float):
     __str__ = float.__repr__
 
     def to(self, unit: str) -> float:
-        """The number counted in another unit."""
+        """The number in another unit."""
         number = float(self)
         if unit == self.unit:
             return number
@@ -51,7 +51,7 @@ class Quantity(float):
 
     @property
     def si(self) -> float:
-        """The number counted in SI units."""
+        """The number in SI units."""
         unit = parse_unit(self.unit)
         return _times(float(self), unit.scale, unit.pi_power, self.unit, "SI units")
 
@@ -79,7 +79,7 @@ class Quantity(float):
         return _in(float(self) / float(other), self.unit, "/", other)
 
     def __rtruediv__(self, other: float) -> float:
-        return _in(float(other) / float(self), "1", "/", self)  # other is no Quantity here
+        return _in(float(other) / float(self), "1", "/", self)  # other is not a Quantity here
 
     def __mod__(self, other: float) -> Quantity:
         return Quantity(float(self) % self._beside(other), self.unit)
@@ -88,7 +88,7 @@ class Quantity(float):
         return Quantity(self._beside(other) % float(self), self.unit)
 
     def __floordiv__(self, other: float) -> float:
-        if isinstance(other, Quantity):  # how often the other goes into it
+        if isinstance(other, Quantity):  # how many times the other goes into it
             return float(self) // self._beside(other)
         return Quantity(float(self) // float(other), self.unit)
 
@@ -127,7 +127,7 @@ class Quantity(float):
     def __ne__(self, other: object) -> bool:
         return not self == other
 
-    # As for all floats: of two that are equal as plain numbers, the hashes are equal.
+    # As for all floats: two that are equal as plain numbers have equal hashes.
     __hash__ = float.__hash__
 
 
@@ -142,7 +142,7 @@ def _times(number: float, factor: Fraction, pi_power: int, unit: str, wanted: st
 
 
 def _in(number: float, unit: str, sign: str, other: float) -> float:
-    """A product or quotient with its unit; plain if that is none, or too long, which leaves SI units."""
+    """A product or quotient with its unit; a plain number if that is 1 or too long, then in SI units."""
     if not isinstance(other, Quantity):
         return Quantity(number, unit)
     if unit == other.unit and sign == "/":
@@ -157,16 +157,16 @@ def _in(number: float, unit: str, sign: str, other: float) -> float:
 def _is_readable(unit: str) -> bool:
     try:
         parse_unit(unit)
-    except UnitError:  # powers, or a text, without end
+    except UnitError:  # powers, or a text, that grow without end
         return False
     return True
 
 
 def is_too_deep(value: object) -> bool:
-    """Whether lists and mappings stand in each other at more than ``MAX_DEPTH`` levels."""
+    """Whether lists and mappings are nested more than ``MAX_DEPTH`` levels deep."""
     level: list[Any] = [value]
     for _ in range(MAX_DEPTH + 1):
-        # What several share is looked at once, or else a few could hold more than can be counted.
+        # Shared values are visited once: a few lists could otherwise hold too many to count.
         holders = {id(each): each for each in level if isinstance(each, (list, tuple, dict))}.values()
         if not holders:
             return False

@@ -1,11 +1,11 @@
 # cython: binding=True
-"""Random streams: one per (seed, dotted path, purpose), whatever the order in which they are asked for.
+"""Random streams: one per (seed, dotted path, purpose), independent of the order in which they are requested.
 
 The key of a stream is a hash of its names, so adding, removing or reordering actors and aspects moves no other
-stream, and neither ``PYTHONHASHSEED`` nor the worker count can.
+stream, and neither does ``PYTHONHASHSEED`` or the number of workers.
 
-NumPy promises the bits of its bit generators for all versions and machines, but not what its distributions make of
-them.  So only the bits are NumPy's (PCG64); every law is our own (``laws``), and draws the same numbers everywhere.
+NumPy guarantees the bits of its bit generators for all versions and machines, but not the values of its distributions.
+So only the bits come from NumPy (PCG64); every law is our own (``laws``), and draws the same numbers everywhere.
 """
 
 from __future__ import annotations
@@ -33,12 +33,13 @@ _PLAIN: Final = frozenset({float, int, bool})
 class RandomStream(Words):
     """Random numbers of one purpose, with the methods of ``numpy.random.Generator`` and bits that never change.
 
-    Parameters may be arrays, and ``size`` asks for an array; its values are drawn one by one in C order, so that
-    ``normal(size=3)`` gives what three calls give.  A law with a closed inverse takes one word of 64 bits for a value
-    and grows with it, so streams stay in step when only parameters differ (common random numbers).
+    Parameters may be arrays, and ``size`` requests an array; its values are drawn one by one in C order, so that
+    ``normal(size=3)`` gives the values of three calls.  A law with a closed inverse uses one 64-bit word per value and
+    increases with it, so streams stay in step when only parameters differ (common random numbers).
 
-    What differs from NumPy: the numbers, but those of ``random`` and ``uniform``; ``choice``, ``shuffle`` and
-    ``permutation`` know the first axis only; rare laws are missing.  Raises ``ValueError`` for parameters out of range.
+    Differences from NumPy: the numbers, except those of ``random`` and ``uniform``; ``choice``, ``shuffle`` and
+    ``permutation`` support only the first axis; rare laws are missing.  Raises ``ValueError`` for parameters out of
+    range.
     """
 
     __slots__ = ()
@@ -50,14 +51,14 @@ class RandomStream(Words):
         if not name.startswith("_") and hasattr(np.random.Generator, name):
             known = ["word", *(each for each in vars(RandomStream) if not each.startswith("_"))]
             raise AttributeError(
-                f"a random stream has no {name!r}{did_you_mean(name, known)}, as what NumPy makes of it depends on its "
-                f"version and the machine; there are {', '.join(sorted(known))}"
+                f"a random stream has no {name!r}{did_you_mean(name, known)}: NumPy's results depend on its version "
+                f"and the machine; available: {', '.join(sorted(known))}"
             )
         raise AttributeError(f"a random stream has no {name!r}")
 
     @property
     def state(self) -> tuple[int, int]:
-        """Where the stream stands: the state of PCG64 before the next word, and its increment."""
+        """The position of the stream: the state of PCG64 before the next word, and its increment."""
         bits = np.random.PCG64()
         bits.state = self._bits.state
         inner = bits.advance(-len(self._ahead)).state["state"]
@@ -70,7 +71,7 @@ class RandomStream(Words):
     # -- bits ------------------------------------------------------------------------------------------------------
 
     def below(self, bound: int) -> int:
-        """An integer of 0, 1, ..., ``bound`` - 1, all alike.
+        """An integer of 0, 1, ..., ``bound`` - 1, all equally likely.
 
         Source: D. Lemire, Fast Random Integer Generation in an Interval, ACM TOMACS 29, 2019.
         """
@@ -99,7 +100,7 @@ class RandomStream(Words):
         return np.append(np.array(ahead, np.uint64), self._bits.random_raw(count - len(ahead)))
 
     def _many_below(self, bound: int, count: int) -> np.ndarray[Any, np.dtype[np.uint64]]:
-        """What ``below`` gives so many times, for a bound of 32 bits at most; many times as fast."""
+        """As many values of ``below``, for a bound of at most 32 bits; many times as fast."""
         found = np.empty(0, np.uint64)
         while len(found) < count:
             words, factor, half = self._words(count - len(found)), np.uint64(bound), np.uint64(32)
@@ -108,7 +109,7 @@ class RandomStream(Words):
         return found
 
     def bytes(self, length: int) -> bytes:
-        """So many random bytes."""
+        """As many random bytes."""
         words = b"".join(self.word().to_bytes(8, "little") for _ in range(-(-length // 8)))
         return words[:length]
 
@@ -139,7 +140,7 @@ class RandomStream(Words):
         def draw(low: int, high: int) -> int:
             count = int(high) - int(low) + endpoint
             if count <= 0:
-                raise ValueError(f"there is no integer from {low} to {high}{'' if endpoint else ', which is left out'}")
+                raise ValueError(f"there is no integer from {low} to {high}{'' if endpoint else ' (excluded)'}")
             return int(low) + self.below(count)
 
         return self._drawn(draw, size, low, high, dtype=dtype)
@@ -149,10 +150,10 @@ class RandomStream(Words):
         items = np.arange(a) if isinstance(a, (int, np.integer)) else a
         count = len(items)
         if not count:
-            raise ValueError("there is nothing to choose from")
+            raise ValueError("the choice is empty: give at least one element")
         weights = None if p is None else np.asarray(p, float).ravel().tolist()
         if weights is not None and len(weights) != count:
-            raise ValueError(f"{len(weights)} weights are given for {count} elements")
+            raise ValueError(f"{len(weights)} weights for {count} elements; give one for each")
         sums = None if weights is None else choices.cumulated(weights)
         if size is None:
             return items[self.below(count) if sums is None else choices.weighted(self, sums)]
@@ -186,7 +187,7 @@ class RandomStream(Words):
     # -- vectors -------------------------------------------------------------------------------------------------------
 
     def multinomial(self, n: int, pvals: ArrayLike, size: Size = None) -> Any:
-        """How often each outcome comes in ``n`` trials with these probabilities; the last one takes what is left."""
+        """How often each outcome comes in ``n`` trials with these probabilities; the last outcome takes the rest."""
         weights = np.asarray(pvals, float).ravel().tolist()
         return self._vectors(lambda: choices.multinomial(self, n, weights), len(weights), size, np.int64)
 
@@ -203,7 +204,7 @@ class RandomStream(Words):
     # -- shapes --------------------------------------------------------------------------------------------------------
 
     def _drawn(self, draw: Callable[..., Any], size: Size, *parameters: ArrayLike, dtype: Any = float) -> Any:
-        """One value of ``draw`` for each element of the parameters, which are broadcast to ``size``."""
+        """One value of ``draw`` for each element of the parameters, broadcast to ``size``."""
         if size is None and _PLAIN.issuperset(map(type, parameters)):
             return draw(*parameters)
         arrays = [np.asarray(each) for each in parameters]
@@ -220,7 +221,7 @@ class RandomStream(Words):
 
 
 def _method(law: Callable[..., Any]) -> Callable[..., Any]:
-    """The method of a stream that draws by a law: its parameters may be arrays, and ``size`` asks for an array."""
+    """The method of a stream that draws from a law: its parameters may be arrays, and ``size`` requests an array."""
     own = inspect.signature(law)
     first, *parameters = own.parameters.values()
     size = inspect.Parameter("size", inspect.Parameter.POSITIONAL_OR_KEYWORD, default=None)
@@ -267,7 +268,7 @@ else:
 
 
 def random_stream(seed: int, path: str, purpose: str = "") -> Stream:
-    """The stream that belongs to one purpose of one actor or aspect in one run."""
+    """The stream of one purpose of one actor or aspect in one run."""
     digest = hashlib.sha256(f"{path}\0{purpose}".encode()).digest()
     key = tuple(int.from_bytes(digest[i : i + 4], "little") for i in range(0, 16, 4))
     return cast(Stream, RandomStream(np.random.PCG64(np.random.SeedSequence(seed, spawn_key=key))))

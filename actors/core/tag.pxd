@@ -1,4 +1,4 @@
-# Types for C; what everything is for is said in tag.py.
+# Types for C; tag.py documents everything.
 
 cimport cython
 from epicycle.actors.core.primitives cimport nearest

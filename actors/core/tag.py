@@ -8,7 +8,7 @@ from typing import NamedTuple
 from .primitives import nearest
 
 NANOSECONDS_PER_SECOND = 1_000_000_000
-# Where time ends: about 146 years. Beyond it a time is a mistake, and int64 columns could not hold it.
+# The end of time: about 146 years. A later time is a mistake, and int64 columns could not hold it.
 LATEST = 2**62
 _FAR = float(LATEST)
 
@@ -32,7 +32,7 @@ _new = tuple.__new__
 
 
 def new_tag(time: int, microstep: int) -> Tag:
-    """A tag, in half the time that its class takes."""
+    """Make a tag, in half the time that its class takes."""
     return _new(Tag, (time, microstep))
 
 
@@ -44,13 +44,13 @@ def to_nanoseconds(seconds: float) -> int:
             return nearest(product)
     if not math.isfinite(seconds):
         raise ValueError(f"{seconds!r} is not a time")
-    # Compared first as floats: the product may be infinite, which has no whole number.
+    # Compared first as floats: the product may be infinite, which has no integer value.
     nanoseconds = seconds * NANOSECONDS_PER_SECOND
     if abs(nanoseconds) > LATEST:
-        raise ValueError(f"{float(seconds):g} s is out of range, the latest time is {to_seconds(LATEST):g} s")
+        raise ValueError(f"{float(seconds):g} s is out of range; the latest time is {to_seconds(LATEST):g} s")
     return round(nanoseconds)
 
 
 def to_seconds(nanoseconds: int) -> float:
-    """Seconds at the edge of the house."""
+    """Seconds, as used outside the engine."""
     return nanoseconds / NANOSECONDS_PER_SECOND

@@ -1,4 +1,4 @@
-"""Units of measurement: `8 m/s`, `100 ms` or `90 deg` into the number that an actor counts in.
+"""Units of measurement: converts `8 m/s`, `100 ms` or `90 deg` to a number in the unit of a parameter.
 
 Factors are exact fractions (of pi, for degrees) and become a float once, at the end, so that `100 ms` is
 0.1 s to the last bit.
@@ -24,7 +24,7 @@ _NONE: Final = (0,) * len(_AXES)
 
 
 class UnitError(EpicycleError):
-    """A unit that is not known, or not the kind of unit that is needed."""
+    """A unit that is unknown, or not of the required kind."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +40,7 @@ class Unit:
 
     @property
     def factor(self) -> float:
-        """How many SI units one of these is."""
+        """The size of the unit in SI units."""
         return _with_pi(self.scale, self.pi_power)
 
     def __mul__(self, other: "Unit") -> "Unit":
@@ -56,7 +56,7 @@ def _with_pi(scale: Fraction, pi_power: int) -> float:
     return float(scale * Fraction(math.pi) ** pi_power if pi_power else scale)
 
 
-# --- the units we know --------------------------------------------------------------------------------
+# --- the known units --------------------------------------------------------------------------------
 
 
 def _unit(scale: Fraction | int = 1, pi_power: int = 0, **powers: int) -> Unit:
@@ -173,7 +173,7 @@ _SUPERSCRIPTS: Final = str.maketrans("⁺⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "+-012
 
 @functools.lru_cache(maxsize=1024)  # a model has few units and many quantities
 def parse_unit(text: str) -> Unit:
-    """Return the unit that a text such as `m/s^2`, `m/s²`, `(m/s)^2`, `1/s` or `%` stands for."""
+    """Return the unit that a text such as `m/s^2`, `m/s²`, `(m/s)^2`, `1/s` or `%` means."""
     if len(text) > MAX_TEXT:
         raise UnitError(f"unreadable unit '{text[:20]}...': it is longer than {MAX_TEXT} characters")
     return _Reader(text).read()
@@ -189,7 +189,7 @@ class _Reader:
         while at < end:
             token = _TOKEN.match(text, at)
             if token is None or token.lastgroup is None:
-                raise self._unreadable(f"'{text[at:].strip()[0]}' has no meaning there")
+                raise self._unreadable(f"'{text[at:].strip()[0]}' is not allowed in a unit")
             self._tokens.append((token.lastgroup, token[token.lastgroup]))
             at = token.end()
         self._next = 0
@@ -199,7 +199,7 @@ class _Reader:
         if self._next < len(self._tokens):
             kind, text = self._tokens[self._next]
             hint = ", write * between units" if kind in ("name", "open") else ""
-            raise self._unreadable(f"'{text}' cannot stand there{hint}")
+            raise self._unreadable(f"'{text}' is not allowed there{hint}")
         return unit
 
     def _product(self) -> Unit:
@@ -243,7 +243,7 @@ class _Reader:
         return self._tokens[self._next][0] if self._next < len(self._tokens) else None
 
     def _bounded(self, unit: Unit) -> Unit:
-        """Return the unit if it is of reasonable size: powers of powers grow without end."""
+        """Return the unit if its powers are of reasonable size: powers of powers grow without end."""
         bits = max(unit.scale.numerator.bit_length(), unit.scale.denominator.bit_length())
         if bits > _MAX_BITS or max(map(abs, (unit.pi_power, *unit.dimension))) > _MAX_EXPONENT:
             raise self._unreadable("its powers are too large")
@@ -287,7 +287,7 @@ def _split(text: str) -> tuple[Fraction, str] | None:
 
 
 def convert(value: str | int | float, unit: str) -> float:
-    """Return a value counted in `unit`: a bare number is so already, a text may bring its own unit."""
+    """Return a value in `unit`: a bare number already is, a text may have another unit."""
     try:
         if isinstance(value, str):
             return _convert_text(value, unit)
@@ -300,7 +300,7 @@ def convert(value: str | int | float, unit: str) -> float:
 
 
 def in_si(text: str) -> float | None:
-    """Return a text with a unit of any kind counted in SI units; None if it is no number with a unit."""
+    """Return a text with a unit of any kind in SI units; None if it is not a number with a unit."""
     split = _split(text)
     if split is None or not (split[1][:1].isalpha() or split[1][:1] in ("%", "°", "(")):
         return None
@@ -311,7 +311,7 @@ def in_si(text: str) -> float | None:
         raise UnitError(f"{brief(text)} is too large for a float") from None
 
 
-@functools.lru_cache(maxsize=4096)  # the copies of an actor have the same quantities
+@functools.lru_cache(maxsize=4096)  # the replicas of an actor have the same quantities
 def _convert_text(text: str, unit: str) -> float:
     split, wanted = _split(text), parse_unit(unit)
     if split is None:
@@ -325,7 +325,7 @@ def _convert_text(text: str, unit: str) -> float:
 
 
 def _unit_in(text: str, unit: str) -> Unit:
-    """The unit that stands in a text."""
+    """The unit in a text."""
     try:
         return parse_unit(unit)
     except UnitError as error:
@@ -334,7 +334,7 @@ def _unit_in(text: str, unit: str) -> Unit:
 
 
 def between(own: str, wanted: str, shown: str) -> tuple[Fraction, int]:
-    """How many of one unit are one of another, and the power of pi to be multiplied with it.
+    """The factor from one unit to another, and the power of pi to multiply it by.
 
     Raises ``UnitError`` about the quantity ``shown`` if the two do not measure the same.
     """
@@ -344,7 +344,7 @@ def between(own: str, wanted: str, shown: str) -> tuple[Fraction, int]:
 
 
 def is_compound(unit: str) -> bool:
-    """Whether a unit needs brackets to be divided by."""
+    """Whether a unit needs brackets in a denominator."""
     return any(sign in unit for sign in "*·⋅/")
 
 
@@ -354,7 +354,7 @@ def _check_kind(shown: str, own_text: str, own: Unit, unit: str, wanted: Unit) -
 
 
 def _is_turns_for_radians(first: str, second: str) -> bool:
-    """True if one counts turns (Hz) and the other angles: 1 Hz is 2 pi rad/s, but has its dimension."""
+    """Whether one counts turns (Hz) and the other angles: 1 Hz is 2 pi rad/s, but has the same dimension."""
     one, other = _symbols(first), _symbols(second)
     return bool((one & _FREQUENCIES and other & _ANGLES) or (one & _ANGLES and other & _FREQUENCIES))
 
@@ -371,7 +371,7 @@ def _symbols(text: str) -> set[str]:
 
 
 def _kind(text: str, unit: Unit) -> str:
-    """Return what a unit measures, in words; the text tells apart what the dimension cannot."""
+    """Return what a unit measures, in words; the text distinguishes what the dimension cannot."""
     symbols = _symbols(text)
     if not any(unit.dimension):
         return "an angle" if symbols & _ANGLES else "a number"

@@ -1,7 +1,7 @@
 """BDF: backward differentiation formulas of order 1 to 5 with quasi-constant steps, for stiff systems.
 
 L. F. Shampine, M. W. Reichelt: The MATLAB ODE suite, SIAM J. Sci. Comput. 18 (1997) 1-22, with the modified
-differentiation formulas (NDF) that stand there.
+differentiation formulas (NDF) given there.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ _FACTORS: Final = [(1.0 / (number + 1), number / (number + 1)) for number in ran
 
 
 class BDF(Stepper):
-    """Backward differences of the states, as many as the order is high, carried from step to step."""
+    """Backward differences of the states, as many as the order, carried from step to step."""
 
     def __init__(self, derivative: Derivative, state: State, limits: Limits) -> None:
         super().__init__(1, derivative, state, limits)
@@ -48,7 +48,7 @@ class BDF(Stepper):
         self._differences = [state, [self.next_step * rate for rate in self.rates]] + [zero] * (_MAX_ORDER + 1)
         self._jacobian = Jacobian(derivative, len(state), limits.absolute)
         self._matrix: Matrix = self._jacobian.at(0.0, state, self.rates)
-        self._is_new = False  # whether that is of the present step
+        self._is_new = False  # whether it belongs to the present step
         self._factors: Factors | None = None
 
     def prepare(self, step: float) -> None:
@@ -73,7 +73,7 @@ class BDF(Stepper):
         state = added(predicted, correction)
         scale = self.scale(state)
         error = _ERROR[self._order] * norm(correction, scale)
-        if not error <= 1.0:  # nor if it is no number
+        if not error <= 1.0:  # also if it is NaN
             factor = max(SHRINK_LIMIT, stretch(error, safety, self._order))
             self._rescale(factor)
             return factor
@@ -84,7 +84,7 @@ class BDF(Stepper):
         return None
 
     def _correct(self, newton: Convergence, end: float, step: float, predicted: State) -> State:
-        """Solve for what is to be added to the predicted state."""
+        """Solve for the correction of the predicted state."""
         share = step / _ALPHA[self._order]
         if self._factors is None:
             self._factors = _factorised(self._matrix, share)
@@ -104,7 +104,7 @@ class BDF(Stepper):
         return correction
 
     def _accept(self, correction: State) -> None:
-        """Carry the differences on by a step: each is what it was, plus the one above it."""
+        """Advance the differences by a step: to each, the one above it is added."""
         differences, order = self._differences, self._order
         differences[order + 2] = taken(correction, differences[order + 1])
         differences[order + 1] = correction
@@ -113,7 +113,7 @@ class BDF(Stepper):
         self._equal_steps += 1
 
     def _choose_order(self, scale: list[float], error: float, safety: float) -> None:
-        """Continue with the order, of this one and its neighbours, that allows the longest step."""
+        """Continue with the order, out of this one and its neighbours, that allows the longest step."""
         order = self._order
         best, best_factor = order, stretch(error, 1.0, order)
         for other in (order - 1, order + 1):
@@ -142,7 +142,7 @@ class BDF(Stepper):
 
 
 def _spread(size: int, factor: float) -> Matrix:
-    """The matrix that takes backward differences to values at points that lie ``factor`` steps apart."""
+    """The matrix from backward differences to values at points ``factor`` steps apart."""
     rows = [[1.0] * size]
     for number in range(1, size):
         step = [0.0, *((number - 1 - factor * column) / number for column in range(1, size))]
@@ -151,7 +151,7 @@ def _spread(size: int, factor: float) -> Matrix:
 
 
 def _factorised(matrix: Matrix, share: float) -> Factors | None:
-    """The identity less a share of a matrix, factorised; None if it is singular."""
+    """The identity minus a multiple of a matrix, factorised; None if it is singular."""
     rows = [[-share * value for value in row] for row in matrix]
     for number, row in enumerate(rows):
         row[number] += 1.0

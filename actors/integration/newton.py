@@ -1,4 +1,4 @@
-"""What implicit methods need: the Jacobian by differences, linear systems, and Newton's iteration watched."""
+"""Tools of implicit methods: the Jacobian by differences, linear systems, and a monitored Newton iteration."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from .stepper import Derivative, Limits, State, taken
 Matrix = list[list[float]]
 
 _PRECISION: Final = sys.float_info.epsilon
-# A difference of derivatives says too little if it is that small beside them, and the next one should be taken over
-# a wider or narrower stretch outside these bounds (D. E. Salane, Sandia report 86-1319, 1986).
+# A difference of derivatives is too inexact if it is this small beside them; outside these bounds, the next one
+# should be taken over a wider or narrower stretch (D. E. Salane, Sandia report 86-1319, 1986).
 _USELESS: Final = 2e-14
 _SMALL: Final = 2e-12
 _LARGE: Final = 1e-4
@@ -20,18 +20,18 @@ _LEAST: Final = 1e3 * _PRECISION
 
 
 class Jacobian:
-    """How the derivatives change with each state, by differences whose widths are learnt from call to call."""
+    """The derivatives with respect to each state, by differences whose widths adapt from call to call."""
 
     def __init__(self, derivative: Derivative, size: int, threshold: float) -> None:
         self._derivative = derivative
-        self._threshold = threshold  # a state counts as no smaller than this
+        self._threshold = threshold  # a state is treated as at least this large
         self._widths = [1.5e-8] * size
 
     def at(self, time: float, state: State, rates: State) -> Matrix:
         """The matrix of d(rate of row)/d(state of column); ``rates`` are the derivatives there."""
         columns = []
         for number, (value, rate) in enumerate(zip(state, rates, strict=True)):
-            # Towards where the solution goes, which is where the derivatives should be defined.
+            # In the direction of the solution, where the derivatives should be defined.
             reach = max(self._threshold, abs(value)) * (1.0 if rate >= 0.0 else -1.0)
             width = self._widths[number]
             while (value + width * reach) - value == 0.0:
@@ -52,7 +52,7 @@ class Jacobian:
     def _difference(
         self, time: float, state: State, rates: State, number: int, move: float
     ) -> tuple[State, float, float]:
-        """A column of the Jacobian, the largest change that it comes from, and the rate that changed so."""
+        """A column of the Jacobian, the largest change behind it, and the rate that changed most."""
         moved = list(state)
         moved[number] += move
         move = moved[number] - state[number]
@@ -65,7 +65,7 @@ class Jacobian:
 
 
 class Factors:
-    """A matrix as the product of triangular ones, with the largest pivot of each column.
+    """The LU factorisation of a matrix, with the largest pivot of each column.
 
     Raises ``ZeroDivisionError`` if the matrix is singular.
     """
@@ -87,7 +87,7 @@ class Factors:
         self._inverse = [1.0 / row[number] for number, row in enumerate(rows)]
 
     def solve(self, right: State) -> State:
-        """The solution for a right side."""
+        """The solution for a right-hand side."""
         found: State = []
         for number, row in zip(self._order, self._rows, strict=True):
             total = right[number]
@@ -103,19 +103,19 @@ class Factors:
 
 
 class Convergence:
-    """Watches the corrections of one Newton iteration of at most ``most`` corrections."""
+    """Monitors one Newton iteration of at most ``most`` corrections."""
 
     def __init__(self, limits: Limits, most: int) -> None:
         relative = limits.relative
         self._tolerance = max(10.0 * _PRECISION / relative, min(0.03, math.sqrt(relative)))
         self._left = most
         self._before: float | None = None
-        self.rate = 0.0  # by which factor the latest correction is smaller than the one before
+        self.rate = 0.0  # the ratio of the latest correction to the one before
         self.count = 0
         self.is_reached = False
 
     def goes_on(self, correction: float) -> bool:
-        """Whether, with the size of the next correction, it is worth going on; if not, ``is_reached`` says why."""
+        """Whether, given the size of the next correction, it is worth continuing; if not, ``is_reached`` says why."""
         self.count += 1
         if correction == 0.0:
             self.is_reached = True
@@ -123,7 +123,7 @@ class Convergence:
             self.rate = rate = correction / self._before
             if not rate < 1.0:
                 return False
-            rest = rate / (1.0 - rate) * correction  # what all further corrections add up to
+            rest = rate / (1.0 - rate) * correction  # the sum of all further corrections
             self.is_reached = rest < self._tolerance
             expected = rest
             for _ in range(self._left - 1):

@@ -31,7 +31,7 @@ _ERROR: Final = ((-13.0 - 7.0 * _ROOT) / 3.0, (-13.0 + 7.0 * _ROOT) / 3.0, -1.0 
 # The inverse of the tableau's matrix has one real eigenvalue and a pair of complex ones,
 _REAL: Final = 3.637834252744496
 _PAIR: Final = (2.6810828736277523, -3.050430199247411)
-# and these matrices lead from its eigenvectors to the stages and back.
+# and these matrices transform from its eigenvectors to the stages and back.
 _TO_STAGES: Final = (
     (0.09443876248897524, -0.14125529502095421, 0.03002919410514742),
     (0.25021312296533332, 0.20412935229379994, -0.38294211275726192),
@@ -64,7 +64,7 @@ class Radau(Stepper):
         super().__init__(3, derivative, state, limits)
         self._jacobian = Jacobian(derivative, len(state), limits.absolute)
         self._matrix: Matrix = self._jacobian.at(0.0, state, self.rates)
-        self._is_new = True  # whether the Jacobian is of where the solution stands
+        self._is_new = True  # whether the Jacobian belongs to the present point
         self._factors: tuple[Factors, Factors] | None = None
         self._was_rejected = False  # a longer step from here
         self._before: tuple[float, float] | None = None  # the latest step and its error
@@ -89,7 +89,7 @@ class Radau(Stepper):
         state = added(self.state, stages[2])
         error = self._error(self._factors[0], stages, state, step)
         factor = safety * self._predicted(step, error)
-        if not error <= 1.0:  # nor if it is no number
+        if not error <= 1.0:  # also if it is NaN
             self._factors = None
             self._was_rejected = True
             return max(SHRINK_LIMIT, factor)
@@ -99,9 +99,9 @@ class Radau(Stepper):
         return None
 
     def _solve(self, newton: Convergence, step: float) -> Stages:
-        """The stages, as what each adds to the state."""
+        """The stages, as increments of the state."""
         stages = [[0.0] * len(self.state)] * 3
-        if self._piece is not None:  # the latest polynomial goes on for a while
+        if self._piece is not None:  # the latest polynomial extrapolates for a while
             stages = [taken(self._piece.at(self.time + node * step), self.state) for node in _NODES]
         if self._factors is None:
             self._factors = _factorised(self._matrix, step)
@@ -134,13 +134,13 @@ class Radau(Stepper):
         error = factors.solve(added(self.rates, ends))
         size = norm(error, scale)
         if self._was_rejected and size > 1.0:
-            # The error of components that decay at once is exaggerated: once more through the system damps it.
+            # The error of stiff components is exaggerated: a second pass through the system damps it.
             rates = self.derivative(self.time, added(self.state, error))
             size = norm(factors.solve(added(rates, ends)), scale)
         return size
 
     def _predicted(self, step: float, error: float) -> float:
-        """By which factor the step may change for an error of 1, as the latest two errors tell (Gustafsson)."""
+        """The factor by which the step may change for an error of 1, from the latest two errors (Gustafsson)."""
         if error == 0.0:
             return math.inf
         root = root_power(error, 0.25)
@@ -155,7 +155,7 @@ class Radau(Stepper):
         self.time, self.state, self.rates = end, state, self.derivative(end, state)
 
     def _go_on(self, step: float, factor: float, newton: Convergence) -> None:
-        """Make ready for the next step; what is factorised is kept while the step would hardly be longer."""
+        """Prepare the next step; the factorisation is kept while the step would hardly be longer."""
         self._is_new = newton.count > 2 and newton.rate > 1e-3
         if self._is_new:
             self._matrix = self._jacobian.at(self.time, self.state, self.rates)
@@ -171,7 +171,8 @@ class Radau(Stepper):
 
 
 def _factorised(matrix: Matrix, step: float) -> tuple[Factors, Factors] | None:
-    """The system of the real eigenvalue, and that of the pair, in real numbers twice as large; None if singular."""
+    """The systems of the real eigenvalue and of the pair, the latter twice as large in real numbers; None if
+    singular."""
     real, (pair, turn) = _REAL / step, (_PAIR[0] / step, _PAIR[1] / step)
     single = [[-value for value in row] for row in matrix]
     upper = [[*row, *([0.0] * len(row))] for row in single]

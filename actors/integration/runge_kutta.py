@@ -1,4 +1,4 @@
-"""Explicit embedded Runge-Kutta methods: what they have in common, and the tableau that describes each."""
+"""Explicit embedded Runge-Kutta methods: the common part, and the tableau of each."""
 
 from __future__ import annotations
 
@@ -10,17 +10,17 @@ from typing import Final
 from .stepper import GROWTH_LIMIT, SHRINK_LIMIT, Derivative, Limits, Piece, State, Stepper, combined, norm, stretch
 
 _SAFETY: Final = 0.9
-Weights = tuple[tuple[int, float], ...]  # pairs of a stage and its weight; stages that weigh nothing are left out
-Stage = tuple[float, Weights]  # where in the step a derivative is taken, and the weights that lead to its state
+Weights = tuple[tuple[int, float], ...]  # pairs of a stage and its weight; stages with weight 0 are left out
+Stage = tuple[float, Weights]  # where in the step a derivative is evaluated, and the weights for its state
 
 
 @dataclass(frozen=True)
 class Tableau:
-    """What a method consists of; stage 0 is the derivative at the start, and the last of ``stages`` that at the end.
+    """The coefficients of a method; stage 0 is the derivative at the start, the last of ``stages`` that at the end.
 
-    ``errors`` has the embedded formula, or the two of which DOP853 makes one.  ``order`` is that of the error.  The
-    rows of ``dense``, over ``stages`` and then ``extra``, are the coefficients of the interpolating polynomial, with
-    factors x, x, x, ..., or if it ``alternates``, x, 1 - x, x, ...
+    ``errors`` has the embedded formula, or the two that DOP853 combines.  ``order`` is that of the error.  The rows of
+    ``dense``, over ``stages`` and then ``extra``, are the coefficients of the interpolating polynomial, with factors x,
+    x, x, ..., or if it ``alternates``, x, 1 - x, x, ...
     """
 
     order: int
@@ -32,12 +32,12 @@ class Tableau:
 
     @property
     def factors(self) -> list[tuple[float, float]]:
-        """The factors of the polynomial as slope and offset."""
+        """The factors of the polynomial, each as slope and offset."""
         return [(-1.0, 1.0) if self.alternates and number % 2 else (1.0, 0.0) for number in range(len(self.dense))]
 
 
 class RungeKutta(Stepper):
-    """The explicit method of a tableau; its polynomial along a step is computed only if somebody asks for it."""
+    """The explicit method of a tableau; the polynomial along a step is computed only on request."""
 
     def __init__(self, tableau: Tableau, derivative: Derivative, state: State, limits: Limits) -> None:
         super().__init__(tableau.order, derivative, state, limits)
@@ -60,10 +60,10 @@ class RungeKutta(Stepper):
             self.next_step = step * min(factor, self._growth)
             return None
         self._growth = 1.0
-        return max(SHRINK_LIMIT, factor)  # NaN shrinks it, too
+        return max(SHRINK_LIMIT, factor)  # also for NaN
 
     def _pass(self, stages: Iterable[Stage], begin: tuple[float, State], step: float, rates: list[State]) -> State:
-        """Take derivatives at stages, and add them to ``rates``; returns the state at the last one."""
+        """Evaluate derivatives at stages, and append them to ``rates``; returns the state at the last one."""
         time, start = begin
         state = start
         for share, weights in stages:

@@ -1,4 +1,4 @@
-"""What all steppers share: the scale of errors, the control of the step, and the polynomial along a step.
+"""The common part of all steppers: the scale of errors, step size control, and the polynomial along a step.
 
 Everything here is computed in plain floats with + - * / and square roots, in a fixed order, so that a solution has
 the same bits on every processor.
@@ -19,13 +19,13 @@ State = list[float]
 Derivative = Callable[[float, State], list[float]]
 Bounds = tuple[float, float]
 
-SHRINK_LIMIT: Final = 0.2  # a step becomes shorter by no more than this factor at once,
-GROWTH_LIMIT: Final = 10.0  # and longer by no more than this one
+SHRINK_LIMIT: Final = 0.2  # a step becomes shorter by at most this factor at once,
+GROWTH_LIMIT: Final = 10.0  # and longer by at most this one
 _BITS: Final = 14
 
 
 def root_power(base: float, exponent: float) -> float:
-    """``base ** exponent`` for an exponent from 0 to 1, which counts to 14 binary places: square roots suffice."""
+    """``base ** exponent`` for an exponent from 0 to 1, used to 14 binary places: square roots suffice."""
     result = 1.0
     for _ in range(_BITS):
         base = math.sqrt(base)
@@ -37,7 +37,7 @@ def root_power(base: float, exponent: float) -> float:
 
 
 def norm(values: Sequence[float], scale: Sequence[float]) -> float:
-    """The root of the mean of the squares of the values, each divided by its scale."""
+    """The root mean square of the values, each divided by its scale."""
     ratios = list(map(truediv, values, scale))
     return math.sqrt(dot(ratios, ratios) / len(scale))
 
@@ -56,7 +56,7 @@ def dot(one: Sequence[float], other: Sequence[float]) -> float:
 
 
 def combined(weights: Sequence[float], rows: Sequence[State]) -> State:
-    """The weighted sum of as many rows."""
+    """The weighted sum of rows."""
     return [dot(weights, column) for column in zip(*rows, strict=True)]
 
 
@@ -76,7 +76,7 @@ class Piece:
     rows: Sequence[State]
 
     def at(self, time: float) -> State:
-        """The states at a time."""
+        """The states at a given time."""
         x = (time - self.origin) / self.width
         values = self.rows[-1]
         for (slope, offset), row in zip(self.factors[::-1], self.rows[-2::-1], strict=True):
@@ -98,7 +98,7 @@ class Piece:
 
 @dataclass(frozen=True)
 class Limits:
-    """The error that a step may make, relative to each state and added to that, and how long it may be."""
+    """The tolerated error of a step, relative and absolute, and its longest length."""
 
     relative: float
     absolute: float
@@ -106,9 +106,9 @@ class Limits:
 
 
 class Stepper(ABC):
-    """A method that takes a solution on, step by step, from time 0.
+    """A method that continues a solution, step by step, from time 0.
 
-    ``time`` and ``state`` are where it stands.  ``order`` is that of the error, by which the first step is chosen.
+    ``time`` and ``state`` are its present point.  ``order`` is that of the error, used to choose the first step.
     """
 
     def __init__(self, order: int, derivative: Derivative, state: State, limits: Limits) -> None:
@@ -135,18 +135,18 @@ class Stepper(ABC):
 
     @abstractmethod
     def prepare(self, step: float) -> None:
-        """Make ready for attempts, the first of which is a step of this length."""
+        """Prepare attempts, the first with a step of this length."""
 
     @abstractmethod
     def attempt(self, end: float, step: float) -> float | None:
-        """Try to go to ``end``, ``step`` from where it stands; None if it is there now, or how much shorter to try."""
+        """Try to go to ``end``, a ``step`` away; None on success, otherwise the factor for a shorter attempt."""
 
     @abstractmethod
     def piece(self) -> Piece:
         """The solution along the latest step."""
 
     def scale(self, *states: State) -> list[float]:
-        """The error that each state may have, by the largest of its values."""
+        """The tolerated error of each state, by the largest of its values."""
         relative, absolute = self.limits.relative, self.limits.absolute
         sizes = map(abs, states[0]) if len(states) == 1 else (max(map(abs, each)) for each in zip(*states, strict=True))
         return [absolute + relative * size for size in sizes]
@@ -172,6 +172,6 @@ class Stepper(ABC):
 
 
 def stretch(error: float, safety: float, order: int) -> float:
-    """By which factor a step of this error may become longer, or must become shorter, for an error of 1."""
+    """The factor by which a step with this error may become longer, or must become shorter, for an error of 1."""
     shrunk = root_power(error, 1.0 / (order + 1))
     return safety / shrunk if shrunk else math.inf

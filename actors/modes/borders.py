@@ -1,4 +1,4 @@
-"""Borders: how variables flow in a mode, which comparisons hold, and when the next one changes."""
+"""Follows the flow of variables in a mode: which comparisons hold, and when the next one changes."""
 
 from __future__ import annotations
 
@@ -12,15 +12,15 @@ from ..solution import sign_of
 from ..trajectory import Trajectory, number_of
 from .condition import Comparison
 
-_LONGEST: Final = 9e9  # s, of the times that there are
-_STILL: Final = "_still"  # a state that does not move, where comparisons change with time, but nothing flows
+_LONGEST: Final = 9e9  # s, of all times that occur
+_STILL: Final = "_still"  # a constant state, for modes where comparisons change with time but nothing flows
 
 
 class Borders:
-    """Of the mode that a machine is in: the solution of its flow, and the comparisons in its guards.
+    """The solution of the flow of the current mode, and the comparisons in its guards.
 
-    ``known`` are the values of variables and held inputs, which it brings up to date.  ``truths`` say which comparisons
-    hold, by their names; one that asks for an input without a value is not among them.  Times are in ns.
+    ``known`` holds the values of variables and held inputs, and is kept up to date.  ``truths`` states by name which
+    comparisons hold; comparisons that use an input without a value are not in it.  Times are in ns.
     """
 
     def __init__(self, known: dict[str, Any], **solver: Any) -> None:
@@ -32,15 +32,15 @@ class Borders:
         self._all: Sequence[Comparison] = ()
         self._flow: Mapping[str, Formula] = {}
         self._trajectory: Trajectory | None = None
-        self._watched: list[Comparison] = []  # by the guards of the trajectory
-        self._deadlines: dict[Comparison, int] = {}  # of those that wait for a time alone
-        self._seen = 0  # when it has been looked at last
-        self._open: dict[Comparison, int] = {}  # those that a transition has put on their border: where they came from
-        self._passed: dict[Formula, int] = {}  # what crosses now, and to which side
-        self._before: dict[str, Any] = {}  # the variables as they were there
+        self._watched: list[Comparison] = []  # in the order of the trajectory's guards
+        self._deadlines: dict[Comparison, int] = {}  # of comparisons that only wait for a time
+        self._seen = 0  # time of the last update
+        self._open: dict[Comparison, int] = {}  # put on their border by a transition: the side they came from
+        self._passed: dict[Formula, int] = {}  # what crosses now, and towards which side
+        self._before: dict[str, Any] = {}  # the variables at the crossing
 
     def enter(self, mode: str, flow: Mapping[str, Formula], comparisons: Sequence[Comparison], now: int) -> None:
-        """Begin with a mode, with what the variables are now."""
+        """Enter a mode with the present values of the variables."""
         origin = now, 0.0
         if self._trajectory is not None and self._passed:
             origin = self._trajectory.time, self._trajectory.fraction
@@ -79,13 +79,13 @@ class Borders:
             passed = self._passed.get(comparison.difference, 0)
             guard.side = sign_of(guard.value(0.0, start))
             if passed and not is_moved:
-                guard.side = passed  # by rounding it may be a hair before its border
+                guard.side = passed  # rounding may have left it just before its border
             elif passed and guard.side != -passed:
                 guard.side, self._open[comparison] = 0, -passed  # the solution will show
         self._judge(trajectory, 0.0)
 
     def change(self, names: Collection[str], now: int) -> None:
-        """Held inputs have other values now."""
+        """Take note that these held inputs have new values."""
         used = {name for each in self._flow.values() for name in each.names}
         if not used.union(*(each.names for each in self._all)).isdisjoint(names):
             self._open = {}
@@ -94,7 +94,7 @@ class Borders:
     # -- time -----------------------------------------------------------------------------------------------------
 
     def advance(self, now: int) -> bool:
-        """Bring variables and comparisons to the present; whether a comparison changes now."""
+        """Bring variables and comparisons up to date; return whether a comparison changes now."""
         self._passed, trajectory = {}, self._trajectory
         has_changed = any(self._seen < time <= now for time in self._deadlines.values())
         self._seen = now
@@ -125,11 +125,11 @@ class Borders:
         self._judge(trajectory, 0.0)
 
     def _keep(self, trajectory: Trajectory, state: State) -> None:
-        """Know the variables as they are now."""
+        """Store the present values of the variables."""
         self._known.update(zip(trajectory.names, state, strict=True))
 
     def next_time(self, now: int) -> int | None:
-        """When to look again: where a comparison changes or, while none is in sight, where the search for it ends."""
+        """When to check again: when a comparison changes or, if none is known to change, where the search ends."""
         looks = [time for time in self._deadlines.values() if now < time < NEVER]
         if self._trajectory is not None and self._watched:
             looks.append(self._trajectory.next_look(now))
@@ -151,8 +151,8 @@ class Borders:
                 side = self._open.get(comparison) or sign_of(guard.value(at, trajectory.solution.at(at)))
             elif self._open.pop(comparison, side) != side:
                 raise EpicycleError(
-                    f"in mode {self._mode!r}, {comparison.source!r} is on its border again at once after a transition "
-                    "that took it off: it may go on so without end (Zeno); leave the mode before"
+                    f"in mode {self._mode!r}, {comparison.source!r} returned to its border at once after a transition "
+                    "had moved it off: it may repeat without end (Zeno); leave the mode earlier"
                 )
             if comparison.difference in self._passed and comparison.is_equality:
                 side = 0  # which is where it crosses

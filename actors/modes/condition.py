@@ -1,4 +1,4 @@
-"""What expressions of a machine are: guards in which time goes on, or variables flow, become events."""
+"""Analyses expressions of a state machine: comparisons in guards over time or flowing variables become events."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ _ON_SIDE: Final[dict[type[ast.cmpop], Callable[[int], bool]]] = {
 
 @dataclass(frozen=True)
 class Comparison:
-    """A comparison in a guard: what is zero where it changes, and whether it holds on a side of that."""
+    """A comparison in a guard: the difference that is zero where it changes, and whether it holds on each side."""
 
     source: str
-    name: str  # what stands for it in the guard
+    name: str  # its placeholder in the guard
     difference: Formula
     sign: type[ast.cmpop]
-    names: frozenset[str]  # that it asks for, beside times
-    until: tuple[str, Formula, int] | None = None  # a time, when it is to be, and the side from then on
+    names: frozenset[str]  # that it uses, except times
+    until: tuple[str, Formula, int] | None = None  # a time, the value at which it changes, and the side from then on
 
     @property
     def is_equality(self) -> bool:
@@ -42,16 +42,16 @@ class Comparison:
 
 @dataclass(frozen=True)
 class Condition:
-    """A guard in which names stand for the comparisons whose changes are events."""
+    """A guard in which names replace the comparisons whose changes are events."""
 
     formula: Formula
     comparisons: tuple[Comparison, ...]
 
 
 def condition_of(guard: Formula, moving: Collection[str], numbers: Collection[str], taken: int) -> Condition:
-    """A guard with its comparisons over ``moving`` values, and otherwise over ``numbers``, taken out.
+    """A guard whose comparisons over ``moving`` values, and otherwise only ``numbers``, are replaced by names.
 
-    ``taken`` is how many comparisons other guards of the mode have, for names of its own.
+    ``taken`` is the number of comparisons in other guards of the mode; it keeps names unique.
     """
     source, found, pieces = guard.source, list[Comparison](), list[tuple[int, int, str]]()
     for node in _compared(parse(source)):
@@ -82,7 +82,7 @@ def condition_of(guard: Formula, moving: Collection[str], numbers: Collection[st
 def _until(
     left: ast.expr, right: ast.expr, written: list[str], moving: Collection[str]
 ) -> tuple[str, Formula, int] | None:
-    """Of a comparison between a time and what does not move: when it changes, and to which side."""
+    """For a comparison between a time and a constant value: when it changes, and to which side."""
     for here, there, text, side in ((left, right, written[1], 1), (right, left, written[0], -1)):
         if isinstance(here, ast.Name) and here.id in TIMES and free_names(there, frozenset()).isdisjoint(moving):
             return here.id, Formula(text), side
@@ -90,7 +90,7 @@ def _until(
 
 
 def _compared(node: ast.expr) -> list[ast.Compare]:
-    """The comparisons of which a condition is made by and, or and not."""
+    """The comparisons that a condition combines with and, or and not."""
     if isinstance(node, ast.Compare):
         return [node]
     if isinstance(node, ast.BoolOp):
@@ -102,7 +102,7 @@ _GIVES: Final[dict[str, Any]] = {"str": str, "bool": bool, "range": Any, "sorted
 
 
 def type_of(formula: Formula, type_of_name: Callable[[str], Any]) -> Any:
-    """What an expression gives, as far as its form tells."""
+    """The type of an expression's value, as far as its form shows."""
     tree = parse(formula.source)
     if formula.is_condition:
         return bool

@@ -1,4 +1,4 @@
-"""Whether a guard holds, where some of the inputs that it asks for may have no token."""
+"""Evaluates guards whose inputs may have no token."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from ..expression import ExpressionError, Formula, evaluate
 
 
 def is_true(guard: Formula, values: Mapping[str, Any]) -> bool:
-    """Whether a guard holds; one that asks for a name without a value does not."""
+    """Whether a guard holds; one that uses a name without a value does not."""
     if len(values) == len(guard.names):
         found = guard(values)
     else:
@@ -26,11 +26,11 @@ def is_true(guard: Formula, values: Mapping[str, Any]) -> bool:
 
 
 class _SilentError(Exception):
-    """A guard asks for an input that has no token."""
+    """A guard uses an input that has no token."""
 
 
 class _Silent(dict[str, Any]):
-    """Values, where asking for one of the ``silent`` names says so."""
+    """Values that raise ``_SilentError`` for ``silent`` names."""
 
     def __init__(self, values: Mapping[str, Any], silent: Collection[str]) -> None:
         super().__init__(values)

@@ -32,20 +32,20 @@ _PRESENT: Final = "_is_present"
 
 
 class Refinements(Protocol):
-    """The refinements of a machine's modes, as the engine has them."""
+    """The refinements of a machine's modes, as the engine provides them."""
 
     def begin(self, mode: str) -> None:
-        """The run begins, or begins anew, in a mode."""
+        """Start, or restart, in a mode."""
 
     def go(self, mode: str, *, history: bool) -> None:
-        """Leave the present mode's, and enter another's: where it was left, or anew."""
+        """Leave the refinement of the present mode and enter that of another: where it was left, or from its start."""
 
     def raise_failure(self) -> None:
-        """No transition takes the error of the present mode's."""
+        """Raise the error of the present refinement, which no transition handles."""
 
 
 class StateMachine(ModalActor):
-    """A state machine, with a transition a line and variables that may flow.
+    """A state machine with one transition per line, and variables that may flow.
 
     A thermostat with a room:
 
@@ -59,44 +59,45 @@ class StateMachine(ModalActor):
             - heating -> idle when temperature >= 22 do heater = false
             - idle -> heating when temperature <= 18 do heater = true
 
-    A transition is ``a, b -> c``, then ``else``, ``immediate``, ``nondeterministic``, ``priority 2`` or ``probability
-    0.1``, then ``on`` inputs of which one must have a token, ``after`` a time since the entry, ``when`` a guard, ``do``
-    actions; or a mapping with these keys.  Expressions are in the language of ``${...}``.  Names in them are variables,
-    ``time`` (s), ``mode_time`` (s since the mode was entered), or else input ports.  A guard that asks for an input
-    without a token does not hold; ``x_is_present`` says whether ``x`` has one, and inputs in ``held`` keep their
-    latest.  An action sets a variable, or sends from an output port of that name.  Tokens that come together at one
-    input are for one reaction each, at the next microsteps.
+    A transition is ``a, b -> c``, followed by ``else``, ``immediate``, ``nondeterministic``, ``priority 2`` or
+    ``probability 0.1``, then ``on`` inputs of which one must have a token, ``after`` a time since the entry, ``when`` a
+    guard, ``do`` actions; or a mapping with these keys.  Expressions are in the language of ``${...}``.  Names in them
+    are variables, ``time`` (s), ``mode_time`` (s since the mode was entered), or else input ports.  A guard that uses
+    an input without a token does not hold; ``x_is_present`` states whether ``x`` has one, and inputs in ``held`` keep
+    their latest.  An action sets a variable, or sends from an output port of that name.  If several tokens arrive
+    together at one input, each gets its own reaction, at the following microsteps.
 
-    In a mode with ``flow``, variables follow differential equations, as in an ``ODE``.  A comparison over them, or over
-    times, in a guard is an event at the nanosecond at which it changes; one whose transition has moved a variable off
-    its border holds again only after it has not held.  ``trigger`` asks for all variables: each has an output port.
+    In a mode with ``flow``, variables follow differential equations, as in an ``ODE``.  In a guard, a comparison over
+    them, or over times, is an event at the nanosecond at which it changes.  If its transition moves a variable off the
+    border, the comparison holds again only after it has not held.  ``trigger`` makes all variables be sent, each from
+    its own output port.
 
-    As in Ptolemy, with ``one_at_a_time``, the machine fires again at the same tag for tokens that are left, taking one
-    of each channel; it reacts again one microstep behind each transition, to be taken by ``else``; and immediate
-    transitions of its first mode come before all others.  With ``set_last``, guards and outputs go by what variables
-    were before the reaction.
+    With ``one_at_a_time``, as in Ptolemy, the machine fires again at the same tag for the remaining tokens, taking one
+    of each channel; it reacts again one microstep after each transition, which ``else`` can take; and immediate
+    transitions of its first mode come before all others.  With ``set_last``, guards and outputs use the values that
+    variables had before the reaction.
 
     Ptolemy: ``FSMActor``, ``ModalModel``.
     """
 
     is_source: ClassVar[bool] = True
-    refinements: Refinements | None = None  # of its modes, if it is the machine of a composite
-    handed: tuple[str, ...] = ()  # variables that are told to refinements whenever a mode is entered
+    refinements: Refinements | None = None  # of its modes, if it belongs to a composite
+    handed: tuple[str, ...] = ()  # variables that are sent to refinements whenever a mode is entered
 
-    trigger = InputPort(required=False, doc="asks for the variables")
+    trigger = InputPort(required=False, doc="makes all variables be sent")
 
-    modes = ModesParameter(object, doc="their names, or what is said of each: flow, entry, exit, final, doc")
-    transitions = TransitionsParameter(object, (), doc="one a line, or {from, to, on, after, when, do, ...}")
-    initial = Parameter(str, None, doc="the mode in which it begins; the first if left out")
-    variables = MappingParameter(Parameter(object), {}, doc="values that it keeps, at the start")
+    modes = ModesParameter(object, doc="their names, or a mapping of names to: flow, entry, exit, final, doc")
+    transitions = TransitionsParameter(object, (), doc="one per line, or {from, to, on, after, when, do, ...}")
+    initial = Parameter(str, None, doc="the mode in which it starts; the first if left out")
+    variables = MappingParameter(Parameter(object), {}, doc="values that it keeps, with their initial values")
     held = MappingParameter(
         Parameter(object, None), {}, doc="inputs that keep their latest token, with a value before the first, or null"
     )
     one_at_a_time = Parameter(
-        bool, False, ptolemy=True, doc="whether tokens that come together are for one firing each, at the same tag"
+        bool, False, ptolemy=True, doc="whether tokens that arrive together get one firing each, at the same tag"
     )
     set_last = Parameter(
-        bool, False, ptolemy=True, doc="whether variables are set when all transitions of a reaction have sent"
+        bool, False, ptolemy=True, doc="whether variables are set after all transitions of a reaction have sent"
     )
 
     method = Parameter(str, "DOP853", choices=tuple(STEPPERS), doc="the solver of flows; see ODE")
@@ -113,8 +114,10 @@ class StateMachine(ModalActor):
         ports: dict[str, InputPort[Any] | OutputPort[Any]] = {}
         for name in self.variables:
             if name in self._reserved:
-                raise ParameterError(f"variables: {name!r} has a meaning of its own", ("variables", name), of_key=True)
-            ports[name] = OutputPort(self._type(name), doc="a variable, when it is asked for")
+                raise ParameterError(
+                    f"variables: {name!r} is a reserved name; choose another", ("variables", name), of_key=True
+                )
+            ports[name] = OutputPort(self._type(name), doc="a variable, sent on request")
         named = [
             *(name for formula in read for name in formula.names),
             *(name for one in self.transitions for name in one.on),
@@ -125,7 +128,7 @@ class StateMachine(ModalActor):
                 ports[name] = InputPort(required=False, multi=True, doc="a name in guards or actions")
         for name, _ in actions:
             if name in self._reserved or isinstance(ports.get(name), InputPort):
-                what = "an input, for it is read" if name in ports else "a time"
+                what = "an input because it is read" if name in ports else "a time"
                 raise ParameterError(
                     f"{name} = ...: {name!r} is {what}; declare it as a variable to set it, or rename it"
                 )
@@ -135,7 +138,7 @@ class StateMachine(ModalActor):
         return ports
 
     def _type(self, name: str) -> Any:
-        """What a name stands for, as far as that is known."""
+        """The type of a name's value, as far as it is known."""
         if name in TIMES:
             return float
         kind = type(self.variables.get(name))
@@ -143,7 +146,7 @@ class StateMachine(ModalActor):
 
     @property
     def catches(self) -> bool:
-        """Whether it has transitions for errors."""
+        """Whether it has error transitions."""
         return any(one.error for one in self.transitions)
 
     @property
@@ -203,12 +206,12 @@ class StateMachine(ModalActor):
             max_step=self.max_step,
         )
         self._has_changed = False  # whether a comparison changes now
-        self._unset: list[Action] = []  # that set variables, when all transitions of the reaction have been taken
+        self._unset: list[Action] = []  # that will set variables after all transitions of the reaction
         self._prepared: Tag | None = None
         self._wake: Wake | None = None
 
     def preempt(self) -> bool:
-        """Look at preemptive transitions, before the refinement of the mode fires; whether one was taken."""
+        """Check preemptive transitions before the refinement of the mode fires; return whether one was taken."""
         self._prepare()
         if self._is_to_react:
             self.react(self._chart.phases[:1])
@@ -223,7 +226,7 @@ class StateMachine(ModalActor):
 
     @property
     def _is_to_react(self) -> bool:
-        """Whether there is a reason to: a token, a comparison that changes, a delay that is over, its refinement."""
+        """Whether there is a reason to react: a token, a changing comparison, an expired delay, or its refinement."""
         is_told = bool(self._tokens) or self.is_asked or self.error is not None
         return is_told or self._has_changed or self.is_called
 
@@ -252,14 +255,14 @@ class StateMachine(ModalActor):
 
     @property
     def next_time(self) -> int | None:
-        """When (ns) it is to fire next of its own accord."""
+        """When (ns) it must fire next without a token."""
         wakes = (self._wake, self._again, *self._timers.values())
         return min((wake.time for wake in wakes if wake is not None and not self.is_due(wake)), default=None)
 
     def _take_tokens(self) -> None:
-        """The first token that waits at each input; with ``one_at_a_time``, of each of its channels."""
+        """Take the first waiting token of each input; with ``one_at_a_time``, of each of its channels."""
         for name in self._inputs:
-            if name in self._tokens:  # before the refinement fired
+            if name in self._tokens:  # taken before the refinement fired
                 continue
             port, queue = self.inputs[name], self._queues[name]
             if port.keep:
@@ -319,7 +322,7 @@ class StateMachine(ModalActor):
 
     def _result(self, name: str, formula: Formula) -> Any:
         if formula.source in self._tokens and name not in self.variables:
-            return self._tokens[formula.source]  # as it came
+            return self._tokens[formula.source]  # unchanged
         return formula(self._values(formula))
 
     def begins(self) -> None:
@@ -333,7 +336,7 @@ class StateMachine(ModalActor):
         self._set()
 
     def _set(self) -> None:
-        """Set the variables that wait for it."""
+        """Set the variables whose actions were deferred."""
         if self._unset:
             for name, formula in self._unset:
                 self._known[name] = self._result(name, formula)
@@ -348,7 +351,7 @@ class StateMachine(ModalActor):
     def probability_of(self, rule: Rule) -> float:
         found = number_of(rule.probability, self._values(rule.probability), f"{rule} probability")
         if not 0.0 <= found <= 1.0:
-            raise EpicycleError(f"{rule}: {found:g} is no probability, which is from 0 to 1")
+            raise EpicycleError(f"{rule}: {found:g} is not a probability, which is from 0 to 1")
         return found
 
     def delay_of(self, rule: Rule) -> float:
@@ -361,7 +364,7 @@ class StateMachine(ModalActor):
         try:
             return is_true(condition, self._values(condition))
         except EpicycleError:
-            return is_true(rule.guard, self._values(rule.guard))  # which tells what is wrong in the words of the model
+            return is_true(rule.guard, self._values(rule.guard))  # which reports the error in the model's terms
 
     def holds_alone(self, rule: Rule) -> bool:
         tokens, self._tokens = self._tokens, {}
@@ -371,7 +374,7 @@ class StateMachine(ModalActor):
             self._tokens = tokens
 
     def _values(self, formula: Formula) -> dict[str, Any]:
-        """What the names of an expression stand for now; those of inputs without a token are left out."""
+        """The present values of the names in an expression, without inputs that have no token."""
         found = {name: self._value(name) for name in formula.names}
         return {name: value for name, value in found.items() if value is not ABSENT}
 

@@ -1,22 +1,23 @@
-"""Modal actors: what modes and transitions mean, whoever writes them.
+"""Modal actors: the meaning of modes and transitions, in models and in Python.
 
 The meaning
 -----------
 A machine is in one mode.  It reacts once per tag at which it fires:
 
-1. Of the transitions that leave the mode, those are *enabled* whose delay is over, one of whose trigger ports has a
-   token, and whose guard holds.  An ``otherwise`` transition is enabled if no other one is.
-   Of those with a ``probability`` one is drawn: each is enabled in a share of its own, one behind the other.
-2. Of the enabled ones, those of the lowest ``priority`` count.  If they are several, each must be nondeterministic, and
-   one is drawn; else the run ends with an error.
+1. A transition that leaves the mode is *enabled* if its delay is over, one of its trigger ports has a token, and its
+   guard holds.  An ``otherwise`` transition is enabled if no other one is.  Of the transitions with a ``probability``,
+   one is drawn: their probabilities divide the range from 0 to 1, one after the other.
+2. Of the enabled transitions, only those with the lowest ``priority`` count.  If there are several, all must be
+   nondeterministic, and one is drawn; otherwise, the run ends with an error.
 3. The transition is taken: the exit actions of the mode, its own actions, the entry actions of its target.
-4. From the target, ``immediate`` transitions alone may be taken in the same reaction, as long as one is enabled.
+4. From the target, only ``immediate`` transitions may be taken in the same reaction, as long as one is enabled.
 
-``preemptive`` transitions go before all others.  Where modes have refinements, they are looked at before the refinement
-fires, which then does not, and all others after it has fired.  If it fails, ``error`` transitions alone are looked at.
+``preemptive`` transitions come before all others.  If a mode has a refinement, they are checked before it fires; if one
+is taken, it does not fire.  All other transitions are checked after it has fired.  If it fails, only ``error``
+transitions are checked.
 
-When it has come to a mode of which a transition is enabled without any token, it reacts again one microstep later.  A
-delay counts from the entry, also when a mode is entered again from itself.  In a final mode nothing happens any more.
+After entering a mode with a transition that is enabled without any token, the machine reacts again one microstep later.
+A delay counts from the entry, even if a mode is entered again from itself.  In a final mode, nothing further happens.
 
 Source: E. A. Lee and S. Tripakis, "Modal Models in Ptolemy" (2010); Ptolemy: ``FSMActor``.
 """
@@ -41,7 +42,8 @@ M = TypeVar("M", bound=Method)
 class Rule:
     """One transition.
 
-    ``guard``, ``delay``, ``probability`` and ``act`` are whatever the modal actor makes use of; None for none.
+    ``guard``, ``delay``, ``probability`` and ``act`` are in the form that the modal actor uses; None means that there
+    is none.
     """
 
     sources: tuple[str, ...]
@@ -58,7 +60,7 @@ class Rule:
     preemptive: bool = False
     history: bool = False
     error: bool = False
-    place: int = 0  # among the transitions, for messages
+    place: int = 0  # index among the transitions, for messages
 
     def __str__(self) -> str:
         return f"{', '.join(self.sources)} -> {self.target}"
@@ -71,7 +73,7 @@ class Chart:
         self, modes: Sequence[str], initial: str | None, final: Collection[str], rules: Sequence[Rule]
     ) -> None:
         if not modes:
-            raise ParameterError("modes: there is none")
+            raise ParameterError("modes: expected at least one")
         self.modes = tuple(modes)
         self.initial = self._known("initial", modes[0] if initial is None else initial, "initial")
         self.final = frozenset(self._known("final", mode, "final") for mode in final)
@@ -100,7 +102,9 @@ class Chart:
             return [mode for mode in self.modes if mode != rule.target and mode not in self.final]
         for mode in rule.sources:
             if self._known(str(rule), mode, "transitions", rule.place) in self.final:
-                raise ParameterError(f"{rule}: {mode!r} is final, so nothing leaves it", ("transitions", rule.place))
+                raise ParameterError(
+                    f"{rule}: {mode!r} is final; no transition can leave it", ("transitions", rule.place)
+                )
         return list(rule.sources)
 
     def _check_reach(self) -> None:
@@ -111,15 +115,15 @@ class Chart:
                     reached.add(rule.target)
                     waiting.append(rule.target)
         if lost := [mode for mode in self.modes if mode not in reached]:
-            message = f"{lost[0]!r} is never entered: no way leads there from {self.initial!r}"
+            message = f"{lost[0]!r} is never entered: no transitions lead there from {self.initial!r}"
             raise ParameterError(message, ("modes", lost[0]), of_key=True)
 
     @staticmethod
     def _check_clear(mode: str, leaving: Sequence[Rule]) -> None:
-        """Refuse transitions that are certain to be enabled together, and of which none is to be preferred."""
+        """Reject transitions that are certain to be enabled together with no preference between them."""
         seen: dict[object, Rule] = {}
         for rule in leaving:
-            if rule.probability is not None:  # they share what is drawn
+            if rule.probability is not None:  # at most one of them is drawn
                 continue
             same = (
                 rule.priority, rule.otherwise, rule.on, rule.guard, rule.delay, rule.preemptive, rule.error
@@ -127,14 +131,14 @@ class Chart:
             first = seen.setdefault(same, rule)
             if first is not rule and not (first.nondeterministic and rule.nondeterministic):
                 raise ParameterError(
-                    f"in {mode!r}, both {first} and {rule} are enabled whenever one is: give one a priority "
-                    "(the lower one goes first), or make both nondeterministic",
+                    f"in {mode!r}, {first} and {rule} are always enabled together: give one a priority (the lower one "
+                    "goes first), or make both nondeterministic",
                     ("transitions", rule.place),
                 )
 
 
 class ModalActor(Actor):
-    """Base of actors with modes, whose transitions are methods:
+    """Base class of actors with modes whose transitions are methods:
 
     >>> class Door(ModalActor):
     ...     button = InputPort()
@@ -149,8 +153,8 @@ class ModalActor(Actor):
     ...     def closes(self) -> None:
     ...         self.lamp.send("red")
 
-    ``modes`` are their names, the first the initial one unless ``initial`` says another; ``final`` are those in which
-    it is done.  What a reaction is stands at the top of this file.
+    ``modes`` are their names; the first is the initial mode unless ``initial`` names another; ``final`` are those in
+    which the actor is done.  The top of this file defines a reaction.
     """
 
     copies_share = ("_chart",)
@@ -159,7 +163,7 @@ class ModalActor(Actor):
     initial: Any = None
     final: Any = ()
 
-    mode = OutputPort(str, doc="the mode, whenever one is entered")
+    mode = OutputPort(str, doc="the mode, sent whenever one is entered")
 
     def check(self) -> None:
         methods = _methods(type(self)).items()
@@ -172,7 +176,7 @@ class ModalActor(Actor):
                     near = did_you_mean(name, self.inputs)
                     raise ParameterError(f"{rule}: there is no input {name!r}{near}; inputs: {valid}")
 
-    # -- what a transition comes to -------------------------------------------------------------------------------
+    # -- parts of a transition ------------------------------------------------------------------------------------
 
     def is_present(self, port: str) -> bool:
         """Whether an input has a token in this reaction."""
@@ -188,7 +192,7 @@ class ModalActor(Actor):
         return float(delay)
 
     def probability_of(self, rule: Rule) -> float:
-        """How likely a transition is that is enabled otherwise."""
+        """The probability of a transition that would otherwise be enabled."""
         return float(rule.probability(self) if callable(rule.probability) else rule.probability)
 
     def act(self, rule: Rule) -> None:
@@ -196,7 +200,7 @@ class ModalActor(Actor):
         getattr(self, rule.act)()
 
     def moves(self, rule: Rule) -> None:
-        """What changes with the mode."""
+        """Apply what changes along with the mode."""
 
     def enters(self, mode: str) -> None:
         """The entry actions of a mode."""
@@ -207,10 +211,10 @@ class ModalActor(Actor):
         self._call("_exit_of", mode)
 
     def commits(self) -> None:
-        """What is done when all transitions of a reaction have been taken."""
+        """Finish a reaction after all its transitions."""
 
     def goes_on(self) -> bool:
-        """Whether it is to react again at the next microstep, though no token comes."""
+        """Whether it must react again at the next microstep without a token."""
         return any(self.holds_alone(each) for each in self._chart.leaving[self._current])
 
     def _call(self, mark: str, mode: str) -> None:
@@ -222,20 +226,20 @@ class ModalActor(Actor):
 
     @property
     def current(self) -> str:
-        """The mode that it is in."""
+        """The current mode."""
         return self._current
 
     def initialize(self) -> None:
         self._current = self._chart.initial
         self._is_begun = False
-        self._is_new = False  # whether it has come to a mode in this firing
-        self._reacted: Tag | None = None  # when it has taken a transition
-        self._timers: dict[Rule, Wake | None] = {}  # of delays; None when one is over
-        self._again: Wake | None = self.wake_in(0)  # a firing that is for a reaction
-        self._drawn: dict[Rule, bool] = {}  # in this firing, of those that have a probability
-        self._number: float | None = None  # by which they are, and how much of it is used up
+        self._is_new = False  # whether it has entered a mode in this firing
+        self._reacted: Tag | None = None  # tag of the latest transition
+        self._timers: dict[Rule, Wake | None] = {}  # of delays; None after the end
+        self._again: Wake | None = self.wake_in(0)  # wake-up for another reaction
+        self._drawn: dict[Rule, bool] = {}  # in this firing, by transition with a probability
+        self._number: float | None = None  # the random number for them, and the range used up
         self._used = 0.0
-        self.error: str | None = None  # with which the refinement of the mode has failed
+        self.error: str | None = None  # of the failed refinement of the mode
 
     def is_due(self, wake: Wake | None) -> bool:
         """Whether a wake-up is for this firing, or for an earlier one at this tag."""
@@ -243,7 +247,7 @@ class ModalActor(Actor):
 
     @property
     def is_called(self) -> bool:
-        """Whether a delay ends now, or a reaction has asked for another."""
+        """Whether a delay ends now, or a reaction has requested another."""
         return any(map(self.is_due, (self._again, *self._timers.values())))
 
     def fire(self) -> None:
@@ -251,7 +255,7 @@ class ModalActor(Actor):
         self.finish()
 
     def react(self, phases: Sequence[Mapping[str, Sequence[Rule]]]) -> None:
-        """One reaction, unless there was one at this tag; of the phases the first in which a transition is enabled."""
+        """React, once per tag, with the first phase in which a transition is enabled."""
         chart = self._chart
         if not self._is_begun:
             self._is_begun = True
@@ -265,11 +269,11 @@ class ModalActor(Actor):
         self.follow(rule)
 
     def begins(self) -> None:
-        """What is done when its first mode has been entered."""
+        """Called when the first mode has been entered."""
         self._begin_delays()
 
     def follow(self, rule: Rule | None) -> None:
-        """Take a transition, if there is one, and immediate ones behind it."""
+        """Take a transition, if there is one, and immediate ones after it."""
         taken = list[Rule]()
         while rule is not None:
             taken.append(rule)
@@ -284,7 +288,7 @@ class ModalActor(Actor):
             self._begin_delays()
 
     def finish(self) -> None:
-        """Tell the mode that it has come to, and react again if it can go on from there without any token."""
+        """Send the new mode, and request another reaction if it can continue from there without a token."""
         self._timers = {rule: None if self.is_due(wake) else wake for rule, wake in self._timers.items()}
         if self.is_due(self._again):
             self._again = None
@@ -313,7 +317,7 @@ class ModalActor(Actor):
         return self._is_open(rule) and is_asked and self.holds(rule) and self._is_drawn(rule)
 
     def _is_drawn(self, rule: Rule) -> bool:
-        """Whether what is drawn in this firing is in the share of a transition, if it has one."""
+        """Whether the number drawn in this firing selects a transition; always true without a probability."""
         if rule.probability is None:
             return True
         if rule not in self._drawn:
@@ -384,12 +388,12 @@ def transition(
     preemptive: bool = False,
     probability: float | Callable[[Any], float] | None = None,
 ) -> Callable[[M], M]:
-    """A method of a ``ModalActor`` that is what a transition does.
+    """Declare a method of a ``ModalActor`` as the actions of a transition.
 
-    ``source`` is a mode, several, or ``"*"`` for all but the target; ``on`` are inputs of which one must have a token;
-    ``when`` is given the actor and says whether the transition can be taken; ``after`` is the time since the entry: s,
-    a text with a unit, or a function of the actor.  ``probability`` is a number, or a function of the actor.  A method
-    may be several transitions.
+    ``source`` is a mode, several, or ``"*"`` for all but the target; ``on`` lists inputs of which one must have a
+    token; ``when`` is a function of the actor that returns whether the transition can be taken; ``after`` is the time
+    since the entry: s, a text with a unit, or a function of the actor.  ``probability`` is a number, or a function of
+    the actor.  A method may serve several transitions.
     """
     delay = Parameter(float, unit="s", min=0).convert(after) if isinstance(after, (str, int, float)) else after
     rule = Rule(
@@ -398,19 +402,19 @@ def transition(
     )  # fmt: skip
 
     def mark(method: M) -> M:
-        vars(method).setdefault("_transitions", []).insert(0, rule)  # decorators apply from below
+        vars(method).setdefault("_transitions", []).insert(0, rule)  # decorators apply from the bottom up
         return method
 
     return mark
 
 
 def on_entry(*modes: str) -> Callable[[M], M]:
-    """A method of a ``ModalActor`` that is called whenever one of these modes is entered."""
+    """Declare a method of a ``ModalActor`` to be called whenever one of these modes is entered."""
     return _marked("_entry_of", modes)
 
 
 def on_exit(*modes: str) -> Callable[[M], M]:
-    """A method of a ``ModalActor`` that is called whenever one of these modes is left."""
+    """Declare a method of a ``ModalActor`` to be called whenever one of these modes is left."""
     return _marked("_exit_of", modes)
 
 
@@ -423,7 +427,7 @@ def _marked(mark: str, modes: tuple[str, ...]) -> Callable[[M], M]:
 
 
 def _methods(cls: type) -> dict[str, Any]:
-    """What a class has by name, its bases' first."""
+    """The attributes of a class by name, those of its bases first."""
     names = dict.fromkeys(name for base in reversed(cls.__mro__) for name in vars(base))
     return {name: getattr(cls, name) for name in names if callable(getattr(cls, name, None))}
 

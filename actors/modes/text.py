@@ -1,4 +1,4 @@
-"""What modes, transitions and actions are as values: texts of one line, or mappings."""
+"""Reads modes, transitions and actions from one-line texts or mappings."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ Action = tuple[str, Formula]
 
 
 class _DelayParameter(FormulaParameter):
-    """A time, or an expression for one in s."""
+    """A time, or an expression for a time in s."""
 
     def describe_type(self) -> str:
         return "time or expression"
@@ -77,45 +77,47 @@ class _ActionsParameter(Parameter[Any]):
 
 
 class Mode(Configurable):
-    """What is said of a mode."""
+    """The declaration of a mode."""
 
     refused: ClassVar[Mapping[str, str]] = {
         "refinement": "a mode of an actor has no refinement: write modes into a composite, beside its 'inputs'"
     }
 
-    flow = MappingParameter(FormulaParameter(), {}, doc="how fast variables change in it, per s; others stand still")
-    entry = _ActionsParameter("what is done whenever it is entered")
-    exit = _ActionsParameter("what is done whenever it is left")
-    final = Parameter(bool, False, doc="whether the machine is done when it is entered")
-    doc = Parameter(str, "", doc="what it is")
+    flow = MappingParameter(
+        FormulaParameter(), {}, doc="rates of change of variables in it, per s; others stay constant"
+    )
+    entry = _ActionsParameter("actions taken whenever it is entered")
+    exit = _ActionsParameter("actions taken whenever it is left")
+    final = Parameter(bool, False, doc="whether the machine ends when it is entered")
+    doc = Parameter(str, "", doc="its purpose")
 
 
 class Transition(Configurable):
-    """What is said of a transition."""
+    """The declaration of a transition."""
 
     reserved: ClassVar[frozenset[str]] = frozenset()
 
     from_ = texts_parameter(doc="the modes that it leaves; * for all but its target")
     to = Parameter(str, doc="the mode that it enters")
     on = texts_parameter((), doc="inputs of which one must have a token")
-    after = _DelayParameter(None, doc="how long after the entry it may be taken, in s")
+    after = _DelayParameter(None, doc="time after the entry from which it may be taken, in s")
     when = FormulaParameter(None, doc="the guard")
-    probability = FormulaParameter(None, doc="how likely it is to be enabled, where it would be without this")
-    do = _ActionsParameter("what is done when it is taken: outputs are sent, variables are set, one after the other")
-    priority = Parameter(int, 0, doc="of several that are enabled, the lower one is taken")
+    probability = FormulaParameter(None, doc="probability that it is enabled when it would otherwise be")
+    do = _ActionsParameter("actions when it is taken: sends outputs and sets variables, one after the other")
+    priority = Parameter(int, 0, doc="if several are enabled, the lowest is taken")
     else_ = Parameter(bool, False, doc="whether it is enabled only if no other is")
     immediate = Parameter(bool, False, doc="whether it can be taken in the reaction in which its mode is entered")
     nondeterministic = Parameter(bool, False, doc="whether one is drawn if several such are enabled")
-    preemptive = Parameter(bool, False, doc="whether it goes before others, and before its mode's refinement fires")
-    history = Parameter(bool, False, doc="whether the refinement of its target goes on where it was left")
-    error = Parameter(bool, False, doc="whether it is for errors of its mode's refinement; 'error' says which")
+    preemptive = Parameter(bool, False, doc="whether it comes before others, and before its mode's refinement fires")
+    history = Parameter(bool, False, doc="whether the refinement of its target resumes where it was left")
+    error = Parameter(bool, False, doc="whether it handles errors of its mode's refinement; 'error' holds the message")
 
 
 class ModesParameter(Parameter[Any]):
-    """Names of modes, or a mapping of names to what is said of them."""
+    """Names of modes, or a mapping of names to their declarations."""
 
     def describe_type(self) -> str:
-        return "list of names, or mapping of names to what is said of a mode"
+        return "list of names, or mapping of names to declarations of modes"
 
     def convert(self, value: object) -> dict[str, Mode]:
         if isinstance(value, (list, tuple)) and all(isinstance(each, str) for each in value):
@@ -165,7 +167,7 @@ def _made(kind: type[Any], said: object, what: str) -> Any:
 
 
 def read_transition(text: str) -> dict[str, object]:
-    """What a transition of one line says; raises ``ParameterError`` if it is none."""
+    """Read a one-line transition; raises ``ParameterError`` if it is not one."""
     arrow = _ARROW.fullmatch(text)
     if arrow is None:
         raise ParameterError(f"{text!r} is not a transition: write {_FORM}")
@@ -184,18 +186,18 @@ def read_transition(text: str) -> dict[str, object]:
     actions = next((number for number, clause in enumerate(clauses) if clause[0] == "do"), len(clauses))
     clauses = clauses[: actions + 1]
     if masked[: clauses[0].start() if clauses else None].strip():
-        raise ParameterError(f"{text!r}: {rest.split()[0]!r} is not understood: write {_FORM}")
+        raise ParameterError(f"{text!r}: unexpected {rest.split()[0]!r}: write {_FORM}")
     for number, clause in enumerate(clauses):
         end = clauses[number + 1].start() if number + 1 < len(clauses) else len(rest)
         value = rest[clause.end() : end].strip()
         if clause[0] in said:
-            raise ParameterError(f"{text!r}: {clause[0]!r} is said twice")
+            raise ParameterError(f"{text!r}: {clause[0]!r} is given twice")
         said[clause[0]] = [each.strip() for each in value.split(",")] if clause[0] == "on" else value
     return said
 
 
 def _masked(text: str) -> str:
-    """The text with all that is quoted or in brackets blanked out."""
+    """The text with everything in quotes or brackets blanked out."""
     text = _QUOTED.sub(lambda match: "_" * len(match[0]), text)
     depth, found = 0, []
     for character in text:

@@ -1,4 +1,4 @@
-"""Resources and those that wait for them: pools, waiting lines, stations."""
+"""Resources and tokens that wait for them: pools, waiting lines, stations."""
 
 from .line import WaitingLine
 from .pool import Pool

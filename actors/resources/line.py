@@ -11,29 +11,29 @@ from .waiting import WaitingActor, check_channels
 
 
 class WaitingLine(WaitingActor):
-    """A queue in any order from which each trigger takes a token: on the channel of the output that it came by.
+    """A queue in any order from which each trigger takes a token, sent on the same channel of the output.
 
-    ``order: due`` lets the earliest due date go first, ``order: work`` the shortest job, ``order: -value`` the highest
-    value, ``order: channel`` what comes in by the first connection; ``discipline`` decides among equals.  A token that
-    has to wait may turn away (``balking``), find no ``room``, or lose its ``patience``.  At one tag those that renege
-    go first, then tokens come in, then triggers let them out; outputs leave at the next microstep, so the actor may
-    stand in a loop.  With ``credits: 2``, before a ``Server`` of 2 servers whose output triggers it, it is a queue of
-    type G/G/2 with that discipline.  ``Queue`` is the plain one.  Sources: Gross and others, Fundamentals of Queueing
-    Theory; SimPy's ``Store`` and ``PriorityStore``.
+    ``order: due`` serves the earliest due date first, ``order: work`` the shortest job, ``order: -value`` the highest
+    value, ``order: channel`` the tokens of the first connection; ``discipline`` decides among equals.  A token that has
+    to wait may turn away (``balking``), find no ``room``, or lose its ``patience``.  At one tag, tokens renege first,
+    then tokens come in, then triggers release them; outputs are sent at the next microstep, so the actor may be part of
+    a loop.  With ``credits: 2``, before a ``Server`` of 2 servers whose output triggers it, it is a G/G/2 queue with
+    that discipline.  ``Queue`` is the simple version.  Sources: Gross and others, Fundamentals of Queueing Theory;
+    SimPy's ``Store`` and ``PriorityStore``.
     """
 
     entrance: ClassVar[str] = "input"
 
-    input = InputPort(multi=True, doc="what comes in")
-    trigger = InputPort(multi=True, required=False, doc="lets the next token go")
-    output = OutputPort(multi=True, depends_on=(), doc="the tokens, each on the channel of its trigger")
-    rejected = OutputPort(depends_on=(), doc="the tokens that found no room")
-    balked = OutputPort(depends_on=(), doc="the tokens that did not care to wait")
-    reneged = OutputPort(depends_on=(), doc="the tokens that lost their patience")
-    waiting = OutputPort(int, depends_on=(), doc="how many wait, whenever that changes")
+    input = InputPort(multi=True, doc="tokens that wait")
+    trigger = InputPort(multi=True, required=False, doc="releases the next token")
+    output = OutputPort(multi=True, depends_on=(), doc="tokens, each on the channel of its trigger")
+    rejected = OutputPort(depends_on=(), doc="tokens that found no room")
+    balked = OutputPort(depends_on=(), doc="tokens that did not join the line")
+    reneged = OutputPort(depends_on=(), doc="tokens that lost their patience")
+    waiting = OutputPort(int, depends_on=(), doc="number of waiting tokens, whenever it changes")
 
-    size = FormulaParameter("1", doc="how much room a token takes; of its fields, token, time, channel")
-    credits = Parameter(int, 0, min=0, doc="how many tokens each channel lets go before its first trigger")
+    size = FormulaParameter("1", doc="room that a token takes: an expression over its fields, token, time, channel")
+    credits = Parameter(int, 0, min=0, doc="number of tokens released on each channel before its first trigger")
     persistent_trigger = Parameter(bool, True, doc="whether a trigger that finds no token waits for the next one")
 
     def initialize(self) -> None:
@@ -59,7 +59,7 @@ class WaitingLine(WaitingActor):
     def _size(self, token: Any, channel: int) -> float:
         size = number_of_token(self.size, "a size", token, time=self.now, channel=channel)
         if size < 0:
-            raise EpicycleError(f"{self.size} gives {size:g}, but a size is >= 0")
+            raise EpicycleError(f"{self.size} gives {size:g}, but a size must be >= 0")
         return size
 
     def _serve(self) -> None:

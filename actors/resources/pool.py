@@ -10,8 +10,9 @@ from .waiting import Waiter, WaitingActor, check_channels
 
 
 class Pool(WaitingActor):
-    """Units of a resource: a token at ``acquire`` asks for some, comes back by ``granted`` when it has them, and one at
-    ``release`` returns them.  Each connection is a requester, who asks, is answered and releases on the same channel.
+    """Units of a resource: a token at ``acquire`` requests some and comes back from ``granted`` when it has them; a
+    token at ``release`` returns them.  Each connection is a requester, which requests, is answered and releases on the
+    same channel.
 
         connections:
           - robot[*].empty -> chargers.acquire
@@ -20,37 +21,40 @@ class Pool(WaitingActor):
 
     Or tokens pass through: ``jobs.output -> crew.acquire``, ``crew.granted -> work.input`` (a ``Server`` with
     ``servers: null``), ``work.output -> crew.release``.  A release returns what the oldest request of its channel
-    holds, or the one with an equal ``key``; with one connection at ``release``, of all channels.  If it holds nothing
-    yet, the request is withdrawn.
+    holds, or the one with an equal ``key``; with a single connection at ``release``, of any channel.  Releasing a
+    request that holds nothing yet withdraws it.
 
-    Requests wait in the order of ``order`` (the least goes first), then of ``discipline``; nobody overtakes the first,
-    whose ``amount`` may be large.  With ``preemptive``, a request takes units from those whose ``order`` is greater,
-    the greatest and latest first: their tokens leave by ``preempted``, they wait again at their old place, and are
-    granted again.  So do those who hold more than there is, when ``capacity`` falls; else they keep it until they are
-    done. Shifts are a ``Clock`` at ``capacity``: ``{period: 24 h, offsets: [8 h, 16 h], values: [3, 1]}``.
+    Requests wait in the order of ``order`` (lowest first), then of ``discipline``; none overtakes the first, even if
+    its ``amount`` is large.  With ``preemptive``, a request takes units from requests with a higher ``order``, the
+    highest and latest first: their tokens leave from ``preempted``, wait again at their old place, and are granted
+    again.  The same happens when ``capacity`` falls below what is held; without ``preemptive``, units are kept until
+    they are released.  For shifts, connect a ``Clock`` to ``capacity``: ``{period: 24 h, offsets: [8 h, 16 h], values:
+    [3, 1]}``.
 
-    At one tag those that renege go first, then comes the capacity, then releases, then requests; outputs leave at the
-    next microstep, so the actor may stand in a loop.  Sources: SimPy's ``PreemptiveResource``; Pegden and others,
+    At one tag, requests renege first; then come the capacity, releases, and requests.  Outputs are sent at the next
+    microstep, so the actor may be part of a loop.  Sources: SimPy's ``PreemptiveResource``; Pegden and others,
     Introduction to Simulation Using SIMAN (seize and release); Ptolemy: ``ResourcePool``.
     """
 
     entrance: ClassVar[str] = "acquire"
 
-    acquire = InputPort(multi=True, doc="asks for units")
-    release = InputPort(multi=True, doc="returns them, or withdraws the request")
-    granted = OutputPort(multi=True, depends_on=(), doc="each request when it has its units")
-    preempted = OutputPort(multi=True, depends_on=(), doc="each request that lost them and waits again")
-    rejected = OutputPort(multi=True, depends_on=(), doc="the requests that found no room")
-    balked = OutputPort(multi=True, depends_on=(), doc="the requests that did not care to wait")
-    reneged = OutputPort(multi=True, depends_on=(), doc="the requests that lost their patience")
-    in_use = OutputPort(int, depends_on=(), doc="how many units are held, whenever that changes")
-    waiting = OutputPort(int, depends_on=(), doc="how many requests wait, whenever that changes")
+    acquire = InputPort(multi=True, doc="requests units")
+    release = InputPort(multi=True, doc="returns units, or withdraws a request")
+    granted = OutputPort(multi=True, depends_on=(), doc="each request when it gets its units")
+    preempted = OutputPort(multi=True, depends_on=(), doc="each request that lost its units and waits again")
+    rejected = OutputPort(multi=True, depends_on=(), doc="requests that found no room")
+    balked = OutputPort(multi=True, depends_on=(), doc="requests that did not join the line")
+    reneged = OutputPort(multi=True, depends_on=(), doc="requests that lost their patience")
+    in_use = OutputPort(int, depends_on=(), doc="number of units held, whenever it changes")
+    waiting = OutputPort(int, depends_on=(), doc="number of waiting requests, whenever it changes")
 
-    capacity = PortParameter(int, 1, min=0, doc="how many units there are")
-    amount = FormulaParameter("1", doc="how many units a request asks for; of its fields, token, time, channel")
-    preemptive = Parameter(bool, False, doc="whether units are taken back for requests that go first")
+    capacity = PortParameter(int, 1, min=0, doc="number of units")
+    amount = FormulaParameter(
+        "1", doc="number of units requested: an expression over the token's fields, token, time, channel"
+    )
+    preemptive = Parameter(bool, False, doc="whether requests with a lower 'order' take units from others")
     key: Parameter[Any] = FormulaParameter(
-        None, doc="what a release and its request have in common; of their fields, and token"
+        None, doc="a release and its request have this value in common: an expression over their fields, and token"
     )
 
     def initialize(self) -> None:
@@ -60,7 +64,8 @@ class Pool(WaitingActor):
         if self.release.width not in (1, self.acquire.width):
             raise PortError(
                 f"{self.acquire.path} has {counted(self.acquire.width, 'channel')} and {self.release.path} has "
-                f"{self.release.width}; it must have 1 or as many, for who has asked on a channel releases on it"
+                f"{self.release.width}; give it 1 channel, or as many, because units are released on the channel of "
+                "their request"
             )
         self._held: list[Waiter] = []  # in the order in which they were granted
         self._in_use = 0
@@ -68,7 +73,7 @@ class Pool(WaitingActor):
 
     def restart(self) -> None:
         super().restart()
-        self._has_begun_anew = True  # and may get back what it does not know
+        self._has_begun_anew = True  # and may return what it does not know
 
     def fire(self) -> None:
         self._send()
@@ -88,10 +93,10 @@ class Pool(WaitingActor):
     def _request(self, token: Any, channel: int) -> Waiter:
         amount = number_of_token(self.amount, "an amount", token, time=self.now, channel=channel)
         if amount != int(amount) or amount < 1:
-            raise EpicycleError(f"{self.amount} gives {amount:g}, but an amount is a whole number of units, 1 or more")
+            raise EpicycleError(f"{self.amount} gives {amount:g}, but an amount must be a whole number >= 1")
         if amount > self.capacity and not self.inputs["capacity"].width:
             have = counted(self.capacity, "unit")
-            raise EpicycleError(f"{brief(token)} asks for {amount:g} of {have}: it would wait for ever")
+            raise EpicycleError(f"{brief(token)} requests {amount:g} of {have} and would wait for ever")
         waiter = self._waiter(token, channel, 1.0)
         waiter.amount = int(amount)
         return waiter
@@ -115,11 +120,11 @@ class Pool(WaitingActor):
         elif not self._has_begun_anew:
             what = "" if self.key is None else f" with the key {wanted!r}"
             raise EpicycleError(
-                f"{self.release.path} got {brief(token)} on channel {channel}, from which there is no request{what}"
+                f"{self.release.path} got {brief(token)} on channel {channel}, which has no request{what}"
             )
 
     def _serve(self) -> None:
-        """Grant as far as there are units."""
+        """Grant requests while there are units."""
         if self.preemptive:
             self._take_back(self._last_of(self._held, self._in_use - self.capacity)[0])
         while len(self._waiting):
@@ -137,7 +142,7 @@ class Pool(WaitingActor):
             self._tell_of("granted", first)
 
     def _last_of(self, holders: list[Waiter], amount: int) -> tuple[list[Waiter], int]:
-        """Those who would go last and hold so many units in all, and how many are missing even so."""
+        """The last requests that together hold a number of units, and how many are still missing."""
         found: list[Waiter] = []
         for each in sorted(holders, key=lambda each: each.key, reverse=True):
             if amount <= 0:

@@ -13,19 +13,19 @@ from ..distributions import Distribution
 
 
 class Station(Process):
-    """A station with ``places``, at which tokens are served one to a place; those that are urgent go first.
+    """A station with ``places``, each of which serves one token at a time; urgent tokens go first.
 
-    A ``simpy.PriorityResource``: whoever has begun is not interrupted.  The time of a service is drawn when it begins.
-    ``Server`` does the same without priorities and without SimPy.
+    A ``simpy.PriorityResource``: a service that has begun is not interrupted.  The time of a service is drawn when it
+    begins.  ``Server`` does the same without priorities and without SimPy.
     """
 
-    input = InputPort(required=False, doc="what is to be served")
-    urgent = InputPort(required=False, doc="what is to be served before those that wait at input")
+    input = InputPort(required=False, doc="tokens to serve")
+    urgent = InputPort(required=False, doc="urgent tokens, served before those that wait at input")
     begun = OutputPort(depends_on=(), doc="each token when its service begins")
-    output = OutputPort(depends_on=(), doc="each token when its service is over")
+    output = OutputPort(depends_on=(), doc="each token when its service ends")
 
-    places = Parameter(int, 1, min=1, doc="how many are served at a time")
-    service_time: Parameter[Distribution] = Parameter(Distribution, unit="s", doc="how long a service takes")
+    places = Parameter(int, 1, min=1, doc="number of tokens served at a time")
+    service_time: Parameter[Distribution] = Parameter(Distribution, unit="s", doc="duration of a service")
 
     def run(self) -> Generator[Event, Any, None]:
         self.resource = simpy.PriorityResource(self.environment, self.places)
@@ -46,19 +46,21 @@ class Station(Process):
 
 
 class Machine(Process):
-    """A machine that makes one part after the other, breaks down now and then, and waits to be repaired.
+    """A machine that makes one part after another, breaks down now and then, and waits for repair.
 
     A breakdown interrupts the work on a part, which resumes where it was when the machine runs again.  The machine
     sends its ``number`` when it breaks down, and runs again when this number comes back.
     """
 
-    repaired = InputPort(int, doc="numbers of machines that are repaired; others' are ignored")
-    broken = OutputPort(int, depends_on=(), doc="the own number, when it breaks down")
-    part = OutputPort(int, depends_on=(), doc="how many parts are made, for each that is finished")
+    repaired = InputPort(int, doc="numbers of repaired machines; those of other machines are ignored")
+    broken = OutputPort(int, depends_on=(), doc="its number, when it breaks down")
+    part = OutputPort(int, depends_on=(), doc="number of parts made so far, sent for each finished part")
 
-    number = Parameter(int, 0, doc="its number, by which it is known")
-    work_time: Parameter[Distribution] = Parameter(Distribution, unit="s", doc="how long a part takes")
-    time_to_failure: Parameter[Distribution] = Parameter(Distribution, unit="s", doc="how long it runs until it breaks")
+    number = Parameter(int, 0, doc="the number that identifies the machine")
+    work_time: Parameter[Distribution] = Parameter(Distribution, unit="s", doc="time to make a part")
+    time_to_failure: Parameter[Distribution] = Parameter(
+        Distribution, unit="s", doc="time that it runs until it breaks down"
+    )
 
     def run(self) -> Generator[Event, Any, None]:
         self._runs = True
@@ -70,7 +72,7 @@ class Machine(Process):
             while not is_made:
                 begin = self.now
                 try:
-                    yield self.wait(left)  # a microstep at least, or else parts that take no time have no end
+                    yield self.wait(left)  # at least a microstep, or parts that take no time would come without end
                     is_made = True
                 except simpy.Interrupt:
                     left = max(left - (self.now - begin), 0.0)
@@ -81,7 +83,7 @@ class Machine(Process):
     def _break(self) -> Generator[Event, Any, None]:
         while True:
             yield self.wait(self.time_to_failure.draw_time(self.random))
-            if self._runs:  # what is broken does not break
+            if self._runs:  # a broken machine does not break down
                 self.process.interrupt()
 
     def _repair(self) -> Generator[Event, Any, None]:

@@ -1,4 +1,4 @@
-"""What a pool and a waiting line share: those that wait, in which order, and why some leave before their turn."""
+"""The common part of a pool and a waiting line: who waits, in which order, and why some leave before their turn."""
 
 from __future__ import annotations
 
@@ -19,25 +19,25 @@ RANDOM: Final = "random"
 
 @dataclass(eq=False)
 class Waiter:
-    """A token that waits, or that has what it has waited for."""
+    """A token that waits, or that has got what it waited for."""
 
     token: Any
     channel: int
     order: float
     place: float  # among those of the same order
     size: float
-    number: int  # no two have the same
-    amount: int = 1  # of units that it asks for
+    number: int  # unique
+    amount: int = 1  # of requested units
     patience: Wake | None = None
 
     @property
     def key(self) -> tuple[float, float, int]:
-        """The lower one goes first."""
+        """The sort key: the lower one goes first."""
         return self.order, self.place, self.number
 
 
 class Waiters:
-    """Those that wait, in the order in which they go."""
+    """The waiting tokens, in the order in which they leave."""
 
     def __init__(self) -> None:
         self._all: list[Waiter] = []
@@ -49,11 +49,11 @@ class Waiters:
         return iter(self._all)
 
     def add(self, waiter: Waiter) -> None:
-        """Let one wait at its place."""
+        """Insert one at its place."""
         insort(self._all, waiter, key=lambda each: each.key)
 
     def remove(self, waiter: Waiter) -> None:
-        """Let one go."""
+        """Remove one."""
         place = bisect_left(self._all, waiter.key, key=lambda each: each.key)
         del self._all[place]
         if waiter.patience is not None:
@@ -66,40 +66,43 @@ class Waiters:
 
     @property
     def first(self) -> Waiter:
-        """Who goes next."""
+        """The next one to go."""
         return self._all[0]
 
 
 class WaitingActor(Actor):
     """Base of actors in which tokens wait for their turn.
 
-    What comes at a tag is dealt with together, and told at the next microstep: the actor may stand in a loop.  A child
-    has the outputs ``rejected``, ``balked``, ``reneged`` and ``waiting``.
+    All tokens of a tag are handled together, and outputs are sent at the next microstep, so the actor may be part of a
+    loop.  A subclass has the outputs ``rejected``, ``balked``, ``reneged`` and ``waiting``.
     """
 
-    entrance: ClassVar[str]  # the input by which tokens come
+    entrance: ClassVar[str]  # the input where tokens come in
 
     discipline = Parameter(
-        str, FIFO, choices=(FIFO, LIFO, RANDOM), doc="of equals: who came first, who came last, or one at random"
+        str, FIFO, choices=(FIFO, LIFO, RANDOM), doc="order among equals: first come, last come, or random"
     )
-    order = FormulaParameter("0", doc="the least goes first; of the token's fields, token, time, channel")
-    room: Parameter[float | None] = Parameter(float, None, min=0, doc="how much may wait; any number if left out")
+    order = FormulaParameter(
+        "0", doc="the lowest value goes first: an expression over the token's fields, token, time, channel"
+    )
+    room: Parameter[float | None] = Parameter(float, None, min=0, doc="how much may wait; unlimited if left out")
     balking: Parameter[Any] = FormulaParameter(
         None,
-        doc="condition or probability to turn away, of one that has to wait; of its fields, and waiting (a number)",
+        doc="when a token that would have to wait leaves: a condition or probability over its fields, and waiting (a "
+        "number)",
     )
     patience: Parameter[Distribution | None] = Parameter(
-        Distribution, None, unit="s", doc="how long one waits until it reneges; for ever if left out"
+        Distribution, None, unit="s", doc="how long a token waits until it reneges; for ever if left out"
     )
 
     def check(self) -> None:
         if self.patience is not None and self.patience.token_type not in (int, float):
-            raise ParameterError(f"patience: {type(self.patience).__name__} does not give numbers alone")
+            raise ParameterError(f"patience: {type(self.patience).__name__} gives values other than numbers")
 
     def initialize(self) -> None:
         self._waiting = Waiters()
         self._told: Pending[tuple[str, Any, int | None]] = Pending(self)
-        self._counts: dict[str, int] = {}  # what was told of them
+        self._counts: dict[str, int] = {}  # the values sent last
         self._came = 0
 
     def _tell(self, port: str, token: Any, channel: int | None = None) -> None:
@@ -117,12 +120,12 @@ class WaitingActor(Actor):
             self._tell(port, count)
 
     def _send(self) -> None:
-        """Send what was to be told."""
+        """Send the pending outputs."""
         for port, token, channel in self._told.due():
             self.outputs[port].send(token, channel)
 
     def _renege(self) -> None:
-        """Let those leave whose patience is over."""
+        """Remove those whose patience has run out."""
         if self.patience is not None:
             for each in [each for each in self._waiting if each.patience is not None and each.patience.due]:
                 self._waiting.remove(each)
@@ -137,7 +140,7 @@ class WaitingActor(Actor):
         return Waiter(token, channel, order, place, size, number)
 
     def _join(self, newcomers: list[Waiter], serve: Callable[[], None]) -> None:
-        """Let newcomers wait; those that cannot be served at once may turn away, or find no room."""
+        """Let new tokens wait; those that cannot be served at once may leave, or find no room."""
         for each in newcomers:
             self._waiting.add(each)
         serve()
@@ -160,7 +163,7 @@ class WaitingActor(Actor):
             if self.patience is not None:
                 each.patience = self.wake_in(self.patience.draw_time(self.random_stream("patience"), "a patience"))
         if stay < len(new):
-            serve()  # who stood behind one that has left
+            serve()  # those behind one that has left
 
     def _turns_away(self, waiter: Waiter, waiting: int) -> bool:
         if self.balking is None:
@@ -168,15 +171,17 @@ class WaitingActor(Actor):
         known = {"time": self.now, "channel": waiter.channel, "waiting": waiting}
         share = of_token(self.balking, waiter.token, **known)
         if not isinstance(share, (bool, int, float)) or not 0 <= share <= 1:
-            raise EpicycleError(f"{self.balking} gives {share!r}, but balking is a condition, or a probability")
+            raise EpicycleError(
+                f"{self.balking} gives {share!r}, but balking must be true or false, or a probability from 0 to 1"
+            )
         return share >= 1 or (share > 0 and self.random_stream("balking").random() < share)
 
 
 def check_channels(actor: Actor, asks: str, answers: str) -> None:
-    """Raise ``PortError`` unless each channel of an input has one of the output for its answers."""
+    """Raise ``PortError`` unless each channel of an input has a channel of the output for its answers."""
     wanted, found = actor.inputs[asks].width, actor.outputs[answers].width
     if wanted > 1 and found not in (0, 1, wanted):
         raise PortError(
-            f"{actor.inputs[asks].path} has {wanted} channels and {actor.outputs[answers].path} has {found}; they must "
-            "have equally many, for what is asked for on a channel is sent on it"
+            f"{actor.inputs[asks].path} has {wanted} channels and {actor.outputs[answers].path} has {found}; give "
+            "both the same number of channels, because requests on a channel are answered on it"
         )

@@ -1,4 +1,4 @@
-# Types for C; what everything is for is said in arrays.py.
+# Types for C; arrays.py documents everything.
 
 cpdef read_only(value)
 cpdef array_of(numbers)

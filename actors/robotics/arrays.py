@@ -1,6 +1,6 @@
-"""Arrays of a few floats, of which NumPy looks at none without taking its time, and their way into numba's kernels.
+"""Arrays of a few floats, for which NumPy is slow, and how they enter numba's kernels.
 
-``arrays.pyx`` does the same in C, where there was a compiler, and takes a tenth of that.
+``arrays.pyx`` does the same in C, in a tenth of the time, if a compiler was available.
 """
 
 from __future__ import annotations
@@ -17,11 +17,11 @@ Array = NDArray[np.float64]
 Pair = tuple[float, float]
 Function = TypeVar("Function", bound=Callable[..., object])
 
-_FLOAT = np.dtype(np.float64)  # NumPy looks for it at each call where the type is given instead
+_FLOAT = np.dtype(np.float64)  # NumPy searches for it at each call if the type is given instead
 
 
 def read_only(value: ArrayLike) -> Array:
-    """A copy that nobody can write to."""
+    """A read-only copy."""
     array = np.array(value, _FLOAT)
     array.setflags(False)  # type: ignore[call-arg]  # write=False takes as long as the copy
     return array
@@ -40,16 +40,16 @@ def pair(values: ArrayLike) -> Pair:
 
 def all_finite(numbers: Sequence[float]) -> bool:
     """Whether every number is finite; for the few of a token, ten times as fast as ``np.isfinite(array).all()``."""
-    return math.isfinite(sum(numbers)) or all(map(math.isfinite, numbers))  # finite ones can add up to infinity
+    return math.isfinite(sum(numbers)) or all(map(math.isfinite, numbers))  # finite numbers can add up to infinity
 
 
 def finite(array: Array) -> bool:
-    """The same of the numbers of an array."""
+    """The same for the numbers of an array."""
     return all_finite((array if array.ndim == 1 else array.ravel()).tolist())
 
 
 def joined(numbers: Sequence[float], array: Array) -> Array:
-    """The numbers, and behind them those of an array."""
+    """The numbers, followed by those of an array."""
     made = np.empty(len(numbers) + array.size)
     made[: len(numbers)] = numbers
     made[len(numbers) :] = array.ravel()
@@ -57,7 +57,7 @@ def joined(numbers: Sequence[float], array: Array) -> Array:
 
 
 def stacked(rows: Iterable[Array], columns: int) -> Array:
-    """A table of rows, with zeros where they end; it has so many columns, or as many as the longest row."""
+    """A table of rows, padded with zeros to a number of columns or to the longest row."""
     kept = list(rows)
     table = np.zeros((len(kept), max(columns, *map(len, kept)) if kept else columns))
     for place, row in enumerate(kept):
@@ -66,11 +66,11 @@ def stacked(rows: Iterable[Array], columns: int) -> Array:
 
 
 def entered(jitted: Function, compiled: Callable[[], Any], takes: str, gives: str) -> Function:
-    """A kernel as Python calls it: by numba's own way, which looks at each array for long.
+    """A kernel as Python calls it: by numba's own way, which takes long to check each array.
 
-    In C it is called by its address, which the object has that ``compiled`` returns, and given that of a row of words:
-    first a function that makes an array of an address and its shape; then what the kernel ``takes``, a float (d), an
-    int (i), a bool (b), or an array of so many dimensions (1 to 9), which is its address and a word for each length.
-    What it ``gives`` stands there when it returns 1.
+    In C it is called by its address, which is in the object that ``compiled`` returns, with the address of a row of
+    words: first a function that makes an array from an address and its shape; then the arguments that the kernel
+    ``takes``, a float (d), an int (i), a bool (b), or an array of 1 to 9 dimensions, as its address and a word for each
+    length. If it returns 1, the results it ``gives`` are in the same place.
     """
     return jitted

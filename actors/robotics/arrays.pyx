@@ -1,5 +1,6 @@
 # cython: language_level=3, boundscheck=False, wraparound=False, cdivision=True
-"""Arrays of a few floats, and kernels: what arrays.py does, in C, for plain arrays of doubles and tuples of floats."""
+"""Arrays of a few floats, and kernels: the same as arrays.py, in C, for plain arrays of doubles and tuples of
+floats."""
 
 cimport numpy
 from cpython.float cimport PyFloat_AS_DOUBLE
@@ -22,7 +23,7 @@ cdef object FLOAT = np.dtype(np.float64)
 
 
 cdef inline bint is_plain(array) noexcept:
-    """Whether the numbers of an array lie one after the other, as C knows them."""
+    """Whether the numbers of an array are contiguous, as C needs them."""
     return (
         type(array) is numpy.ndarray and numpy.PyArray_TYPE(<numpy.ndarray>array) == numpy.NPY_DOUBLE
         and numpy.PyArray_ISCARRAY_RO(<numpy.ndarray>array)
@@ -120,7 +121,7 @@ ctypedef int64_t (*Code)(int64_t*) noexcept
 
 
 cdef class Entry:
-    """A kernel that is called by its address; what it takes becomes words, see ``entered`` in arrays.py."""
+    """A kernel called by its address; its arguments become words, see ``entered`` in arrays.py."""
 
     cdef Code code  # none before the first call
     cdef object owner  # of the code

@@ -1,7 +1,7 @@
-"""The horizon problem as a nonlinear program for CasADi and IPOPT; loaded only when it is asked for.
+"""The horizon problem as a nonlinear program for CasADi and IPOPT; loaded only when requested.
 
-The program is ``numerics.definitions`` on symbols, and owes nothing to the barrier method's code, so that the two can
-check each other.  f6 is exact: each max(0, d - Dmax) is a variable t with t >= 0 and t >= d - Dmax.
+The program is ``numerics.definitions`` on symbols, independent of the barrier method's code, so that the two can check
+each other.  f6 is exact: each max(0, d - Dmax) is a variable t with t >= 0 and t >= d - Dmax.
 
 An infeasible problem is solved in two stages, as the barrier method does: the sum of the squared violations
 of f3-f5 is minimised first; then the objective, with each constraint bounded by its own least violation.
@@ -21,8 +21,8 @@ from .numerics import definitions
 from .numerics.barrier import TOLERANCE, Solution
 from .numerics.horizon import REACH_GOAL, HorizonProblem
 
-_SLACK = 1e-4  # m; what the second stage's bounds are widened by, so that they have an inside
-_STRICT = 1.0 - 1e-7  # f1 and f2 are asked for a little more strictly than IPOPT's tolerance keeps them
+_SLACK = 1e-4  # m; added to the second stage's bounds, so that they have an interior
+_STRICT = 1.0 - 1e-7  # f1 and f2 are a little stricter than IPOPT's tolerance
 _FAR = 1e6  # m; a tube without bound would be inf - inf to IPOPT; this one is out of reach
 _NUMBERS = [name for name in HorizonProblem._fields if name != "objective"]  # a program's parameters
 _OPTIONS = {
@@ -37,16 +37,16 @@ _OPTIONS = {
 
 
 class SolverError(EpicycleError):
-    """A solver that is not installed."""
+    """A solver is not installed."""
 
 
 def load_casadi() -> Any:
-    """The casadi module, or a message that says how to get it."""
+    """The casadi module, or an error that says how to get it."""
     try:
         import casadi
     except ImportError:
         raise SolverError(
-            "the solver 'Casadi' needs a package that is not installed; pip install 'epicycle[casadi]'"
+            "the solver 'Casadi' needs a package that is not installed: pip install 'epicycle[casadi]'"
         ) from None
     return casadi
 
@@ -79,7 +79,7 @@ class _Attempt:
     """One problem: its numbers, its two programs, and how many iterations they have taken."""
 
     def __init__(self, problem: HorizonProblem, steps: int, max_iterations: int) -> None:
-        heavy = problem.sigma_weights > 0.0  # a point without weight counts nothing, and has no logarithm
+        heavy = problem.sigma_weights > 0.0  # a point with weight 0 has no effect, and no logarithm
         self.problem = problem._replace(
             tube_radius=np.where(np.isfinite(problem.tube_radius), problem.tube_radius, _FAR),
             sigma_positions=problem.sigma_positions[heavy],
@@ -105,7 +105,7 @@ class _Attempt:
         return bool((fast <= 0.0).all() and (definitions.f2(controls, self.problem.max_acceleration) <= 0.0).all())
 
     def optimise(self, start: Array, bounds: Any) -> Array | None:
-        """Minimise the objective with f3-f5 at most ``bounds``; None if nothing usable came out."""
+        """Minimise the objective with f3-f5 at most ``bounds``; None without a usable result."""
         beyond = np.empty(0)
         if self.problem.objective != REACH_GOAL and len(self.problem.obstacle_mean):
             positions, reach = definitions.driven(self.problem, start)[0], self.problem.measurement_range
@@ -113,11 +113,11 @@ class _Attempt:
         return self._run(self._programs.optimise, start, beyond, bounds)
 
     def restore(self, start: Array) -> Array | None:
-        """Minimise the sum of the squared violations of f3-f5; None if nothing usable came out."""
+        """Minimise the sum of the squared violations of f3-f5; None without a usable result."""
         return self._run(self._programs.restore, start, np.maximum(self.violations(start), 0.0) + 1e-2, 0.0)
 
     def _run(self, program: Any, start: Array, extra: Array, bounds: Any) -> Array | None:
-        """From the controls ``start`` and ``extra`` variables that may not be negative."""
+        """Solve from the controls ``start`` and ``extra`` non-negative variables."""
         upper, limits = np.zeros(program.size1_out("g")), 2 * len(start) - 1
         upper[limits : limits + self._programs.coupled] = bounds
         result = program(
@@ -148,7 +148,9 @@ def _programs(steps: int, shapes: tuple[tuple[int, ...], ...], objective: int, m
         each = [cs.SX.sym("x") for _ in range(math.prod(shape))]
         return np.array(each, dtype=object).reshape(shape)
 
-    numbers = [symbols(*(shape or (1,))) for shape in shapes]  # NumPy would take a symbol by itself for a function's
+    numbers = [
+        symbols(*(shape or (1,))) for shape in shapes
+    ]  # NumPy would treat a single symbol as an argument of a function
     problem = HorizonProblem(**dict(zip(_NUMBERS, numbers, strict=True)), objective=objective)
     parameters = cs.vertcat(*np.concatenate([np.ravel(each) for each in numbers]))
     controls = symbols(steps, 2)

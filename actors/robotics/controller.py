@@ -24,9 +24,9 @@ _MADE_AT, _CONTROLS = 4, 6  # columns of a table of plans, see ``peer_tubes``
 
 
 class _Standing(NamedTuple):
-    """The plan that the controller made last; made an infinite time ago, nothing is left of it."""
+    """The latest plan of the controller; one made an infinite time ago has no effect."""
 
-    made_at: float  # s, the time of the state that it began from
+    made_at: float  # s, the time of its initial state
     position: Array  # (2,) and velocity at step 1 from made_at
     velocity: Array
     controls: Array  # (N, 2) U_{t+1} .. U_{t+N}, as seen from made_at
@@ -35,17 +35,17 @@ class _Standing(NamedTuple):
 class _Peers:
     """The latest plans of the other robots, each as a row that the kernels take.
 
-    Where others stand at time 0 may be known before.  It is a plan of nobody to stay there, until a first plan takes
-    the place of the nearest one.
+    Positions of others at time 0 may be known in advance.  Each is an anonymous plan to stay there, until a first plan
+    replaces the nearest one.
     """
 
     def __init__(self, places: Array) -> None:
-        # Their names are no paths.
+        # Their names are not paths.
         self._nobody = {f"[{number}]": (x, y) for number, (x, y) in enumerate(places.tolist())}
         self._rows = {name: array_of((*self._nobody[name], 0.0, 0.0, 0.0, 0.0)) for name in sorted(self._nobody)}
 
     def hear(self, plan: Plan) -> None:
-        """Remember a plan, unless a later one of that robot is known."""
+        """Store a plan, unless a later one of that robot is known."""
         known = self._rows.get(plan.robot)
         if known is not None and plan.time < known[_MADE_AT]:
             return
@@ -66,60 +66,67 @@ class _Peers:
 class RobustController(TargetModel, Actor):
     """Solves the horizon problem at every trigger and sends the acceleration for the *next* period.
 
-    Connect ``control`` to the vehicle with a delay of one period: solving takes time, so what is computed
-    from the state at t acts from t + period on (the paper's U_{t+1}).
+    Connect ``control`` to the vehicle with a delay of one period: solving takes time, so a control computed from the
+    state at t acts from t + period on (the paper's U_{t+1}).
 
-    Eq. (2) sums over the states at t + 1 .. t + N periods, of which U_{t+N} reaches none: in the paper's dynamics a
-    control moves the robot two periods later.  ``horizon_from: decision`` counts the N steps from t + period instead,
-    from where the first unknown control acts.
+    Eq. (2) sums over the states at t + 1 .. t + N periods, none of which is affected by U_{t+N}: in the paper's
+    dynamics, a control moves the robot two periods later.  ``horizon_from: decision`` counts the N steps from t +
+    period instead, when the first unknown control acts.
 
-    The problem is posed at the time of the own state, whenever that comes and however long solving takes; the plan is
-    of that time, and the ages of all else are counted from it.  The latest plan of each peer counts; with every period
-    beyond the first between its time and that of the own state, the distance to keep grows (eq. 4).  The latest
-    estimate counts, too: an old one is predicted to the time of the own state as its filter would predict it, with the
-    process noise, so that its covariance grows.
+    The problem is posed at the time of the robot's own state, whenever that arrives and however long solving takes; the
+    plan has that time, and the ages of all other data are counted from it.  The latest plan of each peer is used; the
+    distance to keep grows with every period beyond the first between its time and that of the own state (eq. 4).  The
+    latest estimate is used, too: an old one is predicted to the time of the own state as its filter would predict it,
+    with the process noise, so that its covariance grows.
 
-    Before a first plan or estimate comes, there is nobody to avoid but who is known to stand at ``peers_at_start``.
-    Plans and estimates that are not finite are ignored, the last good ones stay.  Without a finite own state the
-    control is zero, and nothing else is sent.
+    Before the first plan or estimate comes, the robot avoids only the positions in ``peers_at_start``. Plans and
+    estimates that are not finite are ignored; the last good ones are kept.  Without a finite own state the control is
+    zero, and nothing else is sent.
     """
 
     trigger = InputPort(object, doc="plan now")
     state = InputPort(BodyState, triggers=False, doc="where the robot is")
     estimate = InputPort(
-        Estimate, required=False, triggers=False, doc="of the target; unconnected: there is none to avoid"
+        Estimate,
+        required=False,
+        triggers=False,
+        doc="estimate of the target; without a connection, there is none to avoid",
     )
-    peer_plans = InputPort(Plan, multi=True, required=False, triggers=False, doc="what the other robots intend")
+    peer_plans = InputPort(Plan, multi=True, required=False, triggers=False, doc="plans of the other robots")
     control = OutputPort(np.ndarray, shape=(2,), doc="m/s^2, for the period after this one")
-    plan = OutputPort(Plan, doc="what this robot intends, for the others")
-    violation = OutputPort(float, doc="metres by which the plan breaks a constraint at worst; 0 if it keeps all")
-    infeasible = OutputPort(int, doc="how many plans so far broke a constraint")
-    iterations = OutputPort(int, doc="Newton (or solver) iterations that this plan took")
+    plan = OutputPort(Plan, doc="plan of this robot, for the others")
+    violation = OutputPort(float, doc="largest violation of a constraint by the plan in metres; 0 if it keeps all")
+    infeasible = OutputPort(int, doc="number of plans so far that broke a constraint")
+    iterations = OutputPort(int, doc="Newton (or solver) iterations for this plan")
 
-    objective = Parameter(Objective, ReachGoal(), doc="what the robot wants")
-    solver = Parameter(Solver, Barrier(), doc="how the problem is solved")
+    objective = Parameter(Objective, ReachGoal(), doc="objective of the robot")
+    solver = Parameter(Solver, Barrier(), doc="solver of the problem")
     max_speed = Parameter(float, 8.0, unit="m/s", min=1e-6, doc="Vmax")
     max_acceleration = Parameter(float, 8.0, unit="m/s^2", min=1e-6, doc="Amax")
-    horizon = Parameter(int, 10, min=3, doc="N: periods to look ahead")
+    horizon = Parameter(int, 10, min=3, doc="N: prediction horizon in periods")
     horizon_from = Parameter(
         str,
         NOW,
         choices=(NOW, DECISION),
-        doc="where the N steps begin: at t, or at t + period, when U_{t+1} begins to act",
+        doc="start of the N steps: t, or t + period, when U_{t+1} begins to act",
     )
     period = Parameter(float, 0.1, unit="s", above=0, doc="Delta t: time between two triggers")
-    safe_distance = Parameter(float, 2.0, unit="m", min=0, doc="Dmin: to the target and to other robots")
-    margin = Parameter(float, 2.0, unit="1", min=0, doc="alpha: standard deviations to add to it")
+    safe_distance = Parameter(
+        float, 2.0, unit="m", min=0, doc="Dmin: smallest distance to the target and to other robots"
+    )
+    margin = Parameter(float, 2.0, unit="1", min=0, doc="alpha: standard deviations to add to Dmin")
     tube_initial = Parameter(float, 0.2, unit="m", min=1e-6, doc="sigma_r0: radius of the reachability set now")
-    tube_growth = Parameter(float, 0.4, unit="m", min=0, doc="beta: what it grows by, per unit of tau")
+    tube_growth = Parameter(float, 0.4, unit="m", min=0, doc="beta: growth of that radius per unit of tau")
     tube_time = Parameter(str, STEPS, choices=(STEPS, SECONDS), doc="unit of tau in eq. (3)")
     covariance_noise = Parameter(
-        bool, True, doc="let process noise widen the target's predicted covariance, in f4 and in eq. (5)"
+        bool, True, doc="whether process noise widens the target's predicted covariance, in f4 and in eq. (5)"
     )
     peers_at_start = array_parameter(
-        (None, 2), (), unit="m", doc="where other robots stand at time 0, for as long as no plan of theirs has come"
+        (None, 2), (), unit="m", doc="positions of other robots at time 0, used until their plans come"
     )
-    robot_name = Parameter(str, "", doc="name in the plan; empty: the path of what the controller stands in")
+    robot_name = Parameter(
+        str, "", doc="name in the plan; if empty, the path of the composite that contains the controller"
+    )
 
     def initialize(self) -> None:
         from .numerics import definitions, horizon, reachability
@@ -127,12 +134,12 @@ class RobustController(TargetModel, Actor):
 
         self.solver.prepare()
         compile_kernels()
-        # Kept, as an import takes 1 us whenever it is met.
+        # Kept, as executing an import takes 1 us each time.
         self._standing_plan, self._peer_tubes = reachability.standing_plan, reachability.peer_tubes
         self._expected_target, self._new_problem = reachability.expected_target, horizon.HorizonProblem
         self._name = self.robot_name or enclosing(self.path)
         tau = 1.0 if self.tube_time == STEPS else self.period
-        # The kernels count steps from t.  From t + period on there is one more of them, and tau is 0 at the first.
+        # The kernels count steps from t.  From t + period on there is one more step, and tau is 0 at the first.
         ahead = 1 if self.horizon_from == DECISION else 0
         self._steps = self.horizon + ahead
         self._radius = definitions.sigma_r(
@@ -161,17 +168,17 @@ class RobustController(TargetModel, Actor):
         problem, starts = self._problem(own)
         solution = self.solver.solve(problem, starts)
         controls, violation = solution.controls, solution.violation
-        # Input may be so large that its squares are not finite.
+        # Inputs may be so large that their squares are not finite.
         if not violation < math.inf and not finite(controls):
             controls, violation = starts[1], math.inf  # braking
         self._send(own, problem, controls)
-        self._infeasible += bool(violation > 0.0)  # which may be one of NumPy's
+        self._infeasible += bool(violation > 0.0)  # which may be a NumPy type
         self.violation.send(float(violation))
         self.infeasible.send(self._infeasible)
         self.iterations.send(int(solution.iterations))
 
     def _listen(self) -> None:
-        """Remember the latest estimate and plans, also those that come between triggers or overtaken by others."""
+        """Store the latest estimate and plans, also those that come between triggers or are overtaken by others."""
         for plan in self.peer_plans.tokens:
             if plan.robot != self._name and plan.finite:
                 self._peers.hear(plan)
@@ -189,7 +196,7 @@ class RobustController(TargetModel, Actor):
     # --- the problem ------------------------------------------------------------------------------------
 
     def _problem(self, own: BodyState) -> tuple[HorizonProblem, Array]:
-        """The problem, and where its solver may start (2, N, 2): the standing plan from the next period on; braking."""
+        """The problem, and the starts of its solver (2, N, 2): the standing plan from the next period on; braking."""
         # Floats: arithmetic on arrays of two takes ten times as long.
         (x, y), (vx, vy), (ux, uy) = pair(own.position), pair(own.velocity), pair(self._applied)
         now, period = own.time, self.period

@@ -15,11 +15,11 @@ from .arrays import Array, array_of, pair, stacked
 from .messages import RANGE, RELATIVE_POSITION, Estimate, Measurement
 
 EXPECTED, PREDICTED = "expected", "predicted"
-State: TypeAlias = tuple[Array, Array]  # of a filter: mean and covariance, to which nobody writes
+State: TypeAlias = tuple[Array, Array]  # of a filter: mean and covariance, never modified
 
 
 class TargetModel(Configurable):
-    """The parameters that a filter and whoever looks ahead from its estimates have in common."""
+    """The parameters shared by a filter and an actor that predicts from its estimates."""
 
     position_noise = Parameter(float, 0.002, unit="m^2", min=0, doc="Qp: variance a position gains in one period")
     velocity_noise = Parameter(
@@ -29,7 +29,7 @@ class TargetModel(Configurable):
         min=0,
         doc="Qv: variance a velocity gains in one period; Table II's 0.004 is in (m per 0.1 s)^2",
     )
-    kappa = Parameter(float, 0.0, unit="1", min=0, doc="spread of the 9 sigma points; 0 gives the centre no weight")
+    kappa = Parameter(float, 0.0, unit="1", min=0, doc="spread of the 9 sigma points; with 0, the centre has no weight")
 
     @property
     def process_noise(self) -> Array:
@@ -39,7 +39,7 @@ class TargetModel(Configurable):
 
 @dataclass(slots=True)
 class _Step:
-    """What the filter did at one time, which is done again when a late measurement belongs there or before."""
+    """A step of the filter at one time, repeated when a late measurement belongs there or earlier."""
 
     time: int  # ns
     measurements: list[Measurement]
@@ -47,32 +47,33 @@ class _Step:
 
 
 class _Estimator(TargetModel, Actor):
-    """What all estimators share: the model of eq. (1), and one prediction and fusion at each trigger.
+    """The common part of all estimators: the model of eq. (1), and one prediction and fusion at each trigger.
 
-    The estimate is of the time of the trigger, and each measurement is fused at its own time.  One that comes later is
-    put where it belongs among what the filter has done, and the filter runs again from there: from then on the
-    estimates are, to the bit, those of a filter that got it in time.  (Formulas for such out-of-sequence measurements,
-    as by Bar-Shalom, IEEE Trans. Aerosp. Electron. Syst. 38, 2002, spare the second run and are exact for linear
-    models.)  What the filter has done is kept for ``max_delay``; what was measured longer ago is not fused, and
-    counted at ``too_late``.
+    The estimate has the time of the trigger, and each measurement is fused at its own time.  A late measurement is
+    inserted at its place among the past steps, and the filter runs again from there: later estimates are, to the bit,
+    those of a filter that got it in time.  (Formulas for such out-of-sequence measurements, as by Bar-Shalom, IEEE
+    Trans. Aerosp. Electron. Syst. 38, 2002, spare the second run and are exact for linear models.)  Steps are kept for
+    ``max_delay``; older measurements are not fused, but counted at ``too_late``.
 
-    A measurement that comes between two triggers waits for the next one; one from the future, whose clock is wrong, is
-    taken as of now.  A copy of what is fused already changes nothing.  Before the first measurement, or the first
-    trigger, the filter holds its prior.  A measurement that is not finite is ignored, and so is an update whose result
-    would not be.
+    A measurement that comes between two triggers waits for the next one; one from the future, from a wrong clock, is
+    treated as made now.  A copy of a fused measurement has no effect.  Before the first measurement, or the first
+    trigger, the filter holds its prior.  A measurement that is not finite is ignored, as is an update with a result
+    that is not finite.
     """
 
     trigger = InputPort(object, doc="predict to the present time, fuse, and send the estimate")
-    measurements = InputPort(Measurement, multi=True, required=False, triggers=False, doc="of all robots, own included")
+    measurements = InputPort(
+        Measurement, multi=True, required=False, triggers=False, doc="measurements of all robots, including this one"
+    )
     estimate = OutputPort(Estimate, doc="the target's state (x, y, vx, vy) after fusion")
-    too_late = OutputPort(int, doc="how many measurements so far came more than max_delay late; sent with each of them")
+    too_late = OutputPort(
+        int, doc="number of measurements so far that came more than max_delay late; sent with each of them"
+    )
 
     period = Parameter(float, 0.1, unit="s", above=0, doc="the time over which the process noise was measured")
     prior_mean = array_parameter((4,), (10.0, 0.0, 0.0, 0.0), doc="first guess of (x, y, vx, vy) in m and m/s")
     prior_variance = array_parameter((4,), (400.0, 400.0, 4.0, 4.0), min=0, doc="its variances, in m^2 and m^2/s^2")
-    max_delay = Parameter(
-        float, 2.0, unit="s", min=0, max=1e9, doc="how old a measurement may be when it comes, to be fused"
-    )
+    max_delay = Parameter(float, 2.0, unit="s", min=0, max=1e9, doc="largest age of a measurement that is still fused")
 
     noise_direction = Parameter(
         str,
@@ -90,9 +91,11 @@ class _Estimator(TargetModel, Actor):
         self._process_noise = self.process_noise
         self._waiting: list[Measurement] = []  # for the next trigger
         self._too_late = 0
-        self._steps: list[_Step] = []  # of the last ``max_delay``, and what the filter knew before them, at which time
+        self._steps: list[
+            _Step
+        ] = []  # of the last ``max_delay``, and the state of the filter before them, with its time
         self._before: State = np.array(self.prior_mean), np.diag(self.prior_variance)
-        self._before_at: int | None = None  # None: it is the prior, of whatever time
+        self._before_at: int | None = None  # None: it is the prior, at any time
 
     def fire(self) -> None:
         now = self.tag.time
@@ -105,7 +108,7 @@ class _Estimator(TargetModel, Actor):
         self.estimate.send(Estimate(*self._told(state), to_seconds(now), tuple(sorted(fused))))
 
     def _take(self, earliest: int) -> None:
-        """Let the measurements that have come wait for the next trigger, unless they are older than ``earliest``."""
+        """Keep new measurements for the next trigger, unless they are older than ``earliest``."""
         come = [*self._waiting, *(each for each in self.measurements.tokens if each.finite)]
         self._waiting = [each for each in come if to_nanoseconds(each.time) >= earliest]
         if len(self._waiting) < len(come):
@@ -113,9 +116,10 @@ class _Estimator(TargetModel, Actor):
             self.too_late.send(self._too_late)
 
     def _catch_up(self, measurements: list[Measurement], now: int) -> tuple[State, set[str]]:
-        """Put measurements where they belong, and bring the filter to the present; also the robots that were heard."""
+        """Insert measurements at their times, and bring the filter to the present; also returns the robots that were
+        heard."""
         steps = self._steps
-        first = self._place_of(now)  # of the steps that change
+        first = self._place_of(now)  # of the first changed step
         new: list[tuple[_Step, Measurement]] = []
         for each in measurements:
             place = self._place_of(min(to_nanoseconds(each.time), now))
@@ -128,7 +132,7 @@ class _Estimator(TargetModel, Actor):
         fused = set()
         for step in steps[first:]:
             elapsed = 0.0 if before is None else to_seconds(step.time - before)
-            # Sorted, so that the order of arrival decides nothing, not even the last bit.
+            # Sorted, so that the order of arrival has no influence, not even on the last bit.
             robots = {each.robot for each in step.measurements}
             step.measurements.sort(key=_robot if len(robots) == len(step.measurements) else _order)
             state, is_fused = self._step(state, elapsed, step.measurements)
@@ -138,33 +142,33 @@ class _Estimator(TargetModel, Actor):
         return state, fused
 
     def _place_of(self, time: int) -> int:
-        """The place of the step of that time, which may be a new one."""
+        """The index of the step at that time, which may be new."""
         steps = self._steps
         place = len(steps)
-        if steps and time <= steps[-1].time:  # mostly that one, or a new one
+        if steps and time <= steps[-1].time:  # usually the last one, or a new one
             place = place - 1 if time == steps[-1].time else bisect_left(steps, time, key=_time)
         if place == len(steps) or steps[place].time != time:
             steps.insert(place, _Step(time, []))
         return place
 
     def _forget(self, earliest: int) -> None:
-        """Forget the steps before a time, of which nothing will come any more."""
-        if self._steps[0].time < earliest:  # there is one of now at least
+        """Forget the steps before a time, which no measurement can change any longer."""
+        if self._steps[0].time < earliest:  # there is at least the present one
             count = bisect_left(self._steps, earliest, key=_time)
             last = self._steps[count - 1]
             self._before, self._before_at = last.after, last.time
             del self._steps[:count]
 
     def _step(self, before: State, elapsed: float, measurements: list[Measurement]) -> tuple[State, bool]:
-        """What the filter knows ``elapsed`` seconds (0 at the first trigger) later; whether anything was fused."""
+        """The state of the filter ``elapsed`` seconds (0 at the first trigger) later; whether anything was fused."""
         raise NotImplementedError
 
     def _told(self, state: State) -> State:
-        """What is told of a state."""
+        """The estimate to send for a state."""
         return state
 
     def _noise_over(self, elapsed: float) -> Array:
-        """The process noise of so many seconds."""
+        """The process noise of a number of seconds."""
         return self._process_noise * (elapsed / self.period)
 
     def _rows(self, measurements: list[Measurement]) -> Array:
@@ -188,16 +192,16 @@ def _order(measurement: Measurement) -> Any:
 class UnscentedEstimator(_Estimator):
     """The unscented Kalman filter of the paper, compiled; fuses all measurements of one time at once.
 
-    The estimate is of the time of the trigger, and each measurement is fused at its own time.  For one that comes later
-    the filter goes back to that time and runs again from there, so that from then on nothing tells that it was late;
-    what comes more than ``max_delay`` after it was made is not fused, and counted at ``too_late``.
+    The estimate has the time of the trigger, and each measurement is fused at its own time.  For a late one, the filter
+    returns to that time and runs again from there, so that later estimates are as if it had come in time; a measurement
+    more than ``max_delay`` late is not fused, but counted at ``too_late``.
     """
 
     def initialize(self) -> None:
         from .numerics import ukf
 
         super().initialize()
-        self._move_and_fuse = ukf.predict_and_fuse  # kept, as an import takes 1 us whenever it is met
+        self._move_and_fuse = ukf.predict_and_fuse  # kept, as executing an import takes 1 us each time
         self._model = lru_cache(8)(lambda elapsed: (ukf.constant_velocity(elapsed), self._noise_over(elapsed)))
         self._averaged = self.noise_direction == EXPECTED
 

@@ -1,4 +1,4 @@
-"""FilterPy's filters in the place of the compiled one: slower, but others to compare with."""
+"""FilterPy's filters instead of the compiled one: slower, but independent, for comparison."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from .arrays import Array
 from .estimator import EXPECTED, State, _Estimator
 from .messages import RANGE, Measurement
 
-# FilterPy's EnsembleKalmanFilter is left out: it draws from numpy's global random state, so no run could be
-# repeated.
+# FilterPy's EnsembleKalmanFilter is left out: it draws from NumPy's global random state, so runs would not be
+# reproducible.
 LINEAR = ("KalmanFilter", "SquareRootKalmanFilter")
 NONLINEAR = ("ExtendedKalmanFilter", "UnscentedKalmanFilter", "CubatureKalmanFilter")
 
 
 class FilterError(EpicycleError):
-    """A filter that cannot use the measurements it is given."""
+    """A filter cannot use the measurements it got."""
 
 
 class FilterPyEstimator(_Estimator):
@@ -31,14 +31,14 @@ class FilterPyEstimator(_Estimator):
     """
 
     filter = Parameter(
-        str, "UnscentedKalmanFilter", choices=NONLINEAR + LINEAR, doc="class of filterpy.kalman to be used"
+        str, "UnscentedKalmanFilter", choices=NONLINEAR + LINEAR, doc="name of the class in filterpy.kalman"
     )
 
     def initialize(self) -> None:
         super().initialize()
         self._filter = _make_filter(self.filter, self.kappa)
-        self._at: State | None = None  # what it knows
-        if self.filter == "CubatureKalmanFilter":  # which alone wants columns
+        self._at: State | None = None  # its state
+        if self.filter == "CubatureKalmanFilter":  # the only one that needs columns
             self._before = self._before[0].reshape(4, 1), self._before[1]
 
     def _step(self, before: State, elapsed: float, measurements: list[Measurement]) -> tuple[State, bool]:
@@ -72,7 +72,7 @@ class FilterPyEstimator(_Estimator):
         return False
 
     def _noises(self, measurements: list[Measurement]) -> Array:
-        """The measurements' covariances (m, 3), all as seen from the prediction, whatever the order of fusion."""
+        """The measurements' covariances (m, 3), all as seen from the prediction, independent of the order of fusion."""
         from .numerics.ukf import measurement_noise, sigma_points
 
         mean, covariance = self._told((self._filter.x, self._filter.P))
@@ -100,8 +100,8 @@ class FilterPyEstimator(_Estimator):
             if ranged:
                 raise FilterError(
                     f"{self.path}: FilterPy's {self.filter} is linear and cannot fuse a range (from "
-                    f"{measurement.robot}); set 'filter' to one of {', '.join(NONLINEAR)}, "
-                    "or the sensor's 'kind' to relative_position"
+                    f"{measurement.robot}); set 'filter' to one of {', '.join(NONLINEAR)}, or the sensor's 'kind' to "
+                    "relative_position"
                 )
             position = measurement.value + observer
             if self.filter == "SquareRootKalmanFilter":
@@ -147,4 +147,4 @@ def _make_filter(name: str, kappa: float) -> Any:
 
 
 def _unused(state: Array) -> Array:
-    raise NotImplementedError("every update brings its own measurement function")
+    raise NotImplementedError("every update needs its own measurement function")

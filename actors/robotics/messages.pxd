@@ -1,3 +1,3 @@
-# Types for C; what everything is for is said in messages.py.
+# Types for C; messages.py documents everything.
 
 from epicycle.actors.robotics.arrays cimport finite, read_only

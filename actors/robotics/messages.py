@@ -1,7 +1,7 @@
 """The tokens that robots and their parts exchange.  All are immutable; their arrays are read-only.
 
-Each says by its ``time`` (s) of when it is: when what it describes was so, and not when it was sent or came.  The
-source sets it, and whoever uses the token goes by it, however long it was under way.
+Each has the ``time`` (s) of what it describes, not of when it was sent or received.  The source sets it, and users of
+the token rely on it, however long it was on the way.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ _set = object.__setattr__  # in a frozen token; each has its own __init__, as th
 
 
 def is_time(seconds: float) -> bool:
-    """Whether a number can be the time of something."""
+    """Whether a number is a valid time."""
     return abs(seconds) <= _LATEST
 
 
 @dataclass(frozen=True, slots=True, eq=False, init=False)
 class BodyState:
-    """Where a body was at ``time``, and how it moved."""
+    """Position and velocity of a body at ``time``."""
 
     position: Array  # (2,) m
     velocity: Array  # (2,) m/s
@@ -47,14 +47,14 @@ class BodyState:
 
 @dataclass(frozen=True, slots=True, eq=False, init=False)
 class Measurement:
-    """What a robot's sensor saw of the target at ``time``, with what is needed to fuse it elsewhere and later."""
+    """A measurement of the target by a robot's sensor at ``time``, with all data to fuse it elsewhere and later."""
 
-    robot: str  # dotted path of the robot that measured
+    robot: str  # dotted path of the measuring robot
     observer: Array  # (2,) m, where the sensor was
     kind: str  # "relative_position" or "range"
     value: Array  # (2,) m from observer to target, or (1,) m
     along: float  # standard deviation along the line of sight, m
-    across: float  # standard deviation across it, m; no part of a range
+    across: float  # standard deviation across it, m; not used for a range
     time: float  # s, when it was made
 
     def __init__(
@@ -70,7 +70,7 @@ class Measurement:
 
     @property
     def finite(self) -> bool:
-        """Whether it can be fused: finite values of the shape that its kind asks for, positive deviations."""
+        """Whether it can be fused: finite values of the shape for its kind, and positive deviations."""
         shape = (1,) if self.kind == RANGE else (2,)
         return (
             self.value.shape == shape
@@ -84,7 +84,7 @@ class Measurement:
 
 @dataclass(frozen=True, slots=True, eq=False, init=False)
 class Estimate:
-    """What a robot believes about the target at ``time``: a normal distribution over (x, y, vx, vy)."""
+    """A robot's estimate of the target at ``time``: a normal distribution over (x, y, vx, vy)."""
 
     mean: Array  # (4,) m and m/s
     covariance: Array  # (4, 4)
@@ -105,7 +105,7 @@ class Estimate:
 
 @dataclass(frozen=True, slots=True, eq=False, init=False)
 class Plan:
-    """What a robot intends: its state at ``time`` and its accelerations from then on, one per period."""
+    """A robot's plan: its state at ``time`` and its accelerations from then on, one per period."""
 
     robot: str  # dotted path of the robot
     time: float  # s, that of ``state``
@@ -120,12 +120,13 @@ class Plan:
 
     @property
     def finite(self) -> bool:
-        """Whether it can be rolled out: finite numbers, one control at least."""
+        """Whether it can be rolled out: finite numbers, and at least one control."""
         controls = self.controls
         shaped = controls.ndim == 2 and controls.shape[1] == 2 and len(controls) > 0
         return shaped and is_time(self.time) and finite(controls) and self.state.finite
 
 
 def enclosing(path: str) -> str:
-    """The dotted path of what an actor stands in: the robot, for a part of it; its own path at the top."""
+    """The dotted path of the composite that contains an actor: the robot, for a part of it; at the top, the actor's own
+    path."""
     return path.rpartition(".")[0] or path

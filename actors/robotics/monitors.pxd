@@ -1,3 +1,3 @@
-# Types for C; what everything is for is said in monitors.py.
+# Types for C; monitors.py documents everything.
 
 from epicycle.actors.robotics.arrays cimport pair

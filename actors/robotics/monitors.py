@@ -1,4 +1,4 @@
-"""Actors that watch a run and report what matters of it."""
+"""Actors that monitor a run."""
 
 from __future__ import annotations
 
@@ -12,16 +12,16 @@ from .messages import BodyState
 
 
 class GoalMonitor(Actor):
-    """Tells when a body first comes within ``tolerance`` of the goal, and how far it has travelled."""
+    """Sends when a body first comes within ``tolerance`` of the goal, and how far it has travelled."""
 
     state = InputPort(BodyState, doc="the body")
     arrived = OutputPort(bool, doc="true, once, at the first arrival")
     time = OutputPort(float, doc="the time of that state in seconds, once")
-    path_length = OutputPort(float, doc="metres travelled so far, at every state")
-    distance = OutputPort(float, doc="metres to the goal, at every state")
+    path_length = OutputPort(float, doc="length of the path so far in metres, at every state")
+    distance = OutputPort(float, doc="distance to the goal in metres, at every state")
 
-    goal = array_parameter((2,), (0.0, 0.0), unit="m", doc="where the body is to arrive")
-    tolerance = Parameter(float, 0.5, unit="m", min=0, doc="how near counts as arrived")
+    goal = array_parameter((2,), (0.0, 0.0), unit="m", doc="where the body should arrive")
+    tolerance = Parameter(float, 0.5, unit="m", min=0, doc="distance from the goal that counts as arrived")
 
     def initialize(self) -> None:
         self._last: Pair | None = None
@@ -43,16 +43,16 @@ class GoalMonitor(Actor):
 
 
 class _DistanceBetween(Actor):
-    """What monitors of distances share: the latest state of each of several bodies."""
+    """The common part of monitors of distances: the latest state of each body."""
 
     def initialize(self) -> None:
         self._states: dict[int, BodyState] = {}
 
     def _tell(self, output: OutputPort[float], states_by_body: Iterable[Iterable[BodyState]]) -> None:
-        """Take note of states, and send the smallest distance between two bodies, if so many are known.
+        """Store states, and send the smallest distance between two bodies, if at least two are known.
 
-        It is that of the time of the latest state: each has moved on with its velocity since its own state.  One that
-        is older than what is known of a body says nothing new.
+        The distance is at the time of the latest state: each body is moved on from its own state with its velocity.  A
+        state older than the known one of a body has no effect.
         """
         for body, states in enumerate(states_by_body):
             for state in states:
@@ -73,14 +73,14 @@ class _DistanceBetween(Actor):
 class DistanceMonitor(_DistanceBetween):
     """The distance between two bodies, whenever a state of one comes and both are known.
 
-    It is that of the time of the later state: where the other body was last known to be is moved on with its velocity
-    since.  So bodies need not tell where they are at the same times; what the older state lacks is half its
-    acceleration times the square of the difference in time.
+    The distance is at the time of the later state: the other body is moved on from its last known position with its
+    velocity.  So bodies need not send states at the same times; the error is half the acceleration times the square of
+    the time difference.
     """
 
     a = InputPort(BodyState, doc="one body")
     b = InputPort(BodyState, doc="the other body")
-    distance = OutputPort(float, doc="metres between them")
+    distance = OutputPort(float, doc="distance between them in metres")
 
     def fire(self) -> None:
         self._tell(self.distance, (self.a.tokens, self.b.tokens))
@@ -89,7 +89,7 @@ class DistanceMonitor(_DistanceBetween):
 class SeparationMonitor(_DistanceBetween):
     """The smallest distance between any two of several bodies, whenever a state comes and two or more are known.
 
-    It is that of the time of the latest state, as ``DistanceMonitor`` tells it.
+    The distance is at the time of the latest state, as in ``DistanceMonitor``.
     """
 
     bodies = InputPort(BodyState, multi=True, doc="a connection for each body")

@@ -1,4 +1,4 @@
-"""What a controller is given: what the robot wants (eqs. (2) and (5)), and what solves the horizon problem."""
+"""Parts of a controller: objectives of the robot (eqs. (2) and (5)), and solvers of the horizon problem."""
 
 from __future__ import annotations
 
@@ -39,17 +39,20 @@ class ReachGoal(Objective):
 
 
 class Inform(Objective):
-    """Eq. (5): what range measurements at the end of the horizon tell, less a penalty for distance."""
+    """Eq. (5): the information of range measurements at the end of the horizon, minus a penalty for distance."""
 
-    range = Parameter(float, 30.0, unit="m", min=0, doc="Dmax: farther from the target than this is penalised")
+    range = Parameter(float, 30.0, unit="m", min=0, doc="Dmax: distances from the target beyond this are penalised")
     penalty = Parameter(float, 0.001, min=0, doc="gamma: the penalty for each metre too far, at each step")
     variance = Parameter(float, 2.0, unit="m^2", above=0, doc="eta: variance of the predicted ranges")
-    unit = Parameter(str, NAT, choices=(NAT, BIT), doc="of the information, against which the penalty counts")
-    joint = Parameter(bool, True, doc="count what all robots measure together; false: what this one measures")
+    unit = Parameter(str, NAT, choices=(NAT, BIT), doc="unit of the information, relative to the penalty")
+    joint = Parameter(
+        bool, True, doc="whether to count what all robots measure together, or only what this one measures"
+    )
 
     def pose(self, problem: HorizonProblem, points: Array, weights: Array) -> HorizonProblem:
         others = problem.peer_mean if self.joint else problem.peer_mean[:0]
-        # In bits the information is more by 1 / log 2; the penalty by its inverse less has the same optimum.
+        # In bits, the information is larger by a factor of 1 / log 2; a penalty smaller by that factor has the same
+        # optimum.
         penalty = self.penalty * (LN2 if self.unit == BIT else 1.0)
         return problem.to_inform(points, weights, others, self.variance, penalty, self.range)
 
@@ -58,7 +61,7 @@ class Solver(Configurable):
     """Base of the solvers of the horizon problem."""
 
     def prepare(self) -> None:
-        """Called once before time starts: load what is slow to load, complain about what is missing."""
+        """Called once before time starts: load what is slow to load, and report what is missing."""
 
     def solve(self, problem: HorizonProblem, starts: Array) -> Solution:
         """The best plan found from ``starts`` (k, N, 2); never raises, and finite for finite input."""
@@ -68,7 +71,7 @@ class Solver(Configurable):
 class Barrier(Solver):
     """The paper's choice: an interior-point barrier method with Newton steps, compiled.
 
-    How far it goes, over which controls, and what it does where no plan keeps every constraint, the paper leaves open.
+    The paper leaves open how far it goes, over which controls, and what it does if no plan keeps every constraint.
     """
 
     gap = Parameter(float, 1e-5, unit="1", min=1e-9, max=1, doc="relative gap to the optimum at which it stops")
@@ -77,17 +80,17 @@ class Barrier(Solver):
         0.0,
         min=0,
         max=1e3,
-        doc="the barrier parameter at which it stops instead, in units of the objective; 0: by the gap",
+        doc="barrier parameter at which it stops instead, in units of the objective; 0: by the gap",
     )
     free_controls = Parameter(
-        int, 0, min=0, doc="how many controls are free, the last of which is held to the end of the horizon; 0: all"
+        int, 0, min=0, doc="number of free controls, the last of which is held to the end of the horizon; 0: all"
     )
     infeasible = Parameter(
         str,
         "progress",
         choices=("progress", "least_violation", "brake"),
-        doc="the answer to a problem that no plan solves: the plan of least violation that makes the most progress, "
-        "the first one of least violation, or the hardest braking",
+        doc="answer to a problem that no plan solves: the plan of least violation that makes the most progress, the "
+        "first one of least violation, or the hardest braking",
     )
 
     @cached_property
@@ -108,7 +111,7 @@ class Casadi(Solver):
     It comes with ``pip install 'epicycle[casadi]'``.
     """
 
-    max_iterations = Parameter(int, 500, min=1, doc="IPOPT iterations before the best point found so far is taken")
+    max_iterations = Parameter(int, 500, min=1, doc="IPOPT iterations after which the best point so far is taken")
 
     def prepare(self) -> None:
         from .casadi_solver import load_casadi

@@ -1,3 +1,3 @@
-# Types for C; what everything is for is said in world.py.
+# Types for C; world.py documents everything.
 
 from epicycle.actors.robotics.arrays cimport all_finite, pair

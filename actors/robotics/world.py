@@ -1,4 +1,4 @@
-"""The world around the robots' software: bodies that are driven or move by themselves, sensors, a radio channel."""
+"""The world around the robots' software: bodies that are driven or move by themselves, sensors, and a radio channel."""
 
 from __future__ import annotations
 
@@ -18,18 +18,18 @@ class Vehicle(Actor):
 
     ``dt`` is the time since the last trigger and U the acceleration held over it.  A control that arrives at
     the time of a trigger acts from that time on, so the state sent there does not depend on it; one that
-    arrives between two triggers acts from the next one.  Without a new control the last one is held.  A
-    control that is not finite is ignored.
+    arrives between two triggers acts from the next one.  Without a new control, the last one is held.  A control that
+    is not finite is ignored.
     """
 
-    trigger = InputPort(object, doc="move to the present time and send the state")
-    acceleration = InputPort(np.ndarray, shape=(2,), triggers=False, doc="m/s^2, the control to be applied from now on")
+    trigger = InputPort(object, doc="moves to the present time and sends the state")
+    acceleration = InputPort(np.ndarray, shape=(2,), triggers=False, doc="m/s^2, control to apply from now on")
     state = OutputPort(BodyState, depends_on=("trigger",), doc="position and velocity at this time")
 
     start = array_parameter((2,), unit="m", doc="position at the first trigger")
     start_velocity = array_parameter((2,), (0.0, 0.0), unit="m/s", doc="velocity at the first trigger")
-    max_speed = Parameter(float, 8.0, unit="m/s", min=0, doc="a faster velocity is shortened to this")
-    max_acceleration = Parameter(float, 8.0, unit="m/s^2", min=0, doc="a harder control is shortened to this")
+    max_speed = Parameter(float, 8.0, unit="m/s", min=0, doc="limit of the speed")
+    max_acceleration = Parameter(float, 8.0, unit="m/s^2", min=0, doc="limit of the acceleration")
 
     def initialize(self) -> None:
         self._position = pair(self.start)
@@ -58,7 +58,7 @@ class Vehicle(Actor):
 
 
 def shortened(vector: Pair, longest: float) -> Pair:
-    """The vector itself, or the one of length ``longest`` in its direction if it is longer."""
+    """The vector itself, or, if it is longer than ``longest``, the vector of that length in its direction."""
     x, y = vector
     length = hypot(x, y)
     return (x * (longest / length), y * (longest / length)) if length > longest else vector
@@ -67,11 +67,11 @@ def shortened(vector: Pair, longest: float) -> Pair:
 class CircularMotion(Actor):
     """A body on a circle of radius ``speed / turn_rate`` (Table III), computed from the time alone.
 
-    The circle's centre lies to the left of the first heading: with the defaults the body starts on top of a
-    circle around (12, 0) and turns counter-clockwise.
+    The circle's centre lies to the left of the first heading: with the defaults, the body starts at the top of a circle
+    around (12, 0) and turns counter-clockwise.
     """
 
-    trigger = InputPort(object, doc="send the state now")
+    trigger = InputPort(object, doc="sends the state now")
     state = OutputPort(BodyState, doc="position and velocity at this time")
 
     start = array_parameter((2,), (12.0, 2.0), unit="m", doc="position at the start of the run")
@@ -86,7 +86,7 @@ class CircularMotion(Actor):
         now = self.now
         elapsed = now - self._began
         turned = self.turn_rate * elapsed
-        # The chord of the arc travelled: right for any turn rate, 0 included.
+        # The chord of the arc travelled: correct for any turn rate, including 0.
         chord = self.speed * elapsed * _sinc(turned / (2.0 * math.pi))
         direction, heading = self.heading + turned / 2.0, self.heading + turned
         x, y = pair(self.start)
@@ -104,26 +104,31 @@ def _sinc(x: float) -> float:
 class Sensor(Actor):
     """Measures the target's relative position, or its distance, with normal noise (Table II).
 
-    The noise of a relative position is an ellipse: ``along`` the true line of sight and ``across`` it.  Both
-    of its components are drawn at every firing, whether used or not, so that neither ``kind`` nor
-    ``max_range`` moves the noise of later measurements.  A measurement is of the time of the robot's own
-    state, by the robot's own clock.
+    The noise of a relative position is an ellipse: ``along`` the true line of sight and ``across`` it.  Both of its
+    components are drawn at every firing, used or not, so that neither ``kind`` nor ``max_range`` changes the noise of
+    later measurements.  A measurement has the time of the robot's own state, by the robot's own clock.
     """
 
     robot = InputPort(BodyState, doc="where the robot that carries the sensor is")
     location = InputPort(
-        BodyState, required=False, doc="where it believes to be, which stands in the measurement; unconnected: as robot"
+        BodyState,
+        required=False,
+        doc="where the robot believes it is, used in the measurement; without a connection, where it is",
     )
     target = InputPort(BodyState, doc="where the target is")
-    measurement = OutputPort(Measurement, doc="sent at tags where both are known and the target is in range")
+    measurement = OutputPort(
+        Measurement, doc="measurement, sent at tags where both are known and the target is in range"
+    )
 
     kind = Parameter(str, RELATIVE_POSITION, choices=(RELATIVE_POSITION, RANGE), doc="what is measured")
     along = Parameter(float, 0.2, unit="m", min=0, doc="standard deviation along the line of sight, sigma_d")
     across = Parameter(float, 2.0, unit="m", min=0, doc="standard deviation across the line of sight, sigma_b")
     max_range: Parameter[float | None] = Parameter(
-        float, None, unit="m", min=0, doc="no measurement beyond this distance; none: no limit"
+        float, None, unit="m", min=0, doc="no measurement beyond this distance; unlimited if left out"
     )
-    robot_name = Parameter(str, "", doc="name in the measurement; empty: the path of what the sensor stands in")
+    robot_name = Parameter(
+        str, "", doc="name in the measurement; if empty, the path of the composite that contains the sensor"
+    )
 
     def initialize(self) -> None:
         self._draw = self.random_stream("noise").standard_normal
@@ -152,17 +157,17 @@ class Sensor(Actor):
 
 
 class ChannelError(EpicycleError):
-    """A broadcast channel whose ends do not match."""
+    """The ends of a broadcast channel do not match."""
 
 
 class BroadcastChannel(Actor):
-    """Hands what one participant says to all the others.
+    """Passes the messages of each participant to all the others.
 
     The n-th connection into ``input`` and the n-th out of ``output`` belong to the same participant.
     """
 
-    input = InputPort(Any, multi=True, doc="from each participant")
-    output = OutputPort(Any, multi=True, doc="to each participant, what the others said")
+    input = InputPort(Any, multi=True, doc="messages from each participant")
+    output = OutputPort(Any, multi=True, doc="to each participant, the messages of the others")
 
     def initialize(self) -> None:
         if self.input.width != self.output.width:

@@ -1,4 +1,4 @@
-"""Vehicles on the ground: how they roll, what they measure, and how they are guided."""
+"""Ground vehicles: motion, sensors and guidance."""
 
 from .following import WaypointFollower
 from .motion import Ackermann, Unicycle

@@ -1,4 +1,4 @@
-"""How vehicles are guided: WaypointFollower."""
+"""Guidance of vehicles: WaypointFollower."""
 
 from __future__ import annotations
 
@@ -15,37 +15,39 @@ Point = tuple[float, float]
 class WaypointFollower(Actor):
     """Drives a vehicle along straight lines from waypoint to waypoint, by pure pursuit.
 
-    The vehicle heads for the point of the path that lies ``lookahead`` further than the one beside it, on an arc of
+    The vehicle heads for the point of the path that is ``lookahead`` ahead of the point beside it, on an arc of
     curvature ``2 sin(angle) / distance``; a point behind it is approached in the tightest such turn.  The path begins
-    where the vehicle is first seen.  A waypoint is passed when the vehicle is beside it, at the end of its line, or
-    nearer than ``tolerance``; at the last one it stops, unless the path is ``closed``.  For a ``Unicycle`` connect
+    at the first position of the vehicle.  A waypoint is passed when the vehicle is beside it, at the end of its line,
+    or nearer than ``tolerance``; at the last one, it stops unless the path is ``closed``.  For a ``Unicycle`` connect
     ``speed`` and ``turn_rate``, for an ``Ackermann`` ``speed`` and ``steering``.
     Source: R. C. Coulter, Implementation of the Pure Pursuit Path Tracking Algorithm, CMU-RI-TR-92-01, 1992.
     """
 
-    pose = InputPort(Pose, doc="where the vehicle is, or believes to be")
-    speed = OutputPort(float, doc="m/s, how fast to go; 0 at the end")
-    turn_rate = OutputPort(float, doc="rad/s, how fast to turn at this speed; positive is to the left")
-    steering = OutputPort(float, doc="rad, how far to steer; sent where 'wheelbase' is given")
-    passed = OutputPort(int, doc="the number of each waypoint that is passed, from 0")
-    arrived = OutputPort(bool, doc="true, once, when the last one is passed")
-    deviation = OutputPort(float, doc="m, how far the vehicle is from its line; positive is to the left of it")
+    pose = InputPort(Pose, doc="where the vehicle is, or believes it is")
+    speed = OutputPort(float, doc="m/s, speed to drive; 0 at the end")
+    turn_rate = OutputPort(float, doc="rad/s, turn rate at this speed; positive is to the left")
+    steering = OutputPort(float, doc="rad, steering angle; sent if 'wheelbase' is given")
+    passed = OutputPort(int, doc="number of each waypoint passed, from 0")
+    arrived = OutputPort(bool, doc="true, once, when the last waypoint is passed")
+    deviation = OutputPort(float, doc="m, distance of the vehicle from its line; positive is to the left of it")
 
-    waypoints = array_parameter((None, 2), unit="m", doc="where to go, in this order")
-    cruise = Parameter(float, 1.0, unit="m/s", above=0, doc="how fast to go")
-    lookahead = Parameter(float, 1.0, unit="m", above=0, doc="how far ahead the point lies that the vehicle heads for")
-    tolerance = Parameter(float, 0.1, unit="m", above=0, doc="how near to a waypoint is near enough")
+    waypoints = array_parameter((None, 2), unit="m", doc="points to pass, in this order")
+    cruise = Parameter(float, 1.0, unit="m/s", above=0, doc="speed to drive")
+    lookahead = Parameter(
+        float, 1.0, unit="m", above=0, doc="distance along the path to the point that the vehicle heads for"
+    )
+    tolerance = Parameter(float, 0.1, unit="m", above=0, doc="distance from a waypoint that counts as passing it")
     deceleration: Parameter[float | None] = Parameter(
-        float, None, unit="m/s^2", above=0, doc="how it brakes before the last waypoint; not at all if left out"
+        float, None, unit="m/s^2", above=0, doc="deceleration before the last waypoint; no braking if left out"
     )
     wheelbase: Parameter[float | None] = Parameter(
-        float, None, unit="m", above=0, doc="of a vehicle that is steered, from axle to axle"
+        float, None, unit="m", above=0, doc="distance between the axles of a steered vehicle"
     )
     closed = Parameter(bool, False, doc="whether the path is closed: the first waypoint follows the last")
 
     def check(self) -> None:
         if not len(self.waypoints):
-            raise ParameterError("waypoints: there is none to go to")
+            raise ParameterError("waypoints: the list is empty; give at least one")
         if self.closed and len(self.waypoints) == 1:
             raise ParameterError("closed: a path of one waypoint cannot be closed; give two or more")
         rows = self.waypoints.tolist()
@@ -55,7 +57,7 @@ class WaypointFollower(Actor):
 
     def initialize(self) -> None:
         self._points: list[Point] = [(x, y) for x, y in self.waypoints.tolist()]
-        self._next = 0  # the number of the waypoint ahead; as many as there are when the last is passed
+        self._next = 0  # the number of the waypoint ahead; their count when the last is passed
         self._from: Point | None = None  # where its line begins
 
     def fire(self) -> None:
@@ -70,7 +72,7 @@ class WaypointFollower(Actor):
                 self._send(0.0, 0.0)
 
     def _pass(self, pose: BodyState) -> None:
-        """Pass the waypoints that the vehicle has reached; at most all of them once."""
+        """Pass the waypoints that the vehicle has reached; each at most once."""
         x, y = pose.position.tolist()
         for _ in self._points:
             if self._next == len(self._points):
@@ -88,11 +90,11 @@ class WaypointFollower(Actor):
                 self._next = 0
 
     def _beside(self, x: float, y: float) -> tuple[float, float, float]:
-        """How far along its line the vehicle is, how long that is, and how far to the left of it the vehicle is."""
+        """The distance of the vehicle along its line, the length of the line, and the distance to the left of it."""
         assert self._from is not None
         (ax, ay), (bx, by) = self._from, self._points[self._next]
         length = hypot(bx - ax, by - ay)
-        if length == 0.0:  # it begins at a waypoint
+        if length == 0.0:  # the line begins at a waypoint
             return 0.0, 0.0, 0.0
         ex, ey = (bx - ax) / length, (by - ay) / length
         return (x - ax) * ex + (y - ay) * ey, length, (y - ay) * ex - (x - ax) * ey
@@ -116,7 +118,7 @@ class WaypointFollower(Actor):
         self._send(speed, curvature)
 
     def _ahead(self, done: float, length: float) -> tuple[Point, float]:
-        """The point to head for, and how far it is to the last waypoint, along the path."""
+        """The point to head for, and the distance to the last waypoint along the path."""
         assert self._from is not None
         points, number, begin = self._points, self._next, self._from
         wanted = max(done, 0.0) + self.lookahead

@@ -11,19 +11,19 @@ from .pose import Pose
 
 
 class _RollingVehicle(Actor):
-    """What they share: between two tokens speed and turn rate hold, so the path is an arc, and exact."""
+    """The common part: speed and turn rate are constant between tokens, so the path is an arc, and exact."""
 
-    trigger = InputPort(doc="asks for the pose")
-    pose = OutputPort(Pose, depends_on=("trigger",), doc="where it is and how it moves, at the time of each trigger")
+    trigger = InputPort(doc="requests the pose")
+    pose = OutputPort(Pose, depends_on=("trigger",), doc="position, velocity and heading at the time of each trigger")
 
     start = array_parameter((2,), (0.0, 0.0), unit="m", doc="position at the start")
-    heading = Parameter(float, 0.0, unit="rad", doc="direction at the start, from the x axis to the left")
+    heading = Parameter(float, 0.0, unit="rad", doc="heading at the start, from the x axis to the left")
     speed = PortParameter(float, 0.0, unit="m/s", doc="speed along the heading; negative is backwards")
-    max_speed = Parameter(float, math.inf, unit="m/s", min=0, doc="a faster speed is cut off to this")
+    max_speed = Parameter(float, math.inf, unit="m/s", min=0, doc="limit of the speed")
 
     @abstractmethod
     def _turn_rate(self, speed: float) -> float:
-        """How fast it turns at a speed, rad/s."""
+        """The turn rate at a speed, rad/s."""
 
     def initialize(self) -> None:
         x, y = self.start.tolist()
@@ -35,7 +35,9 @@ class _RollingVehicle(Actor):
         speed = within(self.speed, self.max_speed)
         motion = speed, self._turn_rate(speed)
         if not all(map(math.isfinite, motion)):
-            raise EpicycleError(f"a speed of {motion[0]:g} m/s and a turn rate of {motion[1]:g} rad/s lead nowhere")
+            raise EpicycleError(
+                f"a speed of {motion[0]:g} m/s and a turn rate of {motion[1]:g} rad/s are not finite numbers"
+            )
         return motion
 
     def fire(self) -> None:
@@ -57,21 +59,21 @@ class _RollingVehicle(Actor):
 
 
 def within(value: float, limit: float) -> float:
-    """A number, cut off at a limit to both sides."""
+    """A number, limited on both sides."""
     return min(max(value, -limit), limit)
 
 
 class Unicycle(_RollingVehicle):
     """A vehicle driven by speed and turn rate: one wheel, or two with separate drives.
 
-    ``dx/dt = v cos h``, ``dy/dt = v sin h``, ``dh/dt = w``.  Speed and turn rate hold from token to token, so it goes
-    along arcs, which are computed as such: the pose is exact, and does not depend on when it is asked for.  With a
-    constant ``speed`` and ``turn_rate`` it goes round by itself.
+    ``dx/dt = v cos h``, ``dy/dt = v sin h``, ``dh/dt = w``.  Speed and turn rate are constant between tokens, so it
+    moves along arcs, which are computed as such: the pose is exact, and does not depend on when it is requested.  With
+    a constant ``speed`` and ``turn_rate``, it drives in a circle by itself.
     Source: B. Siciliano et al., Robotics: Modelling, Planning and Control, 2009, section 11.2.
     """
 
-    turn_rate = PortParameter(float, 0.0, unit="rad/s", doc="how fast it turns; positive is to the left")
-    max_turn_rate = Parameter(float, math.inf, unit="rad/s", min=0, doc="a faster turn is cut off to this")
+    turn_rate = PortParameter(float, 0.0, unit="rad/s", doc="turn rate; positive is to the left")
+    max_turn_rate = Parameter(float, math.inf, unit="rad/s", min=0, doc="limit of the turn rate")
 
     def _turn_rate(self, speed: float) -> float:
         return within(self.turn_rate, self.max_turn_rate)
@@ -81,15 +83,15 @@ class Ackermann(_RollingVehicle):
     """A car, driven by speed and steering angle.
 
     The kinematic bicycle, ``dh/dt = v tan(steering) / wheelbase``; its position is the middle of the rear axle.  Speed
-    and steering hold from token to token, so it goes along arcs, which are computed as such: the pose is exact, and
-    does not depend on when it is asked for.  How fast an actuator follows is the matter of a ``Limiter`` before it.
+    and steering are constant between tokens, so it moves along arcs, which are computed as such: the pose is exact, and
+    does not depend on when it is requested.  For the dynamics of the actuators, put a ``Limiter`` before them.
     Source: B. Siciliano et al., Robotics: Modelling, Planning and Control, 2009, section 11.2.
     """
 
     steering = PortParameter(float, 0.0, unit="rad", doc="angle of the front wheels; positive is to the left")
-    wheelbase = Parameter(float, 2.5, unit="m", above=0, doc="from axle to axle")
+    wheelbase = Parameter(float, 2.5, unit="m", above=0, doc="distance between the axles")
     max_steering = Parameter(
-        float, 0.6, unit="rad", min=0, max=1.5, doc="a larger angle is cut off to this"
+        float, 0.6, unit="rad", min=0, max=1.5, doc="limit of the steering angle"
     )  # tan has its pole at 1.57
 
     def _turn_rate(self, speed: float) -> float:

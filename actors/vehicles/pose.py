@@ -1,4 +1,4 @@
-"""Pose: where a vehicle is, how it moves, and where it heads."""
+"""Pose: position, velocity and heading of a vehicle."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ _set = object.__setattr__  # in a frozen token
 
 @dataclass(frozen=True, slots=True, eq=False, init=False)
 class Pose(BodyState):
-    """Where a vehicle was at ``time``, how it moved, and where it headed.  It is a ``BodyState``, too."""
+    """Position, velocity and heading of a vehicle at ``time``.  It is also a ``BodyState``."""
 
     heading: float  # rad from the x axis to the left; whole turns count
 
@@ -25,12 +25,12 @@ class Pose(BodyState):
 
     @property
     def speed(self) -> float:
-        """Speed along the heading, m/s; negative when it goes backwards."""
+        """Speed along the heading, m/s; negative when driving backwards."""
         vx, vy = self.velocity.tolist()
         return float(vx * cos(self.heading) + vy * sin(self.heading))
 
     def seen(self, point: Sequence[float]) -> tuple[float, float]:
-        """A point as the vehicle sees it: how far ahead and how far to the left, m."""
+        """A point as seen from the vehicle: metres ahead, and metres to the left."""
         x, y = self.position.tolist()
         dx, dy = point[0] - x, point[1] - y
         along, across = cos(self.heading), sin(self.heading)

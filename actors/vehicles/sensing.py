@@ -1,4 +1,4 @@
-"""What vehicles measure: RangeBearingSensor, RangeScanner and InertialSensor."""
+"""Sensors of vehicles: RangeBearingSensor, RangeScanner and InertialSensor."""
 
 from __future__ import annotations
 
@@ -13,36 +13,34 @@ from ..robotics import BodyState
 from .pose import Pose
 
 _TURN: Final = 2.0 * math.pi
-_EDGE: Final = 1e-9  # of a wall's length, so that no beam slips through where two walls meet
+_EDGE: Final = 1e-9  # of a wall's length, so that no beam passes between two walls that meet
 
 
 class RangeBearingSensor(Actor):
     """Measures the distance and direction of a target as seen from the vehicle, with normal noise.
 
-    The target is what moves and tells its state, or a ``landmark``.  It is seen while it is within ``max_range`` and
-    the field of view.  Both errors are drawn at each pose, whether used or not, so that what is seen does not move the
-    noise of later measurements.
+    The target is a body that sends its state, or a ``landmark``.  It is seen while it is within ``max_range`` and the
+    field of view.  Both errors are drawn at each pose, used or not, so that visibility does not change the noise of
+    later measurements.
     Source: S. Thrun, W. Burgard and D. Fox, Probabilistic Robotics, 2005, section 6.6.
     """
 
-    pose = InputPort(Pose, doc="where the vehicle is; it measures at each pose")
-    target = InputPort(BodyState, required=False, doc="where the target is; the latest position counts")
+    pose = InputPort(Pose, doc="where the vehicle is; each pose causes a measurement")
+    target = InputPort(BodyState, required=False, doc="where the target is; the latest position is used")
     bearing = OutputPort(float, doc="rad, from the heading to the left, from -pi to pi")
     range = OutputPort(float, doc="m, the distance")
 
-    landmark: Parameter[Any] = array_parameter(
-        (2,), None, unit="m", doc="where the target stands, if none is connected"
-    )
+    landmark: Parameter[Any] = array_parameter((2,), None, unit="m", doc="position of the target, if none is connected")
     bearing_deviation = Parameter(float, 0.0, unit="rad", min=0, doc="standard deviation of the bearing")
     range_deviation = Parameter(float, 0.0, unit="m", min=0, doc="standard deviation of the range")
     max_range = Parameter(float, math.inf, unit="m", min=0, doc="nothing is seen beyond this distance")
     field_of_view = Parameter(
-        float, _TURN, unit="rad", above=0, max=_TURN, doc="whole angle, centred on the heading, in which it sees"
+        float, _TURN, unit="rad", above=0, max=_TURN, doc="field of view: full angle, centred on the heading"
     )
 
     def initialize(self) -> None:
         if (self.landmark is None) == (self.target.width == 0):
-            raise PortError(f"{self.path} needs a target: connect 'target', or give a 'landmark', and not both")
+            raise PortError(f"{self.path} needs one target: either connect 'target' or give a 'landmark'")
         self._draw = self.random_stream("noise").standard_normal
         self._seen: list[float] | None = None if self.landmark is None else self.landmark.tolist()
 
@@ -72,31 +70,31 @@ class RangeScanner(Actor):
     """A lidar in the plane: distances to obstacles along beams from the vehicle's position, with noise.
 
     The beams are evenly spread over the field of view, from the right to the left; over a full turn, the first one
-    points backwards.  A beam ends at the nearest wall, disc or body, or at ``max_range``, which it then tells.  The
-    noise is normal, and independent from beam to beam.
+    points backwards.  A beam ends at the nearest wall, disc or body, or at ``max_range``, which is then its distance.
+    The noise is normal, and independent from beam to beam.
     Source: S. Thrun, W. Burgard and D. Fox, Probabilistic Robotics, 2005, section 6.3.
     """
 
-    pose = InputPort(Pose, doc="where the vehicle is; it measures at each pose")
-    bodies = InputPort(BodyState, multi=True, required=False, doc="discs that move; their latest positions count")
+    pose = InputPort(Pose, doc="where the vehicle is; each pose causes a measurement")
+    bodies = InputPort(BodyState, multi=True, required=False, doc="moving discs; their latest positions are used")
     ranges = OutputPort(np.ndarray, shape=(None,), doc="m, a distance for each beam")
-    nearest = OutputPort(float, doc="m, the least of them")
+    nearest = OutputPort(float, doc="m, the shortest of them")
 
-    beams = Parameter(int, 36, min=1, max=10_000, doc="how many beams there are")
+    beams = Parameter(int, 36, min=1, max=10_000, doc="number of beams")
     field_of_view = Parameter(
         float, _TURN, unit="rad", min=0, max=_TURN, doc="angle from the first beam to the last, centred on the heading"
     )
-    max_range = Parameter(float, 30.0, unit="m", above=0, doc="how far it sees")
+    max_range = Parameter(float, 30.0, unit="m", above=0, doc="longest distance that it measures")
     deviation = Parameter(float, 0.0, unit="m", min=0, doc="standard deviation of a range")
     walls = array_parameter((None, 4), (), unit="m", doc="straight walls: x and y of one end, x and y of the other")
-    discs = array_parameter((None, 3), (), unit="m", doc="round things: x, y, and radius")
+    discs = array_parameter((None, 3), (), unit="m", doc="round obstacles: x, y and radius")
     body_radius = Parameter(float, 0.5, unit="m", min=0, doc="radius of the bodies")
 
     def check(self) -> None:
         if self.max_range == math.inf:
-            raise ParameterError("max_range: it is infinite, and a beam that ends nowhere would be, too")
+            raise ParameterError("max_range: it must be finite, because beams that hit nothing end there")
         if any(row[2] < 0.0 for row in self.discs.tolist()):
-            raise ParameterError("discs: a radius is negative")
+            raise ParameterError("discs: a radius is negative; expected >= 0")
 
     def initialize(self) -> None:
         self._draw = self.random_stream("noise").standard_normal
@@ -121,7 +119,7 @@ class RangeScanner(Actor):
 
     def _measured(self, pose: Pose) -> list[float]:
         x, y = pose.position.tolist()
-        # As seen from the vehicle: all beams begin at the origin.
+        # As seen from the vehicle: all beams start at the origin.
         walls = [(ax - x, ay - y, bx - ax, by - ay) for ax, ay, bx, by in self.walls.tolist()]
         discs = [(cx - x, cy - y, radius) for cx, cy, radius in self.discs.tolist()]
         discs += [(body[0] - x, body[1] - y, self.body_radius) for body in self._bodies if body is not None]
@@ -141,9 +139,9 @@ class RangeScanner(Actor):
 
 
 def _to_wall(dx: float, dy: float, ax: float, ay: float, ex: float, ey: float) -> float:
-    """How far it is from the origin along (dx, dy) to a wall from a to a + e; infinite if the beam misses it."""
+    """The distance from the origin along (dx, dy) to a wall from a to a + e; infinite if the beam misses it."""
     across = dx * ey - dy * ex
-    if across == 0.0:  # along the wall, of which the beam sees the edge at most
+    if across == 0.0:  # parallel to the wall: the beam sees at most its edge
         return math.inf
     distance = (ax * ey - ay * ex) / across
     share = (ax * dy - ay * dx) / across
@@ -151,7 +149,7 @@ def _to_wall(dx: float, dy: float, ax: float, ay: float, ex: float, ey: float) -
 
 
 def _to_disc(dx: float, dy: float, cx: float, cy: float, radius: float) -> float:
-    """How far it is from the origin along (dx, dy) to a disc; 0 from within, infinite if the beam misses it."""
+    """The distance from the origin along (dx, dy) to a disc; 0 from within, infinite if the beam misses it."""
     if cx * cx + cy * cy <= radius * radius:
         return 0.0
     along, aside = cx * dx + cy * dy, cx * dy - cy * dx
@@ -160,28 +158,28 @@ def _to_disc(dx: float, dy: float, cx: float, cy: float, radius: float) -> float
 
 
 class InertialSensor(Actor):
-    """An inertial measurement unit in the plane: turn rate and acceleration, with noise and biases that wander.
+    """An inertial measurement unit in the plane: turn rate and acceleration, with noise and drifting biases.
 
-    Both are means from pose to pose, as a sensor has them that integrates.  The noise of a reading over t seconds has
-    the standard deviation ``noise / sqrt(t)``, so densities are those of data sheets; each bias is a Wiener process
-    with the standard deviation ``walk * sqrt(t)``.
+    Both are means from pose to pose, as in a sensor that integrates.  The noise of a reading over t seconds has the
+    standard deviation ``noise / sqrt(t)``, so densities are those in data sheets; each bias is a Wiener process with
+    the standard deviation ``walk * sqrt(t)``.
     Source: IEEE Std 952-1997, annex C; O. J. Woodman, An introduction to inertial navigation, UCAM-CL-TR-696, 2007.
     """
 
-    pose = InputPort(Pose, doc="how the vehicle moves; it measures at each pose from the second on")
+    pose = InputPort(Pose, doc="how the vehicle moves; each pose from the second on causes a measurement")
     turn_rate = OutputPort(float, doc="rad/s, positive to the left")
     acceleration = OutputPort(np.ndarray, shape=(2,), doc="m/s^2, along the heading and to the left of it")
 
     turn_rate_noise = Parameter(
         float, 0.0, min=0, doc="density of the gyroscope's noise, in rad/s per square root of Hz"
     )
-    turn_rate_walk = Parameter(float, 0.0, min=0, doc="how its bias wanders, in rad/s per square root of a second")
+    turn_rate_walk = Parameter(float, 0.0, min=0, doc="random walk of its bias, in rad/s per square root of a second")
     turn_rate_bias = Parameter(float, 0.0, unit="rad/s", doc="its bias at the start")
     acceleration_noise = Parameter(
         float, 0.0, min=0, doc="density of the accelerometers' noise, in m/s^2 per square root of Hz"
     )
     acceleration_walk = Parameter(
-        float, 0.0, min=0, doc="how their biases wander, in m/s^2 per square root of a second"
+        float, 0.0, min=0, doc="random walk of their biases, in m/s^2 per square root of a second"
     )
     acceleration_bias = array_parameter((2,), (0.0, 0.0), unit="m/s^2", doc="their biases at the start")
 

@@ -1,4 +1,4 @@
-"""What every aspect is made of: its kinds, join points, and parameters that select and that take time."""
+"""The parts of every aspect: kinds, join points, and parameters for selections and durations."""
 
 from .aspect import Aspect, Decoration, class_decorations, decorations
 from .fields import STAMP, FieldError, altered, field_of, numbers_in, stamped_as

@@ -1,10 +1,10 @@
-"""Aspect: what is woven around a model from outside, or comes with an actor.
+"""Aspect: woven around a model from outside, or part of an actor.
 
-``@Noise(deviation=0.1).at("output")`` before a class of actors, or called with an actor, lets an aspect come with it:
-the same object that a model declares.  Those of a class stand at every instance of it, in every model; each instance
-has random streams and counts of its own, under the name ``PATH.NAME`` (``robot[2].sensor.noise``).  To all others they
-are a part of the actor: at an output they stand before the aspects of the model, at an input or at the actor's firings
-behind these.
+``@Noise(deviation=0.1).at("output")`` before a class of actors, or called with an actor, makes an aspect part of it; it
+is the same object that a model declares.  Aspects of a class attach to every instance of it, in every model; each
+instance has its own random streams and counts, under the name ``PATH.NAME`` (``robot[2].sensor.noise``).  From outside,
+they are part of the actor: at an output they act before the aspects of the model, at an input or at the actor's firings
+after these.
 """
 
 from __future__ import annotations
@@ -27,14 +27,14 @@ from epicycle.actors import (
 
 T = TypeVar("T")
 
-_OF_CLASS, _OF_INSTANCE = "_decorations", "_own_decorations"  # attributes that keep them
+_OF_CLASS, _OF_INSTANCE = "_decorations", "_own_decorations"  # attributes that hold them
 
 
 class Aspect(Configurable, ABC):
     """Root of all aspects; derive from one of its kinds: ``PortAspect``, ``ExecutionAspect`` or ``ClockAspect``.
 
-    ``at_ports`` and ``stands_at`` say where: at "input" ports, "output" ports, or both, or else at an "actor".
-    ``events`` names what it may note, so that summaries show a zero where nothing happened; ``reports`` names the
+    ``at_ports`` and ``stands_at`` say where it may attach: "input" ports, "output" ports, or both, or else an "actor".
+    ``events`` names the events that it may note, so that summaries show a zero if none occurred; ``reports`` names the
     figures that it gives at the end of a run, with their units.
     """
 
@@ -43,57 +43,59 @@ class Aspect(Configurable, ABC):
     stands_at: ClassVar[frozenset[str]] = frozenset({"actor"})
     events: ClassVar[tuple[str, ...]] = ()
     reports: ClassVar[dict[str, str]] = {}
-    alters_parameters: ClassVar[bool] = False  # a kind of port aspects does
+    alters_parameters: ClassVar[bool] = False  # a kind for port aspects sets it
     alters_numbers: ClassVar[bool] = True  # and nothing else
 
     def __init_subclass__(cls, **keywords: object) -> None:
         super().__init_subclass__(**keywords)
         if "pass_token" in vars(cls) and not cls.at_ports:
-            raise TypeError(f"{cls.__name__} has a pass_token(): derive it from PortAspect, not from Aspect")
+            raise TypeError(f"{cls.__name__} has a pass_token(); derive it from PortAspect, not from Aspect")
 
     def at(self, *ports: str, name: str = "") -> Decoration:
-        """Let it come with actors: ``@Noise(deviation=0.1).at("output")`` before a class, or called with an instance.
+        """Make it part of actors: ``@Noise(deviation=0.1).at("output")`` before a class, or called with an instance.
 
-        It then stands at these ports of every actor of the class, or of this one; an aspect of execution stands at the
-        actor itself, without ports.  The ``name`` is that of the type unless given.  Raises ``EpicycleError``.
+        It then attaches to these ports of every actor of the class, or of this one; an execution aspect attaches to the
+        actor itself, without ports.  The default of ``name`` is that of the type.  Raises ``EpicycleError``.
         """
         kind = type(self).__name__
         if bool(ports) != self.at_ports:
             raise EpicycleError(
-                f"{kind} stands at actors: write at() without ports"
+                f"{kind} attaches to actors, not to ports: write at() without ports"
                 if ports
-                else f"{kind} stands at ports: say at which"
+                else f"{kind} attaches to ports: give their names in at()"
             )
         name = name or re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", kind).lower()
         if not name.isidentifier() or not name.isascii():
-            raise EpicycleError(f"{name!r} is not a name: use letters, digits and _, no digit first")
+            raise EpicycleError(f"{name!r} is not a name: use letters, digits and _, and no digit first")
         return Decoration(self, name, ports)
 
     def report(self, shared: dict[Any, Any], end: int) -> dict[str, float | None]:
         """The figures that it ``reports``, from ``point.shared`` and the time (ns) at which the run ended.
 
-        None is for a figure of which there is nothing to say, such as the mean of nothing.
+        None for a figure without a value, such as the mean of nothing.
         """
         return {}
 
 
 @dataclass(frozen=True)
 class Decoration:
-    """An aspect, its name, and the ports (or parameter) of an actor where it is to stand; none: at its firings."""
+    """An aspect, its name, and the ports (or parameter) of an actor to which it attaches; without ports, its
+    firings."""
 
     aspect: Aspect
     name: str
     ports: tuple[str, ...]
 
     def __call__(self, target: T) -> T:
-        """Let the aspect stand at an actor, or at all actors of a class; returns what was given.
+        """Attach the aspect to an actor, or to all actors of a class; returns the argument.
 
-        Raises ``EpicycleError`` if it cannot stand there.
+        Raises ``EpicycleError`` if it cannot attach there.
         """
         if isinstance(target, Actor):
             if target.is_part:
                 raise EpicycleError(
-                    f"{target.path} is part of a model: weave it there, with model.weave({self.name!r}, ..., at=...)"
+                    f"{target.path} is part of a model: weave the aspect there, with model.weave({self.name!r}, ..., "
+                    "at=...)"
                 )
             known, where, attribute = decorations(target), target.path, _OF_INSTANCE
             directions = {n: p.direction for n, p in {**target.inputs, **target.outputs}.items()}
@@ -107,14 +109,14 @@ class Decoration:
             raise EpicycleError(f"{target!r} is neither an actor nor a class of actors")
         if any(each.name == self.name for each in known):
             raise EpicycleError(
-                f"{where} has an aspect {self.name!r} already: give this one another name with name=..."
+                f"{where} already has an aspect {self.name!r}: give this one another name with name=..."
             )
         own: tuple[Decoration, ...] = vars(target).get(attribute, ())
         setattr(target, attribute, (*own, self))
         return target
 
     def _check_ports(self, where: str, directions: dict[str, str], parameters: Iterable[str]) -> None:
-        """Whether the aspect can stand at its ports, of those that there are, or at a parameter."""
+        """Whether the aspect can attach to its ports, given the existing ones, or to a parameter."""
         kind, stands_at = type(self.aspect).__name__, self.aspect.stands_at
         elsewhere = set(parameters) - set(directions)
         if self.aspect.alters_parameters and len(self.ports) == 1 and self.ports[0] in elsewhere:
@@ -122,26 +124,26 @@ class Decoration:
         for port in self.ports:
             if port not in directions:
                 raise EpicycleError(
-                    f"{kind}: {where} has no port {port!r}{did_you_mean(port, directions)}; "
-                    f"its ports: {', '.join(directions) or 'none'}"
+                    f"{kind}: {where} has no port {port!r}{did_you_mean(port, directions)}; its ports: "
+                    f"{', '.join(directions) or 'none'}"
                 )
             if directions[port] not in stands_at:
                 raise EpicycleError(
-                    f"{kind} stands at {' or '.join(sorted(stands_at))} ports, "
-                    f"but {port} is an {directions[port]} port of {where}"
+                    f"{kind} attaches to {' or '.join(sorted(stands_at))} ports, but {port} is an {directions[port]} "
+                    f"port of {where}"
                 )
         if len({directions[port] for port in self.ports}) > 1:
             raise EpicycleError(
-                f"{kind} stands at inputs or at outputs of {where}, not at both: decorate it twice, with two names"
+                f"{kind} attaches to inputs or to outputs of {where}, not to both: decorate it twice, with two names"
             )
 
 
 def class_decorations(cls: type) -> tuple[Decoration, ...]:
-    """The aspects that come with an actor class, those of its bases first, in the order in which they were given."""
+    """The aspects that are part of an actor class, those of its bases first, in the order in which they were given."""
     return tuple(each for base in reversed(cls.__mro__) for each in vars(base).get(_OF_CLASS, ()))
 
 
 def decorations(actor: Actor) -> tuple[Decoration, ...]:
-    """The aspects that come with an actor, those of its class first."""
+    """The aspects that are part of an actor, those of its class first."""
     own: tuple[Decoration, ...] = getattr(actor, _OF_INSTANCE, ())
     return (*class_decorations(type(actor)), *own)

@@ -1,4 +1,4 @@
-"""What is inside a token, whatever its kind: for aspects that alter it, or need to know it."""
+"""The contents of a token of any kind, for aspects that alter or read them."""
 
 from __future__ import annotations
 
@@ -11,18 +11,19 @@ from numpy.typing import NDArray
 
 from epicycle.actors import EpicycleError
 
-# The field in which a token says of when it is.  No sensor measures that, so what alters all numbers leaves it alone.
+# The field with the time that a token describes.  No sensor measures it, so aspects that alter all numbers do not
+# change it.
 STAMP = "time"
 
 Change = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 
 
 class FieldError(EpicycleError):
-    """A token without the field, or without the numbers, that an aspect needs."""
+    """A token lacks the field, or the numbers, that an aspect needs."""
 
 
 def altered(token: Any, fields: tuple[str, ...], change: Change) -> Any:
-    """The token with ``change`` applied to its numbers: all but the time in its field ``time``, or the named fields.
+    """The token with ``change`` applied to its numbers: all except the time in its field ``time``, or the named fields.
 
     A token may be a number, an array, a list or tuple of these, a dataclass or a dict.  Texts and truth values stay as
     they are, and an integer stays an integer (rounded to even).  Raises ``FieldError``.
@@ -30,14 +31,14 @@ def altered(token: Any, fields: tuple[str, ...], change: Change) -> Any:
     if not fields:
         return _changed(token, change)
     for name in fields:
-        field_of(token, name, "leave out 'fields' to alter all of it")
+        field_of(token, name, "leave out 'fields' to alter all its numbers")
     if isinstance(token, dict):
         return {name: _changed(value, change) if name in fields else value for name, value in token.items()}
     return dataclasses.replace(token, **{name: _changed(getattr(token, name), change) for name in fields})
 
 
 def stamped_as(token: Any, other: Any) -> Any:
-    """A token with the time of another one, if both say of when they are."""
+    """A token with the time of another one, if both have one."""
     if isinstance(token, dict) and isinstance(other, dict):
         return {**token, STAMP: other[STAMP]} if STAMP in token and STAMP in other else token
     if _has_stamp(token) and _has_stamp(other):
@@ -64,7 +65,7 @@ def field_of(token: Any, name: str, advice: str = "") -> Any:
 
 
 def numbers_in(token: Any) -> int:
-    """How many numbers a token holds, however deep; texts and truth values are none.  Raises ``FieldError``."""
+    """The number of numbers in a token, at any depth, without texts and truth values.  Raises ``FieldError``."""
     if isinstance(token, (bool, np.bool_, str)) or token is None:
         return 0
     if isinstance(token, (int, float, np.number)):

@@ -1,22 +1,22 @@
-"""JoinPoint: a place where an aspect stands; and what the aspects that act at such places have in common.
+"""JoinPoint: a place to which an aspect is attached; and the common part of aspects that act at such places.
 
 The weaving contract
 --------------------
-There are three kinds, by what passes an aspect: tokens at ports (``PortAspect``), firings of actors
+There are three kinds of aspects, by what passes them: tokens at ports (``PortAspect``), firings of actors
 (``ExecutionAspect``), and the time that actors see (``ClockAspect``).  The engine makes one aspect object per
 declaration and one ``JoinPoint`` for each port or actor that its pointcut selects.  For every token or firing that
-passes a join point it calls ``pass_token`` or ``schedule``, which decides what goes on by calling ``point.forward``
-never, once or several times, now or (with ``delay``) later, and what is noted by calling ``point.act(...)``.  Doing
-exactly ``point.forward(token)`` leaves no trace.
+passes a join point it calls ``pass_token`` or ``schedule``.  That decides what continues by calling ``point.forward``
+never, once or several times, now or (with ``delay``) later, and what is noted by calling ``point.act(...)``.  A single
+``point.forward(token)`` leaves no trace.
 
 Aspects at the same port apply in the order of their declaration, the first one outermost (nearest to the sender).
 An aspect acts while it is *active*: from ``from`` until ``until`` (again every ``every``), and ``when`` a condition
-over ports holds.  At other times what passes goes on untouched, and the aspect does not learn of it.  It may look at
-what ports have sent last (``PortsParameter``, ``reads``, ``point.latest``), and changes nothing but what passes it.
+over ports holds.  At other times everything passes unchanged, and the aspect is not called.  It may read the latest
+tokens of ports (``PortsParameter``, ``reads``, ``point.latest``), and changes only what passes it.
 
-Each join point has a random stream of its own, keyed by the names of aspect and place: adding, removing or re-aiming
-an aspect moves no stream of an actor, of another aspect, or of the same aspect at another place.  An aspect should
-draw the same number of random values whatever its strength, so that runs at different strengths can be paired.
+Each join point has its own random stream, keyed by the names of aspect and place: adding, removing or re-aiming an
+aspect moves no stream of an actor, of another aspect, or of the same aspect at another place.  An aspect should draw
+the same number of random values whatever its strength, so that runs at different strengths can be paired.
 """
 
 from __future__ import annotations
@@ -30,13 +30,13 @@ from epicycle.actors.expression import PortFormula, PortFormulaParameter, operan
 
 from .aspect import Aspect
 
-TOKEN = "token"  # what expressions over ports call the token that passes
+TOKEN = "token"  # the name of the passing token in expressions over ports
 Reading = tuple[str, tuple[str, ...]]  # an output port, and the fields that lead to a part of its token
 Selection = Mapping[str, Sequence[str]]  # patterns, and the full paths that they select
 
 
 class AspectContext(Protocol):
-    """What the engine offers to a join point."""
+    """The interface that the engine offers to a join point."""
 
     @property
     def tag(self) -> Tag:
@@ -53,7 +53,7 @@ class AspectContext(Protocol):
         """``deliver(token)``, to be called later."""
 
     def latest(self, port: str) -> Any:
-        """What an output port has sent last; None if it has sent nothing yet."""
+        """The latest token of an output port; None if it has sent nothing yet."""
 
     def note(self, aspect: str, owner: str, port: str, event: str, token: Any) -> None:
         """Write an act of an aspect into the event log; ``port`` is a name, empty for an act at an actor."""
@@ -62,18 +62,18 @@ class AspectContext(Protocol):
         """Append a token to a signal among the results of the run."""
 
     def stop(self, reason: str) -> None:
-        """End the run when the present tag has been handled; the first who asks gives the reason."""
+        """End the run when the present tag has been handled; the first call gives the reason."""
 
 
 class JoinPoint:
-    """One port that an aspect stands at.
+    """One port to which an aspect is attached.
 
-    ``counts`` holds how often each event happened here.  ``memory`` belongs to the aspect, for what it must remember
-    about this port between tokens; ``shared`` is one for all its ports.  ``place`` is the connection, for an aspect
-    that stands on one connection to the port alone.  ``readings`` are what the aspect's expressions over ports ask for,
-    ``selections`` what its parameters with patterns select.
-    ``source`` is the port that tokens come from over the connection, at an output the port itself; ``owner`` the actor
-    or composite whose port it is.  ``enter`` lets a token into the composite, for an aspect that is a model.
+    ``counts`` holds how often each event happened here.  ``memory`` belongs to the aspect, for data about this port
+    that it keeps between tokens; ``shared`` is common to all its ports.  ``place`` is the connection, for an aspect on
+    a single connection to the port.  ``readings`` are the ports read by the aspect's expressions, ``selections`` the
+    paths selected by its parameters with patterns. ``source`` is the port that tokens come from over the connection, at
+    an output the port itself; ``owner`` is the actor or composite whose port it is.  ``enter`` lets a token into the
+    composite, for an aspect that is a model.
     """
 
     def __init__(
@@ -111,7 +111,7 @@ class JoinPoint:
 
     @cached_property
     def random(self) -> Stream:
-        """The random stream of the aspect at this port; many never ask for theirs."""
+        """The random stream of the aspect at this port, made on first use."""
         if self._first is not self:
             return self._first.random
         return aspect_stream(self._context.streams, self._place, self.aspect)
@@ -121,7 +121,7 @@ class JoinPoint:
         return self._place == other._place and self.aspect == other.aspect
 
     def share(self, first: JoinPoint) -> None:
-        """Engine: the port has another connection, on which ``first`` stands: one stream, one memory."""
+        """Engine: share stream and memory with ``first``, at another connection of the port."""
         self._first, self.memory, self.counts = first, first.memory, first.counts
 
     @property
@@ -135,7 +135,7 @@ class JoinPoint:
         return to_seconds(self._context.tag.time)
 
     def latest(self, port: str) -> Any:
-        """What an output port that the aspect ``reads`` has sent last; None if it has sent nothing yet."""
+        """The latest token of an output port that the aspect ``reads``; None if it has sent nothing yet."""
         return self._context.latest(port)
 
     def value_of(self, formula: PortFormula, **given: object) -> Any:
@@ -152,7 +152,7 @@ class JoinPoint:
         return formula(values, **given)
 
     def selected(self, parameter: str) -> Selection:
-        """The full paths that each pattern in a ``SelectionParameter`` of the aspect selects."""
+        """The full paths selected by each pattern in a ``SelectionParameter`` of the aspect."""
         return self._selections.get(parameter, {})
 
     def forward(self, token: Any, delay: float | None = None) -> None:
@@ -163,19 +163,19 @@ class JoinPoint:
             self._context.later(to_nanoseconds(delay), self._forward, token)
 
     def hold(self, token: Any) -> Callable[[], None]:
-        """What lets a token pass when it is called: ``forward`` for a token that came at another time."""
+        """A function that lets a token pass: ``forward`` for a later time."""
         return self._context.hold(self._forward, token)
 
     def later(self, delay: float, call: Callable[[Any], None], what: Any) -> None:
-        """Call ``call(what)`` after ``delay`` seconds (0 is the next microstep): for what is decided only then."""
+        """Call ``call(what)`` after ``delay`` seconds (0 is the next microstep), for decisions at that time."""
         self._context.later(to_nanoseconds(delay), call, what)
 
     def count(self, event: str) -> None:
-        """Count an event for the summary, and leave no trace in the log."""
+        """Count an event for the summary, without an entry in the log."""
         self.counts[event] = self.counts.get(event, 0) + 1
 
     def act(self, event: str, token: Any, *details: Any) -> None:
-        """Count an event and write it into the event log: the token as it came, then what was done to it.
+        """Count an event and write it into the event log: the token as it came, then the details.
 
         Details are a new token or a delay in seconds; with details the logged value is a list.
         """
@@ -201,17 +201,17 @@ Point = TypeVar("Point", bound=JoinPoint)
 
 
 class JoinPointAspect(Aspect, Generic[Passing, Point]):
-    """What aspects of ports and of execution have in common: they act on what passes join points, while active.
+    """The common part of port aspects and execution aspects: they act on what passes join points, while active.
 
-    ``in_model_time``: it goes by the time of the model, and not by the clocks of the composites in which it stands.
+    ``in_model_time``: it uses the time of the model, not the clocks of the composites around it.
     """
 
     in_model_time: ClassVar[bool] = False
 
     from_ = Parameter(float, 0.0, min=0.0, unit="s", doc="active from this time on")
-    until: Parameter[float | None] = Parameter(float, None, min=0.0, unit="s", doc="active before this time alone")
+    until: Parameter[float | None] = Parameter(float, None, min=0.0, unit="s", doc="active only before this time")
     every: Parameter[float | None] = Parameter(
-        float, None, above=0, unit="s", doc="active again after this time, and again: a period of on and off"
+        float, None, above=0, unit="s", doc="period with which 'from' and 'until' repeat"
     )
     when = PortFormulaParameter(
         None, doc="active while this expression over ports is true, such as main.state.position[0] < 20"
@@ -220,10 +220,12 @@ class JoinPointAspect(Aspect, Generic[Passing, Point]):
     def __init__(self, **values: object) -> None:
         super().__init__(**values)
         if self.until is not None and self.until <= self.from_:
-            raise EpicycleError(f"it is never active: until {self.until:g} s is not after from {self.from_:g} s")
+            raise EpicycleError(
+                f"it is never active: 'until' ({self.until:g} s) must be after 'from' ({self.from_:g} s)"
+            )
         if self.every is not None and (self.until is None or self.every < self.until - self.from_):
-            wanted = "a time 'until' as well" if self.until is None else "at least the time from 'from' to 'until'"
-            raise EpicycleError(f"every {self.every:g} s needs {wanted}")
+            wanted = "'until' as well" if self.until is None else "to be at least the time from 'from' to 'until'"
+            raise EpicycleError(f"'every' ({self.every:g} s) needs {wanted}")
 
     def is_due(self, time: int) -> bool:
         """Whether ``from``, ``until`` and ``every`` let it act at this time (ns)."""
@@ -235,16 +237,16 @@ class JoinPointAspect(Aspect, Generic[Passing, Point]):
 
     @property
     def is_always_active(self) -> bool:
-        """Whether there is no time and no state in which it does not act."""
+        """Whether it acts at all times and in all states."""
         return self.from_ == 0.0 and self.until is None and self.when is None
 
     def reads(self) -> tuple[str, ...]:
-        """Patterns of the output ports that it looks at."""
+        """Patterns of the output ports that it reads."""
         return ()
 
     def pass_by(self, passing: Passing, point: Point) -> None:
-        """What becomes of what passes while the aspect is not active: it goes on, untouched."""
+        """Called for what passes while the aspect is not active: passes it unchanged."""
         point.forward(passing)
 
     def forget(self, point: Point) -> None:
-        """The actor at which it stands has lost its state in a crash: what it had begun will never be over."""
+        """Called when the actor lost its state in a crash: unfinished work will never end."""

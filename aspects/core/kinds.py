@@ -1,17 +1,17 @@
-"""The kinds of aspects: those of what passes ports, those of firings of actors, and those that are models themselves.
+"""The kinds of aspects: of tokens at ports, of firings of actors, and aspects that are models themselves.
 
-What passes the join point of an actor is a ``Job``: a firing that is due, with the tokens that came at its tag and the
-wake-ups that the actor asked for.  ``point.forward(job)`` lets the actor fire; with a delay, or called later, it fires
-then.  It finds the job's tokens in its ports and its wake-ups due, and all else as it is by that time: ``now`` is the
-time at which it fires, and what it sends leaves then.  A job that is never forwarded is a firing that never happens.
+A ``Job`` passes the join point of an actor: a firing that is due, with the tokens that came at its tag and the wake-ups
+that the actor requested.  ``point.forward(job)`` lets the actor fire; with a delay, or called later, it fires then.  It
+finds the job's tokens in its ports and its wake-ups due, and everything else in its present state: ``now`` is the time
+at which it fires, and its tokens are sent then.  If a job is never forwarded, the firing never happens.
 
-Tokens that come, and wake-ups that fall due, while a job waits are jobs of their own.  An aspect keeps the jobs of one
-actor in their order.  Where several aspects stand at one actor, the first declared is the first to get a job.
+Tokens that come, and wake-ups that fall due, while a job waits, are separate jobs.  An aspect keeps the jobs of one
+actor in order.  If several aspects are attached to one actor, the first declared is the first to get a job.
 
-An aspect that is aimed at a composite stands at all the actors in it, and ``point.unit`` is one for all of them: what
-concerns the composite as a whole, such as a crash, has its stream, memory and events there.  Actors that are
-processes (``run``) are fired by their waits and reads; where they wait for an event of SimPy's (a resource, a
-timeout), no firing resumes them, and so no aspect can hold that up.
+An aspect aimed at a composite attaches to all the actors in it, with one ``point.unit`` for all of them: whatever
+concerns the composite as a whole, such as a crash, has its stream, memory and events there.  Actors that are processes
+(``run``) are fired by their waits and reads; if they wait for an event of SimPy (a resource, a timeout), no firing
+resumes them, so no aspect can delay that.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ from .join_point import JoinPoint, JoinPointAspect, aspect_stream
 class PortAspect(JoinPointAspect[Any, JoinPoint]):
     """An aspect of the tokens that pass ports: write ``pass_token``.
 
-    ``stands_at`` says at which: "input" (communication), "output" (measurement), or both.  ``alters_parameters``: it
-    may also stand at parameters that are numbers, which it gets as tokens whenever their actors fire.
+    ``stands_at`` says which ports: "input" (communication), "output" (measurement), or both.  ``alters_parameters``: it
+    may also attach to numeric parameters, which it gets as tokens whenever their actors fire.
     """
 
     at_ports: ClassVar[bool] = True
@@ -38,30 +38,30 @@ class PortAspect(JoinPointAspect[Any, JoinPoint]):
 
     @abstractmethod
     def pass_token(self, token: Any, point: JoinPoint) -> None:
-        """Decide what becomes of a token at a join point."""
+        """Decide what happens to a token at a join point."""
 
 
 class CommunicationAspect(PortAspect):
-    """An aspect of the way to an input port."""
+    """An aspect of the communication to an input port."""
 
     stands_at: ClassVar[frozenset[str]] = frozenset({"input"})
 
 
 class MeasurementAspect(PortAspect):
-    """An aspect of what leaves an output port."""
+    """An aspect of the tokens that leave an output port."""
 
     stands_at: ClassVar[frozenset[str]] = frozenset({"output"})
 
 
 class ObservationAspect(PortAspect):
-    """An aspect that looks at what passes and never changes it: write ``observe``.
+    """An aspect that observes tokens and never changes them: write ``observe``.
 
-    Every token goes on at once, whatever ``observe`` does with what it sees.
+    Every token continues at once, whatever ``observe`` does.
     """
 
     @abstractmethod
     def observe(self, token: Any, point: JoinPoint) -> None:
-        """Look at a token before it goes on."""
+        """Observe a token before it continues."""
 
     def pass_token(self, token: Any, point: JoinPoint) -> None:
         self.observe(token, point)
@@ -69,7 +69,7 @@ class ObservationAspect(PortAspect):
 
 
 class LossAspect(PortAspect):
-    """An aspect that lets some tokens not pass: write ``loses``.  A loss is noted as the first of its ``events``."""
+    """An aspect that loses some tokens: write ``loses``.  A loss is noted as the first of its ``events``."""
 
     events: ClassVar[tuple[str, ...]] = ("dropped",)
 
@@ -87,11 +87,11 @@ class LossAspect(PortAspect):
 class RandomLoss(LossAspect):
     """A loss that does not depend on the token: write ``draw``."""
 
-    spare_first = Parameter(bool, False, doc="tokens of the first tag at which any comes always pass")
+    spare_first = Parameter(bool, False, doc="whether tokens always pass at the first tag at which any come")
 
     @abstractmethod
     def draw(self, point: JoinPoint) -> bool:
-        """Whether the next token is lost; as many random numbers are drawn at any strength."""
+        """Whether the next token is lost; the number of random draws must not depend on the strength."""
 
     def loses(self, token: Any, point: JoinPoint) -> bool:
         lost = self.draw(point)
@@ -101,10 +101,10 @@ class RandomLoss(LossAspect):
 
 
 def is_bad(point: JoinPoint, worsens: float, recovers: float) -> bool:
-    """The state of a two-state Markov chain that takes one step for every token; it starts in its stationary law.
+    """The state of a two-state Markov chain with one step per token; it starts in its stationary distribution.
 
-    ``worsens`` is the probability of good -> bad in a step, ``recovers`` that of bad -> good.  One uniform number is
-    drawn for every token.
+    ``worsens`` is the probability of a step good -> bad, ``recovers`` that of bad -> good.  One uniform number is drawn
+    for every token.
     """
     draw = point.random.random()
     bad = point.memory.get("bad")
@@ -121,8 +121,8 @@ class Job:
     """A firing that is due.
 
     ``released`` is the tag at which it fell due, in the time of the model.  ``arrivals`` are its tokens and their
-    channels, ``wakes`` its wake-ups; the engine puts both back before the actor fires, at the ``rank`` at which it
-    would have fired.  ``watch``, if set, is told how long the firing took to compute (s).
+    channels, ``wakes`` its wake-ups; the engine restores both before the actor fires, at its original ``rank``.
+    ``watch``, if set, is called with the computing time of the firing (s).
     """
 
     actor: Actor
@@ -131,7 +131,7 @@ class Job:
     arrivals: dict[InputPort[Any], tuple[list[Any], list[int]]]
     wakes: tuple[Wake, ...] = ()
     watch: Callable[[float], None] | None = None
-    life: int = 0  # how many crashes of the actor were before it; one that comes after it makes an end of it
+    life: int = 0  # number of crashes of the actor before it; a later crash cancels the job
 
     @property
     def tokens(self) -> dict[str, tuple[Any, ...]]:
@@ -145,28 +145,28 @@ class Job:
 
     @property
     def is_wanted(self) -> bool:
-        """Whether there still is something to fire for: the actor may have cancelled the wake-ups meanwhile."""
+        """Whether there is still a reason to fire: the actor may have cancelled the wake-ups meanwhile."""
         return bool(self.arrivals) or not all(wake.cancelled for wake in self.wakes)
 
 
 class Keeper(Protocol):
-    """What the engine can do with an actor as a whole."""
+    """The control of the engine over an actor as a whole."""
 
     def suspend(self, point: ActorPoint, keeps: Callable[[Job, ActorPoint], bool]) -> None:
-        """Let the actor not fire until ``resume``; ``keeps`` says whether a job that falls due meanwhile waits."""
+        """Suspend the actor until ``resume``; ``keeps`` says whether a job that falls due meanwhile waits."""
 
     def resume(self, point: ActorPoint) -> None:
-        """Let the actor fire again: first for what was forwarded meanwhile, then for what fell due."""
+        """Let the actor fire again: first the jobs forwarded meanwhile, then those that fell due."""
 
     def kill(self) -> None:
         """Cancel the actor's wake-ups and drop its jobs; its state no longer counts."""
 
     def restart(self) -> None:
-        """Let the actor begin again."""
+        """Restart the actor."""
 
 
 class ActorPoint(JoinPoint):
-    """An actor that an aspect stands at; ``unit`` is what was aimed at, this actor or a composite around it."""
+    """An actor to which an aspect is attached; ``unit`` is its target, this actor or a composite around it."""
 
     unit: Unit
     keeper: Keeper
@@ -178,7 +178,7 @@ class ActorPoint(JoinPoint):
 
 
 class Unit(ActorPoint):
-    """What an execution aspect was aimed at, as a whole: the ``points`` of the actors that it stands at for it."""
+    """The target of an execution aspect as a whole: the ``points`` of its actors."""
 
     def __init__(self, path: str, first: ActorPoint) -> None:
         super().__init__(first.aspect, path, first._context, lambda job: None, first.shared)
@@ -187,24 +187,24 @@ class Unit(ActorPoint):
         self._readings = first._readings
 
     def suspend(self, keeps: Callable[[Job, ActorPoint], bool]) -> None:
-        """From now on its actors do not fire.  What is forwarded to them waits; so does a job that falls due, before
-        any aspect gets it, if it ``keeps`` that job.
+        """Suspend its actors.  Forwarded jobs wait; a job that falls due also waits, before any aspect gets it, if
+        ``keeps`` says so.
         """
         for point in self.points:
             point.keeper.suspend(point, keeps)
 
     def resume(self) -> None:
-        """From now on its actors fire again, at first for the jobs that wait."""
+        """Let its actors fire again, first for the jobs that wait."""
         for point in self.points:
             point.keeper.resume(point)
 
     def kill(self) -> None:
-        """Let its actors lose their state, their wake-ups and what they had begun."""
+        """Discard the state, the wake-ups and the unfinished work of its actors."""
         for point in self.points:
             point.keeper.kill()
 
     def restart(self) -> None:
-        """Let its actors begin again, in the order of their declaration."""
+        """Restart its actors, in the order of their declaration."""
         for point in self.points:
             point.keeper.restart()
 
@@ -212,13 +212,13 @@ class Unit(ActorPoint):
 class ExecutionAspect(JoinPointAspect[Job, ActorPoint]):
     """An aspect of an actor's firing: write ``schedule``.
 
-    ``is_processor``: it stands for the one processor that an actor has, so no two of this kind fit on an actor.
+    ``is_processor``: it represents the processor of the actor, so an actor can have only one such aspect.
     """
 
     is_processor: ClassVar[bool] = False
 
     def begin(self, unit: Unit) -> None:
-        """Called once before the first tag for everything it was aimed at: for what it does on its own."""
+        """Called once before the first tag for each target, for actions that it starts itself."""
 
     @abstractmethod
     def schedule(self, job: Job, point: ActorPoint) -> None:
@@ -227,12 +227,12 @@ class ExecutionAspect(JoinPointAspect[Job, ActorPoint]):
 
 @dataclass(frozen=True)
 class Request:
-    """A token on its way through an aspect that is a model: what the actors of such a composite get and send.
+    """A token on its way through an aspect that is a model; the actors of such a composite receive and send requests.
 
-    ``source`` is the port that the token comes from, ``port`` where it was going (the connection, for an aspect that
-    stands on one alone), ``time`` when it came, in s.  What the composite answers goes on to where the request came
-    from: an actor inside may keep a request for a while, lose it, or change its token with
-    ``dataclasses.replace(request, token=...)``.
+    ``source`` is the port that the token comes from, ``port`` its destination (the connection, for an aspect on a
+    single one), ``time`` when it came, in s.  The answer of the composite continues where the request came from: an
+    actor inside may keep a request for a while, lose it, or change its token with ``dataclasses.replace(request,
+    token=...)``.
     """
 
     token: Any
@@ -240,24 +240,24 @@ class Request:
     port: str
     time: float
     aspect: str
-    way: int = 0  # which of the ways through the port
+    way: int = 0  # number of the route through the port
 
 
 @dataclass(frozen=True)
 class FiringRequest(Request):
     """A firing that is due, on its way through an aspect that is a model: ``port`` is the path of the actor.
 
-    ``execution_time`` (s) is what the aspect says of this actor; ``token`` is None.  The actor fires when the request
-    is answered, with the tokens and wake-ups of the time at which it came.
+    ``execution_time`` (s) is that of this actor in the aspect; ``token`` is None.  The actor fires when the request is
+    answered, with the tokens and wake-ups of the time at which it came.
     """
 
     execution_time: float = 0.0
 
 
 class CompositeAspect(PortAspect):
-    """An aspect that is a model: each token is a request to a composite, and goes on when the composite answers.
+    """An aspect that is a model: each token is a request to a composite, and continues when the composite answers.
 
-    Events: ``requested``; ``delivered``, with the seconds since.  A request that is never answered is a token lost.
+    Events: ``requested``; ``delivered``, with the seconds since.  A token whose request is never answered is lost.
     Ptolemy: ``CompositeCommunicationAspect``.
     """
 
@@ -270,8 +270,8 @@ class CompositeAspect(PortAspect):
 class CompositeExecutionAspect(ExecutionAspect):
     """An aspect at actors that is a model: each firing is a request to a composite, and happens when it answers.
 
-    Events: ``requested``, with the execution time; ``executed``, with the seconds since.  A request that is never
-    answered is a firing that never happens.  Ptolemy: ``CompositeExecutionAspect``.
+    Events: ``requested``, with the execution time; ``executed``, with the seconds since.  A firing whose request is
+    never answered never happens.  Ptolemy: ``CompositeExecutionAspect``.
     """
 
     events: ClassVar[tuple[str, ...]] = ("requested", "executed")

@@ -1,4 +1,4 @@
-"""Parameters of aspects: laws, durations, the times that firings take, and what selects parts of the model."""
+"""Parameters of aspects: laws, durations, execution times, and selections of parts of the model."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ FiringTime: TypeAlias = Duration | Mapping[str, Duration]  # by input port
 
 
 class LawParameter(Parameter[str | Distribution]):
-    """A distribution, or the name of a familiar one: ``normal``, or ``{type: Triangular, low: -1}``."""
+    """A distribution, or the name of a common one: ``normal``, or ``{type: Triangular, low: -1}``."""
 
     def __init__(self, familiar: Iterable[str], default: Any = REQUIRED, *, doc: str = "") -> None:
         super().__init__(str, default, doc=doc)
@@ -38,7 +38,7 @@ class LawParameter(Parameter[str | Distribution]):
 
 
 def law(value: str | Distribution, familiar: Mapping[str, Distribution]) -> Distribution:
-    """What a ``LawParameter`` with these names says."""
+    """The law given by a ``LawParameter`` with these names."""
     return familiar[value] if isinstance(value, str) else value
 
 
@@ -60,21 +60,21 @@ class DurationParameter(Parameter[Duration]):
         if isinstance(value, (Mapping, Configurable)):
             return self._of_law.convert(value)
         if isinstance(value, str) and not any(letter.isdigit() for letter in value):
-            raise ParameterError(f"{value!r} is not a time in s, nor a distribution {{type: ..., ...}}")
+            raise ParameterError(f"{value!r} is neither a time in s nor a distribution {{type: ..., ...}}")
         return super().convert(value)
 
 
 def drawn(duration: Duration, random: Stream) -> float:
-    """A time in seconds; a number is drawn only from a distribution, and counts as 0 where it is negative."""
+    """A time in seconds; random numbers are drawn only for a distribution, and negative ones count as 0."""
     return max(0.0, float(duration.draw(random))) if isinstance(duration, Distribution) else duration
 
 
 class FiringTimeParameter(DurationParameter):
-    """How long a firing takes: a duration, or one for each input port that costs time, ``{trigger: 60 ms}``.
+    """The duration of a firing: a single one, or one for each input port that costs time, ``{trigger: 60 ms}``.
 
-    A duration alone is for firings in which the actor has work to do: for a wake-up, or a token at a port that
-    triggers it.  What it only takes note of costs nothing.  With durations by port a firing takes the longest of those
-    of the ports at which tokens came; other ports, and wake-ups, cost nothing.
+    A single duration applies to firings with work for the actor: a wake-up, or a token at a port that triggers it.
+    Tokens that it only stores cost no time.  With durations by port, a firing takes the longest of those of the ports
+    at which tokens came; other ports, and wake-ups, cost no time.
     """
 
     def __init__(self, default: Any = REQUIRED, *, doc: str = "") -> None:
@@ -86,7 +86,7 @@ class FiringTimeParameter(DurationParameter):
         return "time, distribution, or {port: time}"
 
     def _expected(self) -> str:
-        return "a time in s >= 0, a distribution, or these by input port"
+        return "a time in s >= 0, a distribution, or a mapping of input ports to these"
 
     def convert(self, value: object) -> FiringTime | None:  # type: ignore[override]
         if isinstance(value, Mapping) and value and "type" not in value:
@@ -96,7 +96,7 @@ class FiringTimeParameter(DurationParameter):
 
 
 def time_needed(time: FiringTime, job: Job, random: Stream) -> float | None:
-    """How long a firing takes (s); None: there is nothing to do in it that would take time."""
+    """The duration of a firing (s); None if it has no work that takes time."""
     if not isinstance(time, Mapping):
         return drawn(time, random) if job.is_triggered else None
     come = {port.name for port in job.arrivals}
@@ -104,13 +104,13 @@ def time_needed(time: FiringTime, job: Job, random: Stream) -> float | None:
 
 
 class SelectionParameter(Parameter[T], Generic[T]):
-    """A parameter whose value holds patterns; ``point.selected`` tells what they select.
+    """A parameter whose value holds patterns; ``point.selected`` gives what they select.
 
-    A pattern that selects nothing is a mistake in the model.
+    A pattern that selects nothing is an error in the model.
     """
 
-    selects: ClassVar[str]  # in a word
-    is_single = False  # whether one path at most may be selected
+    selects: ClassVar[str]  # in words
+    is_single = False  # whether at most one path may be selected
 
     def __init__(self, default: Any = REQUIRED, *, doc: str = "") -> None:
         super().__init__(str, default, shape=(None,), doc=doc)  # type: ignore[arg-type]
@@ -121,7 +121,7 @@ class SelectionParameter(Parameter[T], Generic[T]):
 
 
 class PortsParameter(SelectionParameter[tuple[str, ...]]):
-    """Output ports whose latest tokens the aspect looks at: a pattern or several; with ``single`` exactly one port."""
+    """Output ports whose latest tokens the aspect reads: one or several patterns; with ``single`` exactly one port."""
 
     selects = "output port"
 
@@ -134,9 +134,10 @@ class PortsParameter(SelectionParameter[tuple[str, ...]]):
 
 
 class ByActorParameter(SelectionParameter[Mapping[str, T]], Generic[T]):
-    """Values for some actors: ``{robot.planner: 20 ms, "robot[*]": 1 ms}``; an actor gets the last that is for it.
+    """Values for some actors: ``{robot.planner: 20 ms, "robot[*]": 1 ms}``; an actor gets the last value that applies
+    to it.
 
-    A composite stands for all the actors in it.
+    A composite means all the actors in it.
     """
 
     selects = "actor"
@@ -159,7 +160,7 @@ class ByActorParameter(SelectionParameter[Mapping[str, T]], Generic[T]):
 
     @staticmethod
     def of(value: Mapping[str, T], selection: Mapping[str, Sequence[str]], actor: str) -> T | None:
-        """What is for an actor, None if nothing is; ``selection`` is what the patterns select."""
+        """The value for an actor, None if there is none; ``selection`` is what the patterns select."""
         for pattern in list(value)[::-1]:
             if any(actor == path or actor.startswith(f"{path}.") for path in selection.get(pattern, ())):
                 return value[pattern]

@@ -1,4 +1,4 @@
-"""A server with a waiting line: what media and processors have in common.  All times are in ns."""
+"""A server with a queue: the common part of media and processors.  All times are in ns."""
 
 from __future__ import annotations
 
@@ -16,13 +16,13 @@ NEWEST, OLDEST = "newest", "oldest"
 
 @dataclass(order=True)
 class Task(ABC):
-    """What waits for a server, or is served: a message, or a firing.  The smallest ``urgency`` goes first."""
+    """A task that waits or is served: a message, or a firing.  The smallest ``urgency`` goes first."""
 
     urgency: float
-    number: int = field(init=False)  # which of all that have come: among equals, the first goes first
+    number: int = field(init=False)  # number in order of arrival: among equals, the first goes first
     passing: Any = field(compare=False)
     point: JoinPoint = field(compare=False)
-    duration: int = field(compare=False)  # for which it still needs the server
+    duration: int = field(compare=False)  # time for which it still needs the server
     came: int = field(init=False, compare=False)
 
     def __post_init__(self) -> None:
@@ -30,14 +30,14 @@ class Task(ABC):
 
     @abstractmethod
     def release(self, now: int) -> None:
-        """It has been served: let it go on."""
+        """It has been served: let it continue."""
 
 
 T = TypeVar("T", bound=Task)
 
 
 class WaitingLine(Generic[T]):
-    """Tasks that wait, the most urgent first, and in the order in which they came among equals."""
+    """Waiting tasks, the most urgent first, and in order of arrival among equals."""
 
     def __init__(self) -> None:
         self.tasks: list[T] = []  # a heap
@@ -51,7 +51,8 @@ class WaitingLine(Generic[T]):
         return self._area
 
     def add(self, task: T, now: int, capacity: int | None = None, overflow: str = NEWEST) -> T | None:
-        """Let a task wait; returns the one of the least urgent that is dropped for it, which can be itself."""
+        """Let a task wait; returns the one of the least urgent tasks that is dropped for it, possibly the task
+        itself."""
         self.area(now)
         heapq.heappush(self.tasks, task)
         if capacity is None or len(self.tasks) <= capacity:
@@ -70,37 +71,37 @@ class WaitingLine(Generic[T]):
 
 
 class Server:
-    """Serves one task at a time, and counts what it does; ``steps``: one that takes no time takes a microstep."""
+    """Serves one task at a time, and keeps statistics; ``steps``: a task that takes no time takes a microstep."""
 
     def __init__(self, *, steps: bool = False) -> None:
         self.steps = steps
         self.line: WaitingLine[Task] = WaitingLine()
         self.begins = 0
-        self.waited = 0  # by all that have begun, until then
+        self.waited = 0  # of all tasks that have begun, until then
         self.done = 0
-        self.responses = 0  # of all that are done: the times from coming to being done
+        self.responses = 0  # of all finished tasks: the times from arrival to completion
         self.longest = 0  # of these
         self._come = 0
         self._served: Task | None = None
-        self._begun = 0  # when the served one began, or went on
-        self._busy = 0  # of all that were served before it
+        self._begun = 0  # when the served task began or resumed
+        self._busy = 0  # of all tasks served before it
 
     def busy_until(self, end: int) -> int:
-        """How long it has served before ``end``, which is not before the present."""
+        """The time for which it has served before ``end``, which is not before the present."""
         return self._busy + (end - self._begun if self._served is not None else 0)
 
     def arrive(
         self, task: Task, capacity: int | None = None, overflow: str = NEWEST, preemptive: bool | None = None
     ) -> Task | None:
-        """Take in a task, now; returns the one that is dropped for it.
+        """Accept a task now; returns the one that is dropped for it.
 
-        ``preemptive``: a more urgent one interrupts the served one, if false at the instant at which that began alone.
+        ``preemptive``: a more urgent task interrupts the served one; if false, only at the instant at which that began.
         """
         now, served = task.came, self._served
         task.number, self._come = self._come, self._come + 1
         is_in_time = served is not None and (served.duration > 0 or not self.steps)
         if served is not None and is_in_time and self._begun + served.duration <= now:
-            self._finish((served, self._begun))  # it is over, though we have not been called yet
+            self._finish((served, self._begun))  # it is over, although this has not been called yet
             served = self._served
         can_interrupt = preemptive or (preemptive is not None and self._begun == now)
         if served is not None and can_interrupt and task.urgency < served.urgency:
@@ -112,11 +113,11 @@ class Server:
         return None
 
     def has_any(self, point: JoinPoint) -> bool:
-        """Whether a task from there is not over."""
+        """Whether a task from there is unfinished."""
         return any(task.point.is_at(point) for task in (self._served, *self.line.tasks) if task is not None)
 
     def remove(self, point: JoinPoint) -> None:
-        """Drop the tasks from there, now: they will never be over."""
+        """Drop the tasks from there now: they will never be finished."""
         now = point.tag.time
         self.line.tasks = [task for task in self.line.tasks if not task.point.is_at(point)]
         heapq.heapify(self.line.tasks)
@@ -134,7 +135,7 @@ class Server:
             self._release(task, now)
 
     def _finish(self, what: tuple[Task, int]) -> None:
-        """A task is over, unless it was interrupted since it began or went on at that time."""
+        """End a task, unless it was interrupted after it began or resumed at that time."""
         task, begun = what
         if task is self._served and begun == self._begun:
             now = begun + task.duration
@@ -149,7 +150,7 @@ class Server:
         task.release(now)
 
     def _go_on(self, now: int) -> None:
-        """If it is idle, begin with the most urgent task."""
+        """If idle, begin the most urgent task."""
         while self._served is None and self.line.tasks:
             self._begin(self.line.pop(now), now)
 
@@ -158,7 +159,7 @@ class Server:
         self._stop(now)
         task.duration -= worked
         self.line.add(task, now)
-        if worked > 0:  # or else it had not really begun
+        if worked > 0:  # otherwise it had not really begun
             task.point.act("preempted", to_seconds(task.duration))
 
     def _stop(self, now: int) -> None:

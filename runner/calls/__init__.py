@@ -1,4 +1,4 @@
-"""What a program calls: load, run, study, compare, view, plot, draw and save.  Commands go the same way.
+"""The calls of a program: load, run, study, compare, view, plot, draw and save.  The commands use them, too.
 
 ``epicycle`` itself offers all of these.
 """
@@ -57,7 +57,7 @@ _HOMES = {
 
 
 def __getattr__(name: str) -> Any:
-    # On first use: a run needs neither studies nor what draws.
+    # On first use: a run needs neither studies nor drawing.
     home = next((home for home, names in _HOMES.items() if name in names), None)
     if home is None:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

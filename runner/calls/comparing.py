@@ -1,4 +1,4 @@
-"""Comparing variants of a model in pairs of runs: each seed runs every variant, so that all meet the same luck."""
+"""Comparing variants of a model in pairs of runs: every variant runs with each seed, so that all have the same luck."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ Variant = Model | Changes
 
 @dataclass(frozen=True)
 class Difference:
-    """How much greater a metric is in a variant than in the first one, over the seeds that both have it for.
+    """How much greater a metric is in a variant than in the first one, over the seeds for which both have it.
 
-    ``p`` is that of Student's paired test of its being zero, corrected by Holm's method for all differences of the
-    comparison; ``metric`` is what the variant has by itself.
+    ``p`` is the p-value of Student's paired test for a difference of zero, corrected by Holm's method for all
+    differences of the comparison; ``metric`` is the metric's mean in the variant itself.
     """
 
     name: str
@@ -43,9 +43,9 @@ class Difference:
 
 @dataclass(repr=False)
 class Comparison(Tabled):
-    """Runs of variants of a model with the same seeds; the first variant is what the others are compared with.
+    """Runs of variants of a model with the same seeds; the others are compared with the first variant.
 
-    ``runs`` has the results of each variant by seed, ``failures`` the errors of those that failed.
+    ``runs`` has the results of each variant by seed, ``failures`` the errors of failed runs.
     """
 
     model: str
@@ -56,18 +56,18 @@ class Comparison(Tabled):
 
     @property
     def metrics(self) -> list[str]:
-        """The metrics that are numbers in some run of every variant."""
+        """The metrics that have a number in some run of every variant."""
         return [name for name in self.units if all(self.values(each, name) for each in self.runs)]
 
     def values(self, variant: str, metric: str) -> dict[int, float]:
-        """A metric by seed, where it has a number."""
+        """The values of a metric by seed, where it has a number."""
         if metric not in self.units:
             raise EpicycleError(f"{self.model} has no metric {metric!r}{did_you_mean(metric, list(self.units))}")
         found = {seed: results.metrics.get(metric) for seed, results in self.runs[variant].items()}
         return {seed: float(each) for seed, each in found.items() if isinstance(each, (int, float))}
 
     def differences(self) -> list[Difference]:
-        """Each metric in each variant, and its difference to the first variant."""
+        """Each metric in each variant, and its difference from the first variant."""
         first, *others = self.runs
         tested = {
             (metric, variant): paired_difference(self.values(first, metric), self.values(variant, metric))
@@ -115,7 +115,7 @@ class Comparison(Tabled):
         first = next(iter(self.runs))
         failed = [(variant, str(seed), str(error)) for (variant, seed), error in self.failures.items()]
         return [
-            Table(("metric", "variant", "mean", "unit", f"difference to {first}", "p (Holm)", "runs"), rows),
+            Table(("metric", "variant", "mean", "unit", f"difference from {first}", "p (Holm)", "runs"), rows),
             Table(("failed", "seed", "error"), failed),
         ]
 
@@ -131,8 +131,9 @@ def compare(
 ) -> Comparison:
     """Run variants of a model with the same seeds, and compare their metrics in pairs of runs.
 
-    A variant is what ``load`` changes in the model, or another model; a list names disturbances, of which ``none`` is
-    the model as it is.  Seeds count up from ``seed`` (default: the model's).  Runs that fail are reported and left out.
+    A variant is a set of changes as ``load`` takes them, or another model; a list names disturbances, where ``none`` is
+    the unchanged model.  Seeds count up from ``seed`` (default: the model's).  Runs that fail are reported and left
+    out.
 
     >>> epicycle.compare("collision_avoidance", ["none", "wifi_burst"], replications=20)
     >>> epicycle.compare("mm1", {"slow": {}, "fast": {"set": {"mean_service": 0.8}}})
@@ -140,9 +141,9 @@ def compare(
     if not isinstance(variants, Mapping):
         variants = {name: {} if name == "none" else {"disturb": name} for name in variants}
     if len(variants) < 2:
-        raise EpicycleError("a comparison needs two variants or more")
+        raise EpicycleError("a comparison needs at least two variants")
     if replications < 1:
-        raise EpicycleError(f"replications: {replications} is not a whole number from 1 on")
+        raise EpicycleError(f"replications: {replications} is not a whole number of at least 1")
     models = {name: each if isinstance(each, Model) else loaded(model, each) for name, each in variants.items()}
     first, stop = next(iter(models.values())), seconds("until", until)
     seeds = range(start := first.seed if seed is None else seed, start + replications)

@@ -1,4 +1,4 @@
-"""Pictures of models and results, which a notebook shows and a file keeps; and what is saved of results."""
+"""Pictures of models and results, to show in a notebook or write to a file; and saving results."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ from .comparing import Comparison
 
 
 class Picture:
-    """A picture, which is drawn when it is shown or saved: a notebook shows it as SVG."""
+    """A picture, drawn when it is shown or saved; a notebook shows it as SVG."""
 
     def __init__(self, name: str, write: Callable[[Path], object]) -> None:
         self.name = name
         self._write = write
 
     def save(self, path: str | Path) -> Path:
-        """Write it to a file, whose ending decides the format: .svg, .png, .pdf."""
+        """Write it to a file, whose suffix decides the format: .svg, .png or .pdf."""
         self._write(Path(path))
         return Path(path)
 
@@ -74,7 +74,7 @@ class Pictures(Mapping[str, Picture]):
 
 
 def _image(name: str, svg: bytes) -> Html:
-    """An SVG as an image: what is in it cannot reach the page around it."""
+    """An SVG as an image: its content cannot reach the page around it."""
     data = base64.b64encode(svg).decode()
     return tag("img", src=f"data:image/svg+xml;base64,{data}", alt=name, style="max-width: 100%")
 
@@ -93,9 +93,9 @@ def plot(results: Results | StudyResults, figure: None = None) -> Pictures: ...
 @overload
 def plot(results: Results | StudyResults, figure: str | Figure) -> Picture: ...
 def plot(results: Results | StudyResults, figure: str | Figure | None = None) -> Picture | Pictures:
-    """The figures that a model declares, of a run, or a study, of its table; with a name, that one alone.
+    """The figures that a model declares for its runs, or a study for its table; with a name, only that figure.
 
-    Of a run, ``figure`` may also be a pattern of recorded signals, which are drawn over time, or a ``Figure``.
+    For a run, ``figure`` may also be a pattern of recorded signals, which are drawn over time, or a ``Figure``.
     """
     if isinstance(results, StudyResults):
         if isinstance(figure, Figure):
@@ -117,7 +117,7 @@ def plot(results: Results | StudyResults, figure: str | Figure | None = None) ->
 
 
 def _figures(results: Results) -> dict[str, Figure]:
-    """What the model of a run declares."""
+    """The figures that the model of a run declares."""
     problems, known = Problems(), figure_types()
     found = {name: made_figure(name, known, declared, problems) for name, declared in results.figures.items()}
     problems.raise_if_any()
@@ -151,10 +151,10 @@ def _copying(name: str, kinds: dict[str, bytes]) -> Callable[[Path], object]:
 
 
 def save(what: Results | StudyResults | Comparison | Picture, path: str | Path) -> list[Path]:
-    """Write to disk; the files that were written.
+    """Write to disk; returns the files written.
 
-    Of a run, a folder with manifest, signals, figures and, if it was kept, the log; of a study, its report in a folder;
-    of a comparison, the metrics of its runs in a file (.csv); a picture in a file (.svg, .png, .pdf).
+    A run goes to a folder with manifest, signals, figures and, if it was kept, the log; a study to a folder with its
+    report; the metrics of a comparison's runs to a file (.csv); a picture to a file (.svg, .png, .pdf).
     """
     place = Path(path)
     if isinstance(what, Picture):

@@ -1,4 +1,4 @@
-"""One run from a model to what it leaves: what ``epicycle.run`` and the command do."""
+"""One run, from the model to the files of its results: what ``epicycle.run`` and the command do."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ from ..printing import complain, console, notices
 from ..results import LogFile, Results
 from ..text import Problems, call_site, node_of, plain
 
-PATIENCE = 5.0  # s after which a run can be judged
-LONG = 600.0  # s that are worth a word
-NOTICEABLE = 0.05  # s by which a run may be late without our saying so: the operating system alone takes as much
+PATIENCE = 5.0  # s after which the length of a run can be judged
+LONG = 600.0  # s that are worth a notice
+NOTICEABLE = 0.05  # s by which a run may be late without a report: the operating system alone takes as much
 
 load = load_model
 
@@ -41,13 +41,13 @@ class Changes(TypedDict, total=False):
 
 
 def loaded(model: Model | str | Path, changes: Changes) -> Model:
-    """The model of that name or file with the changes; one that is made already takes none."""
+    """The model of that name or file with the changes; an existing model takes none."""
     if not isinstance(model, Model):
         return load_model(model, **changes)
     if changes:
         raise EpicycleError(
-            f"the model {model.name} is made already and takes no {', '.join(changes)}\n"
-            "   help: give the name or file of a model with these, or load it with them"
+            f"the model {model.name} exists already and takes no {', '.join(changes)}\n"
+            "   help: give the name or file of the model instead, or pass them to load"
         )
     return model
 
@@ -64,10 +64,10 @@ def run(
     progress: bool = True,
     **changes: Unpack[Changes],
 ) -> Results:
-    """Run a model once: a packaged one, a file, or one that was loaded or built.
+    """Run a model once: a packaged one, a file, or a loaded or built model.
 
     ``set``, ``disturb`` and the other options of ``load`` change it first.  ``until`` is the stop time (s, or a text
-    with a unit), ``realtime`` how many seconds of it pass in a second.  ``keep_log`` keeps the event log in
+    with a unit), ``realtime`` the seconds of model time that pass per second.  ``keep_log`` keeps the event log in
     ``results.log``, ``log`` writes it to a file (.parquet, .csv, .jsonl), ``out`` writes manifest, signals and figures
     into a folder.  A long run shows a bar in a notebook or on a terminal, unless ``progress`` is false.
 
@@ -94,7 +94,7 @@ FLAGS = {"overrides": "--overrides", "disturb": "--disturb", "aspects": "--aspec
 
 
 def as_command(model: str | Path, seed: int | None, until: float | str | None, changes: Changes) -> list[str]:
-    """The command that makes the same run; classes that a program defines it cannot name."""
+    """The command that makes the same run; it cannot name classes that a program defines."""
     words: list[object] = ["epicycle", "run", model]
     for key, value in changes.items():
         if key == "set" and isinstance(value, Mapping):
@@ -110,7 +110,7 @@ def as_command(model: str | Path, seed: int | None, until: float | str | None, c
 
 @dataclass
 class Done:
-    """What came of a run, what was written of it, and which figures could not be drawn."""
+    """The outcome of a run, the files written, and the figures that could not be drawn."""
 
     results: Results
     written: list[Path] = field(default_factory=list)
@@ -130,9 +130,9 @@ def perform(
     progress: bool = True,
     after: float = SOON,
 ) -> Done:
-    """Run a model and write what is asked for; ``given`` is by what it was, for the manifest.
+    """Run a model and write what is requested; ``given`` is the command or call, for the manifest.
 
-    What is recorded until a run fails is written, too.  ``keep_log`` filters what goes to the ``log``, if there is one.
+    The records of a run that fails are written, too.  ``keep_log`` filters the ``log``, if there is one.
     """
     figures = figures_of(model, Problems())
     if folder is not None and folder.exists() and not folder.is_dir():
@@ -142,7 +142,7 @@ def perform(
 
     replaced = "" if folder is None else check_folder(folder, model.name, list(given))
     simulation = Simulation(model, seed=seed, keep_log=keep_log, log_to=None if log is None else log.add)
-    if replaced:  # and nothing is wrong with what was asked for
+    if replaced:  # and the request is valid
         complain(replaced)
     if until is None and model.endless:
         complain(f"{model.endless}\n   help: end it with Ctrl-C, which keeps what was recorded, or run it with --until")
@@ -154,7 +154,7 @@ def perform(
             results = simulation.results("interrupted" if interrupted else "failed")
             if folder is not None:
                 write_folder(folder, results, given, "interrupted" if interrupted else str(error))
-                complain(f"what was recorded until then is in {folder}")
+                complain(f"what was recorded before is in {folder}")
             raise
         # Before the log is closed, which may fail.
         saved = [] if folder is None else write_folder(folder, results, given)
@@ -180,11 +180,11 @@ def seconds(what: str, given: float | str | None) -> float | None:
 
 
 def outlook(elapsed: float, now: float, end: float) -> str:
-    """What to say of a run that has gone on for a while and will take long: a clock of 1 ns is easily written."""
-    if now <= 0.0:  # for all we know, one step does not end
+    """The notice about a run that has taken a while and will take long: a clock of 1 ns is easily written."""
+    if now <= 0.0:  # perhaps a single step does not end
         state = f"still at 0 s of {end:g} s"
     elif (left := elapsed * (end - now) / now) > LONG:
-        state = f"at {now:.3g} s of {end:g} s: at this pace it takes {left / 3_600:,.1f} h more"
+        state = f"at {now:.3g} s of {end:g} s: at this pace it takes another {left / 3_600:,.1f} h"
     else:
         return ""
     return f"after {elapsed:.0f} s the run is {state}; Ctrl-C ends it, and what was recorded is kept"
@@ -192,13 +192,13 @@ def outlook(elapsed: float, now: float, end: float) -> str:
 
 @contextmanager
 def watched(model: Model, until: float | None, after: float = 0.0) -> Iterator[Callable[[float], None]]:
-    """What shows how far a run is: a bar, and notices of what takes long."""
+    """Shows the progress of a run: a bar, and notices if it takes long."""
     end = until if until is not None else model.stop
     latest = -math.inf
 
     def look(now: float) -> None:
         nonlocal latest
-        if latest < 0.0:  # time starts only now: before, actors were initialised, which says nothing of the run
+        if latest < 0.0:  # time starts only now: before, actors were initialised, which says nothing about the run
             watch.start()
         latest = now
         if show is not None:
@@ -208,7 +208,7 @@ def watched(model: Model, until: float | None, after: float = 0.0) -> Iterator[C
         if end is not None and (text := outlook(PATIENCE, latest, end)):
             complain(text)
 
-    # One step of the run may take for ever, so it is looked at from outside.
+    # A step of the run may never end, so another thread watches it.
     watch = threading.Timer(PATIENCE, judge)
     watch.daemon = True
     terminal = console(stderr=True)

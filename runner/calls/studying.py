@@ -1,4 +1,4 @@
-"""A study from Python: a packaged one, a file, or what such a file says as a mapping."""
+"""A study from Python: a packaged one, a file, or a mapping with the contents of such a file."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from ..show.report import check_figures
 from ..study import Plan, StudyResults, open_study, progress, run_study
 from ..text import call_site, node_of, plain
 
-PROGRAM = Path("<python>")  # the file of a study that a program says
+PROGRAM = Path("<python>")  # stands for the file of a study that a program gives as a mapping
 
 
 def study(
@@ -34,10 +34,10 @@ def study(
     scheduler: str | None = None,
     show_progress: bool = True,
 ) -> StudyResults:
-    """Make all runs of a study that are not in its results folder yet (default: results/NAME); its results.
+    """Make the runs of a study that are not yet in its results folder (default: results/NAME), and return its results.
 
     ``study`` is a packaged study, a file, or a mapping with the keys of such a file.  The other parameters are the
-    options of ``epicycle study``.  Runs are made in processes of their own, ``jobs`` at a time (default: one a core).
+    options of ``epicycle study``.  Runs are made in separate processes, ``jobs`` at a time (default: one per core).
 
     >>> results = epicycle.study({"study": "load", "model": "mm1", "vary": {"load": [0.5, 0.7]}, "replications": 20})
     >>> results.means("mean_wait")

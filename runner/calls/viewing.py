@@ -1,4 +1,4 @@
-"""Runs as a page: what ``epicycle.view`` and the commands that write one do."""
+"""Runs as a page: what ``epicycle.view`` and the commands that write pages do."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from .running import Changes, loaded, seconds, watched
 class Page:
     """A page that shows one run or two, in a notebook, a browser or a file; it needs no network.
 
-    A run that failed or was interrupted is shown up to there: ``errors`` say why.
+    A run that failed or was interrupted is shown up to that point; ``errors`` give the reasons.
     """
 
     def __init__(
@@ -43,7 +43,7 @@ class Page:
         return Path(path)
 
     def open(self) -> Path:
-        """Open it in the browser; the file, which stays until the computer clears its temporary ones."""
+        """Open it in the browser; returns the file, which stays until the computer clears its temporary files."""
         path = self.save(Path(tempfile.mkdtemp(prefix="epicycle-"), f"{self.recordings[0].model.name}.html"))
         webbrowser.open(path.as_uri())
         return path
@@ -65,17 +65,17 @@ def view(
     progress: bool = True,
     **changes: Unpack[Changes],
 ) -> Page:
-    """Run a model, or two to compare, and show what happened: space, graph, signals, and what caused what.
+    """Run a model, or two for comparison, and show what happened: space, graph, signals, and what caused what.
 
-    ``set``, ``disturb`` and the other options of ``load`` change each model that is given by name or file; ``names``
-    tell two runs apart.  ``save`` writes the page, ``open`` shows it in the browser, a notebook shows it in place.
+    ``set``, ``disturb`` and the other options of ``load`` change each model given by name or file; ``names`` tell two
+    runs apart.  ``save`` writes the page, ``open`` shows it in the browser, a notebook shows it in place.
 
     >>> epicycle.view("collision_avoidance", disturb="wifi_burst").save("run.html")
     """
     if not 1 <= len(models) <= 2:
         raise EpicycleError(f"a page shows one run or two, not {len(models)}")
     if names and len(names) != len(models):
-        raise EpicycleError(f"names: {len(names)} for {len(models)} models")
+        raise EpicycleError(f"names: {len(names)} given for {len(models)} models")
     made = [loaded(each, {} if isinstance(each, Model) else changes) for each in models]
     if len(made) == 2 and not names:
         names = [each.name for each in made]
@@ -91,7 +91,7 @@ def recorded(
     names: Sequence[str] = (),
     progress: bool = True,
 ) -> Page:
-    """The page of these models' runs; seeds and stop times are of all, or of each."""
+    """The page of these models' runs; seeds and stop times apply to all, or are given for each."""
     recordings, errors = [], list[EpicycleError | KeyboardInterrupt]()
     for number, model in enumerate(models):
         own_seed = seed[number] if isinstance(seed, Sequence) else seed
@@ -107,9 +107,9 @@ def recorded(
         with watched(model, stop, SOON) if progress else nullcontext() as report:
             try:
                 recordings[-1].run(until=stop, progress=report)
-            except (ActorError, LoopError) as error:  # what led to it is just what one wants to see
+            except (ActorError, LoopError) as error:  # what led to the error is the very thing to look at
                 errors.append(error)
-            except KeyboardInterrupt as error:  # what was recorded is kept, and nothing else begun
+            except KeyboardInterrupt as error:  # the records are kept, and nothing else is started
                 errors.append(error)
                 break
     return Page(recordings, names if len(recordings) > 1 else [], errors)

@@ -31,23 +31,30 @@ if TYPE_CHECKING:
     several(
         "--disturb",
         metavar="NAME or FILE",
-        help="a variant with this disturbance, a packaged one or a YAML file; 'none' is the model as it is; repeat it",
+        help="add a variant with this disturbance, a packaged one or a YAML file; 'none' is the unchanged model; "
+        "may be repeated",
     ),
-    several("--vary", metavar="PATH=VALUE", help="a variant with this parameter, such as load=0.9; repeat it"),
+    several(
+        "--vary", metavar="PATH=VALUE", help="add a variant with this parameter, such as load=0.9; may be repeated"
+    ),
     *(each for each in CHANGES if each is not DISTURB),
     option("--replications", type=COUNT, metavar="N", default=10, help="runs of each variant (default: 10)"),
     SEED,
     option("--until", metavar="TIME", help="stop time, such as 30 or '500 ms' (default: the model's)"),
     option("--json", action="store_true", help="print one JSON object instead of the table"),
     option(
-        "-o", "--out", metavar="FILE", type=Path, help="a page that shows the first runs of the first two side by side"
+        "-o",
+        "--out",
+        metavar="FILE",
+        type=Path,
+        help="write a page that shows the first runs of the first two variants side by side",
     ),
     imports=("calls.comparing",),
 )
 def compare(options: argparse.Namespace) -> int:
-    """Run variants of a model with the same seeds and compare their metrics with those of the first one: the mean
+    """Run variants of a model with the same seeds and compare their metrics with those of the first variant: the mean
     difference over pairs of runs, its 95 % interval, and the p-value of Student's paired test, corrected by Holm's
-    method. A single variant is compared with the model as it is."""
+    method.  A single variant is compared with the unchanged model."""
     from dataclasses import asdict
 
     from ..calls import compare, load, recorded, seconds
@@ -84,7 +91,7 @@ def compare(options: argparse.Namespace) -> int:
         if not options.json:
             tell(f"wrote {options.out}")
         for error in page.errors:
-            if isinstance(error, KeyboardInterrupt):  # failures are told below
+            if isinstance(error, KeyboardInterrupt):  # failures are reported below
                 raise error
     for (name, seed), error in found.failures.items():
         complain(f"error: {name}, seed {seed}: {error}")

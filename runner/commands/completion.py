@@ -14,8 +14,8 @@ from .options import DONE, command, option
     imports=("catalogue",),
 )
 def completion(options: argparse.Namespace) -> int:
-    """Print a script by which a shell completes commands, options, and the names of what is packaged now."""
-    from .shells import script  # here, as it is for this command alone
+    """Print a script with which a shell completes commands, options and the names of everything packaged now."""
+    from .shells import script  # here, because only this command needs it
 
     tell(script(options.shell))
     return DONE

@@ -1,4 +1,4 @@
-"""The commands that run nothing: they check or draw what there is, and say what may be written."""
+"""The commands that run nothing: they check or draw models, and list what models may use."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def validate(options: argparse.Namespace) -> int:
 
 
 def _is_study(name: str) -> bool:
-    """Whether a packaged study has that name, or the file says that it is one."""
+    """Whether a packaged study has that name, or the file declares a study."""
     from ..catalogue import is_path, packaged_models, packaged_studies
     from ..language import is_study
 
@@ -46,7 +46,7 @@ def _is_study(name: str) -> bool:
 
 
 def _validate_study(options: argparse.Namespace) -> int:
-    """Load the model at every level of what the study varies."""
+    """Load the model at every level that the study varies."""
     from epicycle.actors import EpicycleError, counted
 
     from ..language import read_study
@@ -55,7 +55,7 @@ def _validate_study(options: argparse.Namespace) -> int:
 
     for name in ("overrides", "disturb", "aspect", "without"):
         if getattr(options, name):
-            raise EpicycleError(f"--{name} is for models: a study says itself what it changes")
+            raise EpicycleError(f"--{name} is for models: a study states in its file what it changes")
     plan = Plan.made(read_study(options.model, set=options.set, types=map(Path, options.types)))
     check_figures(plan)
     tell(
@@ -123,13 +123,13 @@ def models(options: argparse.Namespace) -> int:
 
     for name, path in packaged_models().items():
         tell_of(name, load_model(path).doc)
-    tell("\ndisturbances, to be added with --disturb:")
+    tell("\ndisturbances, added with --disturb:")
     problems = Problems()
     for name in packaged_disturbances():
         disturbance = load_disturbance(name, problems)
         problems.raise_if_any()
         tell_of(name, disturbance.text.doc if disturbance is not None else "")
-    tell("\nstudies, to be run with epicycle study:")
+    tell("\nstudies, run with epicycle study:")
     for name in packaged_studies():
         tell_of(name, read_study(name).doc)
     return DONE
@@ -197,8 +197,10 @@ def _print_reference(
     *,
     also: Iterable[str] = (),
 ) -> int:
-    """The list of all types, or all about one; ``others`` are those of the other kind, ``also`` names that could have
-    been meant, too."""
+    """The list of all types, or the description of one.
+
+    ``others`` are the types of the other kind, ``also`` further names that could have been meant.
+    """
     from dataclasses import asdict
 
     from epicycle.actors import EpicycleError
@@ -227,7 +229,7 @@ def _print_reference(
         raise EpicycleError(
             f"there is no {what} {name!r}{did_you_mean(name, [*types, *also])}\n"
             f"   help: 'epicycle {kind}s' lists them\n"
-            f"   help: one of your own is known after '--types FILE.py'"
+            f"   help: for your own types, add '--types FILE.py'"
         )
     (reference,) = described({name: types[name]})
     parts = parts_described([types[name]])

@@ -1,4 +1,4 @@
-"""The command that makes a model of a file of Ptolemy II."""
+"""The command that converts a file of Ptolemy II to a model."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def _run(options: argparse.Namespace) -> int:
 
     types = own_types(options)
     if options.out is not None and options.out.suffix not in (".yaml", ".yml"):
-        raise EpicycleError(f"{options.out} is not the name of a model file: it ends in .yaml")
+        raise EpicycleError(f"{options.out} is not a name for a model file: it must end in .yaml")
     found = import_moml(options.file, lambda path: load_model(path, types=types), types)
     for note in found.notes:
         complain(f"note: {note}")
@@ -29,14 +29,14 @@ def _run(options: argparse.Namespace) -> int:
     return DONE
 
 
-import_ = Command(  # "import" is no name in Python
+import_ = Command(  # "import" is a keyword in Python
     "import",
-    "make a model of a MoML file of Ptolemy II",
+    "convert a MoML file of Ptolemy II to a model",
     "Import a model of Ptolemy II: a MoML file with a DE director becomes a model in YAML, in which "
-    "'director: {like: ptolemy}' lets all be as it is there. Layout, icons and views are left out. Each other thing "
-    "that has no counterpart is told in a line, here and at the head of the model. Test actors become checks, which "
-    "'epicycle run' judges. A model that cannot be said is refused with the reasons (exit code 2), and nothing is "
-    "written. No other file is read.",
+    "'director: {like: ptolemy}' keeps the semantics of Ptolemy II. Layout, icons and views are left out. Anything "
+    "else without a counterpart is reported in a line, here and at the head of the model. Test actors become checks, "
+    "which 'epicycle run' evaluates. A model that cannot be expressed is refused with the reasons (exit code 2), and "
+    "nothing is written. No other file is read.",
     (
         option("file", metavar="MODEL.xml", type=Path, help="the MoML file"),
         option(
@@ -44,7 +44,7 @@ import_ = Command(  # "import" is no name in Python
             "--out",
             metavar="MODEL.yaml",
             type=Path,
-            help="write to this file; without it, the model is printed",
+            help="write to this file (default: print the model)",
         ),
         TYPES,
     ),

@@ -1,4 +1,4 @@
-"""begin something of one's own: a model, or a package of actors"""
+"""start something of your own: a model, or a package of actors"""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from .options import DONE, command, option
 MODEL = """\
 # Run it: epicycle run $name.yaml
 model: $name
-doc: Customers come at random, wait in a queue and are served one after the other.
+doc: Customers arrive at random, wait in a queue and are served one after another.
 
 parameters:
-  load: {value: 0.8, unit: "1", min: 0.01, max: 0.99, doc: share of the time in which the server is busy}
-  service_time: {value: 30, unit: s, min: 0.001, doc: how long it takes to serve a customer}
+  load: {value: 0.8, unit: "1", min: 0.01, max: 0.99, doc: share of the time that the server is busy}
+  service_time: {value: 30, unit: s, min: 0.001, doc: how long serving a customer takes}
 
 actors:
   customers: {type: PoissonClock, mean_interval: "$${service_time / load}"}
@@ -24,16 +24,16 @@ actors:
 connections:
   - customers.output -> server.input
 
-# What disturbs the model, from outside: some customers turn round at the door.
+# A disturbance of the model, from outside: some customers turn away at the door.
 aspects:
   impatience: {type: PacketLoss, probability: 0.05, at: server.input}
 
 run: {stop: 100 h, seed: 1, record: [server.size]}
 
 metrics:
-  served: {of: server.output, take: count, doc: customers that were served}
-  longest_queue: {of: server.size, take: max, doc: customers who wait or are served at most}
-  mean_number: {of: server.size, take: time_mean, initial: 0, interval: 0.95, doc: such customers on average}
+  served: {of: server.output, take: count, doc: customers served}
+  longest_queue: {of: server.size, take: max, doc: greatest number of customers waiting or in service}
+  mean_number: {of: server.size, take: time_mean, initial: 0, interval: 0.95, doc: mean number of such customers}
 
 figures:
   queue: {type: TimeSeries, signals: server.size, label: customers}
@@ -54,7 +54,7 @@ dependencies = ["epicycle"]
 [project.optional-dependencies]
 dev = ["pytest>=8"]
 
-# By these, models know the types once the package is installed: Name = "package:Name".
+# Makes the types known to models once the package is installed: Name = "package:Name".
 [project.entry-points."epicycle.actors"]
 Smoother = "$name:Smoother"
 
@@ -82,11 +82,11 @@ __all__ = ["Smoother", "Spikes"]
 
 
 class Smoother(Actor):
-    """Smooths numbers: each output is a share of the new number and the rest of the output before."""
+    """Smooths numbers: each output is a weighted mean of the new number and the previous output."""
 
     input = InputPort(float)
     output = OutputPort(float)
-    share = Parameter(float, 0.2, unit="1", above=0, max=1, doc="how much the new number counts")
+    share = Parameter(float, 0.2, unit="1", above=0, max=1, doc="weight of the new number")
 
     def initialize(self) -> None:
         self.smooth: float | None = None
@@ -102,8 +102,8 @@ class Spikes(MeasurementAspect):
     """Adds a spike to a number now and then."""
 
     events: ClassVar[tuple[str, ...]] = ("spiked",)
-    probability = Parameter(float, 0.1, unit="1", min=0, max=1, doc="how often a number gets a spike")
-    height = Parameter(float, 5.0, doc="how high a spike is")
+    probability = Parameter(float, 0.1, unit="1", min=0, max=1, doc="probability that a number gets a spike")
+    height = Parameter(float, 5.0, doc="height of a spike")
 
     def pass_token(self, token: float, point: JoinPoint) -> None:
         if self.probability and point.random.uniform() < self.probability:
@@ -139,7 +139,7 @@ figures:
 """
 
 TESTS = '''\
-"""What the actors and aspects of $name do."""
+"""Tests of the actors and aspects of $name."""
 
 from pathlib import Path
 
@@ -200,8 +200,10 @@ FILES = {  # of a package
     imports=("text",),
 )
 def new(options: argparse.Namespace) -> int:
-    """Write NAME.yaml, a model to start from, which runs at once; or with --package a package of actors and aspects
-    that models know by its entry points."""
+    """Write NAME.yaml, a model to start from, which is ready to run.
+
+    With --package, write a package whose entry points make its actors and aspects known to models.
+    """
     from keyword import iskeyword
     from string import Template
 
@@ -220,7 +222,7 @@ def new(options: argparse.Namespace) -> int:
     }
     there = [path for path in ([home] if options.package else texts) if path.exists()]
     if there:
-        raise EpicycleError(f"{there[0]} is there already\n   help: choose another name, or another folder")
+        raise EpicycleError(f"{there[0]} already exists\n   help: choose another name or another folder")
     for path, text in texts.items():
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text, encoding="utf-8")

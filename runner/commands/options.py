@@ -1,4 +1,4 @@
-"""What a command is, the options that several commands share, and what these mean."""
+"""What a command is, and the options that several commands share, with their meaning."""
 
 from __future__ import annotations
 
@@ -22,15 +22,17 @@ DONE, FAILED, BAD_INPUT, BROKEN, INTERRUPTED = 0, 1, 2, 3, 130
 Option = Callable[[argparse.ArgumentParser], object]
 Run = Callable[[argparse.Namespace], int]
 
-option: Callable[..., Option] = partial(methodcaller, "add_argument")  # an option or argument, as argparse takes it
-several: Callable[..., Option] = partial(option, action="append", default=[])  # one with a value each time it is given
+option: Callable[..., Option] = partial(methodcaller, "add_argument")  # an option or argument for argparse
+several: Callable[..., Option] = partial(
+    option, action="append", default=[]
+)  # an option that takes a value each time it is given
 
 
 class Command(NamedTuple):
-    """A command: its name, what ``epicycle --help`` and its own ``--help`` say of it, its options, and what it does.
+    """A command: its name, its texts in ``epicycle --help`` and its own ``--help``, its options, and its function.
 
     ``run`` returns the exit code.  Nothing heavy is imported before it runs, so that ``--help`` answers at once;
-    ``imports`` are the packages that it needs in any case.
+    ``imports`` are the packages that it always needs.
     """
 
     name: str
@@ -42,35 +44,35 @@ class Command(NamedTuple):
 
 
 def command(summary: str, *options: Option, imports: tuple[str, ...]) -> Callable[[Run], Command]:
-    """Make a command of a function, which has its name and whose docstring describes it."""
+    """Turn a function into a command with its name, described by its docstring."""
     return lambda run: Command(run.__name__, summary, run.__doc__, options, imports, run)
 
 
-# -- what options say -------------------------------------------------------------------------------------------------
+# -- values of options ------------------------------------------------------------------------------------------------
 
 
 def whole(first: int, last: int | None = None, most: str = "") -> Callable[[str], int]:
-    """What reads a whole number, up to ``last``, which is written as ``most``."""
+    """A reader of whole numbers up to ``last``, which messages show as ``most``."""
 
     def read(text: str) -> int:
         number = int(text) if text.isdecimal() and len(text) <= 20 else -1
         if number < first or (last is not None and number > last):
-            end = "on" if last is None else f"to {most or last}"
-            raise argparse.ArgumentTypeError(f"{text!r} is not a whole number from {first} {end}")
+            bounds = f"of at least {first}" if last is None else f"from {first} to {most or last}"
+            raise argparse.ArgumentTypeError(f"{text!r} is not a whole number {bounds}")
         return number
 
     return read
 
 
 def seed(text: str) -> int:
-    """A seed: a whole number from 0 on."""
+    """A seed: a whole number of at least 0."""
     from ..text import MAX_SEED
 
     return whole(0, MAX_SEED)(text)
 
 
 def number(text: str) -> float:
-    """The number that a text is; NaN if it is none."""
+    """The number that a text represents; NaN if it represents none."""
     try:
         return float(text)
     except ValueError:
@@ -85,7 +87,7 @@ JSON = option("--json", action="store_true", help="print JSON")
 TYPES = several(
     "--types",
     metavar="FILE",
-    help="a Python file with actors and aspects of your own, whose code is run; may be repeated",
+    help="a Python file with your own actors and aspects, whose code is run; may be repeated",
 )
 DISTURB = several(
     "--disturb",
@@ -130,7 +132,7 @@ def own_types(options: argparse.Namespace) -> list[type]:
 
 
 def load(options: argparse.Namespace, *, strict: bool = False) -> Model:
-    """The model that the options describe; warnings are printed, or with ``strict`` raised."""
+    """The model that the options describe; warnings are printed or, with ``strict``, raised."""
     from ..build import load_model
     from ..text import ModelError
 
@@ -154,7 +156,7 @@ def load(options: argparse.Namespace, *, strict: bool = False) -> Model:
 
 
 def check_path(flag: str, path: Path) -> None:
-    """Raise ``EpicycleError`` where no file can be written, before a run is made for it."""
+    """Raise ``EpicycleError`` if the file cannot be written, before a run is made for it."""
     from epicycle.actors import EpicycleError
 
     if not path.parent.is_dir():
@@ -164,7 +166,7 @@ def check_path(flag: str, path: Path) -> None:
 
 
 def complain_of(errors: Sequence[EpicycleError], options: argparse.Namespace) -> int:
-    """Say what went wrong after a run; the exit code."""
+    """Report what went wrong after a run; the exit code."""
     for error in errors:
         if options.debug:
             complain_traceback(error)

@@ -24,9 +24,9 @@ def as_before(options: argparse.Namespace) -> str:
         manifest = json.loads(read_regular(path))
         before, digest = [str(each) for each in manifest["command"]], str(manifest["digest"])
     except FileNotFoundError:
-        raise EpicycleError(f"{options.model} holds no results of a run: there is no manifest.json in it") from None
+        raise EpicycleError(f"{options.model} holds no results of a run: it has no manifest.json") from None
     except (OSError, ValueError, LookupError, TypeError, RecursionError) as error:
-        raise EpicycleError(f"{path} is no manifest of a run: {error}") from None
+        raise EpicycleError(f"{path} is not the manifest of a run: {error}") from None
     if before[1:2] != ["run"]:
         raise EpicycleError(f"{options.model} holds results of 'epicycle {' '.join(before[1:2])}', not of a run")
     known = argparse.ArgumentParser(exit_on_error=False)
@@ -36,10 +36,12 @@ def as_before(options: argparse.Namespace) -> str:
         with redirect_stderr(StringIO()):
             given, _ = known.parse_known_args(before[2:])
     except (argparse.ArgumentError, SystemExit):
-        raise EpicycleError(f"{path} names a command that this version does not know: {shlex.join(before)}") from None
-    if given.types and not options.types:  # code, which nobody but the caller asks for
+        raise EpicycleError(f"{path} names a command that is unknown to this version: {shlex.join(before)}") from None
+    if given.types and not options.types:  # they are code, which only the caller may allow to run
         files = " ".join(f"--types {shlex.quote(file)}" for file in given.types)
-        raise EpicycleError(f"the run in {options.model} used types of its own\n   help: add {files}")
+        raise EpicycleError(
+            f"the run in {options.model} used types of its own\n   help: to let their code run, add {files}"
+        )
     is_same = True
     for name in ("set", "overrides", "disturb", "aspect", "without"):
         is_same &= not getattr(options, name)

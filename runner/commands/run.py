@@ -11,13 +11,13 @@ from .options import BROKEN, MODEL, SEED, command, complain_of, load, number, op
 
 
 def factor(text: str) -> float:
-    """How many seconds of model time pass in a second."""
+    """How many seconds of model time pass per second."""
     from ..engine import SLOWEST
 
     if not SLOWEST <= (found := number(text)) < math.inf:
-        # The model, perhaps, which stands behind the option.
+        # Perhaps the model, which follows the option.
         raise argparse.ArgumentTypeError(
-            f"{text!r} is not a number of {SLOWEST:g} or more (write MODEL before --realtime)"
+            f"{text!r} is not a number of at least {SLOWEST:g} (write MODEL before --realtime)"
         )
     return found
 
@@ -45,8 +45,9 @@ def factor(text: str) -> float:
     several(
         "--log-where",
         metavar="COLUMN=PATTERN",
-        help="write only some records, such as aspect=packet_loss, aspect='*' (all acts of aspects), event=dropped, "
-        "actor='observer[*].**' or port=plan; of several for one column, one must match, and every column must",
+        help="write only matching records, such as aspect=packet_loss, aspect='*' (all acts of aspects), "
+        "event=dropped, actor='observer[*].**' or port=plan; may be repeated: a record must match one pattern of "
+        "each column that has any",
     ),
     option("--json", action="store_true", help="print one JSON object instead of the table"),
     option("--check", action="store_true", help="exit with code 3 if a monitor of the model is broken"),
@@ -63,7 +64,7 @@ def run(options: argparse.Namespace) -> int:
 
     log = LogFile(options.log) if options.log is not None else None
     if log is None and options.log_where:
-        raise EpicycleError(f"--log-where {options.log_where[0]} needs --log FILE, to which the log is written")
+        raise EpicycleError(f"--log-where {options.log_where[0]} needs --log FILE, the file to write the log to")
     log_filter = LogFilter.of(options.log_where)
     until = seconds("--until", options.until)
     model = load(options)

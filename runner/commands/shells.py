@@ -1,4 +1,4 @@
-"""Scripts by which shells complete the commands, made from what these declare to argparse."""
+"""Scripts with which shells complete the commands, made from what the commands declare to argparse."""
 
 from __future__ import annotations
 
@@ -17,24 +17,24 @@ ENDS = {"DIR": "folders", "FILE": "files", "MODEL": "files", "STUDY": "files", "
 
 
 class Given(NamedTuple):
-    """An option or argument of a command: what may stand there are words, files or folders."""
+    """An option or argument of a command, which takes words, files or folders."""
 
-    flags: tuple[str, ...]  # none for an argument
+    flags: tuple[str, ...]  # empty for an argument
     help: str
     takes: bool  # whether a value follows
     repeats: bool
     words: tuple[str, ...]
-    files: str  # "files", "folders" or nothing
+    files: str  # "files", "folders" or empty
 
 
 def script(shell: str) -> str:
-    """What a shell reads."""
+    """The script for a shell."""
     lines = {"bash": _bash, "zsh": _zsh, "fish": _fish}[shell]()
     return "\n".join([f"# Completion of epicycle for {HEAD[shell]}", *lines])
 
 
 def _commands() -> Iterator[tuple[str, str, list[Given]]]:
-    """Each command with what is said of it, and what it is given."""
+    """Each command with its summary and its options and arguments."""
     from ..catalogue import built_in, packaged_disturbances, packaged_models, packaged_studies
     from . import COMMANDS
 
@@ -50,8 +50,8 @@ def _commands() -> Iterator[tuple[str, str, list[Given]]]:
         parser, given = argparse.ArgumentParser(add_help=False), []
         for add in each.options:
             add(parser)
-        parser.add_argument("--debug", action="store_true", help="show the whole traceback of an error")
-        parser.add_argument("-h", "--help", action="store_true", help="show what the command takes")
+        parser.add_argument("--debug", action="store_true", help="show the full traceback of an error")
+        parser.add_argument("-h", "--help", action="store_true", help="show the help of the command")
         for action in parser._actions:
             metavar = action.metavar if isinstance(action.metavar, str) else ""
             words = tuple(map(str, action.choices or ())) or named.get(metavar, ())
@@ -67,7 +67,7 @@ def _commands() -> Iterator[tuple[str, str, list[Given]]]:
 
 
 def _bash() -> Iterator[str]:
-    """One function: what may stand in a place is told by the command and by the word before."""
+    """One function: the command and the previous word decide what may follow."""
     commands = list(_commands())
     yield "_epicycle() {"
     yield '    local word="${COMP_WORDS[COMP_CWORD]}" before="${COMP_WORDS[COMP_CWORD-1]}" command="${COMP_WORDS[1]}"'
@@ -93,7 +93,7 @@ def _bash() -> Iterator[str]:
 
 
 def _compgen(given: Given | None) -> str:
-    """What completes a value in bash."""
+    """The code that completes a value in bash."""
     if given is None or not (given.words or given.files):
         return "COMPREPLY=()"
     kind = {"files": " -f", "folders": " -d"}.get(given.files, "")

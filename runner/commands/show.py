@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 )
 def show(options: argparse.Namespace) -> int:
     """Show the parameters of a model with their types, units, values and docs, the files that it reads, its metrics,
-    what it records, its figures and aspects, and the packaged disturbances that fit it."""
+    recorded ports, figures and aspects, and the packaged disturbances that fit it."""
     from ..text import noting
 
     with noting() as noted:
@@ -51,7 +51,7 @@ def show(options: argparse.Namespace) -> int:
 
 
 def _parameters(model: Model) -> Iterator[dict[str, str]]:
-    """What is declared of each parameter, and its value, which is the default unless it is set."""
+    """The declaration of each parameter and its value, which is the default unless it is set."""
     from epicycle.actors import bounds_text
 
     from ..shown import in_words, short
@@ -73,7 +73,7 @@ def _metrics(model: Model) -> Iterator[dict[str, str]]:
 
 
 def _disturbances(options: argparse.Namespace) -> Iterator[tuple[str, str]]:
-    """The packaged disturbances with which the model can be loaded."""
+    """The packaged disturbances that the model can be loaded with."""
     from epicycle.actors import EpicycleError
 
     from ..build import load_model

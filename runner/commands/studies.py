@@ -1,4 +1,4 @@
-"""The commands of studies: run one, continue with it, say how far it is, repeat one of its runs, report."""
+"""The commands for studies: run one, resume it, show its progress, repeat one of its runs, write its report."""
 
 from __future__ import annotations
 
@@ -16,25 +16,25 @@ from .options import COUNT, DONE, FAILED, INTERRUPTED, TYPES, command, complain_
 if TYPE_CHECKING:
     from ..study import Plan, StudyResults
 
-SHOWN = 5  # failed runs that are told one by one
+SHOWN = 5  # failed runs that are reported one by one
 
 
 def first_seed(text: str) -> int:
-    """A seed after which those of all replications are seeds, too."""
+    """A first seed such that the seeds of all replications are valid, too."""
     from ..language import MAX_STUDY_SEED
 
     return whole(0, MAX_STUDY_SEED)(text)
 
 
 def positive_seconds(text: str) -> float:
-    """A number of seconds of real time."""
+    """A number of seconds of wall-clock time."""
     if not 0.0 < (found := number(text)) < math.inf:
         raise argparse.ArgumentTypeError(f"{text!r} is not a number of seconds greater than 0")
     return found
 
 
 def address(text: str) -> str:
-    """Where a scheduler listens."""
+    """The address of a scheduler."""
     found = re.fullmatch(r"((?:tcp|tls|ws|wss)://)?([^\s:/]+|\[[0-9a-fA-F:]+\]):([0-9]{1,5})", text)
     if found is None or int(found[3]) >= 2**16:
         raise argparse.ArgumentTypeError(f"{text!r} is not an address such as tcp://localhost:8786")
@@ -63,7 +63,7 @@ SESSION = (
         "--run-timeout",
         type=positive_seconds,
         metavar="S",
-        help="real time in seconds after which a run is ended and counts as failed (default: no limit)",
+        help="seconds of wall-clock time after which a run is ended and counts as failed (default: no limit)",
     ),
     option("--retry", action="store_true", help="repeat runs that took too long, or whose process was killed"),
 )
@@ -78,11 +78,14 @@ SESSION = (
         help="set a parameter of the model that the study does not vary; may be repeated",
     ),
     option(
-        "--replications", type=COUNT, metavar="N", help="runs of each condition (default: the study's); more are added"
+        "--replications",
+        type=COUNT,
+        metavar="N",
+        help="runs of each condition (default: the study's); a larger number adds runs",
     ),
     option("--seed", type=first_seed, metavar="N", help="seed of the first replication (default: the study's)"),
     option("--out", metavar="DIR", type=Path, help="results folder (default: results/STUDY)"),
-    option("--yes", action="store_true", help="do not ask for confirmation of many runs"),
+    option("--yes", action="store_true", help="make the runs even if there are very many"),
     TYPES,
     *SESSION,
     imports=("show.report", "study"),
@@ -102,7 +105,7 @@ def study(options: argparse.Namespace) -> int:
         seed=options.seed,
     )
     if options.replications is not None and found.until is not None:
-        complain(f"{found.name} decides itself how many replications it needs: --replications counts for nothing")
+        complain(f"{found.name} decides by 'until' how many replications it needs: --replications has no effect")
     plan = Plan.made(found)
     check_figures(plan)
     if not options.yes:
@@ -120,7 +123,7 @@ def resume(options: argparse.Namespace) -> int:
 
 
 def _check_session(options: argparse.Namespace) -> None:
-    """Raise ``EpicycleError`` for options that do not go together."""
+    """Raise ``EpicycleError`` for options that exclude each other."""
     from epicycle.actors import EpicycleError
 
     if options.scheduler is not None:
@@ -128,12 +131,12 @@ def _check_session(options: argparse.Namespace) -> None:
             raise EpicycleError(f"--scheduler {options.scheduler} is for --executor dask")
         if options.jobs is not None:
             raise EpicycleError(
-                "--jobs counts processes of this machine; a scheduler has the workers that were started for it"
+                "--jobs counts processes on this machine and does not go with --scheduler, which has its own workers"
             )
 
 
 def _session(plan: Plan, folder: Path, options: argparse.Namespace) -> int:
-    """Make the runs that are missing, and tell what came of it."""
+    """Make the missing runs and report the outcome."""
     from epicycle.actors import counted
 
     from ..study import WorkerError, WriteError, again, open_study, progress, run_study
@@ -151,14 +154,15 @@ def _session(plan: Plan, folder: Path, options: argparse.Namespace) -> int:
                 scheduler=options.scheduler,
             )
     except KeyboardInterrupt:
-        complain(f"interrupted; what was finished is kept: 'epicycle resume {folder}' goes on")
+        complain(f"interrupted; finished runs are kept: 'epicycle resume {folder}' continues")
         return INTERRUPTED
-    except (WorkerError, WriteError) as error:  # no fault of the study's
+    except (WorkerError, WriteError) as error:  # not the study's fault
         complain(f"error: {error}")
         return FAILED
     tell(
         f"{plan.study.name}: {counted(plan.conditions, 'condition')}, {counted(outcome.made, 'new run')}, "
-        f"{outcome.there:,} there before" + (f", {outcome.stopped_early:,} not needed" if outcome.stopped_early else "")
+        f"{outcome.there:,} already there"
+        + (f", {outcome.stopped_early:,} not needed" if outcome.stopped_early else "")
     )
     results = open_study(folder)
     for said in _about_others(results):
@@ -181,24 +185,25 @@ def _session(plan: Plan, folder: Path, options: argparse.Namespace) -> int:
 
 
 def _failure(row: dict[str, Any]) -> str:
-    return f"{row['status']}: {row['error']}\n   repeat it: {row['replay']}"
+    return f"{row['status']}: {row['error']}\n   to repeat it: {row['replay']}"
 
 
 def _about_others(results: StudyResults) -> Iterator[str]:
-    """What is to be said of runs that the study as it is now does not ask for."""
+    """Notes on runs in the folder that the study in its present form does not ask for."""
     from epicycle.actors import counted
 
     if beyond := results.beyond():
         asked = counted(results.plan.replications, "replication")
-        yield f"{results.folder} has {counted(beyond, 'run')} beyond the {asked} asked for: the table keeps them"
+        yield f"{results.folder} has {counted(beyond, 'run')} beyond the {asked} requested: they stay in the table"
     if left_out := results.left_out:
         yield (
-            f"{results.folder} has {counted(left_out, 'run')} of another version of the study, its model or Epicycle, "
-            "which the table leaves out"
+            f"{results.folder} has {counted(left_out, 'run')} of another version of the study, its model or Epicycle: "
+            "they are not in the table"
         )
 
 
-# -- what there is ----------------------------------------------------------------------------------------------------
+# -- what the folder holds
+# ----------------------------------------------------------------------------------------------------
 
 
 @command(
@@ -224,15 +229,15 @@ def status(options: argparse.Namespace) -> int:
     beyond = results.beyond()
     tell(
         f"{plan.study.name}: {counts.total() - beyond:,} of {'at most ' if plan.study.until else ''}{plan.size:,} "
-        f"runs are over{f', and {beyond:,} more' if beyond else ''} ({counted(counts) or 'none is over'})"
+        f"runs are finished{f', and {beyond:,} more' if beyond else ''} ({counted(counts) or 'none yet'})"
         + ("; it is running" if running else "")
     )
     for told in _about_others(results):
         tell(told)
     if results.path.exists() and not running and not results.is_written():
         tell(
-            f"{results.path} is not the table of these runs, but damaged or older than they are\n"
-            f"   help: 'epicycle resume {options.folder}' writes it anew"
+            f"{results.path} does not match the runs: it is damaged or out of date\n"
+            f"   help: 'epicycle resume {options.folder}' rewrites it"
         )
     if options.conditions:
         by_condition: dict[int, Counter[str]] = {}
@@ -249,8 +254,8 @@ def status(options: argparse.Namespace) -> int:
 @command(
     "repeat one run of a study",
     FOLDER_OF_STUDY,
-    option("run_key", metavar="RUN", help="the run's name in the column 'run', or its beginning"),
-    option("--out", metavar="DIR", type=Path, help="where to write (default: DIR/replays/RUN)"),
+    option("run_key", metavar="RUN", help="the run's name in the column 'run', or the beginning of the name"),
+    option("--out", metavar="DIR", type=Path, help="folder to write to (default: DIR/replays/RUN)"),
     imports=("build", "show", "study"),
 )
 def replay(options: argparse.Namespace) -> int:
@@ -288,7 +293,7 @@ def replay(options: argparse.Namespace) -> int:
 @command(
     "write the report of a study",
     FOLDER_OF_STUDY,
-    option("--out", metavar="DIR", type=Path, help="where to write (default: the results folder)"),
+    option("--out", metavar="DIR", type=Path, help="folder to write to (default: the results folder)"),
     option("--jobs", metavar="N", type=COUNT, help="runs to repeat at the same time (default: one per core)"),
     imports=("show.report", "study"),
 )

@@ -29,8 +29,13 @@ WIDEST = 80  # characters of a token
         help="actors, such as main.sensor, 'observer[*].sensor' or a whole composite; may be repeated (default: all)",
     ),
     SEED,
-    option("--from", dest="start", metavar="TIME", help="start of what is printed, such as 30 or '500 ms'"),
-    option("--to", metavar="TIME", help="end of what is printed (default: the end of the run)"),
+    option(
+        "--from",
+        dest="start",
+        metavar="TIME",
+        help="first time to print, such as 30 or '500 ms' (default: the start of the run)",
+    ),
+    option("--to", metavar="TIME", help="last time to print (default: the end of the run)"),
     option("--json", action="store_true", help="print one JSON object per line"),
     imports=("calls.running",),
 )
@@ -60,7 +65,7 @@ def trace(options: argparse.Namespace) -> int:
 
 
 def _actors(patterns: list[str], model: Model) -> dict[str, Actor]:
-    """The actors that some patterns select, or that stand in composites that they select."""
+    """The actors that patterns select, directly or as parts of selected composites."""
     from epicycle.actors import EpicycleError
 
     from ..text import PatternError, did_you_mean, select
@@ -83,11 +88,11 @@ def _actors(patterns: list[str], model: Model) -> dict[str, Actor]:
     return {path: actor for path, actor in graph.actors.items() if is_chosen(path)}
 
 
-# -- how it looks -----------------------------------------------------------------------------------------------------
+# -- the text ---------------------------------------------------------------------------------------------------------
 
 
 def _as_text(actors: dict[str, Actor], graph: ModelGraph) -> Callable[[Firing], str]:
-    """A way to write firings as a few lines each, in columns that fit these actors."""
+    """A function that writes a firing as a few lines, in columns wide enough for these actors."""
     wide = max(map(len, actors), default=0)
     ports = [name for actor in actors.values() for name in (*actor.inputs, *actor.outputs)]
     narrow = max(map(len, (*ports, "wake-up"))) + 3  # and the channel
@@ -98,7 +103,7 @@ def _as_text(actors: dict[str, Actor], graph: ModelGraph) -> Callable[[Firing], 
         if firing.outside == "resumed":
             lines.append(("<-", "SimPy", "", "resumed the process"))
         for asked in firing.wakes:
-            lines.append(("<-", "wake-up", "", "asked for in initialize" if asked is None else f"asked for at {asked}"))
+            lines.append(("<-", "wake-up", "", "requested in initialize" if asked is None else f"requested at {asked}"))
         for arrival in firing.arrivals:
             port = (
                 f"{arrival.port}[{arrival.channel}]"
@@ -110,7 +115,7 @@ def _as_text(actors: dict[str, Actor], graph: ModelGraph) -> Callable[[Firing], 
         for record in firing.records:
             port = record.port if record.channel is None else f"{record.port}[{record.channel}]"
             note = f"  {record.event} by aspect {record.aspect}" if record.aspect else ""
-            note = "  let go by an aspect" if firing.outside == "released" and not note else note
+            note = "  released by an aspect" if firing.outside == "released" and not note else note
             lines.append(("->", port, "", _token(record.value) + note))
         head = f"{firing.tag!s:<18} {firing.actor:<{wide}}"
         text = []

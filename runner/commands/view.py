@@ -20,14 +20,16 @@ if TYPE_CHECKING:
 
 @command(
     "show a run in a browser: space, graph, signals, and what caused what",
-    option(
-        "model", metavar="MODEL or RESULTS", nargs="+", help="one or two models, or folders that runs were written to"
-    ),
+    option("model", metavar="MODEL or RESULTS", nargs="+", help="one or two models, or results folders of runs"),
     *CHANGES,
     SEED,
     option("--until", metavar="TIME", help="stop time, such as 30 or '500 ms' (default: the model's)"),
     option(
-        "-o", "--out", metavar="FILE", type=Path, help="the page (default: results/MODEL/view.html, which is opened)"
+        "-o",
+        "--out",
+        metavar="FILE",
+        type=Path,
+        help="write the page to FILE (default: results/MODEL/view.html, which is opened in the browser)",
     ),
     option("--mcap", metavar="FILE", type=Path, help="write the run for Foxglove or Lichtblick; no page without -o"),
     option("--rerun", metavar="FILE", type=Path, help="write the run for rerun; no page without -o"),
@@ -36,8 +38,8 @@ if TYPE_CHECKING:
 def view(options: argparse.Namespace) -> int:
     """Run a model and write a page that shows the run: it needs no network, and any browser opens it.
 
-    For a folder of results the run is made again, as its manifest says.  Two runs are shown side by side, with the
-    first difference between them.  --mcap and --rerun write the run for other viewers.
+    For a results folder, the run recorded in its manifest is repeated.  Two runs are shown side by side, with the first
+    difference between them.  --mcap and --rerun write the run for other viewers.
     """
     from epicycle.actors import EpicycleError
 
@@ -80,7 +82,7 @@ def view(options: argparse.Namespace) -> int:
 
 
 def _exports(options: argparse.Namespace) -> list[tuple[Path, Callable[[Recording, Path], None]]]:
-    """The files for other viewers, and what writes them; what stands against that is said before a run."""
+    """The files for other viewers and the functions that write them; obstacles are reported before a run."""
     from epicycle.actors import EpicycleError
 
     from ..show.view import require_mcap, require_rerun, write_mcap, write_rerun

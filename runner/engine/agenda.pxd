@@ -1,4 +1,4 @@
-# Types for C; what everything is for is said in agenda.py.
+# Types for C; agenda.py has the documentation.
 
 cimport cython
 from epicycle.actors cimport InputPort, Moment, Wake, Way, is_alone

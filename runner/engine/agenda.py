@@ -1,4 +1,4 @@
-"""The agenda: the turns that actors have in a tag, and what is to be done at the tags to come."""
+"""The agenda: the turns of actors at a tag, and the work of future tags."""
 
 from __future__ import annotations
 
@@ -7,29 +7,29 @@ from typing import Any, Protocol
 
 from epicycle.actors import Actor, InputPort, Moment, Wake, Way, is_alone
 
-_NOTHING: list[Any] = []  # what a port shows whose tokens are for a later turn
+_NOTHING: list[Any] = []  # shown by a port whose tokens are for a later turn
 
 
 class Poster(Protocol):
-    """What asks for turns of a composite that fires as one, for what is in it."""
+    """Requests turns for the contents of a composite that fires as one."""
 
-    poster: Poster | None  # of the one around it
+    poster: Poster | None  # of the composite around it
     nesting: int
 
     def note(self, time: int, microstep: int) -> None:
-        """Something inside has asked for a turn."""
+        """Something inside has requested a turn."""
 
 
 class Turn:
-    """The place of an actor in the firing order: where it fires for its wake-ups, or for the tokens of some inputs.
+    """The place of an actor in the firing order, for its wake-ups or for the tokens of some inputs.
 
-    ``ports`` are these inputs, ``later`` those whose tokens are taken in a later turn of the same actor; ports that
-    nothing is connected to are left out.  ``keeps`` are those of its inputs that keep tokens, if there are any.
-    ``wakes`` are the wake-ups of the present tag.
+    ``ports`` are these inputs, ``later`` those whose tokens are taken in a later turn of the same actor; unconnected
+    ports are left out.  ``keeps`` are its inputs that keep tokens, if any.  ``wakes`` are the wake-ups of the present
+    tag.
 
-    ``poster`` posts it, for a composite that is posted as a whole; ``nesting`` is how many of those are around it.
-    An actor that takes ``all_at_once`` takes what waits at all its inputs in any of its turns; if that is true, it also
-    fires in a turn for tokens that it has taken before.
+    ``poster`` posts it, in a composite that is posted as a whole; ``nesting`` is the number of those around it.  With
+    ``all_at_once``, the actor takes all tokens that wait at its inputs in any of its turns, and also fires in a turn
+    for tokens that it has already taken.
     """
 
     __slots__ = (
@@ -51,12 +51,12 @@ class Turn:
         self.keeps: list[InputPort[Any]] | None = keeps or None
         self.poster: Poster | None = None
         self.nesting = 0
-        self.is_wanted = False  # whether the actor is to have this turn at the present tag
-        self.wake: Wake | None = None  # the first of those of the present tag
+        self.is_wanted = False  # whether the actor has this turn at the present tag
+        self.wake: Wake | None = None  # the first one of the present tag
         self.wakes: list[Wake] | None = None  # the others
 
     def add(self, wake: Wake) -> None:
-        """Have a further reason for this turn."""
+        """Add a reason for this turn."""
         if self.wake is None:
             self.wake = wake
         elif self.wakes is None:
@@ -65,7 +65,7 @@ class Turn:
             self.wakes.append(wake)
 
     def use_wakes(self) -> bool:
-        """Make the wake-ups due; false if all were cancelled and there is nothing else to fire for."""
+        """Make the wake-ups due; false if all were cancelled and there is no other reason to fire."""
         due = False
         if self.wake is not None and not self.wake.cancelled:
             self.wake.due = due = True
@@ -77,7 +77,7 @@ class Turn:
         return due or self.new() > 0
 
     def new(self) -> int:
-        """How many tokens have come for it."""
+        """How many tokens have arrived for it."""
         found = 0
         for port in self.ports:
             found += len(port.arrived)
@@ -93,12 +93,12 @@ class Turn:
         return found
 
     def hold(self) -> None:
-        """The actor fires: it does not see yet what is for a later turn."""
+        """The actor fires: it does not yet see tokens for a later turn."""
         for port in self.later:
             port.shown = _NOTHING
 
     def clear(self) -> None:
-        """The actor has fired: what it has not read is gone."""
+        """The actor has fired: unread tokens are dropped."""
         for port in self.ports:
             if port.arrived or port.kept is not None:
                 if port.keep:
@@ -110,7 +110,7 @@ class Turn:
 
 
 class Form:
-    """An actor in C, which fires in its place and works on what the actor holds; in Python there are none."""
+    """An actor in C, which fires in place of the actor and works on its state; in Python there are none."""
 
     __slots__ = ()
 
@@ -120,9 +120,9 @@ class Form:
 
 
 class Instant(Moment):
-    """What is to be done at one tag: tokens to deliver, then wake-ups.
+    """The work of one tag: tokens to deliver, then wake-ups.
 
-    The first wake-up is ``wake``, of the actor that has the ``turn``; of most instants it is the only one.
+    The first wake-up is ``wake``, for the actor of ``turn``; most instants have no other.
     """
 
     __slots__ = ("pending", "turn", "turns", "wake", "wakes")
@@ -134,7 +134,7 @@ class Instant(Moment):
     wakes: list[Wake | None] | None  # of each of these turns
 
     def add(self, turn: Turn, wake: Wake | None) -> None:
-        """Let an actor have a turn, for a wake-up if there is one."""
+        """Give an actor a turn, for a wake-up if there is one."""
         if self.turn is None:
             self.turn, self.wake = turn, wake
         elif self.turns is None or self.wakes is None:
@@ -144,7 +144,7 @@ class Instant(Moment):
             self.wakes.append(wake)
 
     def arrange(self) -> None:
-        """Leave out what was called off, and put what is inside of a composite behind what posts the whole of it."""
+        """Leave out what was cancelled, and put the contents of a composite behind the turn that posts all of it."""
         if self.turn is None:
             return
         found = [(self.turn, self.wake), *zip(self.turns or (), self.wakes or (), strict=True)]
@@ -159,7 +159,7 @@ def _nesting(entry: tuple[Turn, Wake | None]) -> int:
 
 
 def new_instant(time: int, microstep: int, past: Instant | None = None) -> Instant:
-    """An instant at which nothing is to be done yet; one that is past serves again if nobody has kept it."""
+    """An instant without work yet; a past one is reused if nobody has kept it."""
     instant = past if past is not None and is_alone(past) else Instant.__new__(Instant)
     instant.time, instant.microstep = time, microstep
     instant._tag = instant.pending = instant.turn = instant.wake = instant.turns = instant.wakes = None
@@ -167,7 +167,7 @@ def new_instant(time: int, microstep: int, past: Instant | None = None) -> Insta
 
 
 class Delivery:
-    """A token that is on its way: what to do with it when its time has come."""
+    """A token on its way: what to do with it when its time has come."""
 
     __slots__ = ("token", "way")
 
@@ -176,5 +176,5 @@ class Delivery:
         self.token = token
 
     def arrive(self) -> None:
-        """Let it go on."""
+        """Send it onward."""
         self.way.go(self.token)

@@ -1,4 +1,4 @@
-"""What aspects get from the engine at the places where they stand."""
+"""What the engine offers to aspects at their places."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from .way import Call, Deliver
 
 
 class EngineContext:
-    """What the engine offers to a join point: the time of the director that it stands under, the log and signals."""
+    """What the engine offers to a join point: the time of its director, the log and signals."""
 
     def __init__(
         self,
@@ -50,13 +50,13 @@ class EngineContext:
             raise error.of(self._blame(error).path) from None
 
     def hold(self, deliver: Deliver, token: Any) -> Callable[[], None]:
-        """``deliver(token)``, to be called later."""
+        """A later call of ``deliver(token)``."""
         return self._director.hold(Call(deliver), token).arrive
 
     def _deliver(self, deliver: Deliver, token: Any) -> None:
         try:
             deliver(token)
-        except (ActorError, LoopError):  # of what comes behind it
+        except (ActorError, LoopError):  # of something behind it
             raise
         except Exception as error:
             raise self._blame(error) from error

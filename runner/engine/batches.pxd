@@ -1,4 +1,4 @@
-# Types for C; what everything is for is said in batches.py.
+# Types for C; batches.py has the documentation.
 
 cimport cython
 

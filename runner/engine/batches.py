@@ -1,6 +1,6 @@
-"""What one long run says of its own mean: an interval by batch means, and where its warm-up ends.
+"""What one long run shows about its mean: an interval by batch means, and where the warm-up ends.
 
-Batches are kept in constant memory, however long the run is: as soon as there are too many, each two become one.
+Batches need constant memory, however long the run: when there are too many, they are merged in pairs.
 """
 
 from __future__ import annotations
@@ -13,13 +13,13 @@ from ..results import Interval
 from ..student import student_quantile
 
 BATCHES = 20  # more of them gain next to nothing (Schmeiser 1982)
-MOST = 1024  # that are kept
+MOST = 1024  # at most kept
 OF_MSER = 5  # tokens in a batch
 LEAST_OF_MSER = 10  # batches
 
 
 class TokenBatches:
-    """Sums over batches of equally many tokens."""
+    """Sums over batches with equal numbers of tokens."""
 
     __slots__ = ("_count", "_size", "_sum", "_sums")
 
@@ -41,14 +41,14 @@ class TokenBatches:
                 self._size *= 2
 
     def batches(self) -> tuple[list[float], list[float]]:
-        """Their sums and weights; tokens that do not fill one are left out."""
+        """Their sums and weights, without an incomplete last one."""
         return self._sums, [float(self._size)] * len(self._sums)
 
 
 class TimeBatches:
-    """Sums over slices of time of equal width (ns), from ``start`` on: of values times how long they stand there.
+    """Sums over slices of time of equal width (ns), from ``start`` on: of values times their durations.
 
-    ``most`` slices are kept; if more are needed, each two become one.
+    At most ``most`` slices are kept; if more are needed, they are merged in pairs.
     """
 
     __slots__ = ("_covered", "_most", "_start", "_sums", "_width")
@@ -56,10 +56,10 @@ class TimeBatches:
     def __init__(self, start: int, width: int = 1, most: int = MOST) -> None:
         self._start, self._width, self._most = start, width, most
         self._sums: list[float] = []
-        self._covered: list[float] = []  # for how long there was a value, in all ports together
+        self._covered: list[float] = []  # how long there was a value, over all ports
 
     def add(self, value: float, begin: int, end: int) -> None:
-        """Take in a value that stands from ``begin`` to ``end``, neither before the start."""
+        """Add a value that lasts from ``begin`` to ``end``, neither before the start."""
         last = self._slice(end - 1)  # which may make them wider
         sums, covered, width = self._sums, self._covered, self._width
         for index in range((begin - self._start) // width, last + 1):
@@ -71,7 +71,7 @@ class TimeBatches:
             covered[index] = before + length
 
     def _slice(self, time: int) -> int:
-        """The number of the slice in which a time lies; there is one."""
+        """The number of the slice of a time, which exists."""
         while (index := (time - self._start) // self._width) >= self._most:
             self._sums, self._covered = _pairs(self._sums), _pairs(self._covered)
             self._width *= 2
@@ -81,25 +81,25 @@ class TimeBatches:
         return index
 
     def count(self, time: int) -> None:
-        """Take in that something came, once."""
+        """Count one arrival."""
         index = self._slice(time)
         self._sums[index] += 1.0
 
     def cover(self, end: int) -> None:
-        """All of the time until ``end`` was watched."""
+        """The observation lasted until ``end``."""
         self._slice(max(end - 1, self._start))
         for index in range(len(self._covered)):
             self._covered[index] = float(min(self._width, end - self._start - index * self._width))
 
     def batches(self, end: int) -> tuple[list[float], list[float]]:
-        """Sums and weights of the slices that were over at ``end``, from the first on in which there was a value."""
+        """Sums and weights of the slices complete at ``end``, from the first one with a value."""
         full = min((end - self._start) // self._width, len(self._sums))
         first = next((index for index in range(full) if self._covered[index] > 0), full)
         return self._sums[first:full], self._covered[first:full]
 
 
 def _pairs(sums: list[float]) -> list[float]:
-    """Each two of them together; the last one alone, perhaps."""
+    """The values added in pairs; the last one may stay alone."""
     found = []
     for index in range(0, len(sums) - 1, 2):
         first: float = sums[index]
@@ -109,16 +109,16 @@ def _pairs(sums: list[float]) -> list[float]:
 
 
 def batch_interval(sums: Sequence[float], weights: Sequence[float], value: float, level: float) -> Interval | None:
-    """The interval around a mean, by the means of 20 batches; None if there are too few numbers.
+    """The interval around a mean, from the means of 20 batches; None if there are too few numbers.
 
-    Student's interval with 19 degrees of freedom is widened by sqrt((1 + r) / (1 - r)), as if the batch means were an
-    autoregressive sequence; r is their autocorrelation at lag 1, less its bias, if that is above 0.
+    Student's interval with 19 degrees of freedom is widened by sqrt((1 + r) / (1 - r)), as for an autoregressive
+    sequence of batch means; r is their autocorrelation at lag 1, less its bias, if this is above 0.
     Source: A. M. Law, *Simulation Modeling and Analysis*, 9.5.3; for the widening, A. Tafazzoli et al. (2011), Skart.
     """
     size = len(sums) // BATCHES
     if size == 0:
         return None
-    first = len(sums) - size * BATCHES  # what is too much for equal batches is warm-up rather than anything else
+    first = len(sums) - size * BATCHES  # what does not fill equal batches is dropped at the start, where the warm-up is
     means = []
     for begin in range(first, len(sums), size):
         weight = math.fsum(weights[begin : begin + size])
@@ -137,16 +137,16 @@ def batch_interval(sums: Sequence[float], weights: Sequence[float], value: float
 
 
 def mser(means: Sequence[float]) -> int | None:
-    """How many of the batches are warm-up: those without which the standard error of the mean is least.
+    """How many batches are warm-up: those whose removal makes the standard error of the mean least.
 
-    That is the d with the least sum of (x - mean)^2 / (n - d)^2 over the n - d others.  None if it is in the second
-    half of the run, which is too short then.
+    That is the d with the least sum of (x - mean)^2 / (n - d)^2 over the n - d others.  None if the end of the warm-up
+    is in the second half of the run, which then is too short.
     Source: K. P. White, *An effective truncation heuristic for bias reduction in simulation output*, Simulation 69
     (1997); K. P. White, M. J. Cobb, S. C. Spratt, WSC 2000.
     """
     mean, squares = 0.0, 0.0
     best, least = 0, math.inf
-    for count in range(1, len(means) + 1):  # from the end on, so that each d costs one step
+    for count in range(1, len(means) + 1):  # from the end, so that each d costs one step
         place = len(means) - count
         gap = means[place] - mean
         mean += gap / count

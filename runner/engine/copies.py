@@ -1,8 +1,8 @@
-"""Copies of what a run consists of: actors, agenda, ways of tokens, and whatever these hold.
+"""Copies of the parts of a run: actors, agenda, ways of tokens, and everything that these hold.
 
-``copy.deepcopy`` would do but for two things: it takes functions for constants, while the ways that tokens take are
-closures over ports and queues; and it calls itself for each thing within a thing, so that a chain of a thousand actors
-is too deep for it.  Here a thing is first made empty, then entered into a list of what is to be filled.
+``copy.deepcopy`` would do but for two things: it treats functions as constants, while the ways of tokens are closures
+over ports and queues; and it recurses into every object, so that a chain of a thousand actors is too deep for it.  Here
+an object is first created empty, and then added to a list of objects to fill.
 
 What cannot change is not copied: numbers and texts, classes, functions without a memory, tuples and frozen dataclasses
 of such things, arrays that are read-only.  Anything else is copied by Python's own protocol: ``__deepcopy__``, or the
@@ -40,26 +40,25 @@ _Fill = Callable[[Any, Any], None]
 
 
 class CopyError(EpicycleError):
-    """Something that is part of a run and cannot be copied."""
+    """A part of a run that cannot be copied."""
 
 
 class Copies:
-    """Copies that belong together: what several of them refer to is copied once.
+    """Copies that belong together: an object that several of them refer to is copied once.
 
-    ``shared`` are things that the copies have in common with what they are copies of.  With ``callbacks`` these are
-    functions, too, and methods of what is no part of a model: they lead to the outside, where somebody listens.  The
-    list gets those that there are.
+    ``shared`` are objects that the copies share with their originals.  With ``callbacks``, they include functions, and
+    methods of objects outside the model, where somebody listens.  The list collects them.
     """
 
     def __init__(self, shared: Iterable[object] = (), callbacks: list[object] | None = None) -> None:
         self._known: dict[int, Any] = {id(thing): thing for thing in shared}
-        self._kept: list[Any] = []  # what was copied lives on, lest something else gets its id
+        self._kept: list[Any] = []  # originals are kept alive, so that nothing else gets their ids
         self._to_fill: list[tuple[_Fill, Any, Any, tuple[Any, str]]] = []
-        self._owner: tuple[Any, str] = None, ""  # whose that is which is copied just now, and the attribute
+        self._owner: tuple[Any, str] = None, ""  # the owner of the object being copied, and the attribute
         self._callbacks = callbacks
 
     def of(self, thing: T) -> T:
-        """The copy of a thing, whole; raises ``CopyError``."""
+        """The complete copy of an object; raises ``CopyError``."""
         waiting, self._to_fill = self._to_fill, []
         made: T = self._copy(thing)
         while self._to_fill:
@@ -116,7 +115,7 @@ class Copies:
         return tuple.__new__(type(thing), items)
 
     def _frozen(self, thing: Any) -> Any:
-        """A frozen dataclass: as a tuple."""
+        """A frozen dataclass, treated as a tuple."""
         copied = [(name, value, self._copy(value)) for name, value in _attributes(thing)]
         if all(value is other for _, value, other in copied):
             return thing
@@ -125,7 +124,7 @@ class Copies:
             object.__setattr__(made, name, value)
         return made
 
-    # -- what is called --------------------------------------------------------------------------------------------
+    # -- callables -------------------------------------------------------------------------------------------------
 
     def _is_outside(self, thing: Any) -> bool:
         if self._callbacks is None:
@@ -152,7 +151,7 @@ class Copies:
     def _fill_cell(self, thing: Any, made: Any) -> None:
         try:
             content = thing.cell_contents
-        except ValueError:  # nothing has been put in yet
+        except ValueError:  # nothing assigned yet
             return
         made.cell_contents = self._copy(content)
 
@@ -183,14 +182,14 @@ class Copies:
         return thing if there is None else weakref.ref(self._copy(there))
 
     def _actor(self, thing: Actor) -> Any:
-        """An actor; one of a model in less time, for there may be thousands."""
+        """An actor; faster for one in a model, which may have thousands."""
         if self._callbacks is None:
             return self._object(thing)
         return self._later(self._fill_object, thing, thing.twin(self._known))
 
     def _object(self, thing: Any) -> Any:
         made = self._later(self._fill_object, thing, _new_of(type(thing))(type(thing)))
-        if type(thing).__hash__ is not _HASH:  # which asks what is in it, perhaps now
+        if type(thing).__hash__ is not _HASH:  # it may look at its items right now
             self._fill_object(*self._to_fill.pop()[1:3])
         return made
 
@@ -210,7 +209,7 @@ class Copies:
                 put(made, name, value)  # one by one, see ``_Port.bind``
 
     def _by_protocol(self, thing: Any) -> Any:
-        """As ``copy.deepcopy`` does, for what defines how it is copied."""
+        """As ``copy.deepcopy`` does, for objects that define how they are copied."""
         if _is_global(thing):
             return thing
         try:
@@ -226,11 +225,10 @@ class Copies:
             raise
         except Exception as error:
             raise CopyError(
-                f"{_told(*self._owner)} holds a {type(thing).__qualname__}, which cannot be copied ({error}): let its "
-                "class say how, with __deepcopy__, or name the attribute in copies_share for copies of the run to have "
-                "it in common"
+                f"{_told(*self._owner)} holds a {type(thing).__qualname__}, which cannot be copied ({error}): define "
+                "__deepcopy__ in its class, or name the attribute in copies_share to let copies of the run share it"
             ) from error
-        # Items are taken now, while nothing changes, and put in later, as they may lead here again.
+        # Items are taken now, while nothing changes, and added later, because they may lead here again.
         rest = state, list(items or ()), list(pairs or ())
         self._to_fill.append((self._fill_reduced, rest, made, self._owner))
         return made
@@ -250,7 +248,7 @@ class Copies:
 
 
 def _of_class(find: Callable[[Any], T]) -> Callable[[Any], T]:
-    """Find something out for each class once, and forget it with the class: users load theirs again and again."""
+    """Compute something once per class, and forget it with the class: users reload theirs."""
     known: weakref.WeakKeyDictionary[Any, T] = weakref.WeakKeyDictionary()
 
     def found(cls: Any) -> T:
@@ -263,7 +261,7 @@ def _of_class(find: Callable[[Any], T]) -> Callable[[Any], T]:
 
 @_of_class
 def _made_of(cls: Any) -> Callable[[Copies, Any], Any]:
-    """What copies the things of a class."""
+    """The function that copies the instances of a class."""
     if issubclass(cls, _UNCHANGING):
         return lambda _, thing: thing
     if issubclass(cls, Actor):
@@ -277,28 +275,28 @@ def _made_of(cls: Any) -> Callable[[Copies, Any], Any]:
 
 
 def _is_plain(cls: type) -> bool:
-    """Whether an instance is its attributes and nothing else."""
+    """Whether an instance consists of its attributes alone."""
     try:
         _new_of(cls)(cls)
-    except TypeError:  # there is more to it, of which only the class knows
+    except TypeError:  # it has more state, known only to the class
         return False
     is_ours = all(base is object or base.__flags__ & _HEAP_TYPE or _is_compiled(base) for base in cls.__mro__)
     return is_ours and all(getattr(cls, name, None) is getattr(object, name, None) for name in _PROTOCOL)
 
 
 def _is_compiled(cls: type) -> bool:
-    """Whether a class is one of the core's in C: its attributes are those that ``__slots__`` names, as in Python."""
+    """Whether a class belongs to the core in C: its attributes are those named in ``__slots__``, as in Python."""
     return not cls.__flags__ & _HEAP_TYPE and cls.__module__ in CORE_MODULES
 
 
 @_of_class
 def _new_of(cls: Any) -> Callable[[Any], Any]:
-    """What makes an instance without attributes."""
+    """A function that creates an instance without attributes."""
     return next((base.__new__ for base in cls.__mro__ if _is_compiled(base)), object.__new__)
 
 
 def _attributes(thing: Any) -> Iterable[tuple[str, Any]]:
-    """What an object holds, by name."""
+    """The attributes of an object, by name."""
     cls: Any = type(thing)
     named: dict[str, Any] = getattr(thing, "__dict__", _EMPTY)
     if slots := _slots(cls):
@@ -316,14 +314,14 @@ def _slots(cls: Any) -> tuple[str, ...]:
 
 @_of_class
 def _descriptors(cls: Any) -> frozenset[str]:
-    """The names that set something else than the attribute."""
+    """The names that do not set the attribute itself."""
     return frozenset(
         name for base in cls.__mro__ for name, value in vars(base).items() if hasattr(type(value), "__set__")
     ).difference(_slots(cls))
 
 
 def _is_global(thing: Any) -> bool:
-    """Whether a module has it under its own name."""
+    """Whether a module has the object under its own name."""
     module = sys.modules.get(getattr(thing, "__module__", None) or "")
     return getattr(module, getattr(thing, "__qualname__", ""), _NOTHING) is thing
 
@@ -337,7 +335,7 @@ def _told(owner: Any, attribute: str) -> str:
 
 _HASH: Any = object.__hash__
 _PROTOCOL = ("__reduce_ex__", "__reduce__", "__getstate__", "__setstate__", "__getnewargs__", "__getnewargs_ex__")
-_HEAP_TYPE = 1 << 9  # of the flags of a class: it was made by Python code
+_HEAP_TYPE = 1 << 9  # a flag of classes made by Python code
 _NOTHING: Any = object()
 _EMPTY: dict[str, Any] = {}
 _CONSTANT = frozenset(
@@ -364,7 +362,7 @@ _MAKE: dict[type, Callable[[Copies, Any], Any]] = {
     types.MethodWrapperType: Copies._built_in,
     partial: Copies._partial,
     np.ndarray: Copies._array,
-    itertools.count: lambda _, thing: itertools.count(next(thing) + 1),  # without a number that nobody misses
+    itertools.count: lambda _, thing: itertools.count(next(thing) + 1),  # lacks only a number that nobody needs
     weakref.ref: Copies._weak,
     array: lambda _, thing: thing[:],
     type(hashlib.sha256()): lambda _, thing: thing.copy(),

@@ -1,4 +1,4 @@
-# Types for C; what everything is for is said in director.py.
+# Types for C; director.py has the documentation.
 
 cimport cython
 from epicycle.actors cimport InputPort, Moment, Ranks, Times, Wake, Way, new_wake

@@ -1,25 +1,24 @@
 """The discrete-event director: which actor fires when.
 
-Order of events
----------------
-Events are ordered by tag, that is by time and then microstep.  Within a tag, tokens whose delay is over are put into
-their ports first, in the order in which they were sent; then actors fire by rank (``firing_order``: depth in the graph
-of connections without delay, then priority, ties in the order of declaration).  A firing sees all tokens that its actor
-gets at this tag, because all that can still send to it within the tag have a lower rank.  An actor therefore fires
-once per tag; the exception is one with an output that does not depend on an input at once (``depends_on``), which
-may have to send before that input is there: its tokens are taken in a firing of their own, at the rank of the input.
+Order of events --------------- Events are ordered by tag, that is by time and then microstep.  Within a tag, tokens
+whose delay is over are put into their ports first, in the order in which they were sent; then actors fire by rank
+(``firing_order``: depth in the graph of connections without delay, then priority, ties in the order of declaration).  A
+firing sees all tokens that its actor gets at this tag, because every actor that can still send to it within the tag has
+a lower rank.  An actor therefore fires once per tag; the exception is one with an output that does not depend on an
+input at once (``depends_on``), which may have to send before that input has arrived: its tokens are taken in a separate
+firing, at the rank of the input.
 
 Where ties are posted (``postings``), actors of equal depth and priority fire in the order in which they were to have a
-turn first: by a wake-up that was asked for, or by a token that was put in.  Then an actor takes all that waits for it,
-in whichever of its turns it fires, and its turns that follow each other at once are one firing.
+turn first: by requesting a wake-up, or by the arrival of a token.  Then an actor takes all tokens that wait for it, in
+whichever of its turns it fires, and its consecutive turns are one firing.
 
 A token sent over a connection without delay arrives at the same tag; with delay d > 0 at (time + d, 1); with delay 0
 at the next microstep.  A wake-up for the present time comes at the next microstep, one for the future at
 microstep 1.  The first tag of a run is (start, 1).
 
-SimPy owns time, and the events of processes and resources.  The director has an agenda of its own beside it: of the
-two, who is first goes on.  At one instant all that SimPy has to do comes first, and what processes send then is
-received at the first microstep that the director has not handled yet.
+SimPy owns time, and the events of processes and resources.  The director has its own agenda beside it: the earlier of
+the two goes first.  At one instant, all events of SimPy come first, and what processes send then is received at the
+first microstep that the director has not yet handled.
 
 Departures from Ptolemy II: a firing sees all tokens of its tag at once, where Ptolemy fires again for each further
 token; and tokens that an actor does not read do not stay in the port, unless it keeps them (``InputPort.keep``).
@@ -45,7 +44,7 @@ if TYPE_CHECKING:
 
     from ..graph import Postings
 
-REPORTED = 256  # tokens that come together at one port: so many at a time are counted
+REPORTED = 256  # tokens that come together at one port are counted in groups of this size
 
 
 class Director:
@@ -63,12 +62,12 @@ class Director:
     ) -> None:
         self._environment = Environment(initial_time=0)
         self._queue = self._environment.queue
-        self._has_simpy = False  # whether somebody has seen the environment
-        self._time = 0  # what SimPy's time is until then
+        self._has_simpy = False  # whether anybody uses the environment
+        self._time = 0  # SimPy's time until then
         self.seed = seed
         self.streams = Streams(seed)
         self.crowd = Crowd(limits.tokens)
-        self._on_their_way = 0  # tokens, to times and microsteps to come
+        self._on_their_way = 0  # tokens, to future times and microsteps
         self._most_times = limits.times
         self.firings = 0
         self.steps = 0  # tags, and events of SimPy's
@@ -78,19 +77,19 @@ class Director:
         self._past: Instant | None = None  # the one before it, which may serve again
         self.ranks = order  # of actors and of their inputs
         self._turns: list[Turn | None] = [None] * (max(order.values(), default=0) + 1)  # by rank
-        # What is to be done: at the present tag the ranks of turns (a heap), then the next microstep, then later times.
+        # The work: at the present tag the ranks of turns (a heap), then the next microstep, then later times.
         # One entry per actor and tag, whatever the number of its tokens.
         self._ready = Ranks()
-        self._all_at_once = {} if postings is None else postings.actors  # who take all that waits for them
+        self._all_at_once = {} if postings is None else postings.actors  # which take all waiting tokens
         self.posters: dict[str, Poster] = {}  # of composites that are posted as a whole
         if postings is not None:
             self._ready.posts = Posts(postings.places)
         self._next: Instant | None = None
         self._times = Times()
-        self._rank = -1  # the rank of what is handled now
+        self._rank = -1  # the rank of the turn handled now
         self._stop_after: Tag | None = None
         self._reason = "no events left"
-        self._recent: list[str] | None = None  # who fires, when it looks as if time stood still
+        self._recent: list[str] | None = None  # actors that fire while time seems to stand still
         self._is_interrupted = False
         # Called with the time (ns) before it advances there; true if the run is to end instead.
         self.watch: Callable[[int], bool] | None = None
@@ -99,7 +98,7 @@ class Director:
 
     @property
     def tag(self) -> Tag:
-        """The present tag: outside of firings (a process that SimPy resumed), the first not handled yet."""
+        """The present tag: outside of firings (a process that SimPy resumed), the first one not yet handled."""
         return self.now().tag
 
     @property
@@ -114,42 +113,42 @@ class Director:
 
     @property
     def environment(self) -> Environment:
-        """SimPy's part of the run: whoever asks for it is told the time from then on."""
+        """SimPy's part of the run, which is kept up to date once it has been requested."""
         if not self._has_simpy:
             self._has_simpy = True
             self._environment._now = self._time
         return self._environment
 
     def now(self) -> Instant:
-        """The present tag, with what is to be done at it if it is being handled."""
+        """The present tag, with its work if it is being handled."""
         if self.present is not None:
             return self.present
-        # SimPy's time need not be whole; what comes between two nanoseconds belongs to the later one.
+        # SimPy's time need not be whole; a time between two nanoseconds belongs to the later one.
         now, last = math.ceil(self._environment.now) if self._has_simpy else self._time, self._last
         return new_instant(now, 1) if now > last.time else new_instant(last.time, last.microstep + 1)
 
-    # -- what actors and aspects ask for --------------------------------------------------------------------------
+    # -- requests of actors and aspects ---------------------------------------------------------------------------
 
     def wake(self, actor: Actor, time: int) -> Wake:
         """Fire ``actor`` at ``time``; the present or past is the next microstep."""
         return self.wake_turn(self.turn(actor, self.ranks[actor.path]), time)
 
     def wake_turn(self, turn: Turn, time: int) -> Wake:
-        """Let an actor have a turn at ``time``."""
+        """Give an actor a turn at ``time``."""
         now = self.now()
         if self.present is None and time <= now.time:
             return self._call_now(turn, now)
         return self._wake_at(turn, self._to_come(now, time))
 
     def call(self, actor: Actor, tag: Tag, rank: int) -> Wake:
-        """Fire ``actor`` at a tag and rank that are still to come (``next_turn``)."""
+        """Fire ``actor`` at a future tag and rank (``next_turn``)."""
         turn, now = self.turn(actor, rank), self.now()
         if tag.time == now.time and tag.microstep == now.microstep:
             return self._call_now(turn, now)
         return self._wake_at(turn, self._to_come(now, tag.time))
 
     def want_at(self, turn: Turn, time: int) -> Moment:
-        """Let an actor have a turn at ``time`` that it cannot call off; at which tag."""
+        """Give an actor a turn at ``time`` that cannot be cancelled; returns its tag."""
         now = self.now()
         if self.present is None and time <= now.time:
             self.want(turn)
@@ -176,14 +175,14 @@ class Director:
         return wake
 
     def turn(self, actor: Actor, rank: int) -> Turn:
-        """The turn of a rank, which ``actor`` has: an actor of the model, or who stands in for it."""
+        """The turn of a rank, for ``actor``: an actor of the model, or its stand-in."""
         turn = self._turns[rank]
         if turn is None:
             turn = self._turns[rank] = self.new_turn(actor, rank)
         return turn
 
     def new_turn(self, actor: Actor, rank: int) -> Turn:
-        """A turn of an actor, or who stands in for it, at a rank."""
+        """A turn of an actor, or of its stand-in, at a rank."""
         turn = Turn(actor, rank, self.ranks, self._all_at_once.get(actor.path))
         around = actor.path
         while self.posters and around and turn.poster is None:
@@ -194,7 +193,7 @@ class Director:
         return turn
 
     def entry(self, port: InputPort[Any], channel: int, stand_in: Actor | None = None) -> Way:
-        """What puts tokens into a port at the present tag, and lets its actor fire, or who stands in for it."""
+        """The way into a port at the present tag, which lets the port's actor, or its stand-in, fire."""
         return Entry(self, self.turn(stand_in or port.actor, self.ranks[port.path]), port, channel)
 
     def trigger(self, actor: Actor) -> None:
@@ -202,7 +201,7 @@ class Director:
         self.want(self.turn(actor, self.ranks[actor.path]))
 
     def later(self, delay: int, way: Way, token: Any) -> None:
-        """Let a token go on after ``delay`` ns; 0 is the next microstep."""
+        """Send a token onward after ``delay`` ns; 0 is the next microstep."""
         now = self.now()
         instant = self._to_come(now, now.time + delay)
         if instant.pending is None:
@@ -210,16 +209,16 @@ class Director:
         instant.pending.append(self.hold(way, token))
         self._on_their_way += 1
         if len(instant.pending) > self.crowd.most:
-            raise CrowdError(instant.tag, self.crowd.most, "tokens that are on their way", self._who())
+            raise CrowdError(instant.tag, self.crowd.most, "tokens on their way", self._who())
         if self._on_their_way > self._most_times:
-            raise CrowdError(now.tag, self._most_times, "tokens that are on their way, to all times", self._who())
+            raise CrowdError(now.tag, self._most_times, "tokens on their way, over all times", self._who())
 
     def hold(self, way: Way, token: Any) -> Delivery:
-        """What lets a token go on, later."""
+        """A function that sends a token onward, later."""
         return Delivery(way, token)
 
     def stop(self, reason: str) -> None:
-        """End the run when the present tag has been handled; the first who asks gives the reason."""
+        """End the run when the present tag has been handled; the first call gives the reason."""
         if self._stop_after is None:
             self._stop_after = self.tag
             self._reason = reason
@@ -235,16 +234,16 @@ class Director:
         return self.present is None or not first <= self._rank <= last
 
     def is_to_come(self, first: int, last: int) -> bool:
-        """Whether any turn of these ranks is still to come at the present tag, and none of them is being taken."""
+        """Whether a turn of these ranks is still to come at the present tag, and none of them is being taken."""
         if self.present is None or first <= self._rank <= last:
             return False
         return any(turn is not None and turn.is_wanted for turn in self._turns[first : last + 1])
 
     def set_aside(self, job: Job) -> None:
-        """A firing is put off: what it is for does not belong to the next one of its actor."""
+        """A firing is deferred: its tokens and wake-ups do not belong to its actor's next firing."""
 
     def put_back(self, job: Job) -> None:
-        """A firing that was put off is the next one of its actor."""
+        """A deferred firing is its actor's next one."""
 
     # -- the agenda -----------------------------------------------------------------------------------------------
 
@@ -254,7 +253,7 @@ class Director:
         return () if turn is None else (turn.actor.path,)
 
     def want(self, turn: Turn) -> None:
-        """Let an actor have a turn at the present tag."""
+        """Give an actor a turn at the present tag."""
         if not turn.is_wanted:
             turn.is_wanted = True
             self._ready.push(turn.rank)
@@ -262,7 +261,7 @@ class Director:
                 self._await_present()
 
     def _to_come(self, now: Instant, time: int) -> Instant:
-        """What is to be done after the present tag: at the next microstep, or at the first one of a later time."""
+        """The work after the present tag: at the next microstep, or at the first one of a later time."""
         if time > now.time:
             instant = self._times.at(time)
             return self._await(time, 1) if instant is None else instant
@@ -273,7 +272,7 @@ class Director:
         return self._next
 
     def _await_present(self) -> None:
-        """Between tags: see to it that the present one is going to be handled."""
+        """Between tags: make sure that the present one will be handled."""
         now = self.now()
         if self._times.at(now.time) is None:
             self._await(now.time, now.microstep)
@@ -281,7 +280,7 @@ class Director:
     def _await(self, time: int, microstep: int) -> Instant:
         """Put a tag into the agenda."""
         if self._times.size > self._most_times:
-            what = "times at which something is still to come"
+            what = "times with something still to come"
             raise CrowdError(Tag(time, microstep), self._most_times, what, self._who())
         past, self._past = self._past, None
         instant = new_instant(time, microstep, past)
@@ -322,17 +321,17 @@ class Director:
                     self._begin(instant)
                 self.fire(turn)
                 turn.clear()
-        except BaseException as error:  # whatever an actor raises, sys.exit() too, is its failure
+        except BaseException as error:  # anything that an actor raises, even sys.exit(), is its failure
             assert turn is not None
             turn.clear()
             self.fail(turn, error)
-        # Its next microstep comes next, also where nobody fired at this one: a process alone may have asked for that.
+        # Its next microstep comes next, even if nobody fired at this one: a process may have requested it.
         self.present = None if self._next is None else instant
 
     def _gather(self, turn: Turn) -> bool:
-        """Let an actor that takes all that waits have the turns of its own that come next, too.
+        """Give an actor that takes all waiting tokens its next turns, too.
 
-        False if it has nothing to fire for.
+        False if it has no reason to fire.
         """
         is_to_fire = self._has_reason(turn)
         posts = self._ready.posts
@@ -369,7 +368,7 @@ class Director:
             self._recent = None
 
     def use_wakes(self, turn: Turn) -> bool:
-        """Make the wake-ups of a turn due; false if the actor has nothing to fire for after all."""
+        """Make the wake-ups of a turn due; false if the actor has no reason left to fire."""
         return turn.use_wakes()
 
     def fire(self, turn: Turn) -> None:
@@ -389,7 +388,7 @@ class Director:
             self._fire_on(turn)
 
     def _fire_on(self, turn: Turn) -> None:
-        """Let an actor fire as long as it takes tokens out of ports that keep them, and leaves others there."""
+        """Let an actor fire as long as it takes tokens from ports that keep them, and leaves others there."""
         waiting = turn.kept()
         turn.actor.fire()
         left = turn.kept()
@@ -403,19 +402,19 @@ class Director:
             left = turn.kept()
 
     def fail(self, turn: Turn, error: BaseException) -> NoReturn:
-        """Tell the error of an actor in its turn; one of an aspect on the way of a token, say, has been told."""
+        """Report the error of an actor in its turn; one of an aspect on a token's way, say, has been reported."""
         if isinstance(error, (ActorError, LoopError, KeyboardInterrupt)):
             raise error
         doing = "run()" if isinstance(turn.actor, Process) else "fire()"
         raise ActorError(turn.actor.path, self.last, doing, describe(error)) from error
 
     def interrupt(self) -> None:
-        """Raise ``KeyboardInterrupt`` in the place of the next firing, or of the next instant."""
+        """Raise ``KeyboardInterrupt`` instead of the next firing, or of the next instant."""
         self._is_interrupted = True
 
 
 class Entry(Way):
-    """Where a token gets to an actor: into a port, on one channel."""
+    """The end of a token's way: a port of an actor, on one channel."""
 
     __slots__ = ("channel", "director", "is_plain", "port", "turn")
 
@@ -433,7 +432,7 @@ class Entry(Way):
             self.port.arrived.append(token)
         else:
             self.port.receive(token, self.channel)
-        if not turn.is_wanted:  # as in want, without the call: this is done for every token that arrives
+        if not turn.is_wanted:  # as in want, without the call: this happens for every token that arrives
             turn.is_wanted = True
             self.director._ready.push(turn.rank)
             if self.director.present is None:

@@ -1,4 +1,4 @@
-"""Who is the director: of the run, of composites with a time of their own, and of refinements; and their borders."""
+"""The directors of a run, of composites with their own time, and of refinements; and their borders."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 class Directors:
     """The directors of a run ``of`` each composite that has one, with the passages at its ports.
 
-    ``executions`` are of the actors whose firings are put off, or caught; whoever makes them puts them in.
+    ``executions`` are those of the actors whose firings are deferred or whose errors are caught; their maker adds them.
     """
 
     def __init__(self, graph: ModelGraph, actors: dict[str, Actor], director: Director) -> None:
@@ -36,11 +36,11 @@ class Directors:
             self._add_director(composite, clock)
 
     def over(self, path: str) -> Director | LocalDirector | Refinement:
-        """The director that an actor or composite stands under, with its time."""
+        """The director of an actor or composite, with its time."""
         return self.of[self.graph.director_of(path)]
 
     def _add_director(self, composite: str, clock: Clock) -> None:
-        """What is asked for under a director of its own."""
+        """The options of a composite's own director."""
         outside = self.base(self.graph.director_of(composite)) if composite else self.director
         for paths in self.graph.borders(composite):
             self.passages.update({path: Passage(path, outside) for path in paths})
@@ -77,7 +77,7 @@ class Directors:
             self.director.posters[composite] = border
 
     def _let_refire(self, composite: str) -> None:
-        """Let a composite with modes, or a refinement, take a token of each channel in each firing, as in Ptolemy."""
+        """Let a composite with modes, or a refinement, take one token of each channel per firing, as in Ptolemy."""
         inputs, outputs = self.graph.borders(composite)
         for path in (*inputs, *outputs):
             self.passages[path].is_refired = True
@@ -108,7 +108,7 @@ class Directors:
         return refinement is not None and refinement.conductor.machine.catches
 
     def _begin_anew(self, refinement: str) -> None:
-        """Let all that is in a refinement begin again."""
+        """Restart the contents of a refinement."""
         for path, passage in self.passages.items():
             if is_within(path, refinement):
                 passage.clear()
@@ -122,7 +122,7 @@ class Directors:
                 actor.restart()
 
     def post(self, before: str, path: str) -> None:
-        """At the start, one actor was initialized and another one is next: post composites that are done with."""
+        """At the start, between the initialization of two actors: post the composites that are complete."""
         around = before if self.borders else ""
         while around:
             around = around.rpartition(".")[0]

@@ -1,4 +1,4 @@
-"""What ends a run: an actor that fails, time that stands still, too much at one tag."""
+"""The errors that end a run: an actor that fails, time that stands still, too much at one tag."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class ActorError(EpicycleError):
 
 
 class LoopError(EpicycleError):
-    """Time stands still: too many microsteps at one instant, or too many events of SimPy's."""
+    """Time stands still: too many microsteps, or too many SimPy events, at one instant."""
 
     def __init__(self, time: int, actors: tuple[str, ...]) -> None:
         super().__init__(time, actors)
@@ -48,7 +48,7 @@ class LoopError(EpicycleError):
     def __str__(self) -> str:
         head = f"time stands still at {self.time / 1e9:g} s: more than "
         if not self.actors:
-            return head + f"{MAX_STEPS:,} SimPy events; a process waits again and again for no time at all"
+            return head + f"{MAX_STEPS:,} SimPy events; a process keeps waiting for zero time"
         names = ", ".join(self.actors)
         return head + (
             f"{MAX_MICROSTEPS:,} microsteps; the last actors that fired: {names}; give their loop a delay above zero"
@@ -56,7 +56,7 @@ class LoopError(EpicycleError):
 
 
 class CrowdError(LoopError):
-    """More at one tag, or still to come, than was meant to be; ``where`` are the ports at which most of it is."""
+    """More at one tag, or still to come, than the limit; ``where`` are the ports with most of it."""
 
     def __init__(self, tag: Tag, most: int, what: str, where: tuple[str, ...]) -> None:
         super().__init__(tag.time, where)
@@ -64,7 +64,7 @@ class CrowdError(LoopError):
         self.tag, self.most, self.what, self.where = self.args
 
     def of(self, who: str) -> CrowdError:
-        """The same, with the name of who adds to it."""
+        """The same, with the name of the part that adds to it."""
         return CrowdError(self.tag, self.most, self.what, (who,))
 
     def __str__(self) -> str:
@@ -73,7 +73,7 @@ class CrowdError(LoopError):
 
 
 class Crowd:
-    """Counts what one tag holds, where there is much of it: those who add to it report many at a time."""
+    """Counts the contents of a tag when there are many: those who add to it report many at a time."""
 
     def __init__(self, most: int) -> None:
         self.most = most
@@ -82,7 +82,7 @@ class Crowd:
         self._by_port: dict[str, int] = {}
 
     def add(self, tag: Tag, port: str, number: int) -> None:
-        """So many more at a port; raises ``CrowdError``."""
+        """Count more at a port; raises ``CrowdError``."""
         if tag != self._tag:
             self._tag, self._total, self._by_port = tag, 0, {}
         self._total += number
@@ -93,10 +93,10 @@ class Crowd:
 
 
 def of_process(error: BaseException, actors: Iterable[Actor], tag: Tag) -> tuple[ActorError, BaseException | None]:
-    """The error of a process that SimPy resumed, and its cause: from there, no firing says whose it was."""
+    """The error of a process that SimPy resumed, and its cause: no firing says whose error it is."""
     for actor in actors:
         failure = actor.failure if isinstance(actor, Process) else None
-        if isinstance(failure, ActorError):  # of an aspect or a metric, to which the process has sent
+        if isinstance(failure, ActorError):  # of an aspect or a metric that the process has sent to
             return failure, failure.__cause__
         if failure is not None:
             return ActorError(actor.path, tag, "run()", describe(failure)), failure

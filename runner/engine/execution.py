@@ -1,9 +1,9 @@
-"""Execution: how an actor fires at which aspects stand.
+"""Execution: how an actor with aspects fires.
 
-The director does not fire such an actor: in its turns a stand-in fires, which makes a ``Job`` of the tokens and
-wake-ups of the firing and hands it to the aspects.  When they let it pass, the actor fires for it, in a turn of its own
-rank, so that what it sends is received within the tag.  A job that is let pass at once is a firing as any other.  All
-other actors are fired as in a model without such aspects.
+The director does not fire such an actor: in its turns a stand-in fires, which turns the tokens and wake-ups of the
+firing into a ``Job`` and passes it to the aspects.  When they let it pass, the actor fires for it, in a turn at its own
+rank, so that what it sends is received within the tag. A job that passes at once is a firing like any other. All other
+actors fire as in a model without such aspects.
 """
 
 from __future__ import annotations
@@ -24,10 +24,10 @@ from .refinement import Refinement
 
 
 class Execution:
-    """The execution of one actor, and its context: what it asks of the director is asked for its stand-in.
+    """The execution of one actor, and its context: its requests to the director are made for its stand-in.
 
-    ``way`` is where its jobs go, which lead to ``execute``; each of ``refresh`` is called before the actor fires, and
-    ``forget`` when it has lost its state.
+    ``way`` is the way of its jobs, which leads to ``execute``; each of ``refresh`` is called before the actor fires,
+    and ``forget`` when it has lost its state.
     """
 
     def __init__(self, actor: Actor, director: Director, local: Director | LocalDirector | Refinement) -> None:
@@ -35,8 +35,8 @@ class Execution:
         self.way: Callable[[Job], None] = self.execute
         self.refresh: list[Callable[[], None]] = []
         self.forget: Callable[[], None] = _nothing
-        self.border: Border | None = None  # of the composite that it is in, if it is put off from outside of that
-        self.refinement: Refinement | None = None  # that it is in, if errors in there lead to a transition
+        self.border: Border | None = None  # of its composite, if the firing is deferred from outside
+        self.refinement: Refinement | None = None  # its refinement, if errors in it lead to a transition
         self.seed = director.seed
         self.streams = director.streams
         self.environment = local.environment
@@ -51,11 +51,11 @@ class Execution:
         if self.turn_at(self._own.rank).takes_all:
             for turn in self._turns.values():
                 turn.inputs.update(actor.inputs)
-        self._open: int | None = None  # the rank of its turn, while the actor itself does nothing
+        self._open: int | None = None  # the rank of its turn, while the actor itself is idle
         self._asked: list[Wake] = []  # wake-ups that are to come
-        self._ready: dict[Wake, Job] = {}  # what is to be executed, and by when
+        self._ready: dict[Wake, Job] = {}  # jobs to execute, and by when
         self._life = 0  # how often it has been killed
-        # While it is suspended: by whom, what is to be executed, and what has fallen due.
+        # While it is suspended: by whom, the jobs to execute, and those that have fallen due.
         self._gates: dict[ActorPoint, Callable[[Job, ActorPoint], bool]] = {}
         self._held: list[Job] = []
         self._waiting: list[Job] = []
@@ -82,7 +82,7 @@ class Execution:
         return self._local.time
 
     def wake(self, actor: Actor, time: int) -> Wake:
-        """Let the actor have a turn at ``time``."""
+        """Give the actor a turn at ``time``."""
         wake = self._local.wake(self._own, time)
         self._asked.append(wake)
         return wake
@@ -90,12 +90,12 @@ class Execution:
     # -- its turns ------------------------------------------------------------------------------------------------
 
     def turn_of(self, port: InputPort[Any]) -> Actor:
-        """Who fires in place of the actor for a token at a port."""
+        """The stand-in that fires for a token at a port."""
         return self._turns[self._director.ranks[port.path]]
 
     def take(self, turn: _StandIn) -> None:
-        """Use a turn: execute what is ready, and hand what has fallen due to the aspects."""
-        self._director.firings -= 1  # the actor's own count, and a turn is none
+        """Use a turn: execute what is ready, and pass what has fallen due to the aspects."""
+        self._director.firings -= 1  # the actor counts its own firings, and a turn is not one
         job = self._fallen_due(turn)
         ready = [wake for wake, each in self._ready.items() if wake.due and each.rank == turn.rank]
         self._open = turn.rank
@@ -108,7 +108,7 @@ class Execution:
             self._open = None
 
     def _fallen_due(self, turn: _StandIn) -> Job:
-        """Take the tokens out of the ports and the wake-ups back, as if they had not come yet."""
+        """Take the tokens out of the ports and the wake-ups back, as if they had not yet come."""
         due = [wake for wake in self._asked if wake.due] if turn is self._own else []
         if self._asked:
             self._asked = [wake for wake in self._asked if not (wake.due or wake.cancelled)]
@@ -123,12 +123,12 @@ class Execution:
         if not self._gates:
             self.way(job)
             return
-        kept = [keeps(job, point) for point, keeps in self._gates.items()]  # all of them are told
+        kept = [keeps(job, point) for point, keeps in self._gates.items()]  # all of them are notified
         if all(kept):
             self._waiting.append(job)
 
     def execute(self, job: Job) -> None:
-        """Let the actor fire for a job: at once if it is its turn, or else in the next turn that it can have."""
+        """Let the actor fire for a job: at once if it is its turn, or else in its next possible turn."""
         if self._open == job.rank:
             self._carry_out(job)
             return
@@ -161,7 +161,7 @@ class Execution:
             except BaseException as error:
                 self._director.fail(own, error)
             finally:
-                own.clear()  # the director clears the turn of the stand-in alone
+                own.clear()  # the director clears only the turn of the stand-in
         except ActorError as error:
             if self.refinement is None:
                 raise
@@ -170,14 +170,14 @@ class Execution:
             job.watch(perf_counter() - start)
         self._open = turn
 
-    # -- what aspects do with the actor as a whole ----------------------------------------------------------------
+    # -- acts of aspects on the actor as a whole ------------------------------------------------------------------
 
     def suspend(self, point: ActorPoint, keeps: Callable[[Job, ActorPoint], bool]) -> None:
-        """Let the actor not fire until ``resume``; ``keeps`` says whether a job that falls due meanwhile waits."""
+        """Keep the actor from firing until ``resume``; ``keeps`` says whether a job that falls due meanwhile waits."""
         self._gates[point] = keeps
 
     def resume(self, point: ActorPoint) -> None:
-        """Let the actor fire again: first for what it was to do meanwhile, then for what fell due."""
+        """Let the actor fire again: first for the jobs to execute meanwhile, then for those that fell due."""
         del self._gates[point]
         if self._gates:
             return
@@ -198,7 +198,7 @@ class Execution:
         self.forget()
 
     def restart(self) -> None:
-        """Let the actor begin again."""
+        """Restart the actor."""
         self._call(self.actor.restart, "restart()")
 
     def _call(self, method: Callable[[], None], name: str) -> None:
@@ -209,7 +209,7 @@ class Execution:
 
 
 class _StandIn(Actor):
-    """Fires in place of an actor, in its turns at one rank, for the tokens that it takes there."""
+    """Fires in place of an actor, in its turns at one rank, for the tokens taken there."""
 
     def __init__(self, execution: Execution, rank: int) -> None:
         super().__init__(execution.actor.path)
@@ -229,7 +229,7 @@ class _StandIn(Actor):
 
 
 def is_stand_in(actor: Actor) -> bool:
-    """Whether this is not an actor, but stands in for one."""
+    """Whether this is a stand-in, not an actor."""
     return isinstance(actor, _StandIn)
 
 

@@ -12,5 +12,5 @@ if TYPE_CHECKING:
 
 
 def attach(director: Director, actors: Mapping[str, Actor], besides: Container[str]) -> int:
-    """Let forms fire in the place of those actors that have one, ``besides`` some; how many do."""
+    """Let native forms fire in place of the actors that have one, except those ``besides``; returns how many."""
     return 0

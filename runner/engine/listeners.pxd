@@ -1,4 +1,4 @@
-# Types for C; what everything is for is said in listeners.py.
+# Types for C; listeners.py has the documentation.
 
 cimport cython
 from epicycle.actors cimport Way

@@ -1,4 +1,4 @@
-"""Who listens to what leaves a port: the recorder of a signal, and metrics."""
+"""Listeners to what leaves a port: the recorder of a signal, and metrics."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 class Recording(Way):
-    """Lets a signal grow."""
+    """Appends tokens to a signal."""
 
     __slots__ = ("director", "samples")
 
@@ -27,7 +27,7 @@ class Recording(Way):
 
 
 class Measuring(Way):
-    """Hands the tokens of a port to a metric."""
+    """Passes the tokens of a port to a metric."""
 
     __slots__ = ("director", "measurement", "port")
 

@@ -1,7 +1,7 @@
-"""Composites with a director of their own: their local time, and their ports, which one token passes at a time.
+"""Composites with their own director: their local time, and their ports, which pass one token at a time.
 
-The director of the model fires all actors: those of such a composite come one after the other in its order, in the
-place of the composite (``firing_order``).  What is theirs alone is the time that they see.
+The director of the model fires all actors: those of such a composite follow each other in its order, in place of the
+composite (``firing_order``).  Only the time that they see is their own.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ from .way import Call
 
 
 class LocalDirector:
-    """The director as the actors and aspects inside a composite with a clock of its own see it."""
+    """The director as seen by the actors and aspects inside a composite with its own clock."""
 
     def __init__(self, director: Director | Refinement, clock: Clock) -> None:
         self.environment = LocalEnvironment(director.environment, clock)
@@ -49,11 +49,11 @@ class LocalDirector:
         return wake
 
     def stop(self, reason: str) -> None:
-        """End the run, not only what this composite does."""
+        """End the whole run, not only this composite."""
         self._director.stop(reason)
 
     def later(self, delay: int, way: Way, token: Any) -> None:
-        """Let a token go on after ``delay`` ns of local time."""
+        """Send a token onward after ``delay`` ns of local time."""
         self._director.later(self._clock.span(self._director.time, delay), way, token)
 
 
@@ -84,22 +84,22 @@ class LocalEnvironment(simpy.Environment):
 
 
 class Passage(Actor):
-    """A port of a composite with a director of its own: at each tag it lets one token of each channel through.
+    """A port of a composite with its own director: at each tag it lets one token of each channel through.
 
-    What is left waits for the next microstep.  A *lane* is the way of one channel, from the sender's side onward.  With
-    a ``border`` it lets one token through in each firing of the composite; if it ``is_refired`` with what is around the
-    composite, in each of its own.  One that ``holds_one`` keeps the latest token alone of those that come together.
+    The rest waits for the next microstep.  A *lane* is the way of one channel, from the sender's side onward.  With a
+    ``border``, it lets one token through per firing of the composite; if it ``is_refired`` with the surroundings of the
+    composite, per firing of those.  One that ``holds_one`` keeps only the latest of the tokens that come together.
     """
 
     def __init__(self, path: str, director: Director | Refinement) -> None:
         super().__init__(path)
         self.enter(director)
-        self.gate: Refinement | None = None  # behind it, which may be closed: what comes then is lost
-        self.beside: Actor | None = None  # who fires when something has come through
+        self.gate: Refinement | None = None  # the passage behind it, which may be closed: then tokens are lost
+        self.beside: Actor | None = None  # fires when something has come through
         self.border: Border | None = None
         self.is_refired = False
         self.holds_one = False
-        self.requests: deque[Delivery] = deque()  # to an aspect that is a model, which wait for its turn
+        self.requests: deque[Delivery] = deque()  # requests to an aspect that is a model, waiting for its turn
         self._director = director
         self._lanes: dict[object, _Lane] = {}
 
@@ -110,7 +110,7 @@ class Passage(Actor):
             lane.waiting.clear()
 
     def lane(self, channel: object, onward: Way) -> Way:
-        """Where a token of a channel goes that has come so far; ``onward`` is where it goes when it has passed."""
+        """The way of a token of a channel that has come this far; ``onward`` is its way after passing."""
         lane = self._lanes.setdefault(channel, _Lane())
 
         def arrive(token: Any) -> None:
@@ -157,7 +157,7 @@ class Passage(Actor):
             self.wake_in(0)
 
     def await_turn(self, onward: Way) -> Way:
-        """Where a request goes that waits until the composite fires; all of them go on then."""
+        """The way of a request, which waits until the composite fires; then all of them go onward."""
         border, waiting = self.border, self.requests
         assert border is not None
 
@@ -172,10 +172,10 @@ class Passage(Actor):
 
 
 class Border(Actor):
-    """The end of a composite whose director is like Ptolemy's: as long as tokens wait at its inputs, it fires again.
+    """The border of a composite whose director is like Ptolemy's: as long as tokens wait at its inputs, it fires again.
 
-    In each of its firings one token of each channel passes its ports.  What an actor sends whose firing was put off
-    from outside leaves at the next microstep, unless the composite fires at this tag for what comes in.
+    In each of its firings, one token of each channel passes its ports. The output of an actor whose firing was deferred
+    from outside leaves at the next microstep, unless the composite fires at this tag for new input.
     """
 
     def __init__(self, path: str, end: str, director: Director, outside: Director | Refinement) -> None:
@@ -187,35 +187,35 @@ class Border(Actor):
         self._outside = outside
         ranks = [rank for each, rank in director.ranks.items() if is_within(each, path)]
         self._first, self._last = min(ranks), max(ranks)
-        self._came_in: Tag | None = None  # when something did
-        self._resumed: Tag | None = None  # when a firing was executed that had been put off
+        self._came_in: Tag | None = None  # when something came in
+        self._resumed: Tag | None = None  # when a deferred firing was executed
         # When it has fired, it is posted for what comes first inside.
         self.poster: Poster | None = None
         self.nesting = 0
         self._turn: Turn | None = None
-        self._inside: list[tuple[int, int]] = []  # the tags at which something is to be done, a heap
-        self._posted: set[tuple[int, int]] = set()  # for which of them it has been posted
+        self._inside: list[tuple[int, int]] = []  # the tags with work to do, a heap
+        self._posted: set[tuple[int, int]] = set()  # the tags for which it has been posted
 
     @property
     def is_to_come(self) -> bool:
-        """Whether the composite is yet to fire at the present tag."""
+        """Whether the composite has yet to fire at the present tag."""
         return self._director.is_to_come(self._first, self._last)
 
     @property
     def turn(self) -> Turn:
-        """The turn in which it ends a firing of the composite."""
+        """The turn that ends a firing of the composite."""
         if self._turn is None:
             self._turn = self._director.turn(self, self._director.ranks[self.path])
         return self._turn
 
     def note(self, time: int, microstep: int) -> None:
-        """Something inside has asked for a turn."""
+        """Something inside has requested a turn."""
         heapq.heappush(self._inside, (time, microstep))
         if self._director.last.microstep and self._director.is_between(self._first, self._last):
             self.post()
 
     def post(self) -> None:
-        """Ask for a turn for what comes first inside."""
+        """Request a turn for what comes first inside."""
         now = self._director.last
         while self._inside and self._inside[0] <= now:
             heapq.heappop(self._inside)
@@ -225,11 +225,11 @@ class Border(Actor):
             self._director.want_at(self.turn, self._inside[0][0])
 
     def resume(self) -> None:
-        """An actor inside fires now whose firing was put off from outside."""
+        """An actor inside now fires after its firing was deferred from outside."""
         self._resumed = self.tag
 
     def lets_pass(self, passage: Passage) -> bool:
-        """Whether what waits at a port may pass it now."""
+        """Whether waiting tokens may pass a port now."""
         now = self.tag
         if passage in self.inputs_before:
             self._came_in = now

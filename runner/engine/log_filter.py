@@ -12,10 +12,10 @@ _SHOWN = 12  # names in a message
 
 
 class LogFilter:
-    """Which records to keep: those that fit, in each column of ``wanted``, one of the patterns given for it.
+    """Which records to keep: those that match, in each column of ``wanted``, one of its patterns.
 
-    The columns are ``event``, ``actor``, ``port`` (its name alone) and ``aspect``; the pattern ``*`` for an aspect is
-    whatever an aspect did, and no send.  Counts and digest are those of the whole log.  Raises ``LogError``.
+    The columns are ``event``, ``actor``, ``port`` (its name alone) and ``aspect``; the pattern ``*`` for an aspect
+    matches all acts of aspects, and no sends.  Counts and digest are those of the whole log.  Raises ``LogError``.
 
     >>> Simulation(model, keep_log=LogFilter({"aspect": ["packet_loss"], "actor": ["observer[*].controller"]}))
     """
@@ -33,22 +33,22 @@ class LogFilter:
 
     @classmethod
     def of(cls, texts: Iterable[str]) -> LogFilter:
-        """The filter that texts such as ``aspect=packet_loss`` describe."""
+        """The filter described by texts such as ``aspect=packet_loss``."""
         wanted: dict[str, list[str]] = {}
         for text in texts:
             column, sign, pattern = text.partition("=")
             if not (sign and pattern.strip()):
-                raise LogError(f"{text!r} is no filter of the log: write COLUMN=PATTERN, such as aspect=packet_loss")
+                raise LogError(f"{text!r} is not a filter of the log: write COLUMN=PATTERN, such as aspect=packet_loss")
             wanted.setdefault(column.strip(), []).append(pattern.strip())
         return cls(wanted)
 
     def keeps(self, event: str, actor: str, port: str, aspect: str) -> bool:
-        """Whether to keep such a record."""
+        """Whether to keep a record."""
         names = {"event": event, "actor": actor, "port": port, "aspect": aspect}
         return all(any(_fits(each, names[column]) for each in patterns) for column, patterns in self._wanted.items())
 
     def check(self, model: Model) -> None:
-        """Raise ``LogError`` if nothing that the log of a model may hold fits some pattern."""
+        """Raise ``LogError`` if a pattern matches nothing that the log of a model may hold."""
         ports = model.graph.ports
         aspects = [woven.aspect for woven in model.aspects]
         valid = {
@@ -63,7 +63,7 @@ class LogFilter:
                 if not any(_fits(pattern, name) for name in names):
                     known = ", ".join(names[:_SHOWN]) + (", ..." if len(names) > _SHOWN else "")
                     raise LogError(
-                        f"{column}={pattern} fits no {column} of the model{did_you_mean(pattern, names)}; "
+                        f"{column}={pattern} matches no {column} of the model{did_you_mean(pattern, names)}; "
                         f"{column}s: {known or 'none'}"
                     )
 
@@ -77,4 +77,4 @@ def _fits(pattern: str, name: str) -> bool:
     try:
         return name != "" and select(pattern, [name]) == [name]
     except PatternError as error:
-        raise LogError(f"{pattern!r} is no pattern: {error}") from None
+        raise LogError(f"{pattern!r} is not a pattern: {error}") from None

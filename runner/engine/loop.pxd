@@ -1,4 +1,4 @@
-# Types for C; what everything is for is said in loop.py.
+# Types for C; loop.py has the documentation.
 
 cimport cython
 from epicycle.actors cimport Times

@@ -1,4 +1,4 @@
-"""The loop of a run: which comes next, a tag of the director's agenda or an event of SimPy's."""
+"""The loop of a run: which comes next, a tag of the director's agenda or a SimPy event."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from .director import Director
     from .pace import Pace
 
-_NOTICED = 16  # steps between two looks at what else there is
+_NOTICED = 16  # steps between two checks for other work
 
 
 def handle_events(
@@ -28,10 +28,9 @@ def handle_events(
     pace: Pace | None = None,
     most: int | None = None,
 ) -> str:
-    """Handle events up to and including ``stop`` (ns), until none is left, or until a stop was asked for.
+    """Handle events up to and including ``stop`` (ns), until none is left, or until a stop is requested.
 
-    Returns why it ended; nothing if that is because ``most`` steps are done, of which each is a tag or an event of
-    SimPy's.
+    Returns why it ended, or an empty text after ``most`` steps, each of which is a tag or a SimPy event.
     """
     environment, times, queue = director._environment, director._times, director._queue
     last_step = NEVER if most is None else director.steps + most
@@ -47,7 +46,7 @@ def handle_events(
         if director._stop_after is not None and director._last.tag >= director._stop_after:
             break
         is_of_simpy = False
-        if instant is not None:  # more of the present time
+        if instant is not None:  # more at the present time
             upcoming = instant.time
         else:
             upcoming = times.first()

@@ -1,4 +1,4 @@
-# Types for C; what everything is for is said in measurement.py.
+# Types for C; measurement.py has the documentation.
 
 cimport cython
 from epicycle.runner.engine.batches cimport TimeBatches, TokenBatches

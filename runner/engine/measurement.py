@@ -1,4 +1,4 @@
-"""Measurement: a metric while the run goes on, and what it comes to in the end."""
+"""Measurement: a metric during the run, and its final value."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ from ..shown import short
 from .batches import BATCHES, LEAST_OF_MSER, OF_MSER, TimeBatches, TokenBatches, batch_interval, mser
 from .statistic import MOST, Statistic, statistic_of
 
-_HELD = 1024  # whole numbers of which it is known whether a condition holds
-_EXACT = 2**53  # whole numbers up to here are floats
+_HELD = 1024  # whole numbers for which it is known whether a condition holds
+_EXACT = 2**53  # whole numbers up to here have exact floats
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class _Unfit:
 
 
 class Measurement:
-    """Takes in what the ports of a metric send."""
+    """Takes in the tokens that the ports of a metric send."""
 
     __slots__ = ("_holds", "_is_beyond", "_is_of_floats", "_is_of_numbers", "_kept", "_measure", "_ports", "_taking")
 
@@ -40,7 +40,7 @@ class Measurement:
         self._ports = metric.ports
         self._kept: _Kept | None = None
         self._is_beyond = False  # of all numbers
-        # What most tokens count is known without looking further: floats as they are, whole numbers as floats or not.
+        # The values of most tokens are known at once: floats as they are, whole numbers as floats or not.
         self._is_of_numbers = measure.when is None
         self._is_of_floats = measure.when is None and measure.take not in _AS_THEY_ARE
         self._holds: dict[int, Any] | None = None if measure.when is None else {}
@@ -84,8 +84,8 @@ class Measurement:
         return _measured(self._measure, token)
 
     def outcome(self, end: int) -> Outcome:
-        """What it has come to at a time (ns) up to which nothing more will come."""
-        beyond = Outcome(missing="it is beyond all numbers")
+        """Its value at a time (ns) up to which nothing more will come."""
+        beyond = Outcome(missing="it is too large for a number")
         try:
             found = beyond if self._is_beyond else self._outcome(end)
         except (OverflowError, ValueError):  # of sums: infinity, or infinity less infinity
@@ -111,22 +111,22 @@ class Measurement:
         return replace(found, value=Quantity(found.value, unit).to(to), interval=interval)
 
 
-_AS_SENT = ("first", "last", "min", "max")  # of which infinity is a value as any other
+_AS_SENT = ("first", "last", "min", "max")  # for which infinity is a value like any other
 _AS_THEY_ARE = (*_AS_SENT, "sum", "count", "rate")  # whole numbers stay whole
 
 
 def _measured(measure: Measure, token: Any) -> Any:
-    """What counts of a token, or ``_Unfit`` with what the port sent."""
+    """The value of a token, or ``_Unfit`` with what the port sent."""
     if measure.take in ("first", "last", "count", "rate"):
         return token
     if measure.when is not None:
         return (_known if isinstance(token, str) else _holds)(measure.when, token)
-    if isinstance(token, str):  # some of which float() reads
-        return _Unfit(f"{short(token)}, which is no number,")
+    if isinstance(token, str):  # float() reads some of them
+        return _Unfit(f"{short(token)}, which is not a number,")
     try:
         number = float(token)
     except Exception:
-        return _Unfit(f"{short(token)}, which is no number,")
+        return _Unfit(f"{short(token)}, which is not a number,")
     if math.isnan(number) or (math.isinf(number) and measure.take not in _AS_SENT):
         return _Unfit(f"{number}")
     return token if measure.take in _AS_THEY_ARE else number
@@ -137,17 +137,17 @@ def _holds(when: Formula, token: Any) -> float | _Unfit:
     try:
         return float(bool(when({"value": operand(token)})))
     except Exception as error:
-        return _Unfit(f"{short(token)}, of which {when.source!r} cannot be told ({error}),")
+        return _Unfit(f"{short(token)}, for which {when.source!r} cannot be evaluated ({error}),")
 
 
-_known = lru_cache(maxsize=1024, typed=True)(_holds)  # states come again and again
+_known = lru_cache(maxsize=1024, typed=True)(_holds)  # states recur
 
 
-# -- tokens, each of which counts as much ---------------------------------------------------------------------------
+# -- tokens, all with the same weight -------------------------------------------------------------------------------
 
 
 class _Taking:
-    """What takes in values from a time on, ``start``."""
+    """A collector of values from the time ``start``."""
 
     __slots__ = ("_count", "_measure", "_statistic", "_unfit", "start")
 
@@ -159,16 +159,16 @@ class _Taking:
         self._unfit = ""
 
     def add(self, port: str, time: int, value: Any) -> None:
-        """Take in what a port sent."""
+        """Take in a token that a port sent."""
         raise NotImplementedError
 
     def outcome(self, end: int) -> Outcome:
-        """What it has come to at a time."""
+        """Its value at a time."""
         raise NotImplementedError
 
 
 class _Tokens(_Taking):
-    """Takes tokens from a time on."""
+    """Takes tokens from a time onwards."""
 
     __slots__ = ("_batches",)
 
@@ -200,11 +200,11 @@ class _Tokens(_Taking):
         return _with_interval(found, self._batches.batches(), self._measure, self._count, after)
 
 
-# -- spells of time: each value counts for as long as it stands -----------------------------------------------------
+# -- spells of time: each value counts for as long as it lasts ------------------------------------------------------
 
 
 class _Spells(_Taking):
-    """Takes what stands at ports, from a time on."""
+    """Takes the values at ports, from a time onwards."""
 
     __slots__ = ("_batches", "_open")
 
@@ -239,7 +239,7 @@ class _Spells(_Taking):
             self._batches.add(value, begin, time)
 
     def close(self, end: int) -> None:
-        """What stands now stands until the end."""
+        """The present values last until the end."""
         for port in self._open:
             self._close(port, end)
 
@@ -257,7 +257,7 @@ class _Spells(_Taking):
 
 
 class _Arrivals(_Taking):
-    """Counts tokens in time, from a time on."""
+    """Counts tokens over time, from a time onwards."""
 
     __slots__ = ("_batches",)
 
@@ -311,7 +311,7 @@ def _with_interval(
 
 
 class _Kept:
-    """Keeps what came, until it is known where the warm-up ended."""
+    """Keeps all values until it is known where the warm-up ended."""
 
     __slots__ = ("_names", "_numbers", "_ports", "_times", "_unfit", "_values")
 
@@ -329,15 +329,15 @@ class _Kept:
             return
         self._ports.append(self._numbers[port])
         self._times.append(time)
-        self._values.append(0.0 if isinstance(value, str) else float(value))  # of arrivals only the times count
+        self._values.append(0.0 if isinstance(value, str) else float(value))  # for arrivals only the times count
 
     def settled(self, measure: Measure, ports: list[str], end: int) -> _Taking | str:
-        """What has taken all that came after the warm-up; or why there is none."""
+        """The collector of everything after the warm-up, or the reason why there is none."""
         count = len(self._times)
         if self._unfit:
             return self._unfit
         if count < LEAST_OF_MSER * OF_MSER:
-            return f"MSER-5 needs {LEAST_OF_MSER * OF_MSER} tokens, and {count} came"
+            return f"MSER-5 needs {LEAST_OF_MSER * OF_MSER} tokens, but {count} came"
         pieces = count // OF_MSER
         skipped, start = 0, 0
         if measure.kind.over == TIME:
@@ -359,7 +359,7 @@ class _Kept:
             places = range(0, pieces * OF_MSER, OF_MSER)
             means = [math.fsum(self._values[place : place + OF_MSER]) / OF_MSER for place in places]
         if (found := mser(means)) is None:
-            return "it does not settle in the first half of the run, says MSER-5: make it longer"
+            return "by MSER-5, it does not settle in the first half of the run: make the run longer"
         if measure.kind.over == TIME:
             start = origin + found * width
         else:

@@ -12,7 +12,7 @@ from epicycle.aspects import Reading
 
 from ..graph import Monitor
 from ..results import Past, Verdict
-from ..temporal import LINEAR, TINY, Condition, Finding, Judge, Line, Piece, Source, leaves
+from ..temporal import LINEAR, TINY, Condition, Finding, Judge, Line, Piece, Source, leaves, looks_ahead
 
 if TYPE_CHECKING:
     from .director import Director
@@ -59,7 +59,7 @@ class _Margin:
         self._since, self._next = now, now + 1
 
     def close(self, upcoming: int) -> None:
-        """Nothing comes any more before ``upcoming``."""
+        """Nothing more comes before ``upcoming``."""
         if self._is_linear and self._next < upcoming:
             self._source.pieces.append(Piece(self._next, upcoming - 1, self._found))
 
@@ -93,8 +93,8 @@ class Monitoring:
     """
 
     __slots__ = (
-        "_conditions", "_finding", "_judge", "_latest", "_listening", "_missing", "_past", "_time", "_values",
-        "monitor",
+        "_conditions", "_finding", "_is_late", "_judge", "_latest", "_listening", "_missing", "_past", "_time",
+        "_values", "monitor",
     )  # fmt: skip
 
     def __init__(self, monitor: Monitor) -> None:
@@ -113,6 +113,7 @@ class Monitoring:
         self._time = 0  # the instant that is not settled yet
         self._finding = Finding()
         self._missing = ""  # why it cannot be judged
+        self._is_late = looks_ahead(monitor.tree) or linear  # a break may be found out later than it happens
         self._past: Past[tuple[int, dict[str, Any]]] = Past()
         self._values: dict[str, Any] = {}  # of its ports where it broke first
 
@@ -145,9 +146,10 @@ class Monitoring:
         except EpicycleError as error:
             self._missing = f"{error}, at {to_seconds(now):.9g} s"
             return
-        self._past.append((now, dict(self._latest)))
-        if len(self._past) > 2 * _KEPT:
-            del self._past[:_KEPT]
+        if self._is_late:
+            self._past.append((now, dict(self._latest)))
+            if len(self._past) > 2 * _KEPT:
+                del self._past[:_KEPT]
         self._find(over=False)
 
     def _find(self, over: bool) -> None:
@@ -158,7 +160,9 @@ class Monitoring:
 
     def _at(self, time: int) -> dict[str, Any]:
         """What the conditions asked for at a time, if that is still known."""
-        known: dict[str, Any] = next((latest for start, latest in reversed(self._past) if start <= time), {})
+        known: dict[str, Any] = self._latest
+        if self._is_late:
+            known = next((latest for start, latest in reversed(self._past) if start <= time), {})
         asked = dict.fromkeys(each for readings in self._asked() for each in readings)
         return {".".join((port, *path)): value_at(known[port], path) for port, path in asked if port in known}
 
@@ -167,7 +171,7 @@ class Monitoring:
         return (readings for condition, readings in pairs if isinstance(condition, Condition))
 
     def verdict(self, end: int) -> Verdict:
-        """What it comes to when the run ends at a time (ns); nothing may be added any more."""
+        """What it comes to when the run ends at a time (ns); nothing more may be added."""
         self.settle(end + 1)
         if self._missing:
             return Verdict(missing=self._missing)

@@ -1,1 +1,1 @@
-"""What native forms are made of (``native.pyx``).  In Python there are none."""
+"""The parts of native forms (``native.pyx``).  In Python there are none."""

@@ -6,25 +6,25 @@ import math
 import time
 from collections.abc import Callable
 
-SLOWEST = 1e-9  # model seconds in a second: a nanosecond, than which no step of time is shorter
-LONGEST = 3_600.0  # s that are slept at once: what the operating system takes has an end
+SLOWEST = 1e-9  # model seconds per second: a nanosecond, the shortest step of time
+LONGEST = 3_600.0  # s slept at once: the operating system has a limit
 
 
 def notice(progress: Callable[[float], None] | None, now: int) -> None:
-    """Tell of the progress, at a time (ns).
+    """Report the progress at a time (ns).
 
-    A run in C calls this now and then because it is Python: meanwhile signals are handled, and other threads go on.
+    A run in C calls this now and then because it is Python: this lets signals be handled, and other threads run.
     """
     if progress is not None:
         progress(now / 1e9)
 
 
 class Pace:
-    """Lets model time pass no faster than ``factor`` seconds of it in a second of the wall clock.
+    """Limits model time to ``factor`` seconds per second of wall-clock time.
 
-    A run that has fallen behind goes on as fast as it can until it has caught up; ``behind`` is how late its latest
-    instant was and ``worst`` the latest of all (s of the wall clock).  Raises ``ValueError`` for a factor that is no
-    number from ``SLOWEST`` up.
+    A run that has fallen behind runs as fast as it can until it has caught up; ``behind`` is the delay of its latest
+    instant and ``worst`` the greatest of all (s of wall-clock time).  Raises ``ValueError`` for a factor that is not a
+    number of at least ``SLOWEST``.
     """
 
     def __init__(
@@ -35,7 +35,7 @@ class Pace:
         sleep: Callable[[float], None] = time.sleep,
     ) -> None:
         if not SLOWEST <= factor < math.inf:
-            raise ValueError(f"a pace is a number of model seconds in a second, {SLOWEST:g} or more, not {factor:g}")
+            raise ValueError(f"a pace is a number of model seconds per second, at least {SLOWEST:g}, not {factor:g}")
         self.factor = factor
         self.behind = 0.0
         self.worst = 0.0
@@ -44,7 +44,7 @@ class Pace:
         self._start: float | None = None
 
     def wait_for(self, now: float) -> None:
-        """Wait until the model time ``now`` (ns) has come; the first time is the beginning."""
+        """Wait for the model time ``now`` (ns); the first call marks the beginning."""
         if self._start is None:
             self._start = self._clock()
         due = self._start + now / 1e9 / self.factor

@@ -1,4 +1,4 @@
-"""Parameters that change while the model runs: what aspects make of them whenever their actors fire."""
+"""Parameters that change during a run: aspects compute them whenever their actors fire."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from epicycle.actors import Actor, Parameter, ParameterError
 
 
 class VaryingParameter:
-    """A parameter of an actor that aspects stand at; ``nominal`` is the value that the model gives it."""
+    """A parameter of an actor with aspects; ``nominal`` is its value in the model."""
 
     def __init__(self, actor: Actor, parameter: Parameter[Any]) -> None:
         self.actor = actor
@@ -18,7 +18,7 @@ class VaryingParameter:
         self.nominal = parameter.value_in(actor)
 
     def set(self, value: Any) -> None:
-        """Give it the value that comes behind the aspects; raises ``ParameterError`` if it does not take it."""
+        """Set it to the value behind the aspects; raises ``ParameterError`` if the value is not valid."""
         if value is self.nominal:
             self.restore()
             return
@@ -26,10 +26,11 @@ class VaryingParameter:
             converted = self.parameter.convert(value.tolist() if isinstance(value, np.ndarray) else value)
         except ParameterError as error:
             raise ParameterError(
-                f"{self.parameter.name} of {self.actor.path}: {error}; a Saturate behind keeps it within bounds"
+                f"{self.parameter.name} of {self.actor.path}: {error}; an aspect Saturate after the others keeps it "
+                "within bounds"
             ) from None
         self.parameter.store(self.actor, converted)
 
     def restore(self) -> None:
-        """Give it back the value that the model says."""
+        """Restore the value from the model."""
         self.parameter.store(self.actor, self.nominal)

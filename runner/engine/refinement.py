@@ -1,8 +1,8 @@
-"""Refinements: composites that are active in one mode of a machine, and whose time stands still in all others.
+"""Refinements: composites that are active in one mode of a machine; in all others, their time stands still.
 
-What is asked for inside of one waits in an agenda of its own, in its local time.  The conductor of the machine's
-composite fires before all that is in there: it lets the machine take a preemptive transition, or else lets what is due
-go on in the active refinement.  The machine fires last, and whatever it enters begins at the next microstep.
+Requests inside a refinement wait in its own agenda, in its local time.  The conductor of the machine's composite fires
+before everything in it: it lets the machine take a preemptive transition, or else lets the active refinement do what is
+due.  The machine fires last, and a mode that it enters begins at the next microstep.
 """
 
 from __future__ import annotations
@@ -26,12 +26,12 @@ if TYPE_CHECKING:
 
     from epicycle.actors import StateMachine
 
-# When, a number that keeps the order, what and how, and the outer time and microstep before which it is not done.
+# When, a number that keeps the order, what and how, and the earliest outer time and microstep.
 Entry = tuple[int, int, "Wake | Delivery | Event", "Turn | EventPriority | None", tuple[int, int]]
 
 
 class Refinement:
-    """The director as what is inside of a refinement sees it; ``outer`` is what is around its machine."""
+    """The director as seen inside a refinement; ``outer`` is the director around its machine."""
 
     def __init__(self, path: str, outer: Context, director: Director, conductor: Conductor) -> None:
         self.path = path
@@ -42,7 +42,7 @@ class Refinement:
         self.conductor = conductor
         self.is_active = False
         self._outer = outer
-        self._lag = 0  # how far its time is behind (ns)
+        self._lag = 0  # how far its time lags behind (ns)
         self._stood = 0  # outer time since when it has stood still
         self._agenda: list[Entry] = []
         self._numbers = count()
@@ -77,26 +77,26 @@ class Refinement:
         self._put(self.time + delay, self.director.hold(way, token), None)
 
     def put_event(self, event: Event, priority: EventPriority, time: int) -> None:
-        """Let an event of SimPy's happen at a local time."""
+        """Schedule a SimPy event at a local time."""
         self._put(time, event, priority)
 
     def _put(self, time: int, what: Wake | Delivery | Event, how: Turn | EventPriority | None) -> None:
         most = self.director.crowd.most
         if len(self._agenda) >= most:
-            raise CrowdError(self.director.tag, most, f"things that are to come in {self.path}", ())
+            raise CrowdError(self.director.tag, most, f"pending tokens, wake-ups and events in {self.path}", ())
         heapq.heappush(self._agenda, (time, next(self._numbers), what, how, self._not_before(time)))
         if self.is_active:
             self.conductor.plan()
 
     def _not_before(self, time: int) -> tuple[int, int]:
-        """What is for the present time is for its next microstep; but a composite that fires again begins at once."""
+        """Work for the present time is for its next microstep; but a composite that fires again begins at once."""
         if time > self.time or self._is_beginning:
             return 0, 0
         present = self.director.now()
         return present.time, present.microstep + (self.director.present is not None)
 
     def hold(self, way: Way, token: Any) -> Delivery:
-        """What lets a token go on, later."""
+        """A function that sends a token onward, later."""
         return self.director.hold(way, token)
 
     def trigger(self, actor: Actor) -> None:
@@ -107,15 +107,15 @@ class Refinement:
         """End the run."""
         self.director.stop(reason)
 
-    # -- what its conductor does with it --------------------------------------------------------------------------
+    # -- for its conductor ----------------------------------------------------------------------------------------
 
     @property
     def next_time(self) -> int | None:
-        """The outer time at which something is to be done."""
+        """The outer time of its next work."""
         return self._agenda[0][0] + self._lag if self._agenda else None
 
     def release(self) -> bool:
-        """Let go on what is due; whether anything is."""
+        """Do what is due; returns whether anything is."""
         now, present, due = self.time, self.director.now(), list[Entry]()
         while self._agenda and self._agenda[0][0] <= now and self._agenda[0][4] <= (present.time, present.microstep):
             due.append(heapq.heappop(self._agenda))
@@ -135,17 +135,17 @@ class Refinement:
         return is_any
 
     def suspend(self) -> None:
-        """Its time stands still."""
+        """Stop its time."""
         self._stood = self._outer.time
         self.is_active = False
 
     def resume(self) -> None:
-        """Its time resumes where it stood."""
+        """Resume its time where it stood."""
         self._lag += self._outer.time - self._stood
         self.is_active = True
 
     def begin(self) -> None:
-        """It begins again, with the time around it, and with nothing to do."""
+        """Restart it at the outer time, with nothing to do."""
         for _, _, what, *_ in self._agenda:
             if isinstance(what, Wake):
                 what.cancel()
@@ -153,7 +153,7 @@ class Refinement:
         self._lag, self.is_active = 0, True
 
     def begin_inside(self, inside: Callable[[], None]) -> None:
-        """Let all that is in it begin."""
+        """Start its contents."""
         self._is_beginning = True
         inside()
         self._is_beginning = False
@@ -173,30 +173,30 @@ class _Environment(simpy.Environment):
         return self._refinement.time
 
     def schedule(self, event: Event, priority: EventPriority = NORMAL, delay: int | float = 0) -> None:
-        """Let an event happen after ``delay`` ns of local time."""
+        """Schedule an event after ``delay`` ns of local time."""
         if delay == 0 and self._refinement.is_active:
             self._outer.schedule(event, priority, 0)
         else:
             self._refinement.put_event(event, priority, self._refinement.time + round(delay))
 
     def release(self, event: Event, priority: Any) -> None:
-        """Let an event happen now."""
+        """Schedule an event now."""
         self._outer.schedule(event, priority, 0)
 
 
 class Conductor(Actor):
-    """Fires at the head of a composite with modes: it has the refinements, of which one is active at most."""
+    """Fires first in a composite with modes: it holds the refinements, of which at most one is active."""
 
     def __init__(self, path: str, machine: StateMachine, director: Director, outer: Context) -> None:
         super().__init__(path)
         self.enter(outer)
         self.machine = machine
         self.refinements: dict[str, Refinement] = {}
-        self.insides: dict[str, Callable[[], None]] = {}  # what lets all in a refinement begin anew
+        self.insides: dict[str, Callable[[], None]] = {}  # restarts the contents of a refinement
         self.passages: Mapping[str, Any] = {}
         self._director = director
         self._active: Refinement | None = None
-        self._left: Tag | None = None  # the tag at which a preemptive transition, or an error, has cut a firing short
+        self._left: Tag | None = None  # the tag at which a preemptive transition, or an error, cut a firing short
         self._wake: Wake | None = None
         self.is_refired = False  # whether it fires again at a tag as long as tokens wait at the inputs of its composite
         self.failure: ActorError | None = None
@@ -204,7 +204,7 @@ class Conductor(Actor):
 
     @property
     def has_left(self) -> bool:
-        """Whether the active refinement has no part in the present tag any more."""
+        """Whether the active refinement no longer takes part in the present tag."""
         return self._left is not None and self._left == self._director.tag
 
     def fire(self) -> None:
@@ -220,9 +220,9 @@ class Conductor(Actor):
         self.plan()
 
     def plan(self) -> None:
-        """Ask to be fired when something is to be done."""
+        """Request a firing for when there is work."""
         times = [None if self._active is None else self._active.next_time]
-        if self.machine.is_preemptive:  # it is looked at before its refinement fires
+        if self.machine.is_preemptive:  # it is checked before its refinement fires
             times.append(self.machine.next_time)
         time = min((each for each in times if each is not None), default=None)
         if time is None or (self._wake is not None and not self._wake.cancelled and self._wake.time <= time):
@@ -234,7 +234,7 @@ class Conductor(Actor):
     # -- for the machine ------------------------------------------------------------------------------------------
 
     def begin(self, mode: str) -> None:
-        """The run begins, or begins again, in a mode."""
+        """Start, or restart, in a mode."""
         for name, refinement in self.refinements.items():
             refinement.begin()
             if name != mode:
@@ -243,13 +243,13 @@ class Conductor(Actor):
         self._active = self.refinements.get(mode)
 
     def go(self, mode: str, *, history: bool) -> None:
-        """Leave the present mode's refinement, and enter the other's: where it was left, or from the beginning."""
+        """Leave the present mode's refinement, and enter the other's, where it was left or from the beginning."""
         if self._active is not None:
             self._active.suspend()
         if self._wake is not None:
             self._wake.cancel()
             self._wake = None
-        is_over = self.is_refired and self.machine.modes[mode].final  # in Ptolemy, it fires no more
+        is_over = self.is_refired and self.machine.modes[mode].final  # in Ptolemy, it no longer fires
         self._active = None if is_over else self.refinements.get(mode)
         if self._active is None:
             return
@@ -261,7 +261,7 @@ class Conductor(Actor):
         self.plan()
 
     def fail(self, error: ActorError) -> None:
-        """Something in the active refinement has failed: the machine says what follows."""
+        """Something in the active refinement has failed: the machine decides what follows."""
         if not self.machine.catches:
             raise error
         self.failure = error

@@ -19,14 +19,14 @@ class Requests:
         assert woven.model is not None
         self.name = woven.name
         self.model = woven.model
-        self.entries: dict[str, Deliver] = {}  # where requests come in, by the place that they come from
+        self.entries: dict[str, Deliver] = {}  # where requests enter, by the place that they come from
         self._ways: dict[str, list[JoinPoint]] = {}
         self._jobs: dict[tuple[str, int], Job] = {}  # the firings that wait for an answer, by actor and number
         self._number: dict[str, int] = {}  # how many firings of an actor there were
         self._waits: set[str] = set()  # places whose requests wait for the composite's turn
 
     def add_way(self, point: JoinPoint, place: str) -> Callable[[Any], None]:
-        """A further way through a place, to all that is behind a port or to one channel: where its tokens enter."""
+        """A further way through a place, to everything behind a port or to one channel: where its tokens enter."""
         ways = self._ways.setdefault(place, [])
         way = len(ways)
         ways.append(point)
@@ -47,7 +47,7 @@ class Requests:
         return ask_for_firing if place in self.model.times else ask
 
     def told(self, place: str, onward: Way) -> Way:
-        """``onward`` for requests from a place that wait for the composite's turn: they are made when they come in."""
+        """``onward`` for requests from a place that wait for the composite's turn: they are made when they enter."""
         self._waits.add(place)
 
         def come_in(request: Any) -> None:
@@ -59,11 +59,11 @@ class Requests:
         return Call(come_in)
 
     def answer(self, request: Any) -> None:
-        """Take what the composite sends from its response port; raises ``EpicycleError`` if that is no request."""
+        """Take what the composite sends from its response port; raises ``EpicycleError`` if it is not a request."""
         if not isinstance(request, Request):
             raise EpicycleError(
-                f"{self.model.response} sends {request!r}, which is no request: what leaves an aspect that is a model "
-                "must be what came in, with another token in it if need be"
+                f"{self.model.response} sends {request!r}, which is not a request: an aspect that is a model must send "
+                "back the requests that it receives, with another token in them if needed"
             )
         ways = self._ways.get(request.port, []) if request.aspect == self.name else []
         if ways and isinstance(request, FiringRequest):
@@ -74,7 +74,7 @@ class Requests:
                 return
         if isinstance(request, FiringRequest) or not 0 <= request.way < len(ways):
             raise EpicycleError(
-                f"{self.model.response} sends {request!r}, which is no request to {self.name} that waits for an answer"
+                f"{self.model.response} sends {request!r}, but no such request to {self.name} waits for an answer"
             )
         point = ways[request.way]
         point.act("delivered", request.token, self._since(request, point))

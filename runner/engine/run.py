@@ -1,4 +1,4 @@
-"""Run: a model, compiled into all that changes while it runs."""
+"""Run: a model, compiled into everything that changes during a run."""
 
 from __future__ import annotations
 
@@ -35,9 +35,9 @@ Keeps = Callable[[str, str, str, str], bool]
 
 
 class Run:
-    """The state of one run: actors and aspects of its own, the ways between them, agenda, log, and what is measured.
+    """The state of one run: its own actors and aspects, the ways between them, agenda, log, and measurements.
 
-    The model is what it was made from, and nothing in it is changed.
+    The model that it was made from is not changed.
     """
 
     def __init__(
@@ -53,12 +53,12 @@ class Run:
         self.seed = seed
         self.keeps = keeps
         self.is_begun = self.is_over = False
-        self.stopped = ""  # why there is nothing more to do, once there is not
+        self.stopped = ""  # why the run is over, once it is
         self._tracer = tracer
         if acts is None and model.exactly is not None:
             acts = Acts(model.exactly)
         self.acts = acts  # of aspects, where they have names
-        self._stop: int | None = None  # until when (ns) it has been let go on
+        self._stop: int | None = None  # the time (ns) up to which it has been allowed to run
         self._spent = 0.0  # s of the wall clock
         self._initialized: list[Actor] = []
         self._unreported: ActorError | None = None
@@ -78,7 +78,7 @@ class Run:
         self._monitorings = {monitor.name: Monitoring(monitor) for monitor in model.monitors}
         try:
             with without_collection():
-                self.outside: list[object] = [model, model.graph]  # with what else leads there
+                self.outside: list[object] = [model, model.graph]  # with everything else that leads there
                 copies = Copies(self.outside, self.outside)
                 self.actors = {path: copies.of(actor) for path, actor in model.graph.actors.items()}
                 self.aspects = [replace(woven, aspect=copies.of(woven.aspect)) for woven in model.aspects]
@@ -86,10 +86,10 @@ class Run:
                 self._ways = Ways(
                     model.graph, self.actors, self.aspects, self.director, self.log, listeners, self.signals, self.acts
                 )
-        except ActorError as error:  # of a clock that is wrong in a way that cannot be told
+        except ActorError as error:  # from a clock whose error cannot be computed
             raise self._placed(error) from _cause(error)
 
-    # -- what is watched ------------------------------------------------------------------------------------------
+    # -- listeners ------------------------------------------------------------------------------------------------
 
     def _listeners(self) -> dict[str, list[Deliver | Way]]:
         """Recorders, metrics and the stop rule, by the path of the port that they listen to."""
@@ -157,7 +157,7 @@ class Run:
         progress: Callable[[float], None] | None = None,
         pace: Pace | None = None,
     ) -> str:
-        """Go on until ``stop`` (ns), for ``most`` steps; why there is nothing more to do until then, if so.
+        """Run until ``stop`` (ns), for at most ``most`` steps; returns why there is no more to do until then, if so.
 
         An exception ends the run; one of an actor is raised as ``ActorError``.
         """
@@ -213,7 +213,7 @@ class Run:
         attach(self.director, self.actors, self._ways.executed)
 
     def end(self) -> ActorError | None:
-        """Let every actor wrap up, whatever happened before; the first error of these is returned."""
+        """Let every actor wrap up, whatever happened before; returns the first error."""
         self.is_over = True
         self._ways.close()
         if self._tracer is not None:
@@ -236,10 +236,10 @@ class Run:
         return results
 
     def results(self, stopped: str) -> Results:
-        """What has come of the run so far; ``stopped`` says why it is over."""
+        """The results so far; ``stopped`` says why the run is over."""
         end = self._end(stopped)
         verdicts = {name: self.verdict(name, stopped) for name in self._monitorings}
-        outcomes = {}  # of copies, for what is asked of a measurement has an end
+        outcomes = {}  # of copies, because reading a measurement ends it
         for metric in self.model.metrics:
             if (verdict := verdicts.get(metric.monitor)) is None:
                 outcomes[metric.name] = Copies().of(self._measurements[metric.name]).outcome(end)
@@ -266,13 +266,13 @@ class Run:
 
     def verdict(self, name: str, stopped: str) -> Verdict:
         """What a monitor comes to if the run is over."""
-        # Of a copy, for what is asked has an end.
+        # Of a copy, because reading a monitoring ends it.
         return Copies().of(self.monitoring(name)).verdict(self._end(stopped))
 
     def _end(self, stopped: str) -> int:
         end = self.director.last.time
         if stopped == "stop time" and self._stop is not None:
-            end = max(end, self._stop)  # what stood at the last event stands until then
+            end = max(end, self._stop)  # the values at the last event last until then
         return end
 
     def _call(self, actor: Actor, method: str) -> None:
@@ -284,7 +284,7 @@ class Run:
             raise ActorError(actor.path, self.director.tag, f"{method}()", describe(error)) from error
 
     def _placed(self, error: ActorError) -> ActorError:
-        """The error with the place in the model file where its actor is declared, and the user's line it comes from."""
+        """The error with the place in the model file that declares its actor, and the line of user code behind it."""
         position = self.model.position_of(error.path)
         where = f"{position.file}:{position.line}:{position.column}" if position else ""
         return ActorError(error.path, error.tag, error.doing, error.reason, where, raised_at(_cause(error)))
@@ -301,7 +301,7 @@ class Run:
         return figures
 
     def _report(self, woven: WovenAspect) -> dict[str, float | None]:
-        """What an aspect reports; if it fails, that is reported when all results are there."""
+        """The report of an aspect; if it fails, the error is raised once all results are complete."""
         try:
             return dict(woven.aspect.report(self._ways.shared(woven), self.director.last.time))
         except Exception as error:
@@ -311,7 +311,7 @@ class Run:
 
 
 def _cause(error: ActorError) -> BaseException | None:
-    """What an actor really raised: SimPy raises a copy of an error, whose cause the error itself is."""
+    """The exception that an actor raised: SimPy raises a copy, whose cause is the original."""
     cause = error.__cause__
     while isinstance(cause, ActorError):
         cause = cause.__cause__

@@ -1,4 +1,4 @@
-"""Simulation: a model that is run, at once or step by step, and whose run can be kept and gone back to."""
+"""Simulation: runs a model, at once or step by step; its state can be saved and restored."""
 
 from __future__ import annotations
 
@@ -26,28 +26,28 @@ Part = TypeVar("Part", bound=Actor | Aspect)
 
 
 class SnapshotError(EpicycleError):
-    """A run that cannot be kept, or cannot be gone back to."""
+    """A run that cannot be saved or restored."""
 
 
 class Snapshot:
-    """A run at a tag, of which any number of runs can go on: see ``Simulation.snapshot``."""
+    """A run at a tag, from which any number of runs can continue: see ``Simulation.snapshot``."""
 
     def __init__(self, run: Run) -> None:
         self.model = run.model
         self.seed = run.seed
         self.tag = run.director.last
-        self._digest = run.log.digest  # which leaves nothing in the log that waits for its bytes
+        self._digest = run.log.digest  # this encodes everything that waits in the log
         self._steps = run.director.steps
-        # Python cannot copy a generator: what is kept of processes is the way there.
+        # Python cannot copy a generator: instead of processes, the way to their state is kept.
         has_processes = run.is_begun and any(isinstance(actor, Process) for actor in run.actors.values())
-        self.run = None if has_processes else _copy(run)  # a copy that stays where it is
+        self.run = None if has_processes else _copy(run)  # a copy that does not run
         self._keeps = run.keeps
         self._named = run.acts is not None
         self._exactly = None if run.acts is None else run.acts.exactly
         self._reseeds = tuple(run.reseeds)
 
     def again(self) -> Run:
-        """A run that goes on from here; raises ``SnapshotError``."""
+        """A run that continues from here; raises ``SnapshotError``."""
         if self.run is not None:
             return _copy(self.run)
         acts = Acts(self._exactly) if self._named else None
@@ -59,8 +59,9 @@ class Snapshot:
         run.go(None, most=self._steps - run.director.steps)
         if (run.director.last, run.log.digest) != (self.tag, self._digest):
             raise SnapshotError(
-                f"{self.model.name} has processes, so a run goes back to {self.tag} by way of its beginning, but came "
-                "to something else there: the model was changed, or something depends on more than model and seed"
+                f"{self.model.name} has processes, so its run was repeated from the start to go back to {self.tag}, "
+                "but the repeated run is different: the model was changed, or something depends on more than model "
+                "and seed"
             )
         return run
 
@@ -74,13 +75,13 @@ def _copy(run: Run) -> Run:
 
 
 class Simulation(Tabled):
-    """One run of a model, which is checked first, and is not changed by any of its runs.
+    """One run of a model, which is checked first; runs do not change it.
 
-    It is compiled into actors, aspects and ways of this run alone: any number of simulations of a model can go on at
-    once, step by step in turn or in threads.  ``simulation["sink"]``, or ``simulation[sink]`` for the object that was
-    added to the model, is the actor of this run.  ``keep_log`` keeps the records of the event log, all or those that a
-    ``LogFilter`` lets pass; ``log_to``, such as ``LogFile.add``, is given them instead.  With ``acts``, what aspects do
-    to single tokens has names, and some of it can be left out.
+    The model is compiled into actors, aspects and ways of this run alone: any number of simulations of a model can run
+    at once, in turn or in threads.  ``simulation["sink"]``, or ``simulation[sink]`` with the object that was added to
+    the model, is the actor of this run.  ``keep_log`` keeps the records of the event log, all or those that pass a
+    ``LogFilter``; ``log_to``, such as ``LogFile.add``, receives them instead.  With ``acts``, the acts of aspects on
+    single tokens have names, and some of them can be left out.
 
     >>> results = Simulation(load_model("collision_avoidance"), seed=7).run()
     """
@@ -102,7 +103,7 @@ class Simulation(Tabled):
             keep_log.check(model)
         seed = model.seed if seed is None else seed
         if seed < 0:
-            raise ValueError(f"a seed is a whole number from 0 up, not {seed}")
+            raise ValueError(f"a seed is a whole number of at least 0, not {seed}")
         self.model = model
         self._is_told_of = log_to is not None or tracer is not None
         self._parts = _parts(model.graph.actors, model.aspects)
@@ -128,10 +129,10 @@ class Simulation(Tabled):
         progress: Callable[[float], None] | None = None,
         pace: Pace | None = None,
     ) -> Results:
-        """Run to the end and return what came of it; an exception in an actor is raised as ``ActorError``.
+        """Run to the end and return the results; an exception in an actor is raised as ``ActorError``.
 
-        ``until`` is the stop time (s, default: the model's), ``progress`` is told of the time now and then, and
-        ``pace`` holds the run to the wall clock.
+        ``until`` is the stop time (s, default: the model's), ``progress`` is called with the time now and then, and
+        ``pace`` limits the run to the wall clock.
         """
         self._refuse_over()
         stop = self.model.stop_time if until is None else to_nanoseconds(until)
@@ -139,7 +140,7 @@ class Simulation(Tabled):
         return self._run.finish()
 
     def advance(self, until: float) -> bool:
-        """Go on up to and including a time (s); whether there is more to come after it."""
+        """Run up to and including a time (s); returns whether there is more to come after it."""
         self._refuse_over()
         stop, last = to_nanoseconds(until), self.model.stop_time
         is_last = last is not None and stop >= last
@@ -158,17 +159,17 @@ class Simulation(Tabled):
         return any(self.robustness(name) <= least for name, least in robustness.items())
 
     def step(self) -> bool:
-        """Handle the next tag, or what SimPy has to do before it; whether there was anything until the stop time."""
+        """Handle the next tag, or SimPy events before it; returns whether there was anything until the stop time."""
         self._refuse_over()
         return not self._run.go(self.model.stop_time, most=1)
 
     def finish(self) -> Results:
-        """End the run where it has come to, and return what came of it."""
+        """End the run where it is, and return the results."""
         self._refuse_over()
         return self._run.finish()
 
     def results(self, stopped: str) -> Results:
-        """What has come of the run so far; ``stopped`` says why it is over."""
+        """The results so far; ``stopped`` says why the run is over."""
         return self._run.results(stopped)
 
     def robustness(self, monitor: str) -> float:
@@ -191,11 +192,11 @@ class Simulation(Tabled):
     # -- going back -----------------------------------------------------------------------------------------------
 
     def snapshot(self) -> Snapshot:
-        """The run as it is now, between two tags: ``restore`` and ``fork`` go on from there as this one would.
+        """The run as it is now, between two tags: ``restore`` and ``fork`` continue from there as this one would.
 
-        It holds copies of all that the run consists of; where there are processes (``Process``), which Python cannot
-        copy, it holds how far the run has come, and going back to it runs the model again up to there.  Raises
-        ``SnapshotError`` for a run that is over, or that others are told of; ``CopyError`` for what cannot be copied.
+        It holds copies of all parts of the run.  Python cannot copy processes (``Process``): with these, it holds only
+        how far the run has come, and restoring it repeats the run up to there.  Raises ``SnapshotError`` for a run that
+        is over, or that reports to others; ``CopyError`` for parts that cannot be copied.
         """
         self._refuse_told()
         if self._run.is_over:
@@ -203,9 +204,9 @@ class Simulation(Tabled):
         return Snapshot(self._run)
 
     def restore(self, snapshot: Snapshot) -> None:
-        """Go back to a snapshot of a run of the same model, whatever has become of this one.
+        """Go back to a snapshot of a run of the same model, whatever the state of this one.
 
-        Actors are copies of those in the snapshot: ask ``simulation["path"]`` for them once more.
+        Actors are copies of those in the snapshot: get them again from ``simulation["path"]``.
         """
         self._refuse_told()
         if snapshot.model is not self.model:
@@ -213,10 +214,10 @@ class Simulation(Tabled):
         self._run = snapshot.again()
 
     def fork(self, *, reseed: int | None = None) -> Simulation:
-        """Another simulation that goes on from here, as this one does unless something is changed in it.
+        """Another simulation that continues from here, as this one does unless something in it is changed.
 
-        With ``reseed``, every random stream of it goes on as those of a run with this seed begin: what was drawn
-        before stays what it was, and what is drawn from here on depends on this seed alone.
+        With ``reseed``, each random stream becomes the one that a run with this seed would have: what was drawn before
+        stays as it is, and what is drawn from here on depends on this seed alone.
         """
         snapshot, fork = self.snapshot(), copy.copy(self)
         fork._run = snapshot.run or snapshot.again()
@@ -227,17 +228,17 @@ class Simulation(Tabled):
     def _refuse_told(self) -> None:
         if self._is_told_of:
             raise SnapshotError(
-                f"the run of {self.model.name} is told to log_to or to a tracer, which cannot be untold: leave them out"
+                f"the run of {self.model.name} reports to log_to or to a tracer, which cannot be undone: leave them out"
             )
 
-    # -- what there is in it --------------------------------------------------------------------------------------
+    # -- its parts ------------------------------------------------------------------------------------------------
 
     @overload
     def __getitem__(self, part: str) -> Actor: ...
     @overload
     def __getitem__(self, part: Part) -> Part: ...
     def __getitem__(self, part: str | Part) -> Any:
-        """The actor of this run that has a path, or that stands for an actor or aspect object of the model."""
+        """The actor of this run with a path, or the part that belongs to an actor or aspect object of the model."""
         found: Any = None
         if isinstance(part, str):
             found = self.actors.get(part)
@@ -246,7 +247,7 @@ class Simulation(Tabled):
             found = next((ours for own, ours in pairs if own is part), None)
         if found is None:
             name, known = (part, did_you_mean(part, self.actors)) if isinstance(part, str) else (repr(part), "")
-            raise EpicycleError(f"{name} is no part of {self.model.name}{known}")
+            raise EpicycleError(f"{name} is not part of {self.model.name}{known}")
         return found
 
     @property
@@ -266,7 +267,7 @@ class Simulation(Tabled):
 
     @property
     def director(self) -> Director:
-        """Engine: who fires the actors."""
+        """The director, which fires the actors."""
         return self._run.director
 
     @property
@@ -276,7 +277,7 @@ class Simulation(Tabled):
 
     @property
     def signals(self) -> dict[str, Signal]:
-        """What has been recorded so far."""
+        """The signals recorded so far."""
         return self._run.signals
 
 

@@ -1,4 +1,4 @@
-# Types for C; what everything is for is said in statistic.py.
+# Types for C; statistic.py has the documentation.
 
 cimport cython
 

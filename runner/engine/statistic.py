@@ -1,7 +1,7 @@
-"""Statistics that are kept up to date over numbers with weights: tokens weigh 1, spells of time their nanoseconds.
+"""Running statistics of numbers with weights: tokens weigh 1, spells of time their nanoseconds.
 
-Sums are exact, and everything else is made of + - * / and square roots in the order in which numbers come: the same
-bits on every machine.
+Sums are exact, and everything else uses + - * / and square roots in the order of the numbers: the same bits on every
+machine.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ _KEPT = 512  # numbers until they are summed up
 
 
 class Total:
-    """A sum that is exact until it is asked for."""
+    """A sum that is exact until it is read."""
 
     __slots__ = ("_terms",)
 
@@ -28,7 +28,7 @@ class Total:
         self._terms: list[float] = []
 
     def add(self, value: float) -> None:
-        """One more number; raises ``OverflowError`` as soon as it is clear that the sum is beyond all floats."""
+        """Add a number; raises ``OverflowError`` once the sum is certain to exceed the range of floats."""
         if not -MOST <= value <= MOST:
             raise OverflowError
         self._terms.append(value)
@@ -36,7 +36,7 @@ class Total:
             self._terms = self._condensed()
 
     def _condensed(self) -> list[float]:
-        """A few numbers with the same sum: the sum, what it is off by, and so on."""
+        """A few numbers with the same sum: the rounded sum, its error, and so on."""
         found: list[float] = []
         while (rest := math.fsum(chain(self._terms, (-each for each in found)))) != 0.0:
             found.append(rest)
@@ -44,12 +44,12 @@ class Total:
 
     @property
     def value(self) -> float:
-        """The sum, correctly rounded; raises ``OverflowError`` if it is beyond all floats."""
+        """The sum, correctly rounded; raises ``OverflowError`` if it exceeds the range of floats."""
         return math.fsum(self._terms)
 
 
 class Statistic:
-    """Something that is known of the numbers so far."""
+    """A statistic of the numbers so far."""
 
     __slots__ = ()
 
@@ -59,7 +59,7 @@ class Statistic:
 
     @property
     def value(self) -> Any:
-        """What is known; None if there is no such thing yet.  Raises ``OverflowError``."""
+        """Its value; None if there is none yet.  Raises ``OverflowError``."""
         raise NotImplementedError
 
 
@@ -158,7 +158,7 @@ class Mean(Statistic):
 
 
 class Spread(Statistic):
-    """Their standard deviation: of a sample, or with weights that are all there is.  Source: D. H. D. West (1979)."""
+    """Their standard deviation: of a sample or, with weights, of the population.  Source: D. H. D. West (1979)."""
 
     __slots__ = ("_is_sample", "_mean", "_squares", "_weight")
 
@@ -177,7 +177,7 @@ class Spread(Statistic):
     @property
     def value(self) -> float | None:
         weight = self._weight - self._is_sample
-        return math.sqrt(max(self._squares, 0.0) / weight) if weight > 0 else None  # rounding knows no sign
+        return math.sqrt(max(self._squares, 0.0) / weight) if weight > 0 else None  # rounding may make it negative
 
 
 class Quantile(Statistic):
@@ -204,7 +204,7 @@ class Quantile(Statistic):
 
 
 class TimeQuantile(Statistic):
-    """The least number such that at least a share of all weight is on it and those below."""
+    """The least number such that it and the lower ones have at least a share of all weight."""
 
     __slots__ = ("_p", "_weights")
 
@@ -227,7 +227,7 @@ class TimeQuantile(Statistic):
 
 
 def statistic_of(measure: Measure) -> Statistic:
-    """What a metric is taken with."""
+    """The statistics of metrics by name."""
     take, p = measure.take, measure.p
     if take in ("first", "last"):
         return First(last=take == "last")

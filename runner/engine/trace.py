@@ -1,6 +1,6 @@
-"""Trace: who fired when, and why.
+"""Trace: which actors fired when, and why.
 
-The director and the log of a traced run report to a ``Tracer`` what they do; it is otherwise the same, to the bit.
+The director and the log of a traced run report to a ``Tracer``; otherwise the run is the same to the bit.
 """
 
 from __future__ import annotations
@@ -35,11 +35,11 @@ class Arrival:
 
 @dataclass(slots=True)
 class Firing:
-    """One firing of an actor: the tokens and wake-ups that caused it, and what came of it.
+    """One firing of an actor: the tokens and wake-ups that caused it, and its effects.
 
-    ``wakes`` are the tags at which the wake-ups were asked for, None for those of ``initialize``.  ``records`` are the
-    actor's sends, and what aspects at its outputs made of them.  What is sent outside of a firing says so in
-    ``outside``: "resumed" by a process that SimPy resumed, "released" by an aspect that has kept it for some time.
+    ``wakes`` are the tags at which the wake-ups were requested, None for those of ``initialize``.  ``records`` are the
+    actor's sends, and the acts of aspects at its outputs.  ``outside`` marks sends outside of a firing: "resumed" by a
+    process that SimPy resumed, "released" by an aspect that has kept them for some time.
     """
 
     tag: Tag
@@ -51,7 +51,7 @@ class Firing:
 
 
 class Origin(NamedTuple):
-    """What is on its way: which port sent it, when, and the number of that record in the log."""
+    """The source of a token on its way: which port sent it, when, and the number of that record in the log."""
 
     port: str
     tag: Tag
@@ -59,10 +59,10 @@ class Origin(NamedTuple):
 
 
 class Tracer:
-    """Tells ``report`` of each firing of some actors, in order, when it is over.
+    """Passes each firing of some actors to ``report``, in order, when it is over.
 
-    Before, ``seen`` is told of each record of the log, in order: the record, whether it belongs to the firing that goes
-    on, and the number of the send that it is about: its own if it is a send, -1 if nothing has been sent yet.
+    Before that, ``seen`` gets each record of the log, in order: the record, whether it belongs to the present firing,
+    and the number of the send that it is about: its own if it is a send, -1 if nothing has been sent yet.
     """
 
     def __init__(
@@ -75,9 +75,9 @@ class Tracer:
         self.report = report
         self.seen = seen
         self.count = 0  # of records
-        self.origin = Origin("", Tag(0, 0), -1)  # what is on its way just now
-        self.firing: Firing | None = None  # the one that is going on
-        self.releasing = False  # whether something that was kept is on its way
+        self.origin = Origin("", Tag(0, 0), -1)  # the token on its way just now
+        self.firing: Firing | None = None  # the present one
+        self.releasing = False  # whether a kept token is on its way
 
     def begin(self, firing: Firing) -> None:
         """A firing begins."""
@@ -85,17 +85,17 @@ class Tracer:
         self.firing = firing
 
     def end(self) -> None:
-        """It is over."""
+        """The firing is over."""
         if self.firing is not None:
             self.report(self.firing)
             self.firing = None
 
     def add(self, record: Record) -> None:
-        """Something has been written into the log."""
+        """A record has been written to the log."""
         if record.event == "send":
             self.origin = Origin(f"{record.actor}.{record.port}", record.tag, self.count)
         self.count += 1
-        # What aspects do at the actor's inputs is not its doing.
+        # Acts of aspects at the actor's inputs are not its own.
         is_own = record.actor in self.actors and record.port in self.actors[record.actor].outputs
         if is_own:
             self._own(record)
@@ -111,7 +111,7 @@ class Tracer:
 
 
 class TracingLog(EventLog):
-    """A log that a tracer reads along."""
+    """A log that a tracer reads along with."""
 
     def __init__(self, keeps: Callable[[str, str, str, str], bool] | None, tracer: Tracer) -> None:
         super().__init__(keeps)
@@ -132,7 +132,7 @@ class _TracingWriter(Writer):
 
 
 class TracingDirector(Director):
-    """A director that remembers why."""
+    """A director that remembers causes."""
 
     def __init__(
         self, order: dict[str, int], seed: int, tracer: Tracer, limits: Limits, postings: Postings | None = None
@@ -197,7 +197,7 @@ class TracingDirector(Director):
     def fire(self, turn: Turn) -> None:
         actor = turn.actor
         if actor.path not in self._tracer.actors or is_stand_in(actor):
-            self._tracer.end()  # of a process that was resumed before
+            self._tracer.end()  # by a process that was resumed before
             super().fire(turn)
             self._due = []
             return

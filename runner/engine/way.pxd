@@ -1,4 +1,4 @@
-# Types for C; what everything is for is said in way.py.
+# Types for C; way.py has the documentation.
 
 cimport cython
 from epicycle.actors cimport Emitter, Way

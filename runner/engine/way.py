@@ -1,4 +1,4 @@
-"""The parts of which the ways of tokens are made, beside the entries of ports."""
+"""The parts of the ways of tokens, besides the entries of ports."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ Deliver = Callable[[Any], None]
 
 
 class Call(Way):
-    """Hands each token to a function: of an aspect, a recorder, a metric."""
+    """Passes each token to a function: of an aspect, a recorder, a metric."""
 
     __slots__ = ("function",)
 
@@ -33,7 +33,7 @@ class Call(Way):
 
 
 class Fork(Way):
-    """Lets each token go on by several ways."""
+    """Sends each token along several ways."""
 
     __slots__ = ("ways",)
 
@@ -46,7 +46,7 @@ class Fork(Way):
 
 
 class Guarded(Way):
-    """Hands each token, or job, to an aspect at a join point; an error in it is reported with what it was doing."""
+    """Passes each token, or job, to an aspect at a join point; an error in it is reported with what it was doing."""
 
     __slots__ = ("act", "doing", "holds", "pass_by", "point", "tell")
 
@@ -62,7 +62,7 @@ class Guarded(Way):
         self.act = act
         self.doing = doing
         self.point = point
-        self.holds = holds  # none if the aspect is always active
+        self.holds = holds  # None if the aspect is always active
         self.pass_by = pass_by
         self.tell = tell
 
@@ -77,21 +77,21 @@ class Guarded(Way):
                     return
                 doing = self.doing
             self.act(token, self.point)
-        except (ActorError, LoopError):  # of what comes behind it
+        except (ActorError, LoopError):  # of something behind it
             raise
         except Exception as error:
             raise self.tell(doing, error) from error
 
 
 class Waits(Protocol):
-    """A director, or one with a time of its own."""
+    """A director, or one with its own time."""
 
     def later(self, delay: int, way: Way, token: Any) -> None:
-        """Let a token go on after ``delay`` ns."""
+        """Send a token onward after ``delay`` ns."""
 
 
 class Delayed(Way):
-    """Lets each token go on after a time."""
+    """Sends each token onward after a delay."""
 
     __slots__ = ("delay", "director", "onward")
 
@@ -105,16 +105,16 @@ class Delayed(Way):
 
 
 class Channels(Protocol):
-    """What makes ways along single wires."""
+    """Makes ways along single wires."""
 
     def along(self, port: OutputPort[Any], wires: list[Any], channel: int) -> Sender:
-        """What sends over one of the wires of a port."""
+        """The sender over one wire of a port."""
 
 
 class Sender(Emitter):
-    """What ``send`` does at an output port: a token is logged, and goes on by all channels or by one.
+    """The effect of ``send`` at an output port: a token is logged, and sent along all channels or one.
 
-    ``channels`` makes the way along one of its wires, with what logs its sends.
+    ``channels`` makes the way along one of its wires, with the writer of its log records.
     """
 
     __slots__ = ("channels", "director", "onward", "port", "single", "wires", "writer")
@@ -149,7 +149,7 @@ class Sender(Emitter):
             self.to(channel).go(token)
 
     def to(self, channel: int) -> Sender:
-        """What sends to one channel."""
+        """The sender to one channel."""
         if self.single is None:
             self.single = {}
         sender = self.single.get(channel)
@@ -185,5 +185,5 @@ class Screened(Emitter):
 
 
 def all_of(ways: list[Way]) -> Way:
-    """One way that takes all of them."""
+    """A single way along all of them."""
     return ways[0] if len(ways) == 1 else Fork(ways)

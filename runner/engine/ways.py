@@ -1,4 +1,4 @@
-"""Ways: the ways that tokens take, from every output port to the ports behind it."""
+"""Ways: the ways of tokens, from every output port to the ports behind it."""
 
 from __future__ import annotations
 
@@ -51,11 +51,11 @@ P = TypeVar("P", bound=JoinPoint)
 
 
 class Ways:
-    """What ``send`` does at each port of a run: through delays, borders and join points to where a token is heard.
+    """The effect of ``send`` at each port of a run: through delays, borders and join points to the receivers.
 
-    ``actors`` and ``aspects`` are those of the run; of the ``graph`` nothing is changed.
-    ``listeners`` are told of every token that leaves the port of their path, be it an actor's or a composite's.
-    ``signals`` is where aspects record what they see, ``acts`` what they do if that is to have names.
+    ``actors`` and ``aspects`` are those of the run; the ``graph`` is not changed.  ``listeners`` get every token that
+    leaves the port with their path, of an actor or a composite.  ``signals`` is where aspects record what they see,
+    ``acts`` what they do if that is to have names.
     """
 
     def __init__(
@@ -86,7 +86,7 @@ class Ways:
         self._requests = {woven.name: Requests(woven) for woven in aspects if woven.model is not None}
         self._shared: dict[object, dict[Any, Any]] = {}
         self._channels: dict[tuple[Hop, ...], int] = {}  # at their ends
-        self._latest: dict[str, Any] = {}  # what the ports that aspects look at have sent last
+        self._latest: dict[str, Any] = {}  # the latest tokens of ports that aspects look at
         for woven in aspects:
             for path in (*woven.ports, *(woven.actors if isinstance(woven.aspect, ExecutionAspect) else ())):
                 self._woven_at.setdefault(path, []).append(woven)
@@ -115,7 +115,7 @@ class Ways:
             execution.forget = partial(self._forget, path)
 
     def _vary_parameters(self, aspects: list[WovenAspect]) -> None:
-        """Let the aspects that stand at a parameter change it before each firing of its actor."""
+        """Let the aspects at a parameter change it before each firing of its actor."""
         standing: dict[str, list[WovenAspect]] = {}
         for woven in aspects:
             for path in woven.parameters:
@@ -130,11 +130,11 @@ class Ways:
             self._executions[owner].refresh.append(partial(entry.go, varying.nominal))
 
     def context_of(self, path: str) -> Context:
-        """What an actor sees of the run."""
+        """The context of an actor: its view of the run."""
         return self._executions.get(path) or self._by_clock(path)
 
     def _by_clock(self, path: str) -> Director | LocalDirector | Refinement:
-        """The director by the clock of an actor, if that is wrong."""
+        """The director as seen by the clock of an actor, if this is wrong."""
         clock = before = self.graph.clocks[self.graph.director_of(path)]
         for woven, aspect in self._wrong_clocks:
             if path in woven.actors:
@@ -150,16 +150,16 @@ class Ways:
 
     @property
     def executed(self) -> Container[str]:
-        """The actors that aspects stand at, or whose parameters they change."""
+        """The actors with aspects, at themselves or at their parameters."""
         return self._executions
 
     def open(self) -> None:
-        """From now on tokens can be sent."""
+        """Let tokens be sent from now on."""
         for output, emitter in self._emitters:
             output.connect(emitter)
 
     def close(self) -> None:
-        """From now on none can."""
+        """Let no tokens be sent from now on."""
         for output, _ in self._emitters:
             output.disconnect()
 
@@ -176,7 +176,7 @@ class Ways:
                         self._channels[wire.hops] = channel
                         leaving.setdefault(wire.source.path, []).append(wire.hops)
         for hops in leaving.values():
-            hops.sort(key=lambda way: [hop.order for hop in way])  # as they are declared
+            hops.sort(key=lambda way: [hop.order for hop in way])  # in the order of declaration
         emitters = [
             (output, self._emitter(output, self._by_channel(leaving.get(output.path, []))))
             for actor in self.actors.values()
@@ -186,7 +186,7 @@ class Ways:
         return emitters
 
     def _by_channel(self, wires: list[tuple[Hop, ...]]) -> list[list[tuple[Hop, ...]]]:
-        """The wires of an output port by the channel, in their order."""
+        """The wires of an output port by channel, in order."""
         found: dict[object, list[tuple[Hop, ...]]] = {}
         for hops in wires:
             found.setdefault(self.graph.channel_of(hops, hops[0]), []).append(hops)
@@ -208,15 +208,15 @@ class Ways:
                 requests.entries[place] = self._woven(path, path, onward).go
 
     def _heard(self, path: str) -> list[Way]:
-        """Who listens to what leaves a port."""
+        """The listeners to what leaves a port."""
         listeners = self._listeners.get(path, [])
         return [listener if isinstance(listener, Way) else Call(listener) for listener in listeners]
 
     def _emitter(self, port: OutputPort[Any], channels: list[list[tuple[Hop, ...]]]) -> Emitter:
-        """What ``port.send`` does."""
+        """The effect of ``port.send``."""
         port.width = len(channels)
         everywhere = self._sender(port, channels, None, self._branches(port.path, ()))
-        # An aspect at an output stands before the send itself: what it drops has not been sent.
+        # An aspect at an output comes before the send itself: what it drops has not been sent.
         if port.path not in self._woven_at:
             return everywhere
         return Screened(everywhere, partial(self._woven, port.path, port.path))
@@ -228,7 +228,7 @@ class Ways:
         return Sender(port, self.director, writer, all_of([*self._heard(port.path), *ways]), self, channels)
 
     def along(self, port: OutputPort[Any], channels: list[list[tuple[Hop, ...]]], channel: int) -> Sender:
-        """What sends over one of the channels of a port."""
+        """The sender over one of the channels of a port."""
         wires = channels[channel]
         ways = [self._way(wires[0])] if len(wires) == 1 else self._branches(port.path, (), wires)
         return self._sender(port, channels, channel, ways)
@@ -260,7 +260,7 @@ class Ways:
         passage, lane = self.directors.passages.get(far), self.graph.channel_of(channel, hop)
         is_output = self.graph.direction(far) == "output"
         source = far if is_output else hop.source
-        # Aspects at a port of a composite stand outside of it.
+        # Aspects at a port of a composite are outside of it.
         if passage is not None and not is_output:
             onward = self._woven(far, source, passage.lane(lane, onward))
         elif passage is not None:
@@ -280,20 +280,20 @@ class Ways:
         return self.director.entry(port, self._channels[hops], None if execution is None else execution.turn_of(port))
 
     def _woven(self, path: str, source: str, onward: Way) -> Way:
-        """``onward`` with the aspects that stand at a port before it, the first declared outermost."""
+        """``onward`` preceded by the aspects at a port, the first declared outermost."""
         for woven in reversed(self._woven_at.get(path, [])):
             onward = self._through(woven, path, source, onward)
         return onward
 
     def _through(self, woven: WovenAspect, path: str, source: str, onward: Way, place: str = "") -> Way:
-        """``onward`` behind one aspect at a port; ``place`` is the connection, if it stands on one alone."""
+        """``onward`` preceded by one aspect at a port; ``place`` is the connection, if the aspect is at only one."""
         aspect = woven.aspect
         assert isinstance(aspect, PortAspect)
         point = self._point(JoinPoint, woven, aspect, path, onward.go, place or path, source)
         return self._guarded(woven, aspect, aspect.pass_token, point, "pass_token()", place or path)
 
     def _scheduled(self, path: str, onward: Callable[[Job], None]) -> Callable[[Job], None]:
-        """``onward`` with the aspects that stand at an actor before it, the first declared outermost."""
+        """``onward`` preceded by the aspects at an actor, the first declared outermost."""
         for woven in reversed(self._woven_at.get(path, [])):
             aspect = woven.aspect
             assert isinstance(aspect, ExecutionAspect)
@@ -311,7 +311,7 @@ class Ways:
         name: str,
         place: str,
     ) -> Way:
-        """What an aspect does with all that comes to a join point; an error in it is reported with its ``name``."""
+        """The act of an aspect on what comes to a join point; an error in it is reported with its ``name``."""
         holds = None if aspect.is_always_active else partial(self._is_active, woven, aspect, point)
         guarded = Guarded(act, name, point, holds, aspect.pass_by, partial(self._told, woven, point.port))
         return guarded if self.acts is None else Named(guarded, self.acts, place)
@@ -323,7 +323,7 @@ class Ways:
         return self._error(woven, f"{doing} at {path}", error)
 
     def _answer(self, woven: WovenAspect, request: Any) -> None:
-        """Let a token go on that has come through an aspect's composite."""
+        """Send a token onward that has come through an aspect's composite."""
         try:
             self._requests[woven.name].answer(request)
         except (ActorError, LoopError):  # of what comes behind it
@@ -332,7 +332,7 @@ class Ways:
             raise self._error(woven, "delivering", error) from None
 
     def _holds(self, woven: WovenAspect, aspect: JoinPointAspect[T, P], point: P) -> bool:
-        """Whether the ``when`` of an aspect is true of what the ports have sent last; before they have, it is not."""
+        """Whether the ``when`` of an aspect holds for the latest tokens of its ports; not before their first ones."""
         if aspect.when is None:
             return True
         try:
@@ -344,7 +344,7 @@ class Ways:
         return ActorError(f"aspect {woven.name}", self.director.tag, doing, describe(error))
 
     def shared(self, woven: WovenAspect) -> dict[Any, Any]:
-        """What an aspect remembers for all its ports; one for all declarations of a medium."""
+        """The state of an aspect for all its ports; shared by all declarations of a medium."""
         key: object = woven.name
         if isinstance(woven.aspect, Medium) and woven.aspect.medium is not None:
             key = (type(woven.aspect), woven.name.rpartition(".")[0], woven.aspect.medium)
@@ -360,7 +360,7 @@ class Ways:
         place: str,
         source: str = "",
     ) -> P:
-        """Where an aspect stands: at a port or parameter, or at an actor."""
+        """The place of an aspect: a port or parameter, or an actor."""
         name, owner = woven.name, path if kind is ActorPoint else self.graph.owner(path)
         local = self.director if aspect.in_model_time else self.directors.over(owner)
         blame = partial(self._error, woven, f"later() at {path}")
@@ -376,7 +376,7 @@ class Ways:
         return point
 
     def _join(self, point: ActorPoint, woven: WovenAspect, aspect: ExecutionAspect) -> None:
-        """Make the join point of an actor part of what the aspect was aimed at."""
+        """Add the join point of an actor to the target of the aspect."""
         aimed = woven.name, woven.actors[point.port]
         if aimed not in self._units:
             self._units[aimed] = Unit(aimed[1], point)
@@ -386,7 +386,7 @@ class Ways:
         point.unit.points.append(point)
 
     def _forget(self, path: str) -> None:
-        """Tell the aspects at an actor that it has lost its state."""
+        """Notify the aspects at an actor that it has lost its state."""
         for woven in self._woven_at.get(path, ()):
             aspect, point = woven.aspect, self._points_at[woven.name, path]
             assert isinstance(aspect, ExecutionAspect)
@@ -397,7 +397,7 @@ class Ways:
                 raise self._error(woven, f"forget() at {path}", error) from error
 
     def begin(self) -> None:
-        """Let the aspects begin that act of their own accord."""
+        """Start the aspects that act on their own."""
         for woven, aspect, unit in self._to_begin:
             try:
                 aspect.begin(unit)

@@ -1,4 +1,4 @@
-"""Models of Ptolemy II: MoML files as models in YAML."""
+"""Ptolemy II import: converts MoML files to models in YAML."""
 
 from .document import MomlError
 from .imported import Imported, import_moml

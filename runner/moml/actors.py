@@ -1,4 +1,4 @@
-"""Actors of a file as actors of the model language, by the table of counterparts."""
+"""Converts the actors of a file to actors of the model language, using the table of counterparts."""
 
 from __future__ import annotations
 
@@ -38,50 +38,50 @@ _UNIMPORTANT = frozenset({
 
 
 def is_layout(said: Property) -> bool:
-    """Whether an attribute is about how a model looks, or how it came about."""
+    """Whether an attribute only concerns a model's appearance or its authoring history."""
     return bool(_LAYOUT.search(said.java)) or (said.name.startswith("_") and said.name != "_priority")
 
 
 def is_decoration(said: Property) -> bool:
-    """Whether an attribute is what an aspect knows of a port or an actor."""
+    """Whether an attribute holds an aspect's settings for a port or an actor."""
     return bool(_DECORATION.search(said.java)) or said.name.startswith("DecoratorAttributesFor")
 
 
 @dataclass
 class Actor:
-    """One actor that is being imported: what it is there, and what becomes of it."""
+    """One actor that is being imported: its definition in the file, and its conversion."""
 
     entity: Entity
     path: str  # its name in messages
     scope: Scope
     notes: Notes
     row: Counterpart
-    own_names: Mapping[str, str]  # parameters of the model around it, by our names
-    full_name: str = ""  # in Java, which random numbers hang on
+    own_names: Mapping[str, str]  # parameters of the model around it, and our names for them
+    full_name: str = ""  # in Java; random numbers depend on it
     seed: object = 0  # of all random actors of the model
-    whole: frozenset[str] = frozenset()  # ports at which only whole numbers come, as far as that is known
+    whole: frozenset[str] = frozenset()  # ports that are known to receive only whole numbers
     widths: Mapping[str, int] = field(default_factory=dict)  # how many channels its ports have
     values: dict[str, Any] = field(default_factory=dict)  # what is written
-    ports: dict[str, str] = field(default_factory=dict)  # ours, for those of its ports that the row does not know
-    unwired: set[str] = field(default_factory=set)  # ports of its own at which nothing counts
-    used: set[str] = field(default_factory=set)  # the parameters of the model that it names
-    told: set[str] = field(default_factory=set)  # parameters that are dealt with
-    # Lets one of ours go by an expression over variables, or by the variable that a parameter of some name is.
+    ports: dict[str, str] = field(default_factory=dict)  # our names for its ports that are not in the row
+    unwired: set[str] = field(default_factory=set)  # its own ports, connections to which are left out
+    used: set[str] = field(default_factory=set)  # the parameters of the model that it uses
+    told: set[str] = field(default_factory=set)  # parameters that have been handled
+    # Makes our parameter follow an expression over variables, or the variable that the parameter ``name`` is.
     follow: Callable[[str, str, str], None] = lambda ours, text, name: None
-    # What the names in an expression are that change in the run: each by the names of variables, and these.
+    # Of an expression, the names that change during the run: each in terms of variables, and these variables.
     changing: Callable[[Tree], tuple[dict[str, str], dict[str, Changing]]] = lambda tree: ({}, {})
-    arrays: frozenset[str] = frozenset()  # ports at which only arrays come
-    reads: dict[str, Changing] = field(default_factory=dict)  # ports of ours to which variables lead
+    arrays: frozenset[str] = frozenset()  # ports that receive only arrays
+    reads: dict[str, Changing] = field(default_factory=dict)  # our ports that are connected to variables
 
-    # -- what is said in the file ---------------------------------------------------------------------------------
+    # -- reading the file -----------------------------------------------------------------------------------------
 
     def said(self, name: str) -> Property | None:
-        """A parameter that the file gives; None if it is left at its default."""
+        """A parameter that the file sets; None if it keeps its default."""
         found = self.entity.properties.get(name)
         return found if found is not None and found.value is not None else None
 
     def get(self, name: str, default: object = None) -> Any:
-        """The value of a parameter, for what is decided here."""
+        """The value of a parameter, for decisions made during the import."""
         self.told.add(name)
         said = self.said(name)
         if said is None or not (said.value or "").strip():
@@ -93,7 +93,7 @@ class Actor:
             return default
 
     def text(self, name: str, default: str = "") -> str:
-        """A parameter that is a text, whatever its class says."""
+        """A parameter read as text, regardless of its class."""
         self.told.add(name)
         said = self.said(name)
         if said is None:
@@ -103,7 +103,7 @@ class Actor:
             text = text[1:-1]
         return self.scope.filled(text)
 
-    # -- what is written ------------------------------------------------------------------------------------------
+    # -- writing --------------------------------------------------------------------------------------------------
 
     def convert(self) -> None:
         """Find the values of all parameters."""
@@ -125,20 +125,20 @@ class Actor:
             elif name == "firingCountLimit":
                 self._limit(name)
             elif not self._is_only_named(name, said):
-                self.notes.note(f"{self.path}.{name} = {_brief(said.value or '')}: has no counterpart")
+                self.notes.note(f"{self.path}.{name} = {_brief(said.value or '')} has no counterpart")
 
     def _tell_fixed(self) -> None:
-        """Parameters from which something else was computed, though they change in the run."""
+        """Report parameters that change during the run, though other values were computed from them before."""
         for name in sorted(self.told - self.row.parameters.keys()) if not self.reads else ():
             said = self.said(name)
             try:
                 if said is not None and not is_text(said) and self.changing(self.scope.tree(said.value or ""))[1]:
-                    self.notes.note(f"{self.path}.{name} = {_brief(said.value or '')}: goes by what it is at the start")
+                    self.notes.note(f"{self.path}.{name} = {_brief(said.value or '')} keeps its initial value")
             except ExpressionError:
                 continue
 
     def _is_default(self, name: str, value: object) -> bool:
-        """Whether our actor has this value anyway, under a director that is like Ptolemy's."""
+        """Whether our actor has this value by default under a director with ``like: ptolemy``."""
         kind = built_in().actors.get(self.row.type)
         parameter = None if kind is None or "type" in self.values else declared_parameters(kind).get(name)
         if parameter is None or parameter.required or (isinstance(value, str) and "${" in value):
@@ -151,15 +151,15 @@ class Actor:
         return isinstance(found, (bool, int, float, str)) and type(found) is type(default) and found == default
 
     def _limit(self, name: str) -> None:
-        """After so many firings it is over; 0 is no limit."""
+        """Limit the number of firings; 0 means no limit."""
         count = self.get(name)
         if isinstance(count, int) and count > 0 and self.row.type in ("Const", "Ramp", "Pulse"):
             self.values["limit"] = count
         elif isinstance(count, int) and count > 0:
-            self.notes.note(f"{self.path}.{name} = {count}: has no counterpart")
+            self.notes.note(f"{self.path}.{name} = {count} has no counterpart")
 
     def _is_only_named(self, name: str, said: Property) -> bool:
-        """Whether it is a parameter that somebody added, for expressions in other ones."""
+        """Whether this is an added parameter that only serves expressions of other parameters."""
         if not is_variable(said):
             return False
         pattern = re.compile(rf"(?<!\w){re.escape(name)}(?!\w)")
@@ -176,7 +176,7 @@ class Actor:
                 self.values[row.ours] = written(row.default, row.kind)
             return
         if row.kind == "none":
-            self.notes.note(f"{self.path}.{name} = {_brief(said.value or '')}: has no counterpart")
+            self.notes.note(f"{self.path}.{name} = {_brief(said.value or '')} has no counterpart")
             return
         if row.kind == "text":
             self.values[row.ours] = self.text(name)
@@ -188,7 +188,7 @@ class Actor:
             self.notes.error(f"{self.path}.{name} = {_brief(said.value or '')}: {error}")
 
     def _by_name(self, said: Property, value: object, kind: str) -> str | None:
-        """The value in terms of the parameters of the model, if that comes to the same."""
+        """The value as an expression over the parameters of the model, if its value is the same."""
         if is_text(said) or kind not in ("value", "list", "number", "whole", "flag", "time", "times"):
             return None
         found = in_parameters(said.value or "", value, self.scope, self.own_names, is_time=kind in ("time", "times"))
@@ -207,7 +207,7 @@ def _kinds(value: object) -> object:
 def in_parameters(
     text: str, value: object, scope: Scope, own_names: Mapping[str, str], *, is_time: bool
 ) -> tuple[str, set[str]] | None:
-    """``${...}`` over parameters that stands for a value, and the parameters in it; None if it would be another."""
+    """``${...}`` over parameters with this value, and the parameters it uses; None if the values would differ."""
     from epicycle.actors.expression import ExpressionError as OwnError
     from epicycle.actors.expression import evaluate
 
@@ -228,7 +228,7 @@ def in_parameters(
 
 
 def written(value: Any, kind: str) -> object:
-    """A value as it is written for a parameter of that kind."""
+    """A value in the form written for a parameter of this kind."""
     if _has_nil(value):
         raise ValueError("nil cannot be written")
     if kind == "time":
@@ -240,7 +240,7 @@ def written(value: Any, kind: str) -> object:
     if kind == "whole":
         return int(value)
     if kind == "flag" and not isinstance(value, bool):
-        raise ValueError("it is no truth value")
+        raise ValueError("it is not a truth value")
     return plain(value)
 
 
@@ -251,7 +251,7 @@ def _has_nil(value: object) -> bool:
 
 
 def plain(value: Any) -> object:
-    """A value of Ptolemy's as YAML has it."""
+    """A value of Ptolemy's in its YAML form."""
     if isinstance(value, list):
         return [plain(each) for each in value]
     if isinstance(value, dict):
@@ -268,7 +268,7 @@ def plain(value: Any) -> object:
 
 
 def seconds(value: Any) -> object:
-    """A time in s, as it is read."""
+    """A time in s, in the form in which models state it."""
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         raise ValueError(f"{value!r} is not a time")
     if math.isinf(value):
@@ -283,7 +283,7 @@ def _brief(text: str) -> str:
 
 
 def face_of(actor_row: Counterpart | None, entity: Entity, port: str) -> PortFace | None:
-    """What wires need to know of an actor's port, from the table or from the file."""
+    """What wiring needs to know about an actor's port, from the table or from the file."""
     if actor_row is not None and port in actor_row.ports:
         return actor_row.ports[port].face
     said = entity.ports.get(port)

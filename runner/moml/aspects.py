@@ -1,4 +1,4 @@
-"""Aspects: what Ptolemy's decorators know of the ports and actors where they are enabled."""
+"""Converts aspects: the settings that Ptolemy's decorators keep at the ports and actors where they are enabled."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _STAGES = {"inputBufferDelay": "in", "switchFabricDelay": "fabric", "outputBuffe
 
 
 def is_aspect(entity: Entity) -> bool:
-    """Whether it is an aspect, and no actor."""
+    """Whether it is an aspect rather than an actor."""
     package = ".aspect." in entity.java or ".resourceScheduler" in entity.java or ".aspects." in entity.java
     return (
         kind(entity) in MODELS or kind(entity) in SCHEDULERS or (package and kind(entity) not in REQUESTS | RESPONSES)
@@ -32,26 +32,26 @@ def is_aspect(entity: Entity) -> bool:
 
 
 def is_request(entity: Property) -> bool:
-    """Whether tokens or firings come into an aspect's model by it."""
+    """Whether tokens or firings enter an aspect's model here."""
     return kind(entity) in REQUESTS
 
 
 def is_response(entity: Property) -> bool:
-    """Whether they leave it there."""
+    """Whether tokens or firings leave an aspect's model here."""
     return kind(entity) in RESPONSES
 
 
 @dataclass
 class Place:
-    """Where an aspect stands, and what it knows of this place."""
+    """A port or actor at which an aspect is enabled, and the aspect's settings there."""
 
-    path: str  # as patterns tell it
+    path: str  # as patterns name it
     said: Property
     scope: Scope
     is_port: bool
 
     def value(self, name: str, default: Any = None) -> Any:
-        """What it knows; the parameters beside count, too."""
+        """A setting; its expression may use the other settings."""
         text = self.said.text(name)
         if text is None or not text.strip():
             return default
@@ -59,7 +59,7 @@ class Place:
 
 
 def is_decorated(entity: Entity) -> bool:
-    """Whether some aspect is enabled at an actor or its ports."""
+    """Whether any aspect is enabled at an actor or its ports."""
     return any(_is_enabled(said) for owner in (entity, *entity.ports.values()) for said in owner.properties.values())
 
 
@@ -83,7 +83,8 @@ def aspects_of(conversion: Converting, level: Level) -> dict[str, Flow]:
         try:
             make = _MAKERS.get(kind(aspect))
             if make is None and not here:
-                conversion.notes.note(f"{level.told(aspect.name)}, a {aspect.java}: stands nowhere, and is left out")
+                told = f"{level.told(aspect.name)}, a {aspect.java},"
+                conversion.notes.note(f"{told} is not enabled anywhere and is left out")
             elif make is None:
                 conversion.notes.error(
                     f"{level.told(aspect.name)} is a {aspect.java}, which has no counterpart{why_not(aspect.java)}"
@@ -92,7 +93,7 @@ def aspects_of(conversion: Converting, level: Level) -> dict[str, Flow]:
                 made += make(conversion, level, aspect, here)
         except (ExpressionError, ValueError, TypeError) as error:
             conversion.notes.error(f"{level.told(aspect.name)}: {error}")
-    # Those at ports in the order of their numbers, at the places that they have among the others.
+    # Aspects at ports follow their sequence numbers; they share the positions that they have among the others.
     at_ports = iter(sorted((each for each in made if each[0] is not None), key=lambda each: each[0] or 0.0))
     for sequence, name, entry in made:
         if sequence is not None:
@@ -102,7 +103,7 @@ def aspects_of(conversion: Converting, level: Level) -> dict[str, Flow]:
 
 
 def _places(conversion: Converting, level: Level, entity: Entity, prefix: str) -> Iterator[Place]:
-    """The ports and actors within at which aspects are enabled."""
+    """The ports and actors inside at which aspects are enabled."""
     inner = conversion.levels.get(id(entity))
     for child in entity.entities.values():
         if inner is None or child.name not in inner.parts:
@@ -122,7 +123,7 @@ def _places(conversion: Converting, level: Level, entity: Entity, prefix: str) -
         yield from _places(conversion, level, child, f"{path}.")
 
 
-Made = list[tuple[float | None, str, Flow]]  # the sequence number of one at ports, the name, the entry
+Made = list[tuple[float | None, str, Flow]]  # the sequence number if it is at ports, the name, the entry
 
 
 def _sequence(places: list[Place]) -> float | None:
@@ -141,14 +142,14 @@ def _bus(conversion: Converting, level: Level, aspect: Entity, places: list[Plac
         if key in ("serviceTimeMultiplicationFactor", "serviceTime"):
             factor = factor if (value := scope.value_of(said)) is None else value
         elif not is_layout(said) and not is_decoration(said) and said.value is not None:
-            conversion.notes.note(f"{level.told(aspect.name)}.{key} = {said.value!r}: has no counterpart")
-    # Of one length and one place in the order, a declaration; all of them are one medium.
+            conversion.notes.note(f"{level.told(aspect.name)}.{key} = {said.value!r} has no counterpart")
+    # One declaration for each message length and sequence number; all of them share one medium.
     groups: dict[tuple[float, float], list[Place]] = {}
     for place in places:
         key_of = (float(place.value("sequenceNumber", 0)), float(place.value("messageLength", 1)))
         groups.setdefault(key_of, []).append(place)
     if not groups:
-        conversion.notes.note(f"{level.told(aspect.name)} stands nowhere, and is left out")
+        conversion.notes.note(f"{level.told(aspect.name)} is not enabled anywhere and is left out")
     made: Made = []
     for number, ((sequence, length), here) in enumerate(groups.items()):
         entry = Flow({"type": "Bus", "factor": seconds(factor)})
@@ -162,17 +163,17 @@ def _bus(conversion: Converting, level: Level, aspect: Entity, places: list[Plac
 
 
 def _switch(conversion: Converting, level: Level, aspect: Entity, places: list[Place]) -> Made:
-    """A switch: a buffer for each port by which tokens come, its fabric, and a buffer for each by which they leave."""
+    """A switch: a buffer for each input port, its fabric, and a buffer for each output port."""
     scope, told = conversion.scope_of(aspect), level.told(aspect.name)
     delays = dict.fromkeys(_STAGES, 0.1)
     for key, said in aspect.properties.items():
         if key in delays:
             delays[key] = delays[key] if (value := scope.value_of(said)) is None else value
         elif key != "numberOfPorts" and not is_layout(said) and not is_decoration(said) and said.value is not None:
-            conversion.notes.note(f"{told}.{key} = {said.value!r}: has no counterpart")
+            conversion.notes.note(f"{told}.{key} = {said.value!r} has no counterpart")
     if not places:
-        conversion.notes.note(f"{told} stands nowhere, and is left out")
-    # In a crossbar, tokens that came by one port pass the fabric, and leave, apart from those of others.
+        conversion.notes.note(f"{told} is not enabled anywhere and is left out")
+    # In a crossbar, tokens from different input ports pass the fabric and leave it independently.
     ports = ("portIn", "portIn", "portIn") if kind(aspect) == "CrossbarSwitch" else ("portIn", "", "portOut")
     made: Made = []
     for (name, delay), port in zip(delays.items(), ports, strict=True):
@@ -188,7 +189,7 @@ def _switch(conversion: Converting, level: Level, aspect: Entity, places: list[P
 def _scheduler(conversion: Converting, level: Level, aspect: Entity, places: list[Place]) -> Made:
     scope, told = conversion.scope_of(aspect), level.told(aspect.name)
     if not places:
-        conversion.notes.note(f"{told} stands nowhere, and is left out")
+        conversion.notes.note(f"{told} is not enabled anywhere and is left out")
         return []
     entry = Flow({"type": "Processor"})
     policy = SCHEDULERS[kind(aspect)]
@@ -199,7 +200,7 @@ def _scheduler(conversion: Converting, level: Level, aspect: Entity, places: lis
             if scope.value_of(said) is False:
                 entry["preemptive"] = False
         elif key not in ("justMonitor",) and not is_layout(said) and not is_decoration(said) and said.value is not None:
-            conversion.notes.note(f"{told}.{key} = {said.value!r}: has no counterpart")
+            conversion.notes.note(f"{told}.{key} = {said.value!r} has no counterpart")
     if policy == "fcfs":
         entry["preemptive"] = False
     entry["times"] = {each.path: seconds(each.value("executionTime", 0.0)) for each in places}
@@ -216,7 +217,7 @@ def _scheduler(conversion: Converting, level: Level, aspect: Entity, places: lis
 def _model(conversion: Converting, level: Level, aspect: Entity, places: list[Place]) -> Made:
     told = level.told(aspect.name)
     if not places:
-        conversion.notes.note(f"{told} stands nowhere, and is left out")
+        conversion.notes.note(f"{told} is not enabled anywhere and is left out")
         return []
     name = level.names.of(aspect.name)
     part = conversion.composite_part(aspect, level, name)
@@ -231,7 +232,7 @@ def _model(conversion: Converting, level: Level, aspect: Entity, places: list[Pl
         pointcut: dict[str, object] = {"at": place.path}
         if len(requests) > 1:
             if asked not in aspect.entities:
-                raise ExpressionError(f"{place.path} asks for {asked!r}, which is no request port")
+                raise ExpressionError(f"{place.path} names {asked!r}, which is not a request port")
             pointcut["request"] = inner.ports.of(asked)
         if not place.is_port:
             pointcut["time"] = seconds(place.value("executionTime", 0.0))

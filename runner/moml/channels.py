@@ -1,6 +1,6 @@
-"""Publishers and subscribers: what is sent by the name of a channel, as wires.
+"""Converts publishers and subscribers, which share a channel name, to wires.
 
-A channel reaches as far as a director does: all transparent composites under it.  A ``global`` one reaches everywhere.
+A channel reaches all transparent composites under one director.  A ``global`` channel reaches the whole model.
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ from .notes import Notes
 
 @dataclass(frozen=True)
 class _Terminal:
-    """A Publisher or Subscriber, or a port that is one: where it is, from the model down, and what it is for."""
+    """A Publisher or Subscriber, or a port of that kind: its place, from the model down, and its channel."""
 
     around: tuple[Entity, ...]
-    name: str  # of the actor, or "composite.port"
+    name: str  # the actor's, or "composite.port"
     channel: str
     is_global: bool
     is_source: bool
@@ -31,20 +31,20 @@ class _Terminal:
 
     @property
     def region(self) -> Entity:
-        """The composite whose director it is under."""
+        """The composite whose director governs it."""
         return next((each for each in reversed(self.around) if director_of(each) is not None), self.around[0])
 
     def hears(self, source: _Terminal) -> bool:
-        """Whether what is published there is for this subscriber."""
+        """Whether this subscriber receives what ``source`` publishes."""
         is_near = self.region is source.region or source.is_global or self.is_global
         return source.channel == self.channel and is_near
 
 
 def join_channels(model: Entity, notes: Notes) -> None:
-    """Join the relations of publishers and subscribers with one channel, and take these actors out."""
+    """Join the relations of the publishers and subscribers of each channel, and remove these actors."""
     terminals = list(_terminals(model, ()))
     sources = [each for each in terminals if each.is_source]
-    orders = count(1_000_000)  # behind all links of the file
+    orders = count(1_000_000)  # after all links of the file
     for each in terminals:
         heard = [] if each.is_source else [source for source in sources if each.hears(source)]
         for source in heard:
@@ -52,7 +52,7 @@ def join_channels(model: Entity, notes: Notes) -> None:
             _lead(source, shared, orders)
             _lead(each, shared, orders)
         if not heard and not each.is_source:
-            notes.error(f"{each.path} hears nothing: no Publisher within reach has its channel")
+            notes.error(f"{each.path} receives nothing: no Publisher within reach has its channel")
     for each in terminals:
         if "." not in each.name:
             home = each.around[-1]
@@ -80,7 +80,7 @@ def _shared(one: tuple[Entity, ...], other: tuple[Entity, ...]) -> int:
 
 
 def _lead(terminal: _Terminal, shared: int, orders: Iterator[int]) -> None:
-    """Lead a terminal to the relation of its channel in the innermost of the composites that it shares."""
+    """Link a terminal to the relation of its channel in the innermost shared composite."""
     relation = f"channel {terminal.channel}"
     way = terminal.around[shared - 1 :]
     for composite in way:
@@ -101,7 +101,7 @@ def _lead(terminal: _Terminal, shared: int, orders: Iterator[int]) -> None:
 
 
 def _link(composite: Entity, port: str, relation: str, orders: Iterator[int]) -> None:
-    """Link a port to a relation, once."""
+    """Link a port to a relation, unless it is linked already."""
     links = composite.links.setdefault(port, [])
     if all(link.relation != relation for link in links):
         links.append(Link(port, relation, 0, next(orders)))

@@ -1,4 +1,4 @@
-"""Checks of a model: what Test and NonStrictTest become."""
+"""Converts the checks of a model: Test and NonStrictTest."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ if TYPE_CHECKING:
 
 
 def strict_test(actor: Actor) -> None:
-    """The check of a model: what is expected, on one channel or on several together."""
+    """A Test: expected values, on one channel or on several together."""
     _test(actor, strict=True)
 
 
 def non_strict_test(actor: Actor) -> None:
-    """The same, token by token."""
+    """A NonStrictTest: expected values, token by token."""
     _test(actor, strict=False)
 
 
 def _test(actor: Actor, *, strict: bool) -> None:
     if _shared(actor, "trainingMode") is True:
-        actor.notes.note(f"{actor.path} is in training mode: it checks nothing")
+        actor.notes.note(f"{actor.path} is in training mode and checks nothing")
         _records(actor)
         return
     complete = _shared(actor, "requireAllCorrectValues")
@@ -44,13 +44,13 @@ def _test(actor: Actor, *, strict: bool) -> None:
     width = actor.widths.get("input", 1)
     if strict and width > 1 and written and all(type(each) is list for each in values):
         actor.values["together"] = True
-    elif strict and width == 1:  # an array stands for the channels, of which there is one
+    elif strict and width == 1:  # an array holds the values of all channels, here of one
         written = [each[0] if type(each) is list and len(each) == 1 else each for each in written]
     actor.values = {"values": written, **actor.values}
 
 
 def _without_nan(value: Any) -> Any:
-    """Expected values, in which NaN, to which any number is close, is whatever comes."""
+    """Expected values with None for NaN, which any number matches."""
     if isinstance(value, list):
         return [_without_nan(each) for each in value]
     if isinstance(value, dict):
@@ -59,7 +59,7 @@ def _without_nan(value: Any) -> Any:
 
 
 def _shared(actor: Actor, name: str) -> object:
-    """A parameter that all actors of a class have in common: who comes last in the file says it for all."""
+    """A parameter that all actors of a class share: the last one in the file sets it for all."""
     actor.told.add(name)
     top = actor.scope
     while top.around is not None:

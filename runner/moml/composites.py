@@ -1,4 +1,4 @@
-"""Composites of a file as composite classes of the model language: their parts, wires, directors and parameters."""
+"""Converts composites to composite classes of the model language: parts, wires, directors and parameters."""
 
 from __future__ import annotations
 
@@ -38,13 +38,13 @@ COMPOSITES = frozenset({
 
 
 class Conversion:
-    """Goes through a model and makes its sections; what they share is here."""
+    """Goes through a model and makes its sections; holds what these share."""
 
     def __init__(self, model: Entity, notes: Notes, own: Mapping[str, type[OwnActor]]) -> None:
         self.model = model
         self.notes = notes
         self.classes: dict[str, dict[str, Any]] = {}
-        self._known: dict[str, str] = {}  # the class of a body
+        self._known: dict[str, str] = {}  # body: its class
         known = installed()
         self._class_names = Names([*known.actors, *known.aspects, *own])
         self.rows: dict[int, Counterpart | None] = {}
@@ -58,7 +58,7 @@ class Conversion:
         self.levels: dict[int, Level] = {}
         self._containers = {id(child): each for each in model.everything() for child in each.entities.values()}
         self.variables = Variables(self)
-        self.idle: set[int] = set()  # what never fires
+        self.idle: set[int] = set()  # actors that never fire
         self.wiring = Wiring(model, self.face, self._width)
         self.triggers = iterations(self)
         leave_out_idle(self)
@@ -67,10 +67,10 @@ class Conversion:
         found = own.get(kind(entity))
         return counterpart_of(entity.java) if found is None else counterpart_of_type(found)
 
-    # -- what wires need ------------------------------------------------------------------------------------------
+    # -- for wiring -----------------------------------------------------------------------------------------------
 
     def face(self, entity: Entity, port: str) -> PortFace | None:
-        """The direction of a port, and whether it is a multiport; None if nothing is to be wired to it."""
+        """The direction of a port, and whether it is a multiport; None if nothing is wired to it."""
         if id(entity) in self.idle:
             return None
         if self.variables.has_port(entity, port):
@@ -92,7 +92,7 @@ class Conversion:
         try:
             found = self.scope_of(composite).value(said)
         except ExpressionError as error:
-            self.notes.note(f"{relation}: its width {said!r}: {error}")
+            self.notes.note(f"the width {said!r} of {relation}: {error}")
             return None
         return found if isinstance(found, int) and found >= 0 else None
 
@@ -123,7 +123,7 @@ class Conversion:
     # -- composites -----------------------------------------------------------------------------------------------
 
     def level(self, entity: Entity, path: str, at: str = "", outer: Level | None = None) -> Level:
-        """What is known of a composite before its parts are."""
+        """What is known about a composite before its parts are converted."""
         names = Names(), Names(), Names(in_expressions=True)
         level = Level(entity, path, at, outer, self.scope_of(entity), *names)
         self.levels[id(entity)] = level
@@ -134,7 +134,7 @@ class Conversion:
         return level
 
     def _stays(self, name: str, said: Property, level: Level) -> bool:
-        """Whether a parameter can be one of ours."""
+        """Whether a parameter can remain one."""
         try:
             value = level.scope(name)
             plain(value)
@@ -152,7 +152,7 @@ class Conversion:
                 level.requests[child.name] = level.ports.of(child.name)
                 level.names.take(level.requests[child.name])
         for port, ours in level.ports.renamed().items():
-            self.notes.note(f"{level.told(port)} is called {ours}")
+            self.notes.note(f"{level.told(port)} is renamed {ours}")
         actors: dict[str, Flow] = {}
         for child in entity.entities.values():
             if child.name in level.requests:
@@ -163,7 +163,7 @@ class Conversion:
             if part is not None:
                 actors[part.name] = part.entry
                 if part.name != child.name:
-                    self.notes.note(f"{level.told(child.name)} is called {part.name}")
+                    self.notes.note(f"{level.told(child.name)} is renamed {part.name}")
         connections = self._connections(level)
         following = self.variables.add(level, actors, connections)
         connections += level.added_connections
@@ -186,7 +186,7 @@ class Conversion:
         return found
 
     def parameters(self, level: Level) -> dict[str, Any]:
-        """The parameters that something inside names."""
+        """The parameters that are used inside."""
         found = {}
         for name, ours in level.own_names.items():
             if name in level.used:
@@ -210,7 +210,7 @@ class Conversion:
         return found
 
     def channels(self, entity: Entity, port: str) -> int:
-        """How many ports of ours stand for a port of a composite."""
+        """How many ports a port of a composite becomes."""
         face = self.face(entity, port)
         if face is None or not face.multi:
             return 1
@@ -221,7 +221,7 @@ class Conversion:
         return 0 if around is None else self.wiring.width(around, f"{entity.name}.{port}")
 
     def container_of(self, entity: Entity) -> Entity | None:
-        """The composite in which an entity is; None for the model."""
+        """The composite that contains an entity; None for the model."""
         return self._containers.get(id(entity))
 
     def is_linked(self, entity: Entity, port: str) -> bool:
@@ -230,17 +230,17 @@ class Conversion:
         return around is not None and bool(around.links.get(f"{entity.name}.{port}"))
 
     def hand(self, refinement: Entity, name: str) -> None:
-        """Let a refinement go by a variable of its machine."""
+        """Make a refinement follow a variable of its machine."""
         self.variables.hand(refinement, name)
 
     def nets_of(self, composite: Entity) -> list[Net]:
-        """What is joined in a composite."""
+        """The nets of a composite."""
         if id(composite) not in self._nets:
             self._nets[id(composite)] = self.wiring.nets(composite) if id(composite) in self.wiring.groups else []
         return self._nets[id(composite)]
 
     def nets_at(self, composite: Entity, actor: str, port: str, channel: int | None = None) -> list[Net]:
-        """The nets at a port of a child, or with no actor at a port of the composite itself; or at one channel."""
+        """The nets at a port of a child, or at one channel; without an actor, at a port of the composite itself."""
         if id(composite) not in self._at:
             found = self._at[id(composite)] = {}
             for net in self.nets_of(composite):
@@ -250,7 +250,7 @@ class Conversion:
         return self._at[id(composite)].get((actor, port, channel), [])
 
     def port_name(self, names: Names, port: str, channel: int) -> str:
-        """Our name for a channel of a composite's port: each channel is a port by itself."""
+        """Our name for a channel of a composite's port: each channel is a separate port."""
         return names.of(port) if channel == 0 else names.of(f"{port}_{channel}")
 
     def _part(self, child: Entity, level: Level) -> Part | None:
@@ -292,11 +292,11 @@ class Conversion:
 
     @cached_property
     def counting(self) -> Counting:
-        """How many actors there are at the ends of nets, once it is known who never fires."""
+        """Counts the actors at the ends of nets; only valid once the actors that never fire are known."""
         return Counting(self)
 
     def _fed_width(self, composite: Entity, child: Entity, port: str) -> int:
-        """How many channels a port of an actor has; none if it is an input to which nothing sends."""
+        """How many channels a port of an actor has; 0 if it is an input to which nothing sends."""
         face = self.face(child, port)
         if face is not None and face.direction == "input" and not is_fed(self, composite, child, port, self.counting):
             return 0
@@ -304,7 +304,7 @@ class Conversion:
 
     @cached_property
     def _seed(self) -> object:
-        """The seed that all random actors share: a value that one of them gives counts for the others."""
+        """The seed that all random actors share: the value set at one of them holds for all."""
         for each in self.model.everything():
             said, row = each.properties.get("seed"), self.rows.get(id(each))
             if said is not None and row is not None and row.type in ("Random", "VaryingRandom", "PoissonClock"):
@@ -316,7 +316,7 @@ class Conversion:
         return 0
 
     def composite_part(self, child: Entity, level: Level, name: str) -> Part:
-        """A composite as an instance of a class of ours."""
+        """A composite as an instance of a composite class."""
         inner = self.level(child, level.told(child.name), f"{level.at}{name}.", level)
         body = self.body(inner)
         values = self.parameters(inner)
@@ -329,12 +329,12 @@ class Conversion:
         return Part(name, entry)
 
     def class_name(self, name: str) -> str:
-        """A name like this for a further class."""
+        """A similar, unused name for another class."""
         return self._class_names.fresh(name)
 
     def instance(self, child: Entity, body: dict[str, Any], values: dict[str, Any]) -> Flow:
-        """The entry of an instance; its class is one that is there already, if that says the same."""
-        # A parameter takes values of the kind of its default.
+        """The entry of an instance; reuses an existing class with the same content."""
+        # The type of a parameter's default decides which values it takes.
         key = json.dumps([body, sorted((name, type(value).__name__) for name, value in values.items())], default=str)
         if key not in self._known:
             name = self._class_names.fresh(child.of_class.rpartition(".")[2] or child.name)
@@ -352,7 +352,7 @@ class Conversion:
         return connections_of(self, level)
 
     def end(self, level: Level, end: End) -> tuple[str, bool] | None:
-        """Our name for one end of a net, and whether tokens come from there; None if it is left out."""
+        """Our name for one end of a net, and whether it is a source of tokens; None if it is left out."""
         entity = level.entity if not end.actor else level.entity.entities.get(end.actor)
         face = None if entity is None else self.face(entity, end.port)
         if entity is None or face is None:
@@ -381,7 +381,7 @@ class Conversion:
 
 
 def is_composite(entity: Entity) -> bool:
-    """Whether it is a graph of its own."""
+    """Whether it contains a graph."""
     return kind(entity) in COMPOSITES or (
         bool(entity.entities)
         and counterpart_of(entity.java) is None
@@ -390,7 +390,7 @@ def is_composite(entity: Entity) -> bool:
 
 
 def _with_director(body: dict[str, Any], found: dict[str, Any]) -> dict[str, Any]:
-    """The body with its director in the usual place."""
+    """The body with its director in the usual position."""
     said = {key: value for key, value in found.items() if key != "stop"}
     front: dict[str, Any] = {key: body[key] for key in ("doc", "inputs", "outputs") if key in body}
     return {**front, "director": Flow(said), **{key: value for key, value in body.items() if key not in front}}

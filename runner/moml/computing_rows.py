@@ -1,4 +1,4 @@
-"""Rows of the table: what computes something of tokens."""
+"""Rows of the table: actors that compute with tokens."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _REPLACE = counterpart(
 _SIMPLE_REPLACE = replace(_REPLACE, special=None, fixed={"function": "replace"})
 _DOUBLE = counterpart("Expression", "input=input | output", special=formulas.formula("float(input)"))
 _DECIBEL = counterpart("Expression", "input=input | output", special=formulas.decibel)
-# Of whole numbers, which are told by their texts, it is one.
+# The average of whole numbers, recognized by their text, is a whole number.
 _AVERAGE = "int(sum(input) / len(input)) if str(input[0]) == str(int(input[0])) else sum(input) / len(input)"
 COMPUTING: Mapping[str, Counterpart] = {
     "Comparator": counterpart(

@@ -1,4 +1,4 @@
-"""What a row of the table of counterparts says: which actor stands for one of Ptolemy's, and what its words are."""
+"""Rows of the table of counterparts: which of our actors replaces one of Ptolemy's, and the names of its settings."""
 
 from __future__ import annotations
 
@@ -16,14 +16,14 @@ from .names import snake
 from .relations import PortFace
 
 UNSAID: Any = object()
-Special = Callable[[Any], None]  # what finds the values of an actor that is imported
+Special = Callable[[Any], None]  # sets the values of an imported actor
 _PORT = re.compile(r"(?P<name>\w+)(?P<multi>\*?)(?:=(?P<ours>\w+))?\Z")
 _PARAMETER = re.compile(r"(?P<kind>[a-z]+)(?::(?P<ours>\w+))?(?:=(?P<default>.*))?\Z", re.DOTALL)
 
 
 @dataclass(frozen=True)
 class PortSaid:
-    """A port of Ptolemy's, and which of ours it is."""
+    """A port of Ptolemy's, and its counterpart."""
 
     ours: str
     face: PortFace
@@ -31,9 +31,9 @@ class PortSaid:
 
 @dataclass(frozen=True)
 class ParameterSaid:
-    """A parameter of Ptolemy's: which of ours it is, how it is written, and what it is if it is left out there.
+    """A parameter of Ptolemy's: its counterpart, the kind of its value, and the value it has if the file omits it.
 
-    The default stands only where ours is another, or has none.  The kinds: ``value``, ``list``, ``number``, ``whole``,
+    A default is given only where ours differs or is missing.  The kinds: ``value``, ``list``, ``number``, ``whole``,
     ``flag``, ``time`` (s), ``times``, ``text``; ``nothing`` makes no difference to a run, ``none`` has no counterpart.
     """
 
@@ -44,18 +44,18 @@ class ParameterSaid:
 
 @dataclass(frozen=True)
 class Counterpart:
-    """A row: our type, its ports by their names there, its parameters, and values that it always has."""
+    """A row: our type, its ports and parameters by their names in Ptolemy, and fixed values."""
 
     type: str
     ports: Mapping[str, PortSaid]
     parameters: Mapping[str, ParameterSaid]
     fixed: Mapping[str, object] = field(default_factory=dict)
-    special: Special | None = None  # what the words of a row cannot say
-    is_view: bool = False  # it only shows what comes, to somebody who looks on
-    needs: frozenset[str] = frozenset()  # inputs of which one must be fed, or it never fires there, though ours would
+    special: Special | None = None  # what a row cannot express
+    is_view: bool = False  # it only displays its input
+    needs: frozenset[str] = frozenset()  # in Ptolemy, it never fires unless something sends to one of these
 
     def has_port(self, name: str) -> bool:
-        """Whether a port there is one of our actor's."""
+        """Whether a port has a counterpart in our actor."""
         kind = built_in().actors.get(self.type)
         return kind is None or has_own_ports(kind) or self.ports[name].ours in declared_ports(kind)
 
@@ -69,7 +69,7 @@ def counterpart(
     needs: str = "",
     **parameters: str,
 ) -> Counterpart:
-    """A row in few words: ``"input* trigger=ours | output"`` (``*`` is a multiport), ``period="time=1.0"``."""
+    """A row in short form: ``"input* trigger=ours | output"`` (``*`` marks a multiport), ``period="time=1.0"``."""
     said: dict[str, PortSaid] = {}
     for direction, names in zip(("input", "output"), f"{ports} | ".split("|"), strict=False):
         for each in names.split():
@@ -90,7 +90,7 @@ def _parameter(name: str, text: str) -> ParameterSaid:
 
 
 def counterpart_of_type(kind: type[OwnActor]) -> Counterpart:
-    """The row of an actor of one's own, for a Java class of its name: all names are ours in camel case."""
+    """The row of a user's actor, for a Java class of that name: all names are ours in camel case."""
     ports = {}
     for name, port in declared_ports(kind).items():
         ports[_camel(name)] = PortSaid(name, PortFace(port.direction, port.multi))
@@ -104,7 +104,7 @@ def _camel(name: str) -> str:
 
 
 def view(ports: str = "input*") -> Counterpart:
-    """An actor that only shows what comes; a Recorder where an aspect stands there, or a channel counts."""
+    """An actor that only displays its input; a Recorder if an aspect is enabled there or a channel matters."""
     found = counterpart("Recorder", ports)
     ours = {name: PortSaid("input", each.face) for name, each in found.ports.items()}
     return Counterpart("Recorder", ours, {}, is_view=True)

@@ -1,4 +1,4 @@
-"""Directors of a file: which of them fire as DE's does, and what is said of them here."""
+"""Converts directors: which of them fire by the rules of DE, and which settings they keep."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ _FIRED_WHOLE = frozenset({
     "SDFDirector", "SROnceDirector", "SRDirector", "DDFDirector", "HDFDirector", "PSDFDirector", "FSMDirector",
     "MultirateFSMDirector", "TMDirector", "GiottoDirector",
 })  # fmt: skip
-_IN_ITERATIONS = frozenset({"SDFDirector", "SRDirector", "SROnceDirector"})  # which a clock can start, of a model, too
-NUMBERS = {"AUTO": -1, "UNBOUNDED": 0}  # what iterations are called
+_IN_ITERATIONS = frozenset({"SDFDirector", "SRDirector", "SROnceDirector"})  # which a clock can start, even at the top
+NUMBERS = {"AUTO": -1, "UNBOUNDED": 0}  # Ptolemy's names for numbers of iterations
 _WITHOUT_EFFECT = frozenset({
     "binCountFactor", "isCQAdaptive", "minBinCount", "maskImpliedFirings", "timeResolution", "verbose",
     "allowDisconnectedGraphs", "allowRateChanges", "vectorizationFactor", "stopWhenQueueIsEmpty", "seed",
@@ -28,22 +28,22 @@ _IN_REAL_TIME = frozenset({"synchronizeToRealTime", "timeScale", "realTime"})
 
 
 def director_of(entity: Entity) -> Property | None:
-    """The director that a composite has of its own."""
+    """The composite's own director, if it has one."""
     found = [each for each in entity.properties.values() if kind(each).endswith("Director") and not is_layout(each)]
     return found[-1] if found else None
 
 
 def fires_whole(director: Property) -> bool:
-    """Whether in each iteration it fires all actors, also those that nothing triggers."""
+    """Whether it fires all actors in each iteration, even those that nothing triggers."""
     return kind(director) in _FIRED_WHOLE
 
 
 def said_of(director: Property, path: str, around: Scope, notes: Notes, *, of_model: bool) -> dict[str, Any]:
-    """What is said of a director, its stop time included, in s."""
+    """The settings of a director, including its stop time in s."""
     found: dict[str, Any] = {}
     scope = Scope(director, around, NUMBERS)
     if fires_whole(director) and (not of_model or kind(director) in _IN_ITERATIONS):
-        notes.note(f"{path}, a {kind(director)}: what is inside fires by the rules of DE")
+        notes.note(f"{path}, a {kind(director)}: the actors inside fire by the rules of DE")
     elif kind(director) not in _DE_LIKE:
         notes.error(f"{path} is a {director.java}, which has no counterpart{why_not(director.java)}")
     for name, said in director.properties.items():
@@ -67,7 +67,7 @@ def _drift(value: Any) -> dict[str, Any]:
 
 
 def _note(name: str, value: Any, found: dict[str, Any], of_model: bool) -> bool:
-    """Take note of a parameter of a director; whether it can be said."""
+    """Store a parameter of a director; return whether it has a counterpart."""
     if name == "startTime":
         found |= {"start": seconds(value)} if value else {}
     elif name == "stopTime":

@@ -1,7 +1,7 @@
-"""Reading MoML: an XML file as a tree of elements that know their line; nothing in it is fetched or expanded.
+"""Reading MoML: an XML file as a tree of elements with their lines; nothing is fetched or expanded.
 
-A file of Ptolemy II names its DTD in the line before the first element.  That line is blanked, so a file cannot bring
-along or ask for any entity: whatever else is of a DTD is refused.
+A file of Ptolemy II names its DTD on the line before the first element.  That line is blanked, and any other part of a
+DTD is refused, so a file can neither define nor request entities.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ _ENCODING = re.compile(rb"<\?xml[^>]*\bencoding\s*=")
 
 
 class MomlError(EpicycleError):
-    """A file that cannot be imported; the message says why, and where."""
+    """A file that cannot be imported; the message states why and where."""
 
 
 @dataclass
@@ -45,7 +45,7 @@ class Element:
     text: str = ""
 
     def get(self, name: str) -> str | None:
-        """An attribute, or None."""
+        """The value of an attribute, or None."""
         return self.attributes.get(name)
 
 
@@ -57,13 +57,13 @@ def read_document(path: Path) -> Element:
     except (OSError, ValueError) as error:
         raise MomlError(f"{path} cannot be read: {getattr(error, 'strerror', None) or error}") from None
     if len(data) > MAX_BYTES:
-        raise MomlError(f"{path} has more than {MAX_BYTES:,} bytes, which is more than any model needs")
+        raise MomlError(f"{path} is larger than the maximum of {MAX_BYTES:,} bytes")
     return parse_document(data, str(path))
 
 
 def parse_document(data: bytes, name: str) -> Element:
-    """The root element of a text; ``name`` is what messages call it."""
-    # Imported here, as no other command needs it.
+    """The root element of a text; messages call it ``name``."""
+    # Imported here because no other command needs it.
     from defusedxml.common import DefusedXmlException
     from defusedxml.expatreader import DefusedExpatParser
 
@@ -76,20 +76,20 @@ def parse_document(data: bytes, name: str) -> Element:
     except DefusedXmlException:
         line = parser.getLineNumber()
         raise MomlError(
-            f"{name}:{line}: declares entities or a DTD of its own, which is refused\n"
-            f"   help: only a line like '<!DOCTYPE entity PUBLIC ...>' may stand before the model"
+            f"{name}:{line}: the file declares entities or its own DTD, which is not allowed\n"
+            "   help: only a line like '<!DOCTYPE entity PUBLIC ...>' may precede the model"
         ) from None
     except SAXParseException as error:
         raise MomlError(f"{name}:{error.getLineNumber()}: not well-formed XML: {error.getMessage()}") from None
-    except (ValueError, LookupError) as error:  # an encoding that Python does not know
+    except (ValueError, LookupError) as error:  # an encoding unknown to Python
         raise MomlError(f"{name}: not well-formed XML: {error}") from None
     if tree.root is None:
-        raise MomlError(f"{name}: there is nothing in it")
+        raise MomlError(f"{name}: the file is empty")
     return tree.root
 
 
 def _decodable(data: bytes) -> bytes:
-    """The bytes as UTF-8, where they say of no encoding that they are in it and are not: Java wrote some in Latin-1."""
+    """The bytes as UTF-8.  Files that declare no encoding and are not UTF-8 are in Latin-1, as Java wrote some."""
     if data.startswith((codecs.BOM_UTF8, codecs.BOM_UTF16_BE, codecs.BOM_UTF16_LE)) or _ENCODING.match(data):
         return data
     try:
@@ -100,7 +100,7 @@ def _decodable(data: bytes) -> bytes:
 
 
 def _without_doctype(data: bytes) -> bytes:
-    """The text with blanks for the line that names the DTD, so that lines keep their numbers."""
+    """The text with the line that names the DTD blanked, so that lines keep their numbers."""
     start = data.find(b"<!DOCTYPE")
     prolog = _PROLOG.match(data.removeprefix(codecs.BOM_UTF8))
     if start < 0 or prolog is None or prolog.end() + (len(data) - len(data.removeprefix(codecs.BOM_UTF8))) != start:
@@ -112,7 +112,7 @@ def _without_doctype(data: bytes) -> bytes:
 
 
 class _Tree(ContentHandler):
-    """Builds the tree, as far as it keeps within bounds."""
+    """Builds the tree, within limits on its size and depth."""
 
     def __init__(self, name: str) -> None:
         super().__init__()
@@ -131,7 +131,7 @@ class _Tree(ContentHandler):
     def startElement(self, name: str, attrs: Any) -> None:  # noqa: N802
         self._count += 1
         if self._count > MAX_ELEMENTS:
-            raise MomlError(f"{self._name}: more than {MAX_ELEMENTS:,} elements, which is more than any model needs")
+            raise MomlError(f"{self._name}: more than the maximum of {MAX_ELEMENTS:,} elements")
         if len(self._open) >= MAX_DEPTH:
             raise MomlError(f"{self._name}:{self._line()}: elements are nested deeper than {MAX_DEPTH} levels")
         made = Element(name, dict(attrs.items()), self._line())
@@ -149,4 +149,4 @@ class _Tree(ContentHandler):
             self._open[-1].text += content
 
     def skippedEntity(self, name: str) -> None:  # noqa: N802
-        raise MomlError(f"{self._name}:{self._line()}: the entity &{name}; is not known")
+        raise MomlError(f"{self._name}:{self._line()}: unknown entity &{name};")

@@ -1,7 +1,8 @@
-"""What a MoML file builds: entities with ports, relations and links; classes are opened up in their instances.
+"""Builds the model of a MoML file: entities with ports, relations and links; classes are expanded in their instances.
 
-MoML is a list of things to do: an element makes what it names, or changes what is there.  An instance of a class that
-the file defines begins as a copy of it, so what comes out knows no classes any more, only which one an entity was of.
+MoML is a list of instructions: an element creates what it names, or changes it if it exists.  An instance of a class
+that the file defines starts as a copy of it.  The result therefore has no classes; an entity only keeps the name of its
+class.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ ABSTRACT_COMPOSITE = "ptolemy.actor.TypedCompositeActor"
 
 @dataclass
 class Property:
-    """An attribute of anything: its Java class, its text, and attributes of its own."""
+    """An attribute: its Java class, its text, and its own attributes."""
 
     name: str
     java: str = ""
@@ -27,7 +28,7 @@ class Property:
     line: int = 0
     properties: dict[str, Property] = field(default_factory=dict)
     configure: str = ""
-    own: bool = True  # whether it is said here, and not by a class
+    own: bool = True  # whether it is set here rather than by a class
 
     def text(self, name: str) -> str | None:
         """The value of one of its attributes."""
@@ -36,13 +37,13 @@ class Property:
 
 
 def kind(said: Property) -> str:
-    """The name of its Java class, without the package."""
+    """The name of its Java class without the package."""
     return said.java.rpartition(".")[2]
 
 
 @dataclass
 class Port(Property):
-    """A port, as far as the file says something of it."""
+    """A port that the file mentions."""
 
     def flag(self, name: str) -> bool:
         """Whether it is an ``input``, ``output`` or ``multiport``."""
@@ -57,12 +58,12 @@ class Relation(Property):
 
 @dataclass
 class Link:
-    """A port's link to a relation; ``relation`` is None for one that only takes a place."""
+    """A port's link to a relation; without one, ``relation`` is None and the link only occupies a channel."""
 
-    port: str  # "actor.port", or "port" of the composite itself
+    port: str  # "actor.port", or "port" for one of the composite itself
     relation: str | None
     line: int
-    order: int  # in which they were made
+    order: int  # of creation
 
 
 @dataclass
@@ -73,14 +74,14 @@ class Entity(Property):
     entities: dict[str, Entity] = field(default_factory=dict)
     classes: dict[str, Entity] = field(default_factory=dict)
     relations: dict[str, Relation] = field(default_factory=dict)
-    # The links of each port, in the order of its channels; of the composite's own ports those inside.
+    # The links of each port, in the order of its channels; for the composite's own ports, those inside.
     links: dict[str, list[Link]] = field(default_factory=dict)
-    joined: list[tuple[str, str, int]] = field(default_factory=list)  # relations that are linked, and in which order
-    of_class: str = ""  # the class of the file that it is an instance of
+    joined: list[tuple[str, str, int]] = field(default_factory=list)  # linked relations, and their order of creation
+    of_class: str = ""  # the class in the file that it instantiates
     doc: str = ""
 
     def everything(self) -> Iterator[Entity]:
-        """It and all within."""
+        """The entity and everything inside it."""
         yield self
         for each in self.entities.values():
             yield from each.everything()
@@ -90,7 +91,7 @@ Tell = Callable[[str, int], None]
 
 
 class Builder:
-    """Does what the elements of the file of that name say; ``tell`` takes what cannot be done."""
+    """Carries out the elements of the named file; ``tell`` receives what could not be done."""
 
     def __init__(self, name: str, tell: Tell) -> None:
         self._file = name
@@ -102,7 +103,7 @@ class Builder:
         while root.tag == "group" and len(root.children) == 1:
             root = root.children[0]
         if root.tag not in ("entity", "class", "model"):
-            raise MomlError(f"{self._file}:{root.line}: <{root.tag}> is no model: MoML begins with <entity>")
+            raise MomlError(f"{self._file}:{root.line}: <{root.tag}> is not a model: MoML starts with <entity>")
         return self._made(root, [])
 
     def _made(self, element: Element, around: list[Entity]) -> Entity:
@@ -127,7 +128,7 @@ class Builder:
     def _enter(self, count: int, element: Element) -> None:
         self._count += count
         if self._count > MAX_ENTITIES:
-            raise MomlError(f"{self._file}:{element.line}: the model comes to more than {MAX_ENTITIES:,} entities")
+            raise MomlError(f"{self._file}:{element.line}: more than the maximum of {MAX_ENTITIES:,} entities")
 
     def _name(self, element: Element) -> str:
         name = element.get("name")
@@ -136,7 +137,7 @@ class Builder:
         return name
 
     def _class(self, name: str, around: list[Entity]) -> Entity | None:
-        """A class of the file, as it is known inside of entities; None if there is none of that name."""
+        """The class of that name visible inside these entities; None if the file defines none."""
         if name.startswith("."):
             found: Entity | None = around[0] if around else None
             first, *parts = name[1:].split(".")
@@ -155,7 +156,7 @@ class Builder:
             self._do(entity, child, inside)
 
     def _do(self, entity: Entity, child: Element, inside: list[Entity]) -> None:
-        """What one element says of the entity that it stands in."""
+        """Apply one element to the entity that contains it."""
         match child.tag:
             case "property":
                 self._property(entity, child)
@@ -181,7 +182,7 @@ class Builder:
                     self._do(entity, each, inside)
             case "doc":
                 entity.doc = child.text.strip()
-            case "director":  # as the first MoML had it
+            case "director":  # in the first version of MoML
                 self._property(entity, child)
             case "configure":
                 entity.configure = child.text.strip()
@@ -190,18 +191,18 @@ class Builder:
             case "display" | "rendition" | "location" | "vertex":
                 pass
             case tag:
-                self._tell(f"<{tag}> is not understood, and left out", child.line)
+                self._tell(f"<{tag}> is not supported and is left out", child.line)
 
     def _child(self, entity: Entity, child: Element, inside: list[Entity]) -> None:
         name = self._name(child)
         *path, last = name.split(".") if not name.startswith(".") else [name]
         home = _down(entity, path) if path else entity
         if home is None:
-            self._tell(f"there is no {'.'.join(path)!r} for {name!r}", child.line)
+            self._tell(f"{name!r}: there is no entity {'.'.join(path)!r}", child.line)
             return
         kin = home.classes if child.tag == "class" else home.entities
         if last in kin and (child.get("class") is None or last in home.entities):
-            self._fill(kin[last], child, inside)  # more of what is there
+            self._fill(kin[last], child, inside)  # adds to an existing entity
             return
         made = self._made(Element(child.tag, {**child.attributes, "name": last}, child.line, child.children), inside)
         kin[last] = made
@@ -215,7 +216,7 @@ class Builder:
         self._about(found, element)
 
     def _about(self, owner: Property, element: Element) -> None:
-        """What an element says of a property, port or relation."""
+        """Apply an element to a property, port or relation."""
         owner.java = element.get("class") or owner.java
         owner.line, owner.own = element.line, True
         if (value := element.get("value")) is not None:
@@ -227,7 +228,7 @@ class Builder:
                 owner.configure = child.text.strip()
             elif child.tag == "deleteProperty":
                 owner.properties.pop(child.get("name") or "", None)
-            elif child.tag == "entity" and child.get("name"):  # a model inside of an attribute
+            elif child.tag == "entity" and child.get("name"):  # a model inside an attribute
                 owner.properties.setdefault(str(child.get("name")), Property(str(child.get("name")), line=child.line))
 
     # -- links ----------------------------------------------------------------------------------------------------
@@ -243,10 +244,10 @@ class Builder:
             return
         port, relation = element.get("port"), element.get("relation")
         if port is None:
-            self._tell("a link that names no port is left out", element.line)
+            self._tell("a link without a port is left out", element.line)
             return
         if relation is not None and relation not in entity.relations:
-            self._tell(f"{port} is linked to {relation!r}, which does not exist: left out", element.line)
+            self._tell(f"the link of {port} is left out: there is no relation {relation!r}", element.line)
             return
         links = entity.links.setdefault(port, [])
         place = _number(element.get("insertAt") or element.get("insertInside"))
@@ -254,7 +255,7 @@ class Builder:
             links.append(Link(port, relation, element.line, self._next()))
             return
         if place > 1000:
-            self._tell(f"{port} is linked at place {place}, which is too far: left out", element.line)
+            self._tell(f"the link of {port} is left out: its channel {place} is above the limit of 1000", element.line)
             return
         links += [Link(port, None, element.line, 0) for _ in range(place - len(links))]
         links.insert(place, Link(port, relation, element.line, self._next()))
@@ -293,7 +294,7 @@ class Builder:
 
 
 def _inherited(entity: Entity) -> None:
-    """Note that what is here so far comes from a class."""
+    """Mark everything that is here so far as coming from a class."""
     for each in entity.everything():
         for owner in (each, *each.ports.values()):
             for said in owner.properties.values():
@@ -301,13 +302,13 @@ def _inherited(entity: Entity) -> None:
 
 
 def version_of(model: Entity) -> tuple[int, int]:
-    """The version of Ptolemy that wrote a model; a recent one if that is not said."""
+    """The version of Ptolemy that wrote a model; a recent one if the file does not state it."""
     said = re.match(r"(\d+)\.(\d+)", model.text("_createdBy") or "")
     return (int(said[1]), int(said[2])) if said is not None else (11, 0)
 
 
 def _down(entity: Entity, names: list[str]) -> Entity | None:
-    """What lies inside of an entity, by its name there."""
+    """An entity inside another, by the names on the path to it."""
     for name in names:
         found = entity.classes.get(name) or entity.entities.get(name)
         if found is None:

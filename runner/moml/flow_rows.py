@@ -1,4 +1,4 @@
-"""Rows of the table: time, queues, and what directs, joins and takes apart tokens."""
+"""Rows of the table: time, queues, and actors that route, combine and split tokens."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Names of former versions of Ptolemy II, as its own reader takes them."""
+"""Names from former versions of Ptolemy II, which its own reader accepts, too."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ _NAMES = {
 
 
 def rename_former(model: Entity) -> None:
-    """Give ports and parameters the names that they have now."""
+    """Give ports and parameters their present names."""
     for composite in model.everything():
         for child in composite.entities.values():
             for former, name in _NAMES.get(kind(child), {}).items():

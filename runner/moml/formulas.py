@@ -1,4 +1,4 @@
-"""Actors that become expressions, over the tokens of one tag or over blocks of them."""
+"""Converts actors to expressions over the tokens of one tag or over blocks of tokens."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def expression(actor: Actor) -> None:
-    """An Expression, whose inputs are ports that somebody added."""
+    """An Expression, whose inputs are ports added in the model."""
     said = actor.said("expression")
     actor.told.add("expression")
     text = (said.value if said is not None else "") or ""
@@ -29,7 +29,7 @@ def expression(actor: Actor) -> None:
         if not _is_port_parameter(actor, name) or name in held:
             actor.ports[name] = names.of(name)
     for name, ours in names.renamed().items():
-        actor.notes.note(f"{actor.path}.{name} is called {ours}")
+        actor.notes.note(f"{actor.path}.{name} is renamed {ours}")
     try:
         tree = actor.scope.tree(text)
         changing, actor.reads = actor.changing(tree)
@@ -44,7 +44,7 @@ def expression(actor: Actor) -> None:
         named = {name: value for name, value in held.items() if name in names_of(tree) or name in actor.reads}
         actor.values |= {"type": "HoldingExpression", "held": {actor.ports[name]: each for name, each in named.items()}}
         if "iteration" in names_of(tree):
-            actor.notes.error(f"{actor.path}: expression: iteration has no counterpart beside inputs that hold a value")
+            actor.notes.error(f"{actor.path}: expression: 'iteration' has no counterpart if inputs hold a value")
     elif "iteration" in names_of(tree):
         actor.values["iteration"] = True
     actor.values["expression"] = _with_all(
@@ -58,7 +58,7 @@ def _is_port_parameter(actor: Actor, name: str) -> bool:
 
 
 def _held(actor: Actor) -> dict[str, object]:
-    """The values of inputs that hold one from the start: linked PortParameters, and ports with a default."""
+    """The initial values of inputs that have one: linked PortParameters, and ports with a default."""
     found: dict[str, object] = {}
     said = {name: each for name, each in actor.entity.properties.items() if _is_port_parameter(actor, name)}
     said = {name: each for name, each in said.items() if actor.widths.get(name, 0)}
@@ -75,7 +75,7 @@ def _held(actor: Actor) -> dict[str, object]:
 
 
 def _of_variables(actor: Actor, name: str) -> str | None:
-    """A parameter in terms of variables, which are to be led to the actor; None if it does not change."""
+    """A parameter in terms of variables to be connected to the actor; None if it does not change."""
     said = actor.said(name)
     try:
         if said is None or is_text(said):
@@ -89,7 +89,7 @@ def _of_variables(actor: Actor, name: str) -> str | None:
 
 
 def _first_value(actor: Actor, changing: Changing) -> object:
-    """The value of a variable before the first change."""
+    """The value of a variable before its first change."""
     scope = actor.scope
     while scope.entity is not changing.owner and scope.around is not None:
         scope = scope.around
@@ -100,15 +100,15 @@ def _first_value(actor: Actor, changing: Changing) -> object:
 
 
 def _with_all(text: str, ports: list[str]) -> str:
-    """The expression, in which all ports are named: one that is not would be no port."""
+    """The expression extended to name all ports, because a name that it does not use would not be a port."""
     left = [each for each in ports if not re.search(rf"(?<!\w){each}(?!\w)", text)]
     return f"[{text}, {', '.join(left)}][0]" if left else text
 
 
 def formula(template: str, **defaults: object) -> Special:
-    """An Expression for an actor that computes something: ``{name}`` is a parameter, or the port of that name.
+    """An Expression for a computing actor: ``{name}`` is a parameter, or the port of that name.
 
-    Where something is linked to such a port, it holds its latest token, and what the parameter says up to the first.
+    If such a port is linked, it holds its latest token, and the value of the parameter before the first.
     """
 
     def convert(actor: Actor) -> None:
@@ -133,7 +133,7 @@ def formula(template: str, **defaults: object) -> Special:
 
 
 def array_extract(actor: Actor) -> None:
-    """ArrayExtract, with zeros before and behind."""
+    """ArrayExtract, with zeros before and after."""
     part = "input[{sourcePosition}:{sourcePosition} + {extractLength}]"
     is_whole = not any(actor.widths.get(name, 0) for name in ("destinationPosition", "outputArrayLength"))
     length = None if actor.widths.get("extractLength", 0) else actor.get("extractLength", 1)
@@ -145,12 +145,12 @@ def array_extract(actor: Actor) -> None:
 
 
 def blocks(template: str, number: str = "1", *, items: bool = True, **defaults: object) -> Special:
-    """A BlockExpression: ``{name}`` is a parameter, ``number`` the one that says how long a block is, or a number."""
+    """A BlockExpression: ``{name}`` is a parameter, ``number`` the length of a block or the parameter with it."""
 
     def convert(actor: Actor) -> None:
         found = {name: actor.get(name, value) for name, value in defaults.items()}
         if not all(isinstance(each, int) for each in found.values()):
-            actor.notes.error(f"{actor.path}: its parameters are no whole numbers")
+            actor.notes.error(f"{actor.path}: its parameters are not whole numbers")
             return
         count = found[number] if number in found else int(number)
         actor.values |= {"number": count, "expression": template.format(**found)}
@@ -161,7 +161,7 @@ def blocks(template: str, number: str = "1", *, items: bool = True, **defaults: 
 
 
 def up_sample(actor: Actor) -> None:
-    """UpSample, whose phase is the last by default."""
+    """UpSample, whose default phase is the last."""
     factor = actor.get("factor", 2)
     phase = actor.get("phase", factor - 1)
     zero = "[block[0] * 0]"
@@ -169,7 +169,7 @@ def up_sample(actor: Actor) -> None:
 
 
 def chop(actor: Actor) -> None:
-    """Chop: a part of each block, or more than that, with what came before it or zeros."""
+    """Chop: a part of each block, extended by earlier tokens or zeros where needed."""
     read, write = actor.get("numberToRead", 128), actor.get("numberToWrite", 64)
     offset, uses_past = actor.get("offset", 0), actor.get("usePastInputs", True) is not False
     front, part, zero = "", "block", "[block[0] * 0]"
@@ -186,28 +186,28 @@ def chop(actor: Actor) -> None:
 
 
 def delay_line(actor: Actor) -> None:
-    """DelayLine: the latest first."""
+    """DelayLine: the latest token first."""
     initial = [plain(each) for each in actor.get("initialValues", [0, 0, 0, 0])]
     actor.values |= {"past": initial[-2::-1], "expression": "block + past[::-1]"}
 
 
 def sample_delay(actor: Actor) -> None:
-    """SampleDelay: what is sent at the start comes one by one, with the first tokens."""
+    """SampleDelay: the initial outputs are sent one by one, with the first tokens."""
     actor.values |= {"past": [plain(each) for each in actor.get("initialOutputs", [0])], "expression": "past[0]"}
 
 
 def repeat(actor: Actor) -> None:
-    """Repeat, of single tokens or of blocks."""
+    """Repeat, for single tokens or for blocks."""
     if (size := actor.get("blockSize", 1)) == 1:
         return
     if actor.widths.get("numberOfTimes", 0):
-        actor.notes.error(f"{actor.path}.blockSize = {size!r}: has no counterpart where the number comes by a port")
+        actor.notes.error(f"{actor.path}.blockSize = {size!r} has no counterpart if the number comes from a port")
     times = actor.get("numberOfTimes", 2)
     actor.values = {"type": "BlockExpression", "number": size, "expression": f"block * {times}", "items": True}
 
 
 def extreme_of_array(function: str) -> Special:
-    """ArrayMinimum or ArrayMaximum, which may tell the place, too: of equals the first."""
+    """ArrayMinimum or ArrayMaximum, which may also send the index: of equal elements, that of the first."""
 
     def convert(actor: Actor) -> None:
         best = f"{function}(input)"
@@ -222,7 +222,7 @@ def extreme_of_array(function: str) -> Special:
 
 
 def quantizer(actor: Actor) -> None:
-    """Quantizer: the level that is nearest, of two the lower one; without levels, steps from 0 on."""
+    """Quantizer: the nearest level, the lower one of two; without levels, steps from 0."""
     levels = [float(each) for each in actor.get("levels", [-1.0, 1.0]) or ()]
     step = float(actor.get("delta", 1.0))
     if not levels:
@@ -233,14 +233,14 @@ def quantizer(actor: Actor) -> None:
 
 
 def decibel(actor: Actor) -> None:
-    """DB: of an amplitude, or of a power, and no less than its ``min``."""
+    """DB: of an amplitude or a power, and at least its ``min``."""
     factor = 10.0 if actor.get("inputIsPower", False) is True else 20.0
     least = float(actor.get("min", -100.0))
     actor.values["expression"] = f"max({factor} * log(input, 10), {least!r}) if input > 0 else {least!r}"
 
 
 def array_sort(actor: Actor) -> None:
-    """ArraySort, in one direction or the other, of equals all or one."""
+    """ArraySort, ascending or descending, with or without duplicates."""
     text = "sorted(input)"
     if actor.get("allowDuplicates", True) is False:
         text = f"[{text}[k] for k in range(len(input)) if k == 0 or {text}[k] != {text}[k - 1]]"
@@ -262,7 +262,7 @@ def math_function(actor: Actor) -> None:
 
 
 def rounding(actor: Actor) -> None:
-    """Round, of which the half goes up and truncation is a function of its own."""
+    """Round, where halves go up, and truncation is a separate function."""
     words = {"ceil": "ceil(input)", "floor": "floor(input)", "round": "floor(input + 0.5)", "truncate": "int(input)"}
     word = actor.text("function", "round")
     actor.values["expression"] = words.get(word, words["round"])

@@ -1,4 +1,4 @@
-"""Functions of Ptolemy II's expressions: of Java's Math, of its own, and what texts, arrays and records offer."""
+"""Functions of Ptolemy II's expressions: those of Java's Math, its own, and methods of texts, arrays and records."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ def element(whole: Any, index: Any) -> Any:
     if index == 0 and isinstance(whole, (int, float)):
         return whole
     if not isinstance(whole, (list, str)) or type(index) is not int or not 0 <= index < len(whole):
-        raise ExpressionError(f"there is no element {index}")
+        raise ExpressionError(f"there is no element at index {index}")
     return whole[index]
 
 
 def _numeric(function: Callable[[Any], Any]) -> Callable[[Any], Any]:
-    """The function, which goes through arrays and matrices."""
+    """The function, applied to each element of arrays and matrices."""
 
     def apply(value: Any) -> Any:
         if isinstance(value, list):
@@ -43,7 +43,7 @@ def _best(function: Callable[..., Any]) -> Callable[..., Any]:
 
 def _repeated(count: Any, value: Any) -> list[Any]:
     if not 0 <= count <= MAX_ELEMENTS:
-        raise ExpressionError(f"it has more than {MAX_ELEMENTS:,} elements")
+        raise ExpressionError(f"it has more than the maximum of {MAX_ELEMENTS:,} elements")
     return [value] * count
 
 
@@ -70,7 +70,7 @@ def _subarray(items: Any, start: int, count: int | None = None) -> Any:
 
 
 def _extracted(items: Any, chosen: Any) -> list[Any]:
-    """The elements at some places, or those beside which there is ``true``."""
+    """The elements at the given indices, or those for which the given array has ``true``."""
     if all(isinstance(each, bool) for each in chosen):
         return [each for each, is_chosen in zip(items, chosen, strict=False) if is_chosen]
     return [element(items, each) for each in chosen]
@@ -129,13 +129,13 @@ def _logarithm(function: Callable[[float], float]) -> Callable[[float], float]:
 
 def _plain(text: str) -> str:
     if set(text) & set("\\^$.|?*+()[]{}"):
-        raise ExpressionError(f"{text!r}: patterns are not known here")
+        raise ExpressionError(f"{text!r}: regular expressions have no counterpart")
     return text
 
 
 def _split(text: str, between: str) -> list[str]:
     found = text.split(_plain(between))
-    while len(found) > 1 and not found[-1]:  # Java leaves out empty ones at the end
+    while len(found) > 1 and not found[-1]:  # Java drops empty ones at the end
         found.pop()
     return found
 

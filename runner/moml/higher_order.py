@@ -1,4 +1,4 @@
-"""Composites that fire what is in them in a way of their own, as plain ones: ThreadedComposite and Case."""
+"""Turns composites with their own firing rules into plain ones: ThreadedComposite and Case."""
 
 from __future__ import annotations
 
@@ -20,14 +20,14 @@ _OF_THREADS = ("delay", "synchronizeToRealTime", "UNDEFINED")
 
 
 def plain_composites(model: Entity, notes: Notes) -> None:
-    """Say with wires and actors what such composites do."""
+    """Express with wires and actors what such composites do."""
     _Rewriting(notes).inside(model, Scope(model))
 
 
 class _Rewriting:
     def __init__(self, notes: Notes) -> None:
         self._notes = notes
-        self._orders = count(4_000_000)  # behind all links of the file
+        self._orders = count(4_000_000)  # after all links of the file
 
     def inside(self, composite: Entity, scope: Scope) -> None:
         for child in composite.entities.values():
@@ -40,7 +40,7 @@ class _Rewriting:
             self.inside(child, inner)
 
     def _wire(self, composite: Entity, *ports: str) -> None:
-        """Join some ports of a composite, all channels of them."""
+        """Join ports of a composite, with all their channels."""
         name = f"relation of {' '.join(ports)}"
         composite.relations[name] = Relation(name)
         for port in ports:
@@ -53,10 +53,10 @@ class _Rewriting:
         made.properties = {key: Property(key, _PARAMETER, value) for key, value in parameters.items()}
         return name
 
-    # -- a thread of its own ----------------------------------------------------------------------------------------
+    # -- threads ----------------------------------------------------------------------------------------------------
 
     def _threaded(self, child: Entity, scope: Scope, ports: Iterable[str]) -> None:
-        """What is inside fires at once, and what it sends leaves after the delay."""
+        """The inner actor fires at once; its outputs leave after the delay."""
         inner = next(iter(child.entities.values()))
         try:
             said = child.properties.get("delay")
@@ -66,11 +66,11 @@ class _Rewriting:
             return
         if (said is not None and said.value == "UNDEFINED") or delay < 0:
             self._notes.note(
-                f"{child.name}: its outputs come when a thread has computed them, here at the next microstep"
+                f"{child.name}: in Ptolemy, it sends when its thread has finished; here, at the next microstep"
             )
         for name, said in list(child.properties.items()):
             if name not in _OF_THREADS and not is_layout(said) and not said.java.endswith("Director"):
-                inner.properties.setdefault(name, said)  # it has the parameters of what is inside
+                inner.properties.setdefault(name, said)  # the inner actor takes over its parameters
         for name in [
             *_OF_THREADS,
             *(name for name, said in child.properties.items() if said.java.endswith("Director")),
@@ -89,7 +89,7 @@ class _Rewriting:
         child.java = ABSTRACT_COMPOSITE
 
     def _mirrored(self, child: Entity, inner: Entity, name: str) -> PortFace | None:
-        """The face of a port of what is inside, which the composite has, too."""
+        """The face of a port of the inner actor, which is given to the composite, too."""
         face = face_of(counterpart_of(inner.java), inner, name) or face_of(None, child, name)
         if face is not None:
             port = child.ports.setdefault(name, Port(name))
@@ -97,10 +97,10 @@ class _Rewriting:
                 port.properties.setdefault(flag, Property(flag, value="true"))
         return face
 
-    # -- one of several ---------------------------------------------------------------------------------------------
+    # -- cases ------------------------------------------------------------------------------------------------------
 
     def _case(self, child: Entity, scope: Scope, *, is_fed: bool) -> None:
-        """Inputs go to the refinement that has the name of what ``control`` says."""
+        """Inputs go to the refinement with the name that ``control`` gives."""
         said = child.properties.pop("control", None)
         try:
             first = java_text(True if said is None else scope.value_of(said))
@@ -132,7 +132,7 @@ class _Rewriting:
         child.java = ABSTRACT_COMPOSITE
 
     def _which(self, child: Entity, order: list[str], default: str) -> str:
-        """An Expression for the number of the refinement."""
+        """Add an Expression that computes the number of the refinement."""
         text = str(order.index(default))
         for number, name in enumerate(order):
             if name != default:

@@ -1,4 +1,4 @@
-"""The import of a model: a MoML file in, the text of a model and what is to be said of it out."""
+"""Imports a MoML file: returns the text of a model and notes about it."""
 
 from __future__ import annotations
 
@@ -26,22 +26,22 @@ from .publishing import plain_channels
 from .writing import Flow, block
 
 LIKE = {"like": "ptolemy"}
-"""What is said of the director of an imported model."""
+"""The director of an imported model."""
 
 
 @dataclass(frozen=True)
 class Imported:
-    """What has become of a MoML file."""
+    """The result of importing a MoML file."""
 
     text: str
     notes: tuple[str, ...]
 
 
 def import_moml(path: Path, load: Callable[[Path], object] | None = None, types: Iterable[type] = ()) -> Imported:
-    """Import a file; raises ``MomlError`` with all that stands in the way.
+    """Import a file; raises ``MomlError`` with everything that prevents it.
 
-    ``load`` is given a file with the result and is to raise what is wrong with it.  ``types`` are actors of one's own:
-    one that has the name of a Java class stands for it.
+    ``load`` is called with a file that holds the result, and must raise its errors.  ``types`` are the user's actors:
+    one with the name of a Java class replaces it.
     """
     notes = Notes()
     own = {each.__name__: each for each in types if issubclass(each, Actor)}
@@ -49,7 +49,7 @@ def import_moml(path: Path, load: Callable[[Path], object] | None = None, types:
         root = Builder(path.name, lambda text, line: notes.note(f"line {line}: {text}")).build(read_document(path))
         text = _text(root, path.name, notes, own)
     except RecursionError:
-        raise MomlError(f"{path.name}: it is nested too deeply") from None
+        raise MomlError(f"{path.name}: the model is nested too deeply") from None
     if notes.errors:
         raise MomlError(_refusal(path.name, notes.errors))
     if load is not None:
@@ -86,11 +86,11 @@ def _text(model: Entity, file: str, notes: Notes, own: Mapping[str, type[Actor]]
         sections["parameters"] = Flow(parameters)
     sections["director"] = Flow(LIKE)
     if said:
-        notes.note("its time is not that of a run: it is a composite with a director of its own")
+        notes.note("the model has its own time: it becomes a composite with its own director")
         body = _inside(sections["model"], body, sections.pop("parameters", None), said, conversion)
     for key in ("inputs", "outputs"):
         if body.pop(key, None):
-            notes.note(f"the {key} of the model lead nowhere, and are left out")
+            notes.note(f"the {key} of the model are connected to nothing and are left out")
     if conversion.classes:
         sections["composites"] = conversion.classes
     sections |= body
@@ -102,7 +102,7 @@ def _text(model: Entity, file: str, notes: Notes, own: Mapping[str, type[Actor]]
 def _inside(
     name: str, body: dict[str, Any], parameters: object, said: dict[str, Any], conversion: Conversion
 ) -> dict[str, Any]:
-    """The body of a model that has one composite, which has all in it and a clock of its own."""
+    """The body of a model with one composite, which contains everything and has its own clock."""
     kind = conversion.class_name(name)
     head = {"parameters": parameters} if parameters is not None else {}
     conversion.classes[kind] = {**head, "director": Flow(said), **body}
@@ -119,7 +119,7 @@ def _comment(file: str, notes: Notes) -> list[str]:
 
 
 def _check(text: str, file: str, load: Callable[[Path], object]) -> None:
-    """Load what is to be written; raises ``MomlError`` with the reason if that cannot be."""
+    """Load the text that is to be written; raises ``MomlError`` with the reason if that fails."""
     from epicycle.actors import EpicycleError
 
     with tempfile.TemporaryDirectory() as folder:
@@ -129,4 +129,4 @@ def _check(text: str, file: str, load: Callable[[Path], object]) -> None:
             load(written)
         except EpicycleError as error:
             reason = str(error).replace(f"{folder}/", "")
-            raise MomlError(f"{file} cannot be imported: what comes of it is no valid model\n{reason}") from None
+            raise MomlError(f"{file} cannot be imported: the result is not a valid model\n{reason}") from None

@@ -1,4 +1,4 @@
-"""MultiInstanceComposite: as many composites as it says, and wires to each of them."""
+"""Expands MultiInstanceComposite: one composite for each instance, and wires to each of them."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ _PARAMETER = "ptolemy.data.expr.Parameter"
 
 
 def expand_instances(model: Entity, notes: Notes) -> None:
-    """Put all instances beside each other, each with the number of its own that its parameters may name."""
+    """Place all instances side by side, each with its number, which its parameters may use."""
     _Expansion(notes).inside(model, Scope(model))
 
 
 class _Expansion:
     def __init__(self, notes: Notes) -> None:
         self._notes = notes
-        self._orders = count(2_000_000)  # behind all links of the file
+        self._orders = count(2_000_000)  # after all links of the file
         self._left = MAX_ENTITIES
 
     def inside(self, composite: Entity, scope: Scope) -> None:
@@ -42,11 +42,11 @@ class _Expansion:
             self._notes.error(f"{first.name}.nInstances: {error}")
             return
         if type(number) is not int:
-            self._notes.error(f"{first.name}.nInstances = {number!r}: it is no whole number")
+            self._notes.error(f"{first.name}.nInstances = {number!r} is not a whole number")
             return
         self._left -= max(number, 1) * sum(1 for _ in first.everything())
         if self._left < 0:
-            raise MomlError(f"{first.name}: its instances come to more than {MAX_ENTITIES:,} entities")
+            raise MomlError(f"{first.name}: its instances have more than the maximum of {MAX_ENTITIES:,} entities")
         _number(first, 0)
         first.java = ABSTRACT_COMPOSITE
         joins = [
@@ -78,7 +78,7 @@ class _Expansion:
         return found
 
     def _join(self, composite: Entity, port: str, relation: str, beyond: list[str]) -> None:
-        """Join a port of an instance as that of the first is joined, with multiports by one more channel."""
+        """Join a port of an instance as that of the first instance, using one more channel of each multiport."""
         if beyond:
             relation = f"r_{port.replace('.', '_')}"
             composite.relations[relation] = Relation(relation)

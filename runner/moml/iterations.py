@@ -1,4 +1,4 @@
-"""Directors that fire all in iterations, such as SDF's inside of DE: clocks and delays that go by these."""
+"""Converts directors that fire all actors in iterations, such as SDF inside DE, to clocks and registers."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ _DELAYS = {"SampleDelay": "initialOutputs", "NonStrictDelay": "initialValue", "P
 
 
 def plain_iterations(model: Entity, notes: Notes) -> None:
-    """Give each such composite a clock if it has a period, and for delays what sends in each iteration."""
+    """Give each such composite a clock if it has a period, and replace its delays by registers."""
     waiting: list[tuple[Entity, Scope | None, Entity | None]] = [(model, None, None)]
     while waiting:
         composite, around, outside = waiting.pop()
@@ -42,21 +42,21 @@ def plain_iterations(model: Entity, notes: Notes) -> None:
                 for port in composite.ports.values()
             )
             if is_fed:
-                notes.note(f"{composite.name}.period = {period}: there, what comes waits for the next iteration")
+                notes.note(f"{composite.name}.period = {period}: only in Ptolemy do tokens wait for the next iteration")
             _clock(composite, period)
         elif count is not None and count > 1:
-            notes.note(f"{composite.name}.{director.name}.iterations = {count:g}: there, it ends with these")
+            notes.note(f"{composite.name}.{director.name}.iterations = {count:g}: only in Ptolemy does it stop then")
 
 
 def _number(said: Property | None, scope: Scope) -> float | None:
-    """The value of a parameter that is a number; None if it is not given."""
+    """The value of a number parameter; None if it is not set."""
     value = None if said is None else scope.value_of(said)
     return None if value is None else float(value)
 
 
 def _run_whole(model: Entity, period: float | None, count: int, notes: Notes) -> None:
-    """A model that is nothing but iterations: as many as it says, at one time or one in each period."""
-    count = abs(count)  # -1 is one
+    """A model that consists only of iterations: the given number, all at one time or one in each period."""
+    count = abs(count)  # -1 means one
     if count and (director := director_of(model)) is not None:
         end = repr((count - 1) * (period or 0.0))
         director.properties.setdefault("stopTime", Property("stopTime", _PARAMETER, end))
@@ -65,11 +65,11 @@ def _run_whole(model: Entity, period: float | None, count: int, notes: Notes) ->
     elif 0 < count <= MAX_AT_ONCE:
         _clock(model, 1.0, number=count)
     else:
-        notes.error(f"{model.name}: {count or 'endless'} iterations at one time have no counterpart")
+        notes.error(f"{model.name}: {count or 'endlessly many'} iterations at one time have no counterpart")
 
 
 def _register(delay: Entity, scope: Scope) -> None:
-    """A delay of one iteration: what came in the one before, sent at the begin of each."""
+    """A delay of one iteration: the input of the previous one, sent at the start of each."""
     name = _DELAYS[kind(delay)]
     said = delay.properties.pop(name, None)
     value = "" if said is None else said.value or ""
@@ -80,14 +80,14 @@ def _register(delay: Entity, scope: Scope) -> None:
             initial = None
         if said is not None and (not isinstance(initial, list) or len(initial) != 1):
             delay.properties[name] = said
-            return  # of several iterations
+            return  # a delay of several iterations
         value = f"({value})(0)" if said is not None else "0"
     delay.properties["initialValue"] = Property("initialValue", _PARAMETER, value, delay.line)
     delay.java = _REGISTER
 
 
 def _clock(composite: Entity, period: float, *, number: int = 1) -> None:
-    """Let a clock trigger what nothing triggers, so often at one time."""
+    """Add a clock that triggers the actors that nothing triggers, ``number`` times at one time."""
     name = relation = "period"
     while name in composite.entities:
         name += "_"

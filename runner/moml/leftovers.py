@@ -1,4 +1,4 @@
-"""What is said of parts of a composite that have no counterpart."""
+"""Reports the parts of a composite that have no counterpart."""
 
 from __future__ import annotations
 
@@ -11,24 +11,24 @@ from .scope import is_variable
 
 
 def about_ports(conversion: Converting, entity: Entity, level: Level) -> None:
-    """What the file says of ports and has no counterpart."""
+    """Report settings of ports that have no counterpart."""
     for port in entity.ports.values():
         for said in port.properties.values():
             known = said.name in ("input", "output", "multiport") or is_layout(said) or is_decoration(said)
             known = known or (said.name == "defaultValue" and kind(entity) == "Expression")
             if not known and said.value:
                 path = f"{level.told(entity.name)}.{port.name}" if entity is not level.entity else level.told(port.name)
-                conversion.notes.note(f"{path}.{said.name} = {said.value!r}: has no counterpart")
+                conversion.notes.note(f"{path}.{said.name} = {said.value!r} has no counterpart")
 
 
 def about_links(conversion: Converting, child: Entity, level: Level) -> None:
-    """Ports to which something is linked, and that actors of ours do not have."""
+    """Report linked ports that our actors do not have."""
     row = conversion.rows.get(id(child))
     if row is None or row.is_view or id(child) in conversion.idle:
         return
     for name in level.linked.get(child.name, ()):
         if conversion.face(child, name) is None:
-            conversion.notes.note(f"{level.told(child.name)}.{name} has no counterpart: its wires are left out")
+            conversion.notes.note(f"{level.told(child.name)}.{name} has no counterpart; its wires are left out")
 
 
 def about_properties(conversion: Converting, level: Level) -> None:
@@ -36,21 +36,21 @@ def about_properties(conversion: Converting, level: Level) -> None:
         if is_layout(said) or is_decoration(said) or is_variable(said) or kind(said).endswith("Director"):
             continue
         if said.value is not None or said.java:
-            conversion.notes.note(f"{level.told(name)}, a {kind(said) or 'property'}: has no counterpart")
+            conversion.notes.note(f"{level.told(name)}, a {kind(said) or 'property'}, has no counterpart")
 
 
 def about_unknown(conversion: Converting, child: Entity, level: Level) -> None:
-    """An actor whose class has no row: whether the model can do without it."""
+    """Report an actor whose class has no row: an error, or a note if the model can do without it."""
     told = level.told(child.name)
     linked = level.linked.get(child.name, [])
     if not linked and is_layout(child):
         return
     if not linked:
-        what = f"{told} is a {child.java}, has no counterpart, and is left out"
+        what = f"{told} is a {child.java}, which has no counterpart and is left out"
         conversion.notes.note(f"{what}: nothing is connected to it")
     elif all(_only_takes(conversion, child, port) for port in linked):
         conversion.notes.note(
-            f"{told} is a {child.java}, has no counterpart, and is left out: it only takes what comes"
+            f"{told} is a {child.java}, which has no counterpart and is left out: it only receives tokens"
         )
     else:
         conversion.notes.error(f"{told} is a {child.java}, which has no counterpart{why_not(child.java)}")
@@ -62,7 +62,7 @@ def _only_takes(conversion: Converting, child: Entity, port: str) -> bool:
 
 
 def is_watched(conversion: Converting, child: Entity, level: Level) -> bool:
-    """Whether a view cannot be left out: an aspect stands there, or it takes a channel of a multiport."""
+    """Whether a view must be kept: an aspect is enabled there, or it occupies a channel of a multiport."""
     if is_decorated(child):
         return True
     relations = {

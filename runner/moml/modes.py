@@ -19,13 +19,13 @@ from .writing import Flow
 MACHINES = frozenset({"FSMActor", "ModalController", "InterfaceAutomaton", "FSMActorModal"})
 _RESERVED = ("mode", "trigger", "time", "mode_time", "error", "machine")
 _WORD = re.compile(r"(?<![\w.])(on|after|when|do)(?![\w.])")
-_LAST_WITH_HISTORY = (9, 0)  # versions up to here took transitions for those with history
+_LAST_WITH_HISTORY = (9, 0)  # up to this version, transitions kept history by default
 _FLAGS = {"preemptive": "preemptive", "immediate": "immediate", "nondeterministic": "nondeterministic",
           "defaultTransition": "else", "error": "error"}  # fmt: skip
 
 
 def controller_of(entity: Entity) -> Entity | None:
-    """The machine of an entity: itself, or what is inside of a modal model; None if it has none."""
+    """The state machine of an entity: the entity itself, or the one inside a modal model; None without one."""
     if kind(entity) in MACHINES:
         return entity
     director = director_of(entity)
@@ -47,7 +47,7 @@ class _Machine:
     """One machine that is being imported."""
 
     conversion: Converting
-    entity: Entity  # the modal model, or the machine itself
+    entity: Entity  # the modal model, or the state machine itself
     controller: Entity
     path: str
     at: str
@@ -66,7 +66,7 @@ class _Machine:
             if port.flag("input") and not port.flag("output")
         }
         self.outputs = {name: self._channels(owner, name) for name, port in said.items() if port.flag("output")}
-        heard = {} if self.entity is self.controller else self.outputs  # what refinements send
+        heard = {} if self.entity is self.controller else self.outputs  # ports to which refinements send
         self.words = Words(self.scope, {**self.inputs, **heard}, self.outputs, self.variables, self.tell)
         taken = {ours for names in (*self.inputs.values(), *self.outputs.values()) for ours in names}
         for transition in self.controller.relations.values():
@@ -82,16 +82,16 @@ class _Machine:
                     ours = self.ports.of(inner[1])
                     others = {said for each, said in self.variables.items() if each != name}
                     if ours not in taken | others:
-                        self.variables[name] = ours  # else two refinements, or a port, would have it by one name
+                        self.variables[name] = ours  # otherwise two refinements, or a port, would share the name
         self._hand()
 
     def _channels(self, owner: Entity, name: str) -> list[str]:
-        """Our names for a port: each channel is a port by itself."""
+        """Our names for a port: each channel is a separate port."""
         conversion = self.conversion
         return [conversion.port_name(self.ports, name, channel) for channel in range(conversion.channels(owner, name))]
 
     def _inner_of(self, name: str) -> tuple[Entity, str] | None:
-        """The refinement, and the parameter of it, that an action sets; None if it does not."""
+        """The refinement and its parameter that an action sets; None if it sets no such parameter."""
         refinement, _, inner = name.partition(".")
         child = self.entity.entities.get(refinement) if self.entity is not self.controller else None
         if child is None or inner not in child.properties or controller_of(child) is not None:
@@ -99,7 +99,7 @@ class _Machine:
         return child, inner
 
     def _hand(self) -> None:
-        """Tell the refinements the variables by which something in them goes."""
+        """Make the refinements follow the variables that they use."""
         for name in self.variables:
             inner = self._inner_of(name)
             if inner is not None:
@@ -115,7 +115,7 @@ class _Machine:
         return [each for each in self.entity.entities.values() if each is not self.controller]
 
     def _readers(self, child: Entity, name: str) -> list[tuple[Entity, Property]]:
-        """What in a refinement is computed of a variable."""
+        """The parameters in a refinement that are computed from a variable."""
         pattern = re.compile(rf"(?<![\w.]){re.escape(name)}(?!\w)")
         return [
             (each, said)
@@ -127,10 +127,10 @@ class _Machine:
     def tell(self, text: str) -> None:
         self.conversion.notes.note(f"{self.path}: {text}")
 
-    # -- what is written ------------------------------------------------------------------------------------------
+    # -- writing --------------------------------------------------------------------------------------------------
 
     def written(self) -> dict[str, Any]:
-        """What is said of modes and transitions."""
+        """The sections for modes and transitions."""
         modes: dict[str, Any] = {}
         initial, finals = self._initial_state(), self._final_states()
         lost = self._unreachable(initial, finals)
@@ -141,7 +141,7 @@ class _Machine:
             said: dict[str, Any] = {}
             refinements = [each.strip() for each in (state.text("refinementName") or "").split(",") if each.strip()]
             if len(refinements) > 1:
-                self.tell(f"{state.name} has {len(refinements)} refinements, and only {refinements[0]} is one here")
+                self.tell(f"{state.name} has {len(refinements)} refinements; only {refinements[0]} is kept")
             if refinements and self.entity is not self.controller:
                 said |= self._refinement(refinements[0], self.states.of(state.name))
             if state.name in finals:
@@ -166,22 +166,22 @@ class _Machine:
             self.conversion.notes.error(f"{self.path} has no states")
         self._tell_readers()
         for name, ours in {**self.ports.renamed(), **self.states.renamed()}.items():
-            self.tell(f"{name} is called {ours}")
+            self.tell(f"{name} is renamed {ours}")
         return found
 
     def _tell_readers(self) -> None:
-        """What in refinements is computed of variables, and would change with them."""
+        """Report parameters in refinements that are computed from variables and should change with them."""
         for name in self.variables:
             for child in self._refinements():
                 if controller_of(child) is not None:
                     for each, said in self._readers(child, name):
-                        self.tell(f"{each.name}.{said.name} goes by what {name} is at the start")
+                        self.tell(f"{each.name}.{said.name} uses the initial value of {name} throughout")
 
     def _states(self) -> list[Entity]:
         return list(self.controller.entities.values())
 
     def _initial_state(self) -> str | None:
-        """The last that says so itself, or the one that the machine names, as in files of former versions."""
+        """The last state marked as initial, or the one that the machine names, as in files of former versions."""
         said = (self.controller.text("initialStateName") or "").strip().strip('"')
         named = said if said in self.controller.entities else None
         return next((each.name for each in reversed(self._states()) if self._flag(each, "isInitialState")), named)
@@ -191,7 +191,7 @@ class _Machine:
         return frozenset(each.name for each in self._states() if self._flag(each, "isFinalState") or each.name in named)
 
     def _unreachable(self, initial: str | None, finals: frozenset[str]) -> frozenset[str]:
-        """The states that are never entered, which Ptolemy allows."""
+        """The states that are never entered; Ptolemy allows them."""
         names = [each.name for each in self._states()]
         ways = [self._ends(each) for each in self.controller.relations]
         waiting = [initial or name for name in names[:1]]
@@ -224,10 +224,10 @@ class _Machine:
             return False
 
     def _refinement(self, name: str, mode: str) -> dict[str, Any]:
-        """The class of a refinement, which knows its ports by the names that they have outside."""
+        """The class of a refinement, whose ports keep the names that they have outside."""
         child = self.entity.entities.get(name)
         if child is None:
-            self.conversion.notes.error(f"{self.path}: there is no refinement {name!r}")
+            self.conversion.notes.error(f"{self.path}: there is no refinement named {name!r}")
             return {}
         found = refinement_of(self, child, f"{self.path}.{name}", mode)
         return {"refinement": found["type"] if len(found) == 1 else found}
@@ -237,7 +237,7 @@ class _Machine:
     def _transition(self, transition: Relation) -> Any:
         source, target = self._ends(transition.name)
         if source is None or target is None:
-            self.tell(f"the transition {transition.name} does not lead from one state to another, and is left out")
+            self.tell(f"the transition {transition.name} is left out: it needs a state at each end")
             return None
         flags = [ours for name, ours in _FLAGS.items() if self._flag(transition, name)]
         if self._has_history(transition) and self._leads_to_refinement(target):
@@ -259,7 +259,7 @@ class _Machine:
         return _line(self.states.of(source), self.states.of(target), flags, said)
 
     def _ends(self, name: str) -> tuple[str | None, str | None]:
-        """The states that a transition leaves and enters."""
+        """The source and target states of a transition."""
         source = target = None
         for port, links in self.controller.links.items():
             state, _, end = port.rpartition(".")
@@ -288,7 +288,7 @@ class _Machine:
 
 
 def _line(source: str, target: str, flags: list[str], said: dict[str, str]) -> Any:
-    """A transition on one line, or as a mapping where its words could be mistaken."""
+    """A transition on one line, or as a mapping where the line would be ambiguous."""
     if " " in said.get("probability", "") or any(_WORD.search(QUOTED.sub("", each)) for each in said.values()):
         return Flow({"from": source, "to": target, **dict.fromkeys(flags, True), **said})
     if "probability" in said:
@@ -334,7 +334,7 @@ def _class(machine: _Machine) -> dict[str, Any]:
 
 
 def refinement_of(around: _Machine, child: Entity, path: str, mode: str) -> Flow:
-    """The refinement of a mode: a composite, perhaps with modes of its own."""
+    """The refinement of a mode: a composite, possibly with its own modes."""
     conversion, controller, at = around.conversion, controller_of(child), f"{around.at}{mode}."
     if controller is not None:
         machine = _Machine(conversion, child, controller, path, at, around.outer, around.ports)
@@ -351,7 +351,7 @@ def refinement_of(around: _Machine, child: Entity, path: str, mode: str) -> Flow
 
 
 def _tell_rest(conversion: Converting, child: Entity, path: str, machine: _Machine) -> None:
-    """Attributes that say nothing here."""
+    """Report attributes without a counterpart."""
     known = {
         "initialStateName",
         "finalStateNames",
@@ -372,4 +372,4 @@ def _tell_rest(conversion: Converting, child: Entity, path: str, machine: _Machi
             ):
                 continue
             if said.value is not None or said.java:
-                conversion.notes.note(f"{path}.{name}, a {kind(said) or 'property'}: has no counterpart")
+                conversion.notes.note(f"{path}.{name}, a {kind(said) or 'property'}, has no counterpart")

@@ -1,4 +1,4 @@
-"""Names of a MoML file as names of the model language: kept where it allows them."""
+"""Converts names of a MoML file to names of the model language, which keeps them where it can."""
 
 from __future__ import annotations
 
@@ -19,21 +19,21 @@ def snake(name: str) -> str:
 
 
 class Names:
-    """The names of one place: each of the file's has one of ours, and no two the same."""
+    """The names of one namespace: each name of the file has a unique name of ours."""
 
     def __init__(self, taken: Iterable[str] = (), *, in_expressions: bool = False) -> None:
         self._of: dict[str, str] = {}
         self._taken = set(taken)
-        self._in_expressions = in_expressions  # where keywords and functions cannot be names
+        self._in_expressions = in_expressions  # in which keywords and functions cannot be names
 
     def of(self, name: str) -> str:
-        """Ours for a name of the file."""
+        """Our name for a name of the file."""
         if name not in self._of:
             self._of[name] = self.fresh(name)
         return self._of[name]
 
     def fresh(self, name: str) -> str:
-        """A name like this that nothing has yet."""
+        """A similar name that is still unused."""
         base = _STRANGE.sub("_", name.strip()).strip("_") if _STRANGE.search(name) else name
         if not base or not base[0].isalpha():
             base = f"_{base}" if base[:1] != "_" else base
@@ -46,9 +46,9 @@ class Names:
         return found
 
     def take(self, name: str) -> None:
-        """Let nothing be called this."""
+        """Reserve a name."""
         self._taken.add(name)
 
     def renamed(self) -> dict[str, str]:
-        """Those that could not be kept."""
+        """The names that could not be kept."""
         return {name: ours for name, ours in self._of.items() if name != ours}

@@ -1,4 +1,4 @@
-"""Operators of Ptolemy II's expressions, and how its values look in texts."""
+"""Operators of Ptolemy II's expressions, and the text form of its values."""
 
 from __future__ import annotations
 
@@ -16,20 +16,20 @@ MAX_ELEMENTS = 10_000
 
 
 class Rows(list[Any]):
-    """A matrix: a list of its rows, which is no array of arrays."""
+    """A matrix: a list of its rows, distinct from an array of arrays."""
 
 
 def limited(items: list[Any]) -> list[Any]:
-    """The items, unless they are too many."""
+    """The items; raises ``ExpressionError`` if there are too many."""
     if len(items) > MAX_ELEMENTS:
-        raise ExpressionError(f"it has more than {MAX_ELEMENTS:,} elements")
+        raise ExpressionError(f"it has more than the maximum of {MAX_ELEMENTS:,} elements")
     return items
 
 
 def truth(value: Any) -> bool:
     """A truth value; raises ``TypeError``."""
     if not isinstance(value, bool):
-        raise TypeError(f"{value!r} is no truth value")
+        raise TypeError(f"{value!r} is not a truth value")
     return value
 
 
@@ -44,7 +44,7 @@ def number(value: Any) -> Any:
 
 
 def java_text(value: Any) -> str:
-    """A value as Ptolemy writes it into a text."""
+    """A value as Ptolemy writes it as text."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, float):
@@ -58,7 +58,7 @@ def java_text(value: Any) -> str:
     if value is None:
         return "nil"
     if not isinstance(value, (str, int)):
-        raise TypeError("it has no text")
+        raise TypeError("it has no text form")
     return str(value)
 
 
@@ -67,7 +67,7 @@ def _quoted(value: Any) -> str:
 
 
 def _java_double(value: float) -> str:
-    """With up to 13 decimals, and with an exponent where it is 0.001 or less, or a million or more."""
+    """With up to 13 decimals, and an exponent if it is 0.001 or less, or a million or more."""
     if math.isinf(value) or math.isnan(value):
         return "NaN" if math.isnan(value) else "Infinity" if value > 0 else "-Infinity"
     exact = Decimal(repr(value))
@@ -83,7 +83,7 @@ def _java_double(value: float) -> str:
 
 
 def unified(items: list[Any]) -> list[Any]:
-    """The elements of an array, which have one type: beside a double all numbers are, beside a text all are texts."""
+    """The elements of an array converted to one type: text if one is a text, otherwise double if one is a double."""
     kinds = {type(each) for each in items}
     if kinds == {int, float}:
         return [float(each) for each in items]
@@ -104,12 +104,12 @@ def unified(items: list[Any]) -> list[Any]:
 
 
 def pairwise(function: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Any]:
-    """The function, which goes through arrays, matrices and records element by element."""
+    """The function, applied to arrays, matrices and records element by element."""
 
     def apply(left: Any, right: Any) -> Any:
         if isinstance(left, list) and isinstance(right, list):
             if len(left) != len(right):
-                raise TypeError("arrays of different lengths")
+                raise TypeError("the arrays have different lengths")
             return type(left)(apply(one, other) for one, other in zip(left, right, strict=True))
         if isinstance(left, list):
             return type(left)(apply(each, right) for each in left)
@@ -126,7 +126,7 @@ def _product(left: Rows, right: Rows) -> Rows:
     """The product of two matrices."""
     columns = list(zip(*right, strict=True))
     if any(len(row) != len(right) for row in left):
-        raise TypeError("matrices whose sizes do not go together")
+        raise TypeError("the sizes of the matrices do not match")
     return Rows([_sum_of_products(row, column) for column in columns] for row in left)
 
 
@@ -162,14 +162,14 @@ minus = pairwise(lambda left, right: number(left) - number(right))
 
 
 def plus(left: Any, right: Any) -> Any:
-    """The sum, element by element; a matrix beside a text is one, too."""
+    """The sum, element by element; a matrix added to a text becomes text."""
     if {type(left), type(right)} == {str, Rows}:
         return _plus(left, right)
     return _each_plus(left, right)
 
 
 def times(left: Any, right: Any) -> Any:
-    """The product: that of matrices, element by element otherwise."""
+    """The product: the matrix product for matrices, element by element otherwise."""
     if isinstance(left, Rows) and isinstance(right, Rows):
         return _product(left, right)
     return _each_times(left, right)
@@ -194,7 +194,7 @@ def _rest(left: Any, right: Any) -> Any:
     if isinstance(left, int) and isinstance(right, int):
         if right == 0:
             raise ZeroDivisionError("division by zero")
-        return abs(left) % abs(right) * (-1 if left < 0 else 1)  # with the sign of the first, as in Java
+        return abs(left) % abs(right) * (-1 if left < 0 else 1)  # with the sign of the first operand, as in Java
     return math.fmod(left, right)
 
 
@@ -208,7 +208,7 @@ def _raised(left: Any, right: Any) -> Any:
 
 
 def equal(left: Any, right: Any) -> bool:
-    """Whether two values are equal; a text is compared with what the other is as a text."""
+    """Whether two values are equal; a text is compared with the text form of the other."""
     if isinstance(left, str) is not isinstance(right, str):
         return java_text(left) == java_text(right)
     return isinstance(left, bool) is isinstance(right, bool) and bool(left == right)
@@ -223,7 +223,7 @@ def _whole(value: Any) -> int:
 def _shift(left: Any, right: Any) -> int:
     bits, by = _whole(left), _whole(right)
     if not -63 <= by <= 63:
-        raise ExpressionError("it shifts too far")
+        raise ExpressionError("the shift is too large")
     return bits << by if by >= 0 else bits >> -by
 
 

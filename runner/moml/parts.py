@@ -1,4 +1,4 @@
-"""What is known of the composites of a file while they are imported, and what becomes of their parts."""
+"""The state of the import: what is known about composites, and the results for their parts."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from .writing import Flow
 
 @dataclass
 class Part:
-    """What a child of a composite becomes: its name and entry, and its ports by their names there."""
+    """The result for a child of a composite: its name and entry, and its ports by their names in the file."""
 
     name: str
     entry: Flow
-    row: Counterpart | None = None  # of an actor
+    row: Counterpart | None = None  # only for an actor
     ports: Mapping[str, str] = field(default_factory=dict)
-    unwired: frozenset[str] = frozenset()  # ports there for which there is none of ours
-    channels: Mapping[str, Sequence[str | None]] = field(default_factory=dict)  # ours, where each is a port by itself
+    unwired: frozenset[str] = frozenset()  # ports in the file without a counterpart
+    channels: Mapping[str, Sequence[str | None]] = field(default_factory=dict)  # our names, if channels are ports
 
 
 @dataclass
@@ -34,24 +34,24 @@ class Level:
     """One composite that is being imported."""
 
     entity: Entity
-    path: str  # as messages tell it
-    at: str  # where it is in the written model: "" or a path with a dot behind it
+    path: str  # as messages show it
+    at: str  # where it is in the written model: "" or a path with a final dot
     outer: Level | None
     scope: Scope
     names: Names  # of its actors
     ports: Names
     parameters: Names
-    own_names: dict[str, str] = field(default_factory=dict)  # parameters that may stay names, and ours for them
+    own_names: dict[str, str] = field(default_factory=dict)  # our names for parameters that may remain
     used: set[str] = field(default_factory=set)
     parts: dict[str, Part | None] = field(default_factory=dict)
-    requests: dict[str, str] = field(default_factory=dict)  # ports of an aspect's model, which are actors there
-    added_inputs: list[str] = field(default_factory=list)  # by which something in it knows a variable around it
-    added_outputs: list[str] = field(default_factory=list)  # by which something in it sets a variable around it
+    requests: dict[str, str] = field(default_factory=dict)  # ports of an aspect's model, which are entities in the file
+    added_inputs: list[str] = field(default_factory=list)  # through which something inside reads an outer variable
+    added_outputs: list[str] = field(default_factory=list)  # through which something inside sets an outer variable
     added_connections: list[str] = field(default_factory=list)
 
     @cached_property
     def linked(self) -> dict[str, list[str]]:
-        """The ports of each child to which something is linked."""
+        """The linked ports of each child."""
         found: dict[str, list[str]] = {}
         for path, links in self.entity.links.items():
             actor, _, port = path.rpartition(".")
@@ -60,7 +60,7 @@ class Level:
         return found
 
     def told(self, name: str) -> str:
-        """The path of something within, for messages."""
+        """The path of something inside, for messages."""
         return f"{self.path}.{name}" if self.path else name
 
 
@@ -71,22 +71,22 @@ class Changing:
     owner: Entity
     name: str
     delayed: bool = True
-    is_port: bool = False  # of a composite, by which its values come
+    is_port: bool = False  # whether its values come from a port of a composite
     actor: str = ""  # our name of the Variable
-    setters: list[str] = field(default_factory=list)  # what leads to it, as seen from the owner
-    readers: list[tuple[str, str]] = field(default_factory=list)  # where parameters go by it, and how
-    inputs: list[str] = field(default_factory=list)  # to which it leads
+    setters: list[str] = field(default_factory=list)  # its sources, as seen from the owner
+    readers: list[tuple[str, str]] = field(default_factory=list)  # places where parameters follow it, and how
+    inputs: list[str] = field(default_factory=list)  # that it is connected to
 
 
 class CountsEnds(Protocol):
-    """Who knows how many actors send into a net, and how many take what it carries."""
+    """Counts the actors that send into a net, and those that receive from it."""
 
     def senders(self, composite: Entity, ends: list[End]) -> int: ...
     def receivers(self, composite: Entity, ends: list[End]) -> int: ...
 
 
 class Converting(Protocol):
-    """The import of a model, as those know it who do a part of it."""
+    """The import of a model, as seen by the modules that do a part of it."""
 
     model: Entity
     notes: Notes

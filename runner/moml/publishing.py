@@ -1,4 +1,4 @@
-"""Publishers that check, and subscribers to several channels: as plain ones, with an actor that does the rest."""
+"""Turns publishers that check, and subscribers to several channels, into plain ones with an additional actor."""
 
 from __future__ import annotations
 
@@ -17,8 +17,8 @@ _SUMS = {"add": ("AddSubtract", "plus"), "multiply": ("MultiplyDivide", "multipl
 
 
 def plain_channels(model: Entity, notes: Notes) -> None:
-    """Take checks and sums apart from the channels that they publish or hear."""
-    orders = count(3_000_000)  # behind all links of the file
+    """Separate checks and sums from the publishers and subscribers that contain them."""
+    orders = count(3_000_000)  # after all links of the file
     for composite in list(model.everything()):
         for child in list(composite.entities.values()):
             if kind(child) in _CHECKS:
@@ -37,7 +37,7 @@ def _named(composite: Entity, name: str) -> str:
 
 
 def _check(composite: Entity, child: Entity) -> None:
-    """A Test, beside a Publisher of what comes to it."""
+    """Replace it by a Test, and a Publisher of the same input."""
     publisher = Entity(_named(composite, f"{child.name}_publisher"), f"{_LIBRARY}Publisher", line=child.line)
     for name in ("channel", "global"):
         if name in child.properties:
@@ -55,7 +55,7 @@ def _check(composite: Entity, child: Entity) -> None:
 
 
 def _published(composite: Entity, scope: Scope) -> list[str]:
-    """The channels of all publishers, in their order; all of them are written out, those of subscribers, too."""
+    """The channels of all publishers, in order; resolves all channel names, including those of subscribers."""
     found: list[str] = []
     for child in composite.entities.values():
         inner = scope.inside(child)
@@ -80,12 +80,12 @@ def channel_name(said: Property, scope: Scope) -> str:
 
 
 def _aggregate(composite: Entity, child: Entity, channels: list[str], orders: count[int], notes: Notes) -> None:
-    """The sum or product of what several Subscribers hear."""
+    """Replace it by several Subscribers, and the sum or product of what they receive."""
     text = (child.text("channel") or "channel1").strip().strip('"')
     try:
         pattern = re.compile(text)
     except re.error as error:
-        notes.error(f"{child.name}.channel = {text!r}: it is no pattern: {error}")
+        notes.error(f"{child.name}.channel = {text!r} is not a valid pattern: {error}")
         return
     java, port = _SUMS.get((child.text("operation") or "add").strip().strip('"'), _SUMS["add"])
     child.java = f"{_LIBRARY}{java}"

@@ -1,4 +1,4 @@
-"""Random actors: their distributions, and the generators that give the numbers of Java."""
+"""Converts random actors: their distributions, and the generators that reproduce Java's numbers."""
 
 from __future__ import annotations
 
@@ -36,16 +36,16 @@ def random(law: str, **parameters: str) -> Special:
 
 
 def _vary(actor: Actor, name: str, ours: str) -> None:
-    """Let a parameter of the distribution come by a port."""
+    """Read a parameter of the distribution from a port."""
     actor.values.setdefault("varying", []).append(ours)
     actor.ports[name] = ours
 
 
 def _fixed(actor: Actor, *names: str) -> None:
-    """Parameters of another distribution, of which ours are computed before the run."""
+    """Parameters from which those of our distribution are computed before the run."""
     for name in names:
         if actor.widths.get(name, 0):
-            actor.notes.error(f"{actor.path}.{name}: a distribution that changes in a run has no counterpart")
+            actor.notes.error(f"{actor.path}.{name}: a distribution that changes during the run has no counterpart")
 
 
 def java_hash(text: str) -> int:
@@ -57,11 +57,11 @@ def java_hash(text: str) -> int:
 
 
 def generator(actor: Actor) -> None:
-    """The numbers of Java's generators, where the model fixes them: by a seed of its own, or by the shared one."""
+    """The numbers of Java's generators, if the model fixes them by its own seed or the shared one."""
     own, shared = actor.get("privateSeed"), actor.get("seed", actor.seed)
     kind = "DRand" if ".colt." in actor.entity.java else "JavaRandom"
     if (made := actor.text("generatorClass", "DRand")) != "DRand":
-        actor.notes.note(f"{actor.path}.generatorClass = {made!r}: has no counterpart, the numbers are others")
+        actor.notes.note(f"{actor.path}.generatorClass = {made!r} has no counterpart; the numbers will differ")
     elif isinstance(own, int) and not isinstance(own, bool):
         actor.values["generator"] = {"type": kind, "seed": own}
     elif isinstance(shared, int) and shared:
@@ -91,7 +91,7 @@ def colt_gamma(actor: Actor) -> None:
 
 
 def colt_negative_binomial(actor: Actor) -> None:
-    """Its p is the probability of what is not counted."""
+    """Its p is the probability of the outcomes that are not counted."""
     _fixed(actor, "n", "p")
     probability = 1.0 - actor.get("p", 0.5)
     actor.values["distribution"] = {

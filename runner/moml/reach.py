@@ -1,4 +1,4 @@
-"""Actors that never fire: with an input that they need and nothing that sends to it."""
+"""Finds actors that never fire because nothing sends to an input that they need."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ MAX_ROUNDS = 200
 
 
 def leave_out_idle(conversion: Converting) -> None:
-    """Leave out what can never fire, and then what nothing is left for."""
+    """Leave out the actors that can never fire, and those that then never receive anything."""
     inputs: dict[int, list[str]] = {}
     for _ in range(MAX_ROUNDS):
         counting = Counting(conversion)
@@ -29,7 +29,7 @@ def leave_out_idle(conversion: Converting) -> None:
         for composite, (child, port) in idle:
             conversion.idle.add(id(child))
             path = conversion.path_of(composite, child)
-            conversion.notes.note(f"{path} is left out: it never fires, for nothing sends to its {port}")
+            conversion.notes.note(f"{path} is left out: it never fires because nothing sends to its {port}")
 
 
 def _idle(
@@ -78,7 +78,7 @@ def _idle(
 
 
 def _waits_for(composite: Entity, child: Entity, row: Counterpart) -> Iterator[str]:
-    """The linked inputs that somebody added to an actor that waits for a token at each of them."""
+    """The linked inputs added in the model to an actor that waits for a token at each of them."""
     if row.type not in ("Expression", "RecordAssembler") or row.fixed.get("apart"):
         return
     for name, port in child.ports.items():
@@ -93,7 +93,7 @@ def _waits_for(composite: Entity, child: Entity, row: Counterpart) -> Iterator[s
 
 
 def _inputs(conversion: Converting, child: Entity, row: Counterpart) -> list[str]:
-    """All inputs of an actor, those of parameters included."""
+    """All inputs of an actor, including those of parameters."""
     names = dict.fromkeys([*row.ports, *child.ports, *row.parameters, *child.properties])
     faces = {name: conversion.face(child, name) for name in names}
     return [name for name, face in faces.items() if face is not None and face.direction == "input"]
@@ -108,7 +108,7 @@ def is_fed(conversion: Converting, composite: Entity, child: Entity, port: str, 
 
 
 def iterations(conversion: Converting) -> dict[tuple[int, str], str]:
-    """The inputs of composites that trigger what fires in each iteration of their director, by its trigger."""
+    """The inputs of composites that start iterations of their directors, by the trigger ports that fire in each."""
     found = {}
     for composite in conversion.model.everything():
         director = director_of(composite) if composite is not conversion.model else None

@@ -1,4 +1,4 @@
-"""Relations, their widths, and the nets of one channel that they make: which ports of a composite are joined."""
+"""Finds the widths of relations, and the nets of one channel each: which ports of a composite are joined."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from .entities import Entity, Link, kind
 
 MAX_WIDTH = 1000
 _IN, _OUT = "input", "output"
-# Multiports of which there are as many channels as of another; and whether that tells of the other, too.
+# Multiports with as many channels as another; and whether this also determines the other.
 _AS_WIDE: dict[str, tuple[tuple[str, str, bool], ...]] = {
     **dict.fromkeys(("BooleanSelect", "ConfigurationSelect"), ((_OUT, "trueInput", True), (_OUT, "falseInput", True))),
     **dict.fromkeys(("BooleanSwitch", "ConfigurationSwitch"), (("trueOutput", _IN, True), ("falseOutput", _IN, True))),
@@ -22,7 +22,7 @@ _AS_WIDE: dict[str, tuple[tuple[str, str, bool], ...]] = {
 
 @dataclass(frozen=True)
 class PortFace:
-    """What wires need to know of a port: its direction, and whether it is a multiport."""
+    """What wiring needs to know about a port: its direction, and whether it is a multiport."""
 
     direction: str  # input or output
     multi: bool
@@ -43,14 +43,14 @@ class End:
 
 @dataclass
 class Net:
-    """What is joined by one channel of a relation: the ports in the order in which they were linked."""
+    """The ports joined by one channel of a relation, in the order in which they were linked."""
 
     ends: list[End] = field(default_factory=list)
     order: int = 0
 
 
 class Groups:
-    """The relations of one composite, those that are linked to each other as one."""
+    """The relations of one composite, grouped by the links between them."""
 
     def __init__(self, composite: Entity) -> None:
         self.composite = composite
@@ -76,7 +76,7 @@ class Groups:
         return None if link.relation is None or link.relation not in self._of else self._root(link.relation)
 
     def total(self, links: list[Link]) -> int:
-        """How many channels links come to, as far as that is known."""
+        """How many channels links have in all, as far as that is known."""
         found = 0
         for link in links:
             group = self.of(link)
@@ -130,7 +130,7 @@ class Wiring:
                         pass
 
     def _propagate(self) -> bool:
-        """Let what is known on one side of a composite's ports tell of the other."""
+        """Carry known widths from one side of a composite's ports to the other."""
         found = False
         for composite in self._composites:
             outer = self.groups[id(composite)]
@@ -157,7 +157,7 @@ class Wiring:
             return False
         difference = max(known.total(links) - open_.total(others), 0)
         if len(unknown) not in (1, difference) and difference:
-            return False  # which of them has how many cannot be told
+            return False  # how they share the channels is unknown
         for group in unknown:
             open_.width[group] = difference // len(unknown)
         return True
@@ -170,9 +170,9 @@ class Wiring:
         return groups.total(composite.links.get(port, []))
 
     def nets(self, composite: Entity) -> list[Net]:
-        """What is joined in a composite, each channel by itself."""
+        """The nets of a composite, one for each channel."""
         groups = self.groups[id(composite)]
-        at: dict[str, list[tuple[int, str, int]]] = {}  # of each relation: order, port, first channel
+        at: dict[str, list[tuple[int, str, int]]] = {}  # for each relation: order, port, first channel
         for port, links in composite.links.items():
             face = self._face(composite, port)
             channel = 0
@@ -197,7 +197,7 @@ class Wiring:
     def _ends(
         self, composite: Entity, groups: Groups, group: str, at: dict[str, list[tuple[int, str, int]]]
     ) -> list[tuple[int, str, int]]:
-        """The ports of a group in the order in which Ptolemy comes to them, from the relation of a sender on."""
+        """The ports of a group in the order in which Ptolemy visits them, starting from the relation of a sender."""
         members = groups.members(group)
         start = next(
             (name for name in members for _, port, _ in at.get(name, []) if self._sends(composite, port)), None
@@ -218,7 +218,7 @@ class Wiring:
         seen: set[str],
         found: list[tuple[int, str, int]],
     ) -> None:
-        # A stack, for a file may link relations in a long chain.
+        # A stack, because a file may link relations in a long chain.
         stack = [iter(self._linked(relation, groups, at, seen))]
         while stack:
             for order, port, channel in stack[-1]:
@@ -233,7 +233,7 @@ class Wiring:
     def _linked(
         self, relation: str, groups: Groups, at: dict[str, list[tuple[int, str, int]]], seen: set[str]
     ) -> list[tuple[int, str, int]]:
-        """The ports and relations that are linked to a relation; the latter with channel -1."""
+        """The ports and relations linked to a relation; relations have channel -1."""
         if relation in seen:
             return []
         seen.add(relation)

@@ -1,4 +1,4 @@
-"""What the names in expressions mean: the attributes of an entity, and of all that it is in."""
+"""The meaning of names in expressions: attributes of an entity and of everything that contains it."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ MAX_DEPTH = 50
 
 
 def is_text(said: Property) -> bool:
-    """Whether the value is taken as it is written, but for ``$name``."""
+    """Whether the value is used as written, except for ``$name``."""
     return said.java.rpartition(".")[2] in TEXTS or said.text("_stringMode") == "true"
 
 
@@ -30,7 +30,7 @@ def is_variable(said: Property) -> bool:
 
 
 class Scope:
-    """The attributes of one entity, within those of its surroundings."""
+    """The attributes of one entity, nested in those of its surroundings."""
 
     def __init__(
         self, entity: Property, around: Scope | None = None, defaults: Mapping[str, object] | None = None
@@ -42,11 +42,11 @@ class Scope:
         self._open: set[str] = set()
 
     def inside(self, entity: Entity, defaults: Mapping[str, object] | None = None) -> Scope:
-        """What an entity within knows."""
+        """The scope of an entity inside this one."""
         return Scope(entity, self, defaults)
 
     def find(self, name: str) -> Property | None:
-        """The attribute that a name stands for, here or around."""
+        """The attribute that a name refers to, here or further out."""
         scope: Scope | None = self
         while scope is not None:
             if (found := scope.own(name)) is not None:
@@ -59,7 +59,7 @@ class Scope:
         found = self.entity.properties.get(name)
         if found is not None and is_variable(found):
             return found
-        for each in self.entity.properties.values():  # attributes that widen the scope
+        for each in self.entity.properties.values():  # attributes that extend the scope
             if each.java.endswith(("ScopeExtendingAttribute", "ScopeExtender")) and name in each.properties:
                 return each.properties[name]
         return None
@@ -74,7 +74,7 @@ class Scope:
         return None
 
     def __call__(self, name: str) -> object:
-        """The value of a name; raises ``KeyError``, or ``ExpressionError`` if its own expression has none."""
+        """The value of a name; raises ``KeyError``, or ``ExpressionError`` if its own expression has no value."""
         scope: Scope | None = self
         while scope is not None:
             if (found := scope.own(name)) is not None:
@@ -87,7 +87,7 @@ class Scope:
     def _value(self, name: str, said: Property) -> object:
         if name not in self._values:
             if name in self._open or len(self._open) > MAX_DEPTH:
-                raise ExpressionError(f"{name!r} is defined by itself")
+                raise ExpressionError(f"{name!r} is defined in terms of itself")
             self._open.add(name)
             try:
                 self._values[name] = self.value_of(said)
@@ -96,14 +96,14 @@ class Scope:
         return self._values[name]
 
     def value_of(self, said: Property) -> Any:
-        """What an attribute comes to; raises ``ExpressionError``."""
+        """The value of an attribute; raises ``ExpressionError``."""
         text = said.value or ""
         if is_text(said):
             return self.filled(text, as_is=said.java.endswith("StringAttribute"))
         return self.value(text)
 
     def value(self, text: str) -> Any:
-        """What an expression comes to; None if it is empty."""
+        """The value of an expression; None if it is empty."""
         return evaluate(self.tree(text), self) if text.strip() else None
 
     def tree(self, text: str) -> Tree:
@@ -127,5 +127,5 @@ class Scope:
         return _REFERENCE.sub(value, text)
 
     def is_constant(self, name: str) -> bool:
-        """Whether a name is one that the language itself knows."""
+        """Whether a name is a constant of the language itself."""
         return name in CONSTANTS and self.find(name) is None

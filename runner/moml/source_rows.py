@@ -1,4 +1,4 @@
-"""Rows of the table: what begins events, and random numbers."""
+"""Rows of the table: sources of events, and random numbers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The expression language of Ptolemy II, read into trees."""
+"""Parses the expression language of Ptolemy II into trees."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ MAX_TERMS = 200
 
 
 class ExpressionError(Exception):
-    """Text that is no expression, or one that cannot be said or computed here; the message says why."""
+    """Text that is not an expression, or one that cannot be converted or evaluated; the message states why."""
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class Unary:
 
 @dataclass(frozen=True)
 class Binary:
-    """Two operands with a sign between them."""
+    """Two operands with an operator between them."""
 
     sign: str
     left: Tree
@@ -57,7 +57,7 @@ class Choice:
 
 @dataclass(frozen=True)
 class Call:
-    """A function, or what a parameter holds, with arguments behind it: ``max(a, b)``, ``array(0)``."""
+    """A function, or the value of a parameter, followed by arguments: ``max(a, b)``, ``array(0)``."""
 
     function: Tree
     arguments: tuple[Tree, ...]
@@ -104,7 +104,7 @@ class Steps:
 
 @dataclass(frozen=True)
 class Lambda:
-    """``function(x, y: int) x + y``, whose types are not kept."""
+    """``function(x, y: int) x + y``, without the types."""
 
     names: tuple[str, ...]
     body: Tree
@@ -125,22 +125,22 @@ _LEVELS: dict[object, int] = {
     sign: level
     for level, signs in enumerate(("||", "&&", "|", "#", "&", "== !=", "< <= > >=", "<< >> >>>", "+ -", "* / %"))
     for sign in signs.split()
-}  # how tightly signs hold
+}  # how tightly operators bind
 _CONSTANTS = {"true": True, "True": True, "TRUE": True, "false": False, "False": False, "FALSE": False}
 
 
 def parse(text: str) -> Tree:
     """The tree of an expression; raises ``ExpressionError``."""
     if len(text) > MAX_LENGTH:
-        raise ExpressionError(f"an expression of more than {MAX_LENGTH:,} characters")
+        raise ExpressionError(f"the expression has more than the maximum of {MAX_LENGTH:,} characters")
     try:
         return _Parser(text).whole()
-    except RecursionError:  # who calls may be deep down already
+    except RecursionError:  # the caller may be deep in the stack already
         raise ExpressionError(f"{_short(text)} is nested too deeply") from None
 
 
 def unescaped(text: str) -> str:
-    """What stands between quotes, with its escapes resolved."""
+    """The text between quotes, with its escapes resolved."""
     return re.sub(r"\\(u[0-9a-fA-F]{4}|.)", _character, text, flags=re.DOTALL)
 
 
@@ -161,7 +161,7 @@ class _Parser:
         while at < end:
             match = _TOKEN.match(text, at)
             if match is None:
-                raise ExpressionError(f"{_short(text)} is not understood at {_short(text[at:].strip())}")
+                raise ExpressionError(f"{_short(text)} cannot be read at {_short(text[at:].strip())}")
             at = match.end()
             self._read(match)
         self._tokens.append(("end", ""))
@@ -178,7 +178,7 @@ class _Parser:
 
     def _number(self, text: str, suffix: str) -> object:
         if "i" in suffix or "j" in suffix:
-            raise ExpressionError(f"{text}{suffix}: complex numbers are not known here")
+            raise ExpressionError(f"{text}{suffix}: complex numbers are not supported")
         try:
             if text[:2].lower() == "0x":
                 return int(text, 16)
@@ -191,7 +191,7 @@ class _Parser:
     # -- tokens ---------------------------------------------------------------------------------------------------
 
     def _peek(self, ahead: int = 0) -> object:
-        """The next sign; "" if the next token is none."""
+        """The next operator; "" if the next token is not one."""
         kind, value = self._tokens[min(self._place + ahead, len(self._tokens) - 1)]
         return value if kind == "sign" else ""
 
@@ -211,17 +211,17 @@ class _Parser:
             self._fail(f"expected {sign!r}")
 
     def _fail(self, why: str) -> NoReturn:
-        raise ExpressionError(f"{_short(self._text)} is not understood: {why}")
+        raise ExpressionError(f"{_short(self._text)} cannot be read: {why}")
 
     # -- grammar --------------------------------------------------------------------------------------------------
 
     def whole(self) -> Tree:
-        """The expression, behind which nothing else may stand."""
+        """The whole expression; nothing may follow it."""
         found = self._choice()
         while self._skip(";"):
             pass
         if self._tokens[self._place][0] != "end":
-            self._fail(f"{self._tokens[self._place][1]!r} was not expected")
+            self._fail(f"unexpected {self._tokens[self._place][1]!r}")
         return found
 
     def _choice(self) -> Tree:
@@ -249,7 +249,7 @@ class _Parser:
                 self._expect(",")
             kind, name = self._take()
             if kind != "name":
-                self._fail("the name of an argument was expected")
+                self._fail("expected the name of an argument")
             names.append(str(name))
             if self._skip(":"):
                 self._choice()
@@ -267,7 +267,7 @@ class _Parser:
         return left
 
     def _power(self) -> Tree:
-        """A sign holds tighter than a power: -2 to the power of 2 is 4."""
+        """A sign binds more tightly than a power: -2 to the power of 2 is 4."""
         found = self._unary()
         count = 0
         while self._skip("^"):
@@ -303,7 +303,7 @@ class _Parser:
             elif self._skip("."):
                 kind, name = self._take()
                 if kind != "name":
-                    self._fail("a name was expected after '.'")
+                    self._fail("expected a name after '.'")
                 found = Method(found, str(name), self._arguments(")") if self._skip("(") else None)
             else:
                 return found
@@ -333,8 +333,8 @@ class _Parser:
         if value == "[":
             return self._brackets()
         if value == "{|":
-            return self._braces("|}")  # a union, as a record with the one field that it has
-        return self._fail("it ends too early" if kind == "end" else f"{value!r} was not expected")
+            return self._braces("|}")  # a union, as a record with its one field
+        return self._fail("it ends too early" if kind == "end" else f"unexpected {value!r}")
 
     def _is_field(self) -> bool:
         kind = self._tokens[self._place][0]
@@ -351,7 +351,7 @@ class _Parser:
             if self._skip(end):
                 return Record(tuple(fields))
             self._expect(",")
-        return self._fail("a field 'name = value' was expected")
+        return self._fail("expected a field 'name = value'")
 
     def _brackets(self) -> Tree:
         if self._is_field():

@@ -1,8 +1,8 @@
-"""The table of counterparts: which of our actors stands for one of Ptolemy II's.
+"""The table of counterparts: which of our actors replaces which of Ptolemy II's.
 
-``"input* name=ours | output"`` are inputs and outputs, ``*`` a multiport; a name without ``=`` is ours in snake case.
-A parameter says its kind, then ``:ours`` where the name is another, and ``=default`` where Ptolemy's default is another
-or ours has none.  Everything is meant for a model with ``like: ptolemy``.
+``"input* name=ours | output"`` lists inputs and outputs; ``*`` marks a multiport; a name without ``=`` is ours in snake
+case.  A parameter states its kind, then ``:ours`` if the name differs, and ``=default`` if Ptolemy's default differs or
+ours has none.  All rows assume a model with ``like: ptolemy``.
 """
 
 from __future__ import annotations
@@ -82,7 +82,7 @@ _VIEWS = frozenset(
         "XMLWriter",
         "Exit",
         "Pause",
-        "TypeTest",  # of types, which are resolved otherwise here
+        "TypeTest",  # checks types, which are resolved differently here
     }
 )
 _ALSO = {
@@ -100,7 +100,7 @@ _NAMED: Mapping[str, Counterpart] = {**SOURCES, **RANDOM, **TIME, **FLOW, **COMP
 # The same name in two packages.
 _OTHERS: Mapping[str, str] = {"ptolemy.domains.de.lib.Sampler": "MostRecent"}
 _PACKAGES = ("ptolemy.", "org.ptolemy.", "kepler.")
-# Where names that are in the table mean something else.
+# Packages in which names of the table mean something else.
 _FOREIGN = ("ptolemy.actor.lib.vhdl.", "ptolemy.matlab.", "ptolemy.domains.ci.", "ptolemy.domains.ptera.")
 
 

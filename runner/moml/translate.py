@@ -1,4 +1,4 @@
-"""Expressions of Ptolemy II as expressions of Epicycle's; what is known before the run is computed."""
+"""Translates expressions of Ptolemy II to Epicycle's; what is known before the run is evaluated."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from .syntax import (
 )
 from .values import Function, Scope, evaluate
 
-# How tightly a piece of an expression holds together.
+# How tightly a piece of an expression binds.
 _CHOICE, _OR, _AND, _NOT, _COMPARE, _SUM, _PRODUCT, _SIGN, _POWER, _ATOM = range(10)
 _SIGNS: Mapping[str, tuple[str, int]] = {
     "||": ("or", _OR), "|": ("or", _OR), "&&": ("and", _AND), "&": ("and", _AND),
@@ -32,8 +32,8 @@ _SIGNS: Mapping[str, tuple[str, int]] = {
 }  # fmt: skip
 _SAME = ("abs", "min", "max", "sqrt", "exp", "log", "sin", "cos", "tan", "atan2", "hypot", "sum")
 MAX_OPENED = 20  # functions within functions
-MAX_TEXT = 2_000  # characters of an expression of ours
-_PATTERNS: Mapping[str, str] = {  # arguments are in brackets or between commas
+MAX_TEXT = 2_000  # characters of a translated expression
+_PATTERNS: Mapping[str, str] = {  # arguments are in parentheses or between commas
     "floor": "float(floor({0}))",
     "ceil": "float(ceil({0}))",
     "round": "floor({0} + 0.5)",
@@ -94,19 +94,19 @@ _Made: TypeAlias = "tuple[tuple[str, ...], Tree, _Translation]"  # arguments, bo
 def translated(
     tree: Tree, names: Mapping[str, str], scope: Scope, whole: Collection[str] = (), arrays: Collection[str] = ()
 ) -> str:
-    """The expression, in which ``names`` stand for what is known in the run alone; raises ``ExpressionError``.
+    """The translated expression, in which ``names`` are known only during the run; raises ``ExpressionError``.
 
-    Those in ``whole`` stand for whole numbers, whose quotients are whole in Ptolemy, too; those in ``arrays`` for
-    arrays, which are added and multiplied item by item.
+    Those in ``whole`` are whole numbers, whose quotients are whole in Ptolemy, too; those in ``arrays`` are arrays,
+    which are added and multiplied item by item.
     """
     try:
         return _Translation(names, scope, whole, arrays=arrays).said(tree)[0]
     except RecursionError:
-        raise ExpressionError("it is nested too deeply") from None
+        raise ExpressionError("the expression is nested too deeply") from None
 
 
 def literal(value: object) -> str:
-    """A value as it stands in an expression; raises ``ExpressionError``."""
+    """A value as written in an expression; raises ``ExpressionError``."""
     if isinstance(value, list):
         return "[" + ", ".join(map(literal, value)) + "]"
     if isinstance(value, dict):
@@ -117,7 +117,7 @@ def literal(value: object) -> str:
 
 
 def names_of(tree: Tree) -> set[str]:
-    """All names in an expression, those of functions included."""
+    """All names in an expression, including those of functions."""
     match tree:
         case Name(name):
             return {name}
@@ -146,7 +146,7 @@ def names_of(tree: Tree) -> set[str]:
 
 
 def _leaves(tree: Tree) -> Iterator[Tree]:
-    """What stands between the operators of an expression."""
+    """The operands of an expression."""
     match tree:
         case Unary(_, operand):
             yield from _leaves(operand)
@@ -170,10 +170,10 @@ class _Translation:
         self._scope = scope
         self._whole = set(whole)
         self._arrays = set(arrays)
-        self._depth = depth  # of functions that are opened up
+        self._depth = depth  # of expanded functions
 
     def said(self, tree: Tree) -> Said:
-        """The text, and how tightly it holds together."""
+        """The text, and how tightly it binds."""
         if not names_of(tree) & self._names.keys():
             text = literal(evaluate(tree, self._scope))
             return text, _SIGN if text.startswith("-") else _ATOM
@@ -214,12 +214,12 @@ class _Translation:
             case Matrix(rows):
                 lines = ("[" + ", ".join(self.said(each)[0] for each in row) + "]" for row in rows)
                 return "[" + ", ".join(lines) + "]", _ATOM
-        raise ExpressionError("it has an operator that is not known here")
+        raise ExpressionError("it has an operator that is not supported")
 
-    # -- functions that the model defines -------------------------------------------------------------------------
+    # -- functions defined in the model ---------------------------------------------------------------------------
 
     def _made(self, tree: Tree) -> _Made | None:
-        """A function, if it is one that the model defines."""
+        """A function, if the model defines it."""
         if isinstance(tree, Lambda):
             return tree.names, tree.body, self
         if not isinstance(tree, Name) or tree.name in self._names or not self._is_known(tree.name):
@@ -230,24 +230,24 @@ class _Translation:
         return found.names, found.body, _Translation({}, found.scope, (), self._depth)
 
     def _opened(self, made: _Made, texts: list[str], given: tuple[Tree, ...] = ()) -> Said:
-        """The body of a function, with what it is given in the place of its arguments."""
+        """The body of a function, with the given texts in place of its arguments."""
         names, body, around = made
         if len(names) != len(texts):
-            raise ExpressionError(f"a function takes {len(names)} values, and is given {len(texts)}")
+            raise ExpressionError(f"wrong number of arguments: the function takes {len(names)}, not {len(texts)}")
         if self._depth > MAX_OPENED:
-            raise ExpressionError("functions that call themselves are not known here")
+            raise ExpressionError("functions that call themselves are not supported")
         whole = {name for name, each in zip(names, given, strict=False) if self._is_whole(each)}
         meant = {**around._names, **dict(zip(names, texts, strict=True))}
         inner = _Translation(meant, around._scope, (around._whole - {*names}) | whole, self._depth + 1)
         found = inner.said(body)
         if len(found[0]) > MAX_TEXT:
-            raise ExpressionError("it is too long with the functions in it opened up")
+            raise ExpressionError("the expression is too long after expanding its functions")
         return found
 
     def _each(self, name: str, made: _Made, array: Tree) -> Said:
-        """A function of each element of an array."""
+        """A function applied to each element of an array."""
         if len(made[0]) != 1:
-            raise ExpressionError(f"{name} with a function of {len(made[0])} values is not known here")
+            raise ExpressionError(f"{name} takes a function of one argument, not of {len(made[0])}")
         item = made[0][0]
         while item in self._names.values():
             item += "_"
@@ -279,7 +279,7 @@ class _Translation:
         if sign == "%":
             return self._rest(left, right)
         if sign in ("==", "!=") and right == Const(0) and isinstance(left, Binary) and left.sign == "%":
-            # Whether there is a rest does not hang on signs.
+            # Whether there is a remainder does not depend on signs.
             return f"{self._held(left.left, _PRODUCT)} % {self._held(left.right, _SIGN)} {word} 0", _COMPARE
         beside = 1 if level in (_COMPARE, _SUM, _PRODUCT, _POWER) else 0
         first = self._held(left, level + (1 if level in (_COMPARE, _POWER) else 0))
@@ -301,7 +301,7 @@ class _Translation:
         return False
 
     def _item(self, tree: Tree) -> str:
-        """An item of an array, at the place ``k``; what is none is the same for all."""
+        """The item of an array at index ``k``; a value that is not an array is the same for all items."""
         match tree:
             case Unary("-", operand) if self._is_array(operand):
                 return f"-{self._item(operand)}"
@@ -310,7 +310,7 @@ class _Translation:
         return f"{self._held(tree, _ATOM)}[k]" if self._is_array(tree) else self._held(tree, _ATOM)
 
     def _rest(self, left: Tree, right: Tree) -> Said:
-        """The rest has the sign of the first operand there, and that of the second here."""
+        """The remainder has the sign of the first operand in Ptolemy, and that of the second here."""
         first, second = self._held(left, _ATOM), self._held(right, _SIGN)
         if not self._is_at_least(right, 1e-300):
             second = f"abs({second})"
@@ -375,4 +375,4 @@ class _Translation:
                 return pattern.format(*said), _ATOM if bare or pattern.endswith(")") else _POWER
         except IndexError:
             raise ExpressionError(f"{name} has too few arguments") from None
-        raise ExpressionError(f"the function {name!r} is not known here")
+        raise ExpressionError(f"the function {name!r} is not supported")

@@ -1,4 +1,4 @@
-"""What expressions of Ptolemy II come to: numbers, texts, truth values, arrays as lists, records as dicts."""
+"""Evaluates expressions of Ptolemy II: to numbers, texts, truth values, lists for arrays, dicts for records."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ from .syntax import (
     parse,
 )
 
-MAX_CALLS = 20_000  # of functions that expressions define
+MAX_CALLS = 20_000  # of functions defined in expressions
 CONSTANTS: Mapping[str, object] = {
     "PI": math.pi,
     "pi": math.pi,
@@ -50,7 +50,7 @@ CONSTANTS: Mapping[str, object] = {
     "MinFloat": 1.401298464324817e-45,
     "MaxUnsignedByte": 255,
     "MinUnsignedByte": 0,
-    # types, by a value of theirs
+    # types, each represented by a value
     "boolean": False,
     "int": 0,
     "long": 0,
@@ -65,7 +65,7 @@ Scope = Callable[[str], object]
 
 @dataclass
 class _Calls:
-    """How many calls an evaluation may still make, and how many evaluations are open."""
+    """How many calls an evaluation may still make, and how many evaluations are in progress."""
 
     left: int = MAX_CALLS
     open: int = 0
@@ -75,7 +75,7 @@ _CALLS = _Calls()
 
 
 class Function:
-    """What ``function(x) ...`` is worth."""
+    """The value of ``function(x) ...``."""
 
     def __init__(self, names: tuple[str, ...], body: Tree, scope: Scope) -> None:
         self.names = names
@@ -84,27 +84,27 @@ class Function:
 
     def __call__(self, *arguments: Any) -> Any:
         if len(arguments) != len(self.names):
-            raise TypeError(f"a function takes {len(self.names)} values, and is given {len(arguments)}")
+            raise TypeError(f"wrong number of arguments: the function takes {len(self.names)}, not {len(arguments)}")
         _CALLS.left -= 1
         if _CALLS.left < 0:
-            raise ExpressionError("it takes too long")
+            raise ExpressionError("evaluating it takes too long")
         given = dict(zip(self.names, arguments, strict=True))
         return _value(self.body, lambda name: given[name] if name in given else self.scope(name))
 
 
 def evaluate(tree: Tree, scope: Scope) -> Any:
-    """The value; ``scope`` finds that of a name, or raises ``KeyError``.  Raises ``ExpressionError``."""
+    """The value; ``scope`` returns that of a name, or raises ``KeyError``.  Raises ``ExpressionError``."""
     if _CALLS.open == 0:
         _CALLS.left = MAX_CALLS
     _CALLS.open += 1
     try:
         return _value(tree, scope)
     except KeyError as error:
-        raise ExpressionError(f"{error.args[0]!r} is not known") from None
+        raise ExpressionError(f"unknown name {error.args[0]!r}") from None
     except RecursionError:
-        raise ExpressionError("it is nested too deeply") from None
+        raise ExpressionError("the expression is nested too deeply") from None
     except (TypeError, ValueError, IndexError, ZeroDivisionError, OverflowError, AttributeError, MemoryError) as error:
-        raise ExpressionError(f"it cannot be computed: {error}") from None
+        raise ExpressionError(f"it cannot be evaluated: {error}") from None
     finally:
         _CALLS.open -= 1
 
@@ -137,7 +137,7 @@ def _value(tree: Tree, scope: Scope) -> Any:
             if isinstance(whole, dict) and name in whole:
                 return _applied(whole[name], given)
             if name not in FUNCTIONS:
-                raise ExpressionError(f"the function {name!r} is not known here")
+                raise ExpressionError(f"the function {name!r} is not supported")
             return FUNCTIONS[name](whole, *given)
         case Array(items):
             return unified([_value(each, scope) for each in items])
@@ -151,7 +151,7 @@ def _value(tree: Tree, scope: Scope) -> Any:
             return Rows([limited(_stepped(one, by, end))])
         case Lambda(names, body):
             return Function(names, body, scope)
-    raise ExpressionError("it is not understood")
+    raise ExpressionError("the expression is not supported")
 
 
 def _called(tree: Call, scope: Scope) -> Any:
@@ -165,7 +165,7 @@ def _called(tree: Call, scope: Scope) -> Any:
         if name == "eval" and len(arguments) == 1 and isinstance(arguments[0], str):
             return _evaluated(arguments[0], scope)
         if name not in FUNCTIONS:
-            raise ExpressionError(f"the function {name!r} is not known here") from None
+            raise ExpressionError(f"the function {name!r} is not supported") from None
         return FUNCTIONS[name](*arguments)
     return _applied(whole, arguments)
 
@@ -173,12 +173,12 @@ def _called(tree: Call, scope: Scope) -> Any:
 def _evaluated(text: str, scope: Scope) -> Any:
     _CALLS.left -= 1
     if _CALLS.left < 0:
-        raise ExpressionError("it takes too long")
+        raise ExpressionError("evaluating it takes too long")
     return _value(parse(text), scope)
 
 
 def _applied(whole: Any, arguments: list[Any]) -> Any:
-    """A function with its arguments, or an array or matrix with its indices."""
+    """Call a function with its arguments, or index an array or matrix."""
     if isinstance(whole, Function):
         return whole(*arguments)
     for index in arguments:
@@ -188,6 +188,6 @@ def _applied(whole: Any, arguments: list[Any]) -> Any:
 
 def _stepped(first: Any, step: Any, last: Any) -> list[Any]:
     if not step or (last - first) / step > MAX_ELEMENTS:
-        raise ExpressionError(f"it has more than {MAX_ELEMENTS:,} elements")
+        raise ExpressionError(f"it has more than the maximum of {MAX_ELEMENTS:,} elements")
     count = math.floor((last - first) / step + 1e-9) + 1
     return [first + number * step for number in range(max(count, 0))]

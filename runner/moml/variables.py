@@ -1,6 +1,7 @@
-"""Parameters that change in a run: those that a SetVariable sets, and PortParameters of composites.
+"""Converts parameters that change during a run: those set by a SetVariable, and PortParameters of composites.
 
-Each is a ``Variable`` beside the actors of the composite that declares it; what goes by it has an aspect ``Replace``.
+Each becomes a ``Variable`` among the actors of the composite that declares it; parameters that follow it get an aspect
+``Replace``.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from .syntax import ExpressionError, Tree
 from .translate import names_of, translated
 from .writing import Flow
 
-_FIRST = -1000  # a priority: a new value counts for all who fire at that microstep
+_FIRST = -1000  # a priority: a new value takes effect for all firings at that microstep
 
 
 class Variables:
@@ -41,27 +42,27 @@ class Variables:
         child, _, inner = name.rpartition(".")
         if child and (not inner or (found_child := around.entities.get(child)) is None or found_child.entities):
             path = self._conversion.path_of(around, entity)
-            self._conversion.notes.note(f"{path} sets {name}, which is no parameter of an actor beside it")
+            self._conversion.notes.note(f"{path} sets {name}, which is not a parameter of an actor beside it")
         home = None if scope.around is None else scope.around.home(name)
         owner = around if home is None or not isinstance(home.entity, Entity) else home.entity
         found = self._found.setdefault((id(owner), name), Changing(owner, name))
         found.delayed = (entity.text("delayed") or "true").strip() != "false"
 
     def has_port(self, entity: Entity, port: str) -> bool:
-        """Whether values come by a port of a composite."""
+        """Whether a port of a composite delivers values of a parameter."""
         found = self._found.get((id(entity), port))
         return found is not None and found.is_port
 
     def hand(self, refinement: Entity, name: str) -> None:
-        """Let a refinement go by a variable of its machine, which comes by an input of that name at each entry."""
+        """Make a refinement follow a variable of its machine, which arrives at an input of that name at each entry."""
         self._found[id(refinement), name] = Changing(refinement, name, delayed=False, is_port=True)
 
     def of(self, owner: Entity) -> list[Changing]:
-        """Those that a composite declares."""
+        """The changing parameters that a composite declares."""
         return [each for each in self._found.values() if each.owner is owner]
 
     def find(self, scope: Scope, name: str) -> Changing | None:
-        """The one that a name means, if it is one."""
+        """The changing parameter that a name refers to, if it is one."""
         around: Scope | None = scope
         while around is not None:
             if (found := self._found.get((id(around.entity), name))) is not None:
@@ -72,7 +73,7 @@ class Variables:
         return None
 
     def said(self, text: str, scope: Scope) -> tuple[str, Changing] | None:
-        """An expression by what the variables in it send, and one of them; None if there are none in it."""
+        """An expression over what its variables send, and one of these variables; None if it has none."""
         if not self._found:
             return None
         try:
@@ -83,7 +84,7 @@ class Variables:
             return None
 
     def names_in(self, tree: Tree, scope: Scope) -> tuple[dict[str, str], dict[str, Changing]]:
-        """What changes of an expression: its names in terms of our names for variables, and these."""
+        """The names in an expression that change, with our names for the variables, and these variables."""
         if not self._found:
             return {}, {}
         names, _ = self._names(tree, scope, 0)
@@ -93,7 +94,7 @@ class Variables:
         return ours, {name: each for name, each in variables.items() if re.search(rf"(?<!\w){name}(?!\w)", said)}
 
     def lead_to(self, changing: Changing, level: Level, port: str) -> None:
-        """Lead a variable to the input of an actor, through the composites between."""
+        """Connect a variable to the input of an actor, through the composites between."""
         here = level
         while here.entity is not changing.owner and here.outer is not None:
             name = here.names.fresh(f"{changing.name}_is")
@@ -133,7 +134,7 @@ class Variables:
         return changing.actor
 
     def follow(self, actor: Actor, level: Level, ours: str, text: str, name: str) -> None:
-        """Let a parameter of an actor go by the variables that its expression names, or by the one that it is."""
+        """Make a parameter of an actor follow the variables in its expression, or the variable that it is itself."""
         found = self.said(text, actor.scope) if text else None
         own = self._found.get((id(level.entity), f"{actor.entity.name}.{name}"))
         if own is not None:
@@ -145,13 +146,13 @@ class Variables:
             changing.readers.append((path.removeprefix(owner.at), expression))
 
     def note_setter(self, entity: Entity, level: Level, part: Part) -> None:
-        """Lead what a SetVariable sends to its variable, through the composites between."""
+        """Connect a SetVariable to its variable, through the composites between."""
         name = (entity.text("variableName") or "").strip().strip('"')
         changing = self.find(self._conversion.scope_of(level.entity), name)
         if changing is None:
             return
         end, here = f"{part.name}.variable", level
-        if "value" in part.entry:  # what it tells is what the variable is worth
+        if "value" in part.entry:  # it sends the value of the variable
             owner = self._conversion.levels[id(changing.owner)]
             path = f"{level.at}{part.name}.value".removeprefix(owner.at)
             changing.readers.append((path, f"{self.actor_of(changing)}.value"))
@@ -164,7 +165,7 @@ class Variables:
         changing.setters.append(end)
 
     def add(self, level: Level, actors: dict[str, Flow], connections: list[object]) -> dict[str, Flow]:
-        """Put the variables of a composite beside its actors; the aspects that come with them."""
+        """Add the variables of a composite to its actors; returns the aspects that follow them."""
         aspects: dict[str, Flow] = {}
         for each in self.of(level.entity):
             if not each.setters and not each.is_port:
@@ -177,7 +178,7 @@ class Variables:
             connections += [f"{source} -> {name}.input" for source in sources]
             setters = {source.partition(".")[0] for source in sources if not each.delayed and not each.is_port}
             for port in each.inputs:
-                if setters & self._behind(level, port.partition(".")[0]):  # it is read on the way to where it is set
+                if setters & self._behind(level, port.partition(".")[0]):  # it is read on the path to where it is set
                     connections.append(Flow({"from": f"{name}.value", "to": port, "delay": "0 s"}))
                 else:
                     connections.append(f"{name}.value -> {port}")
@@ -187,7 +188,7 @@ class Variables:
         return aspects
 
     def _behind(self, level: Level, name: str) -> set[str]:
-        """All parts of a composite to which tokens come from one of them, itself included, by our names."""
+        """All parts of a composite that tokens from a given part can reach, including itself, by our names."""
         ways: dict[str, set[str]] = {}
         for net in self._conversion.nets_of(level.entity):
             ends = {end.actor: self._conversion.end(level, end) for end in net.ends if end.actor}
@@ -204,7 +205,7 @@ class Variables:
 
 
 def set_variable(actor: Actor) -> None:
-    """A SetVariable, which begins with the value that the model gives."""
+    """A SetVariable, which starts with the value set in the model."""
     name = actor.text("variableName")
     actor.told.add("delayed")
     if actor.get("delayed", True) is False:

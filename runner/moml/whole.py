@@ -1,6 +1,6 @@
-"""What comes at the ports of actors, as far as those beside them tell: whole numbers, or arrays.
+"""Finds ports that receive only whole numbers or only arrays, judging by the actors connected to them.
 
-What whole numbers are divided by leaves no fractions in Ptolemy; arrays are added item by item.
+In Ptolemy, the quotient of whole numbers has no fraction, and arrays are added item by item.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ _VALUES = {
     "DiscreteClock": ("values",), "Clock": ("values",), "PoissonClock": ("values",), "Sequence": ("values",),
     "Const": ("value",), "Ramp": ("init", "step"), "Counter": (), "CurrentMicrostep": (),
 }  # fmt: skip
-# The parameters that say what these send; whole numbers if they are left out.
-_LISTS = ("DiscreteClock", "Clock", "PoissonClock", "Sequence")  # of which the values are items of a list
+# The parameters that determine what these send; whole numbers if they are left out.
+_LISTS = ("DiscreteClock", "Clock", "PoissonClock", "Sequence")  # which send the items of a list
 _OF_ARRAYS = frozenset({
     "SequenceToArray", "ElementsToArray",
     "ArrayAppend", "ArraySort", "ArrayExtract", "ArrayUpdate", "ArrayRemoveElement",
@@ -24,12 +24,12 @@ _OF_ARRAYS = frozenset({
 
 
 def whole_ports(conversion: Converting, composite: Entity, child: Entity) -> frozenset[str]:
-    """The ports of a child at which only whole numbers come."""
+    """The ports of a child that receive only whole numbers."""
     return _ports(conversion, composite, child, lambda entity: _sends(conversion, entity, int))
 
 
 def array_ports(conversion: Converting, composite: Entity, child: Entity) -> frozenset[str]:
-    """The ports at which only arrays come."""
+    """The ports of a child that receive only arrays."""
 
     def sends(entity: Entity) -> bool:
         return kind(entity) in _OF_ARRAYS or _sends(conversion, entity, list)
@@ -55,7 +55,7 @@ def _ports(conversion: Converting, composite: Entity, child: Entity, sends: Call
 
 
 def _sends(conversion: Converting, entity: Entity, wanted: type) -> bool:
-    """Whether all that it sends is of a type."""
+    """Whether everything that an actor sends is of a type."""
     names = _VALUES.get(kind(entity))
     if names is None or (wanted is list and not names):
         return False

@@ -1,4 +1,4 @@
-"""Nets as connections: a line each, in an order in which the channels of all multiports are those of the file."""
+"""Writes nets as connections: a line each, in an order that keeps the channels of all multiports."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def connections_of(conversion: Converting, level: Level) -> list[Any]:
     for each in made:
         if each.sinks and not each.sources and any("." in sink for sink in each.sinks):
             level_path = level.told(each.sinks[0])
-            conversion.notes.note(f"{level_path} is connected to nothing that sends")
+            conversion.notes.note(f"{level_path} has no sender connected to it")
     written = [line for each in _ordered(lines, conversion, level) for line in each.written()]
     for (composite, path), port in conversion.triggers.items():
         actor, _, name = path.rpartition(".")
@@ -35,13 +35,13 @@ def connections_of(conversion: Converting, level: Level) -> list[Any]:
 
 
 class _Line:
-    """One connection, with what is to be known of its ends."""
+    """One connection, with what must be known about its ends."""
 
     def __init__(self, conversion: Converting, level: Level, net: Net, counting: CountsEnds) -> None:
         self.ends: list[End] = net.ends
         self.sources: list[str] = []
         self.sinks: list[str] = []
-        self.again: list[str] = []  # ports to which it leads by more than one channel
+        self.again: list[str] = []  # ports that it reaches through more than one channel
         for end in net.ends:
             found = conversion.end(level, end)
             if found is None:
@@ -53,7 +53,7 @@ class _Line:
         self.shared = self._is_shared(conversion, level, counting)
 
     def _is_shared(self, conversion: Converting, level: Level, counts: CountsEnds) -> bool:
-        """Whether it has to be said that all of it is one channel."""
+        """Whether the connection must be marked as one shared channel."""
         if counts.senders(level.entity, self.ends) > 1:
             return True
         if counts.receivers(level.entity, self.ends) < 2:
@@ -61,7 +61,7 @@ class _Line:
         return any(_sends_by_channel(conversion, level, end) for end in self.ends)
 
     def written(self) -> list[Any]:
-        """The line, and more of them where it leads to a port by several channels."""
+        """The line, and further lines if it reaches a port through several channels."""
         return [self._written(self.sinks), *(self._written([each]) for each in self.again)]
 
     def _written(self, sinks: list[str]) -> Any:
@@ -72,7 +72,7 @@ class _Line:
 
 
 def _sends_by_channel(conversion: Converting, level: Level, end: End) -> bool:
-    """Whether this is an output of an actor of ours that has channels."""
+    """Whether this is an output with channels of one of our actors."""
     part = level.parts.get(end.actor)
     if part is None or part.row is None or end.port not in part.row.ports:
         return False
@@ -85,20 +85,20 @@ def _sends_by_channel(conversion: Converting, level: Level, end: End) -> bool:
 
 
 class Counting:
-    """How many actors' outputs lead into a net, and to how many inputs it leads, through the borders of composites."""
+    """Counts the actor outputs that lead into a net and the inputs that it reaches, across borders of composites."""
 
     def __init__(self, conversion: Converting) -> None:
         self._conversion = conversion
-        self._found: dict[tuple[int, str, int, bool], int] = {}  # 0 while it is looked for
+        self._found: dict[tuple[int, str, int, bool], int] = {}  # 0 while it is being counted
         self._nets: dict[tuple[int, bool], int] = {}
         self._machines: dict[int, bool] = {}
 
     def senders(self, composite: Any, ends: list[End]) -> int:
-        """How many outputs of actors lead to some ends of a net; 2 stands for several."""
+        """How many outputs of actors lead to these ends of a net; 2 means several."""
         return self._all(composite, ends, senders=True)
 
     def receivers(self, composite: Any, ends: list[End]) -> int:
-        """To how many inputs of actors they lead."""
+        """How many inputs of actors these ends lead to; 2 means several."""
         return self._all(composite, ends, senders=False)
 
     def _all(self, composite: Any, ends: list[End], *, senders: bool) -> int:
@@ -110,7 +110,7 @@ class Counting:
         return min(found, 2)
 
     def _beyond(self, composite: Any, end: End, *, senders: bool) -> int:
-        """How many there are behind one end; 2 stands for several."""
+        """How many there are beyond one end; 2 means several."""
         conversion = self._conversion
         child = composite.entities.get(end.actor) if end.actor else composite
         face = None if child is None else conversion.face(child, end.port)
@@ -121,14 +121,14 @@ class Counting:
             return 0
         if end.actor and (id(child) not in conversion.wiring.groups or self._is_machine(child)):
             return 1
-        # On the other side of a composite's port.
+        # Continue on the other side of a composite's port.
         if end.actor:
             inside, actor = child, ""
         else:
             inside, actor = conversion.container_of(composite), composite.name
         if inside is None:
             return 0
-        if self._is_machine(inside):  # whose refinements are joined with its ports by their names
+        if self._is_machine(inside):  # its refinements are joined to its ports by name
             return 1
         key = (id(inside), f"{actor}.{end.port}", end.channel, senders)
         if key not in self._found:
@@ -143,7 +143,7 @@ class Counting:
         return self._machines[id(entity)]
 
     def _in_net(self, composite: Any, net: Net, *, senders: bool) -> int:
-        """The same of all of a net: the end that asks is none of those that it asks for."""
+        """The same for all of a net: the end from which it was reached never counts itself."""
         key = (id(net), senders)
         if key not in self._nets:
             self._nets[key] = 0
@@ -152,7 +152,7 @@ class Counting:
 
 
 def _ordered(lines: list[_Line], conversion: Converting, level: Level) -> list[_Line]:
-    """The lines in their order, but as the channels of every multiport ask for."""
+    """The lines in their order, changed where the channels of a multiport require it."""
     channels: dict[str, list[tuple[int, int, int]]] = {}
     for number, line in enumerate(lines):
         for end in line.ends:
@@ -174,7 +174,7 @@ def _ordered(lines: list[_Line], conversion: Converting, level: Level) -> list[_
     while left:
         if not ready:
             ready = [min(left)]
-            conversion.notes.note(f"{level.path or 'the model'}: some channels of multiports are in another order")
+            conversion.notes.note(f"{level.path or 'the model'}: some channels of multiports are in a different order")
         number = heapq.heappop(ready)
         if number not in left:
             continue
@@ -188,7 +188,7 @@ def _ordered(lines: list[_Line], conversion: Converting, level: Level) -> list[_
 
 
 def _rank(level: Level, end: End) -> int:
-    """Where a port stands among those of one actor that are one port of ours."""
+    """The position of a port among those of an actor that become one port of ours."""
     part = level.parts.get(end.actor)
     if part is None or part.row is None:
         return 0

@@ -1,4 +1,4 @@
-"""What guards and actions of a machine say, in the words of the model language."""
+"""Converts guards and actions of a state machine to the model language."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ _TARGET = re.compile(r"(?P<name>[^()]+?)\s*(\((?P<channel>[^()]*)\))?")
 
 
 class Words:
-    """The names of a machine, and what it says with them.
+    """The names of a state machine, and the guards and actions that use them.
 
-    There, a name of an input, with or without ``_isPresent``, is of its last channel, or of the one whose number
-    follows.  Here, each channel is a port by itself.
+    In Ptolemy, the name of an input, with or without ``_isPresent``, refers to its last channel, or to the one whose
+    number follows.  Here, each channel is a separate port.
     """
 
     def __init__(
@@ -36,11 +36,11 @@ class Words:
         self._outputs = outputs
         self._variables = variables
         self._tell = tell
-        self._asked: set[str] = set()  # ours
+        self._asked: set[str] = set()  # our names
         self._sent: set[str] = set()
 
     def _names(self) -> dict[str, str]:
-        """What guards and actions name, and how that is said here."""
+        """The names that guards and actions may use, and our names for them."""
         found: dict[str, str] = {}
         for name, channels in self._heard.items():
             said = {name: channels[-1], **{f"{name}_{number}": ours for number, ours in enumerate(channels)}}
@@ -88,7 +88,7 @@ class Words:
 
     @staticmethod
     def targets(transition: Relation, name: str) -> list[str]:
-        """What actions of a kind set."""
+        """The targets of actions of a kind."""
         parts = (part.partition("=") for part in _split(transition.text(name) or ""))
         return [target.strip() for target, equals, _ in parts if equals and target.strip()]
 
@@ -98,13 +98,13 @@ class Words:
         for part in filter(str.strip, _split(transition.text(name) or "")):
             target, equals, text = (each.strip() for each in part.partition("="))
             if not (equals and target):
-                self._tell(f"{transition.name}: the action {part.strip()!r} is not understood, and left out")
+                self._tell(f"{transition.name}: the action {part.strip()!r} is not an assignment and is left out")
                 continue
             left_out = f"{transition.name}: {target} = {text} is left out"
             match = _TARGET.fullmatch(target)
             port = target if match is None else match["name"]
             if port not in self._outputs and port not in self._variables:
-                self._tell(f"{left_out}: {port} is no output and no variable here")
+                self._tell(f"{left_out}: {port} is neither an output nor a variable")
                 continue
             ours = self._destinations(target, port, None if match is None else match["channel"])
             if not ours:
@@ -118,18 +118,18 @@ class Words:
         return said
 
     def _destinations(self, target: str, port: str, channel: str | None) -> list[str]:
-        """Our outputs for one of the file's: for all of its channels, or for one."""
+        """Our outputs for an output of the file: for all of its channels, or for one."""
         if port not in self._outputs:
             return [self._variables[port]]
         if channel is None:
             return [*self._outputs[port]]
         number = self._scope.value(channel)
         if type(number) is not int or number < 0:
-            raise ExpressionError(f"{target} = ...: {channel.strip()} is no channel")
+            raise ExpressionError(f"{target} = ...: {channel.strip()} is not a channel")
         return [*self._outputs[port][number : number + 1]]
 
     def wired(self) -> dict[str, list[str | None]]:
-        """Our ports for the channels of each port of the file, none for those that no guard or action names."""
+        """Our ports for the channels of each port of the file; None for those that no guard or action names."""
         inputs = {name: channels for name, channels in self._heard.items() if name not in self._outputs}
         for name, channels in inputs.items():
             if self._asked.isdisjoint(channels):
@@ -153,7 +153,7 @@ def _conjuncts(tree: Tree) -> list[Tree]:
 
 
 def _split(text: str) -> list[str]:
-    """Actions between semicolons, those in texts and brackets not counted."""
+    """The actions separated by semicolons, except semicolons in texts and brackets."""
     masked = QUOTED.sub(lambda match: "_" * len(match[0]), text)
     depth, start, found = 0, 0, []
     for place, character in enumerate(masked):

@@ -1,4 +1,4 @@
-"""YAML as a person would write it: short things on one line, sections in the usual order."""
+"""Writes YAML as a person would: short values on one line, sections in the usual order."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Flow(dict[str, object]):
 
 
 def scalar(value: object, *, flow: bool = False) -> str:
-    """A value without parts; ``flow``: inside of brackets."""
+    """A value without parts; ``flow``: inside brackets."""
     if isinstance(value, bool):
         return "true" if value else "false"
     if value is None:

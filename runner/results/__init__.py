@@ -1,4 +1,4 @@
-"""What a run leaves: the event log and its digest, signals, metrics, and the files that hold them."""
+"""The results of a run: the event log and its digest, signals, metrics, and the files that hold them."""
 
 from .arrow import write_signals
 from .encoding import TokenError, canonical, cell, leaves, plain

@@ -1,7 +1,7 @@
 """Columns of an Arrow table, made of buffers, and the file of recorded signals.
 
-``pyarrow.array`` would do, but imports all of pandas to ask whether the values are of its kinds, which takes longer
-than anything else that a short run does (0.5 s of 1.4 s).
+``pyarrow.array`` would do, but imports all of pandas to check for its types, which takes longer than anything else in a
+short run (0.5 s of 1.4 s).
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ def numbers(values: Sequence[float | None], kind: DTypeLike) -> Any:
 
 
 def texts(values: Sequence[str | None]) -> Any:
-    """A column of texts; None is null.  Halves of surrogate pairs, which are no characters, are escaped."""
+    """A column of texts; None is null.  Lone surrogates, which are not characters, are escaped."""
     import pyarrow as pa
 
     encoded = [(value or "").encode(errors="backslashreplace") for value in values]
@@ -38,7 +38,7 @@ def texts(values: Sequence[str | None]) -> Any:
 
 
 def _nulls(values: Sequence[object]) -> Any:
-    """Where there is something, a bit for each; None if there is everywhere."""
+    """Which values are present, a bit for each; None if all are."""
     import pyarrow as pa
 
     present = np.fromiter((value is not None for value in values), bool, len(values))
@@ -46,7 +46,7 @@ def _nulls(values: Sequence[object]) -> Any:
 
 
 def categories(values: Sequence[str]) -> Any:
-    """A column of texts of which there are few, each stored once."""
+    """A column with few different texts, each stored once."""
     import pyarrow as pa
 
     known = {value: number for number, value in enumerate(dict.fromkeys(values))}
@@ -54,7 +54,7 @@ def categories(values: Sequence[str]) -> Any:
 
 
 def write_signals(results: Results, path: Path) -> None:
-    """The recorded signals as ``Results.table`` has them."""
+    """The recorded signals, as in ``Results.table``."""
     import pyarrow as pa
     import pyarrow.parquet as pq
 
@@ -71,7 +71,7 @@ def write_signals(results: Results, path: Path) -> None:
         }
     )
     aside = path.with_name(f".{path.name}")
-    # Numbers are mostly near to the one before: told that, Parquet takes two thirds of the place for both times.
+    # Most times are close to the one before; using that, Parquet needs two thirds of the space for both columns.
     encoding = dict.fromkeys(("time", "value"), "BYTE_STREAM_SPLIT") | {"time_ns": "DELTA_BINARY_PACKED"}
     few = [name for name in columns if name not in encoding]
     pq.write_table(table, aside, compression="zstd", use_dictionary=few, column_encoding=encoding)

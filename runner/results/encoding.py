@@ -1,7 +1,7 @@
 """Tokens as plain data and as canonical bytes, for the event log and its digest.
 
 A token may be a number, a text, None, a list or tuple, a set, a mapping with text keys, a NumPy array, or a dataclass
-of these.  Anything else is logged by its ``repr``; if that shows an address instead of a value, it is refused.
+of these.  Anything else is logged by its ``repr``; if that shows an address instead of a value, the token is refused.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ _INTEGER = struct.Struct("<cq").pack
 _COUNT = struct.Struct("<I").pack
 
 
-# A NaN has many bit patterns, and machines differ in which one an operation gives.
+# NaN has many bit patterns, and machines differ in the one that an operation gives.
 _NAN = struct.pack("<cQ", b"f", 0x7FF8000000000000)
 MOST_NESTED = 64
 _ADDRESS = re.compile(r" at 0x[0-9a-fA-F]+")
@@ -45,7 +45,7 @@ def field_names(cls: type) -> tuple[str, ...]:
 
 @cache
 def field_values(cls: type) -> Callable[[Any], tuple[Any, ...]]:
-    """What gives the values of a dataclass, in the same order."""
+    """A function that gives the values of a dataclass, in the same order."""
     names = field_names(cls)
     if len(names) > 1:
         return attrgetter(*names)
@@ -74,7 +74,7 @@ Encode = Callable[[Any], bytes]
 
 
 class Encoders(dict[type, Encode]):
-    """``encoders[type(token)](token)`` is a token as bytes; what a type is, is found out when it is first met."""
+    """``encoders[type(token)](token)`` is a token as bytes; the encoder of a type is made when it first occurs."""
 
     def __missing__(self, cls: type) -> Encode:
         encode = self[cls] = _encoder(cls)
@@ -85,7 +85,7 @@ encoders = Encoders()
 
 
 def canonical(token: Any) -> bytes:
-    """A token as bytes: equal tokens give equal bytes on every machine, and no two kinds are confused."""
+    """A token as bytes: equal tokens give equal bytes on every machine, tokens of different kinds different ones."""
     return encoders[type(token)](token)
 
 
@@ -95,7 +95,7 @@ def is_record(cls: type) -> bool:
 
 
 def _encoder(cls: type) -> Encode:
-    """What makes bytes of the tokens of one type."""
+    """The encoder for the tokens of one type."""
     if issubclass(cls, float):
         return _float
     if cls is np.ndarray:
@@ -113,7 +113,7 @@ def _encoder(cls: type) -> Encode:
 
 
 def _float(token: float) -> bytes:
-    return _NAN if token != token else _DOUBLE(b"f", token)  # noqa: PLR0124  NaN is; asked without a call
+    return _NAN if token != token else _DOUBLE(b"f", token)  # noqa: PLR0124  true of NaN; without a call
 
 
 def _integer(token: int) -> bytes:
@@ -128,7 +128,7 @@ def _scalar(token: Any) -> bytes:
 
 
 class _Level(threading.local):
-    """How deep in a token the encoder of this thread is."""
+    """The present nesting depth of the encoder of this thread."""
 
     depth = 0
 
@@ -137,9 +137,9 @@ _level = _Level()
 
 
 def _nested(encode: Encode) -> Encode:
-    """What encodes a token that holds others, as far as no loop wraps it up again and again.
+    """The encoder for tokens that hold others, up to a limit in case a loop keeps wrapping a token.
 
-    A limit of our own: where Python runs out of stack depends on who called, and would differ from core to core.
+    The limit is our own: where Python runs out of stack depends on the caller, and would differ between cores.
     """
 
     def encode_inside(token: Any) -> bytes:
@@ -147,8 +147,7 @@ def _nested(encode: Encode) -> Encode:
         try:
             if _level.depth > MOST_NESTED:
                 raise TokenError(
-                    f"the token is nested more than {MOST_NESTED} levels deep; "
-                    "does a loop put it into a list again and again?"
+                    f"the token is nested more than {MOST_NESTED} levels deep; does a loop keep putting it into a list?"
                 )
             return encode(token)
         finally:
@@ -188,7 +187,7 @@ _OF_KINDS: tuple[tuple[Any, Encode], ...] = (
 
 
 def _fields_encoder(cls: type) -> Encode:
-    """The encoder of a dataclass: what is the same for all its instances is encoded here."""
+    """The encoder of a dataclass: what all its instances share is encoded here."""
     names = [_text(name) for name in field_names(cls)]
     values = field_values(cls)
     head = b"d" + _text(cls.__qualname__) + _COUNT(len(names))
@@ -203,7 +202,7 @@ def _fields_encoder(cls: type) -> Encode:
 
 
 def _array(token: Any) -> bytes:
-    if token.dtype is _FLOAT64 and token.size <= _FEW:  # most of them, in half the time
+    if token.dtype is _FLOAT64 and token.size <= _FEW:  # most of them take half the time
         few: bytes = token.tobytes()
         total = sum(_FEW_NUMBERS[token.size](few))
         if total == total:  # noqa: PLR0124  so no number is NaN
@@ -211,7 +210,7 @@ def _array(token: Any) -> bytes:
     kind = token.dtype.kind
     if kind not in "biuf":
         return b"A" + canonical(token.dtype.str) + canonical(token.tolist())
-    # The largest number of an array with a NaN is NaN; asking so takes a quarter of the time of isnan(...).any().
+    # The maximum of an array with a NaN is NaN; this check takes a quarter of the time of isnan(...).any().
     if kind == "f" and token.size and math.isnan(token.item(token.argmax())):
         token = token.copy()
         token[np.isnan(token)] = np.nan
@@ -225,7 +224,7 @@ def _array_head(dtype: np.dtype[Any], shape: tuple[int, ...]) -> bytes:
 
 
 _FLOAT64 = np.dtype("<f8")
-_FEW = 32  # numbers that are looked at in Python
+_FEW = 32  # numbers that are checked in Python
 _FEW_NUMBERS = [struct.Struct(f"<{size}d").unpack for size in range(_FEW + 1)]
 
 
@@ -238,8 +237,8 @@ def _shown(token: Any) -> str:
     text = repr(token)
     if _ADDRESS.search(text):
         raise TokenError(
-            f"a token of type {type(token).__name__} has no value that could be logged: make it a dataclass, "
-            "or give it a __repr__ that shows what is in it"
+            f"a token of type {type(token).__name__} has no value that can be logged: make it a dataclass, or give it "
+            "a __repr__ that shows its contents"
         )
     return text
 
@@ -250,9 +249,9 @@ def _text(text: str) -> bytes:
 
 
 def leaves(token: Any, field: str = "") -> Iterator[tuple[str, Any]]:
-    """What a token is made of in the end, with the names of the places, e.g. ``("position[0]", 1.5)``.
+    """The leaves of a token, with the names of their places, such as ``("position[0]", 1.5)``.
 
-    What holds nothing, such as an empty list, is a leaf itself.
+    An empty container, such as an empty list, is itself a leaf.
     """
     found: Iterator[tuple[str, Any]] | None = None
     if isinstance(token, np.ndarray) and token.ndim == 0:
@@ -280,7 +279,7 @@ def cell(leaf: Any) -> Cell:
     """A leaf in the columns of a table: its type, its value as a float, its text.
 
     Numbers have a value and truth values 0 or 1; a text has itself, a member of an enumeration its name, and anything
-    else what the event log shows of it.  An int that no float is has its digits as text, too.  None has neither.
+    else what the event log shows of it.  An int that no float equals has its digits as text, too.  None has neither.
     """
     if leaf is None:
         return "none", None, None
@@ -291,7 +290,7 @@ def cell(leaf: Any) -> Cell:
     if isinstance(leaf, (int, np.integer)):
         try:
             value = float(leaf)
-        except OverflowError:  # beyond all floats
+        except OverflowError:  # too large for a float
             value = math.inf if leaf > 0 else -math.inf
         return "int", value, None if value == leaf else str(int(leaf))
     if isinstance(leaf, (float, np.floating)):

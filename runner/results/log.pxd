@@ -1,4 +1,4 @@
-# Types for C; what everything is for is said in log.py.
+# Types for C; log.py has the documentation.
 
 cimport cython
 

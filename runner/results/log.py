@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     import pandas
 
 COLUMNS = ("time", "microstep", "event", "actor", "port", "channel", "aspect", "value")
-_MANY = 1_000  # records that are hashed together, when a tag is over
+_MANY = 1_000  # records that are hashed together at the end of a tag
 _MOST = 10_000
 
 
@@ -45,7 +45,7 @@ class Record:
     value: Any
 
     def encoded(self, *, microstep: bool = True) -> bytes:
-        """The record in the canonical form of which the digest is made; with ``microstep`` false without that."""
+        """The record in the canonical form that the digest uses; without the microstep if ``microstep`` is false."""
         names = map(canonical, (self.event, self.actor, self.port, self.aspect, self.channel))
         tag = self.tag if microstep else Tag(self.tag.time, 0)
         return stamp(tag) + b"".join(names) + canonical(self.value)
@@ -71,7 +71,7 @@ class Record:
 
 
 class Writer:
-    """Appends records with the same names to a log: a tag and a value are all that there is to give for each."""
+    """Appends records with the same names to a log; each needs only a tag and a value."""
 
     __slots__ = ("_head", "_keep", "log", "names")
 
@@ -82,7 +82,7 @@ class Writer:
         self._keep = keep
 
     def write(self, when: When, value: Any) -> None:
-        """Append a record; raises what makes it impossible to log the value."""
+        """Append a record; raises an exception if the value cannot be logged."""
         log = self.log
         sheet = log.sheet
         if when is not log.when:
@@ -92,7 +92,7 @@ class Writer:
             sheet.keep(self._head, kept)
             if type(kept) is bytes and len(kept) > LARGE:
                 log.hash_records()
-        if sheet.size > _MOST:  # all of them at one tag, nearly
+        if sheet.size > _MOST:  # nearly all at one tag
             log.hash_many(f"{self.names[1]}.{self.names[2]}")
         if self._keep is not None:
             self._keep(Record(_tag(when), *self.names, value))
@@ -103,9 +103,9 @@ def _tag(when: When) -> Tag:
 
 
 class EventLog:
-    """Counts and digests every record, and keeps those that ``keeps(event, actor, port, aspect)`` says.
+    """Counts and digests every record, and keeps those for which ``keeps(event, actor, port, aspect)`` is true.
 
-    With ``log_to`` it keeps none of these, but gives them to that.
+    With ``log_to``, it passes these on instead.
     """
 
     __slots__ = (
@@ -122,18 +122,18 @@ class EventLog:
         self._keeps = keeps
         self._writers: dict[Names, Writer] = {}
         self._hash = hashlib.sha256()
-        self.sheet = Sheet()  # what is to be hashed, many records at a time
+        self.sheet = Sheet()  # bytes to be hashed, many records at a time
         self.tokens = WaitingTokens()
         self._hashed = 0  # records
-        self.when: When | None = None  # of the last record
-        self.crowd: Callable[[Tag, str, int], None] | None = None  # is told of many records at one tag
+        self.when: When | None = None  # tag of the last record
+        self.crowd: Callable[[Tag, str, int], None] | None = None  # counts many records at one tag
 
     def add(self, tag: Tag, event: str, actor: str, port: str, channel: int | None, aspect: str, value: Any) -> None:
         """Append a record."""
         self.writer(event, actor, port, channel, aspect).write(tag, value)
 
     def writer(self, event: str, actor: str, port: str, channel: int | None, aspect: str) -> Writer:
-        """What appends records with these names."""
+        """The writer of records with these names."""
         names = (event, actor, port, channel, aspect)
         if (writer := self._writers.get(names)) is None:
             keeps = self._keeps is not None and self._keeps(event, actor, port, aspect)
@@ -142,24 +142,24 @@ class EventLog:
         return writer
 
     def new_writer(self, names: Names, keep: Callable[[Record], None] | None) -> Writer:
-        """A writer that there was none of before."""
+        """A new writer."""
         return Writer(self, names, keep)
 
     def turn_to(self, when: When) -> None:
-        """The records that follow are of this tag."""
+        """The following records have this tag."""
         self.when = when
         self.sheet.turn_to(when)
         if self.sheet.size > _MANY:
             self.hash_records()
 
     def hash_many(self, port: str) -> None:
-        """There are very many records at one tag, of which a port has just sent one."""
+        """Handle very many records at one tag, the last of them sent by a port just now."""
         if self.crowd is not None and self.when is not None:
             self.crowd(_tag(self.when), port, _MOST)
         self.hash_records()
 
     def hash_records(self) -> None:
-        """Make the bytes of what waits for that."""
+        """Encode the waiting records."""
         size = self.sheet.size
         self._hash.update(self.sheet.taken(canonical))
         self._hashed += size

@@ -1,4 +1,4 @@
-"""LogFile: an event log that is written while the run goes on, so that it takes no memory."""
+"""LogFile: an event log that is written during the run, so that it takes no memory."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ from .log import COLUMNS, LogError, Record
 
 FORMATS = (".parquet", ".csv", ".jsonl")
 _LOGGER = logging.getLogger("epicycle")
-_ROWS = 10_000  # that are written together
+_ROWS = 10_000  # rows that are written together
 _Row = tuple[Any, ...]
 
 
 class LogFile:
-    """Parquet, CSV or JSON lines, by the ending of the file's name; raises ``LogError``.
+    """Parquet, CSV or JSON lines, by the suffix of the file's name; raises ``LogError``.
 
-    What it has been given is in the file when it is closed, however the run has ended.  A file that cannot be written
-    any more, as on a full disk, does not end the run: this is reported when it is closed.
+    All its records are in the file once it is closed, however the run has ended.  A file that can no longer be written,
+    as on a full disk, does not end the run: the error is reported when the file is closed.
 
     >>> with LogFile(Path("log.csv")) as file:
     ...     Simulation(model, keep_log=True, log_to=file.add).run()
@@ -80,19 +80,19 @@ class LogFile:
 def check_log_path(path: Path) -> None:
     """Raise ``LogError`` early, before a run whose log could not be written."""
     if path.suffix not in FORMATS:
-        raise LogError(f"{path} is no log file: its name must end in {', '.join(FORMATS)}")
+        raise LogError(f"{path} is not a log file: its name must end in {', '.join(FORMATS)}")
     if not path.parent.is_dir():
         raise LogError(f"{path} cannot be written: there is no folder {path.parent}")
 
 
 def write_log(records: Iterable[Record], path: Path) -> None:
-    """Write records that have been kept."""
+    """Write kept records."""
     with LogFile(path) as file:
         for record in records:
             file.add(record)
 
 
-# -- formats: what writes many rows, and what ends the file -----------------------------------------------------------
+# -- formats: functions that write many rows, and that end the file ---------------------------------------------------
 
 _Opened = tuple[Callable[[list[_Row]], None], Callable[[], None]]
 
@@ -120,7 +120,7 @@ def _csv(path: Path) -> _Opened:
 
 
 def _put(file: io.FileIO, text: str) -> None:
-    """Write all of it at once, so that a kill leaves few half lines."""
+    """Write everything at once, so that a kill leaves few incomplete lines."""
     data = memoryview(text.encode())
     while data:
         data = data[file.write(data) or 0 :]

@@ -1,4 +1,4 @@
-"""Outcome: what a metric came to, and the interval around it."""
+"""Outcome: the value of a metric and the interval around it."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from typing import Any
 
-SHAKY = 0.45  # two standard deviations of the autocorrelation of 20 numbers that have nothing to do with each other
+SHAKY = 0.45  # two standard deviations of the autocorrelation of 20 independent numbers
 
 
 @dataclass(frozen=True)
@@ -21,21 +21,21 @@ class Interval:
 
     @property
     def half(self) -> float:
-        """Half its width."""
+        """Half of its width."""
         return (self.high - self.low) / 2
 
     @property
     def is_shaky(self) -> bool:
-        """Whether the batch means hang together so much that only a longer run can be trusted."""
+        """Whether the batch means are so correlated that only a longer run can be trusted."""
         return self.autocorrelation > SHAKY
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """What a metric came to.
+    """The outcome of a metric.
 
-    ``missing`` says why there is no value, ``unsure`` why there is no interval where one was asked for; ``after`` is
-    the time (s) until which nothing counted; ``note`` is for people.
+    ``missing`` says why there is no value, ``unsure`` why there is no interval although one was requested; ``after``
+    is the time (s) before which nothing counted; ``note`` is for people.
     """
 
     value: Any = None
@@ -52,21 +52,21 @@ class Outcome:
         return show(self.value) + (f" ± {self.interval.half:.2g}" if self.interval is not None else "")
 
     def plain(self) -> dict[str, Any]:
-        """What to add to the value, for programs."""
+        """Additions to the value, for programs."""
         found: dict[str, Any] = {"after": self.after} if self.after else {}
         found |= {key: said for key, said in (("missing", self.missing), ("unsure", self.unsure)) if said}
         return found if self.interval is None else {**found, **asdict(self.interval)}
 
     @property
     def remarks(self) -> list[str]:
-        """What people should know of the value."""
+        """Notes on the value, for people."""
         if self.missing:
             return [f"no value, because {self.missing}"]
         found = [self.note] if self.note else []
         if self.interval is not None:
             found.append(
                 f"{100 * self.interval.level:.6g} % interval, autocorrelation {self.interval.autocorrelation:.2f}"
-                + (" (too much: make the run longer)" if self.interval.is_shaky else "")
+                + (" (too high: make the run longer)" if self.interval.is_shaky else "")
             )
         if self.unsure:
             found.append(f"no interval, because {self.unsure}")

@@ -1,4 +1,4 @@
-# Types for C; what everything is for is said in packing.py.
+# Types for C; packing.py has the documentation.
 
 cimport cython
 

@@ -1,4 +1,4 @@
-"""Records as bytes, many at a time; compiled, where a compiler was there (``packing.pyx``)."""
+"""Records as bytes, many at a time; compiled if there was a compiler (``packing.pyx``)."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any, Final
 
 from epicycle.actors import When
 
-TAKES_NUMBERS: Final = False  # whether a sheet writes them down at once: in Python that is no faster
+TAKES_NUMBERS: Final = False  # whether a sheet encodes them at once: in Python that is no faster
 _TAG: Final = struct.Struct("<cqcq").pack  # as ``canonical`` writes two integers
 
 
@@ -18,33 +18,33 @@ def stamp(when: When) -> bytes:
 
 
 class Sheet:
-    """Records that wait until the event log makes bytes of them, many at a time."""
+    """Records that wait until the event log encodes them, many at a time."""
 
     __slots__ = ("_pieces", "_stamp", "size")
 
     def __init__(self) -> None:
         self.size = 0  # records
         self._stamp = b""
-        self._pieces: list[Any] = []  # three for each: tag, names, what was kept of the value
+        self._pieces: list[Any] = []  # three for each: tag, names, what is kept of the value
 
     def turn_to(self, when: When) -> None:
-        """The records that follow are of this tag."""
+        """The following records have this tag."""
         self._stamp = stamp(when)
 
     def add(self, head: bytes, value: Any) -> bool:
-        """Put a record in, if its value is a number or the like."""
+        """Add a record if its value is a number or similarly simple."""
         return False
 
     def keep(self, head: bytes, kept: Any) -> None:
-        """Put a record in, with the bytes of its value, or with a token that cannot change until they are made."""
+        """Add a record, with the bytes of its value, or with a token that cannot change until it is encoded."""
         self._pieces.extend((self._stamp, head, kept))
         self.size += 1
 
     def taken(self, encode: Callable[[Any], bytes]) -> bytes:
         """Take all records out, as bytes.
 
-        Tokens are often logged again and again, by who sends them, by channels that hand them on, by aspects on their
-        way: they are encoded once.
+        Tokens are often logged several times, by their sender, by channels that pass them on, by aspects on their way:
+        they are encoded once.
         """
         made: dict[int, bytes] = {}
         pieces, self._pieces, self.size = self._pieces, [], 0

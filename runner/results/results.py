@@ -1,4 +1,4 @@
-"""What a run leaves behind: signals, metrics, counts and the log."""
+"""The results of a run: signals, metrics, counts and the log."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ COLUMNS = ("time", "time_ns", "microstep", "signal", "field", "type", "value", "
 @dataclass(repr=False)
 class Results(Tabled):
     """The outcome of one run: ``metrics``, recorded ``signals``, counts and figures of ``aspects``, the ``log``
-    and its ``digest``.  ``outcomes`` say more of each metric: its interval, or why it has no value.
+    and its ``digest``.  ``outcomes`` say more about each metric: its interval, or why it has no value.
 
     >>> results = Simulation(model, seed=7).run()
     >>> results.metrics["mean_wait"], results["server.output"].values
@@ -49,7 +49,7 @@ class Results(Tabled):
     outcomes: dict[str, Outcome] = field(default_factory=dict)  # of the metrics
     monitors: dict[str, Verdict] = field(default_factory=dict)
     acts: list[Act] = field(default_factory=list)  # of aspects, if they were to be noted
-    figures: dict[str, Any] = field(default_factory=dict)  # that the model declares, as it declares them
+    figures: dict[str, Any] = field(default_factory=dict)  # as the model declares them
 
     @property
     def intervals(self) -> dict[str, Interval]:
@@ -82,11 +82,11 @@ class Results(Tabled):
         return name in self.signals
 
     def table(self) -> dict[str, list[Any]]:
-        """All that was recorded in long form, the columns of ``signals.parquet``: a row for each leaf of each token.
+        """All recorded signals in long form, the columns of ``signals.parquet``: a row for each leaf of each token.
 
-        ``time`` is in s, ``time_ns`` the same as an integer, ``field`` the place in the token, and ``type`` says what
-        was there.  ``value`` is a number, or 0 or 1 for false or true; ``text`` is anything else, and the digits of an
-        int that no float is.
+        ``time`` is in s, ``time_ns`` is the same in whole ns, ``field`` is the place in the token, and ``type`` is the
+        type of the leaf.  ``value`` is a number, or 0 or 1 for false or true; ``text`` is anything else, and the digits
+        of an int that no float equals.
         """
         rows = (
             (to_seconds(tag.time), *tag, name, place, *(("float", leaf, None) if type(leaf) is float else cell(leaf)))
@@ -101,12 +101,12 @@ class Results(Tabled):
         return table
 
     def to_pandas(self) -> pandas.DataFrame:
-        """All that was recorded in long form, as ``table`` has it."""
+        """All recorded signals in long form, as in ``table``."""
         frame: pandas.DataFrame = pandas_module().DataFrame(self.table())
         return frame
 
     def frame(self, name: str) -> pandas.DataFrame:
-        """One signal as ``Signal.to_pandas`` gives it."""
+        """One signal, as ``Signal.to_pandas`` returns it."""
         return self[name].to_pandas()
 
     def __repr__(self) -> str:

@@ -1,4 +1,4 @@
-# Types for C; what everything is for is said in samples.py.
+# Types for C; samples.py has the documentation.
 
 from cpython cimport array
 

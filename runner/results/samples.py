@@ -1,4 +1,4 @@
-"""Samples: tags and tokens in order, as the numbers that they are where they are numbers."""
+"""Samples: tags and tokens in order, stored as numbers where they are numbers."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ T = TypeVar("T")
 
 
 class Past(list[T]):
-    """What has happened in a run, and does not change any more: a copy of the run has a list of the same things."""
+    """Past events of a run, which no longer change: a copy of the run shares the items of the list."""
 
 
 class Samples:
@@ -21,13 +21,14 @@ class Samples:
         self.times = array("q")
         self.microsteps = array("i")
         self.tokens: Any = array("d")
-        self.kind: type | None = float  # of all tokens; None: there are others, and ``tokens`` is a list
+        self.kind: type | None = float  # type of all tokens; None if there are others, and ``tokens`` is a list
 
     def add(self, time: int, microstep: int, token: Any) -> None:
         """Append a token."""
         if type(token) is not self.kind and self.kind is not None:
             self._make_room(token)
-        # Ctrl-C may come between any two of these lines: a token is there when its microstep is, which is added last.
+        # Ctrl-C may come between any two of these lines: a token counts once its microstep is there, which is added
+        # last.
         try:
             self.tokens.append(token)
         except OverflowError:  # an int of more than 64 bits
@@ -37,7 +38,7 @@ class Samples:
         self.microsteps.append(microstep)
 
     def _make_room(self, token: Any) -> None:
-        """See to it that a token of another type than before can be kept."""
+        """Prepare for a token of a different type."""
         if type(token) is int and not self.tokens:
             self.tokens, self.kind = array("q"), int
         else:

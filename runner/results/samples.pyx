@@ -9,7 +9,7 @@ from array import array as new_array
 
 
 class Past(list):
-    """What has happened in a run, and does not change any more: a copy of the run has a list of the same things."""
+    """Past events of a run, which no longer change: a copy of the run shares the items of the list."""
 
 
 cdef class Samples:

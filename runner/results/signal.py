@@ -1,4 +1,4 @@
-"""Signal: what one port sent, as lists, NumPy arrays or a data frame."""
+"""Signal: the tokens that one port sent, as lists, NumPy arrays or a data frame."""
 
 from __future__ import annotations
 
@@ -19,15 +19,15 @@ from .samples import Samples
 if TYPE_CHECKING:
     import pandas
 
-_SHOWN = 8  # tokens at the beginning and at the end
+_SHOWN = 8  # tokens shown of the beginning and of the end
 
 
 class SignalError(EpicycleError):
-    """A signal, or a field of its tokens, that is not there."""
+    """A signal, or a field of its tokens, that does not exist."""
 
 
 class Signal(Tabled):
-    """What one port sent: tags and tokens, in order.
+    """The tokens that one port sent, with their tags, in order.
 
     >>> state = results["main.state"]
     >>> state.times, state["position"]          # arrays of shape (n,) and (n, 2)
@@ -50,11 +50,11 @@ class Signal(Tabled):
 
     @property
     def tokens(self) -> list[Any]:
-        """What was sent."""
+        """The tokens."""
         return list(self.samples.tokens[: len(self)])
 
     def __iter__(self) -> Iterator[tuple[Tag, Any]]:
-        """Each token with its tag, of which there may be more than fit into memory all at once."""
+        """Each token with its tag; all at once, they may not fit into memory."""
         return zip(map(Tag, self.samples.times, self.samples.microsteps), self.samples.tokens, strict=False)
 
     def __len__(self) -> int:
@@ -72,7 +72,7 @@ class Signal(Tabled):
 
     @property
     def values(self) -> NDArray[Any]:
-        """The tokens as an array: numbers as such, arrays of one shape stacked, anything else as objects."""
+        """The tokens as an array: numbers as numbers, arrays of one shape stacked, anything else as objects."""
         return as_array(self.tokens)
 
     @property
@@ -102,8 +102,8 @@ class Signal(Tabled):
     def to_pandas(self) -> pandas.DataFrame:
         """A row for each token, indexed by time in s: ``microstep``, and a column for each number or text in a token.
 
-        The column of a plain number is ``value``; others are called by their place, such as ``position[0]``.  A field
-        ``time`` or ``microstep`` of the token itself is ``token.time`` or ``token.microstep``.
+        The column of a plain number is ``value``; others have the name of their place, such as ``position[0]``.  A
+        field ``time`` or ``microstep`` of the token itself is ``token.time`` or ``token.microstep``.
         """
         frames = pandas_module()
         index = frames.Index(self.times, name="time")
@@ -136,7 +136,7 @@ class Signal(Tabled):
 
 
 def as_array(tokens: list[Any]) -> NDArray[Any]:
-    """Tokens as an array, whose first axis counts them."""
+    """Tokens as an array; its first axis counts them."""
     kinds = {type(token) for token in tokens}
     if kinds <= {bool, int, float, str} and (len(kinds) < 2 or str not in kinds):
         return np.array(tokens, dtype=None if tokens else float)

@@ -1,8 +1,8 @@
-"""Tokens that wait until the event log turns them into bytes, many at a time.
+"""Tokens that wait until the event log encodes them, many at a time.
 
-A token is sent in the midst of something else, where nothing that makes bytes of it lies in the processor's caches: it
-takes three times as long there as among a thousand others.  One that cannot change therefore waits.  It is often logged
-again and again, by who sends it, by channels that hand it on, by aspects on its way: its bytes are made once.
+A token is sent in the middle of other work, when the encoder is not in the processor's caches: encoding takes three
+times as long there as among a thousand others.  A token that cannot change therefore waits.  It is often logged several
+times, by its sender, by channels that pass it on, by aspects on its way: it is encoded once.
 """
 
 from __future__ import annotations
@@ -15,27 +15,27 @@ import numpy as np
 
 from .encoding import canonical, encoders, field_values
 
-LARGE = 10_000  # bytes of a token, more or less: those above do not wait, lest a thousand of them fill the memory
+LARGE = 10_000  # approximate bytes of a token: larger ones do not wait, as a thousand of them could fill the memory
 _BEYOND = LARGE + 1
 _SMALL = frozenset({float, bool, type(None), np.float64})
-_AT_ONCE = _SMALL | {int}  # types whose tokens are encoded as fast as they are looked up
+_AT_ONCE = _SMALL | {int}  # types whose tokens are encoded as fast as looked up
 
 
 class WaitingTokens(dict[type, Callable[[Any], Any]]):
-    """``waiting[type(token)](token)`` is what to keep of a token; later there are the bytes of all that was kept."""
+    """``waiting[type(token)](token)`` is what to keep of a token; later, everything kept is encoded."""
 
     def __init__(self) -> None:
         super().__init__()
-        self._known: dict[int, Any] = {}  # tokens that wait, by their id: while they do, no other one has it
+        self._known: dict[int, Any] = {}  # waiting tokens by id: while they wait, no other object has it
 
     def __missing__(self, cls: type) -> Callable[[Any], Any]:
         self[cls] = keep = encoders[cls] if cls in _AT_ONCE else self._keep
         return keep
 
     def _keep(self, token: Any) -> Any:
-        """The token itself, if it cannot change until it is encoded, or else its bytes.
+        """The token itself if it cannot change until it is encoded, or else its bytes.
 
-        Raises what makes it impossible to encode.
+        Raises an exception if it cannot be encoded.
         """
         if id(token) in self._known:
             return token
@@ -45,12 +45,12 @@ class WaitingTokens(dict[type, Callable[[Any], Any]]):
         return token
 
     def forget(self) -> None:
-        """All that was kept has become bytes: no token waits any more."""
+        """Everything kept has been encoded: no token waits any longer."""
         self._known.clear()
 
 
 def weight(token: Any) -> int:
-    """About how many bytes a token takes that can wait; one that can change, or may not be encodable, is huge."""
+    """The approximate number of bytes of a token that can wait; huge if it can change, or may not be encodable."""
     kind: type = type(token)
     if kind is np.ndarray:
         is_fixed = not token.flags.writeable and token.base is None and token.dtype.kind in "biuf"
@@ -72,7 +72,7 @@ def weight(token: Any) -> int:
 
 @cache
 def _values_of_fixed(cls: type) -> Callable[[Any], Iterable[Any]] | None:
-    """What gives the values in a tuple, or in a dataclass whose fields cannot be set; None for all other types."""
+    """A function that gives the values in a tuple, or in a frozen dataclass; None for all other types."""
     if cls is tuple:
         return iter
     params = vars(cls).get("__dataclass_params__")

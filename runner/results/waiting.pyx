@@ -1,5 +1,5 @@
 # cython: language_level=3, boundscheck=False, wraparound=False, cdivision=True
-"""Tokens as bytes at once, in C, where waiting.py keeps them until it is worth while: here it always is.
+"""Tokens as bytes at once, in C, where waiting.py keeps them until encoding is worthwhile: here it always is.
 
 Numbers, texts, arrays, tuples and dataclasses of these are encoded as in encoding.py; all else by that.
 """
@@ -19,13 +19,13 @@ from .encoding import canonical, encoders, field_names, is_record
 
 numpy.import_array()
 
-LARGE = 10_000  # bytes of a token: those above are not kept, lest a thousand of them fill the memory
+LARGE = 10_000  # bytes of a token: larger ones are not kept, as a thousand of them could fill the memory
 _AT_ONCE = frozenset({float, bool, type(None), np.float64, int})
 
 cdef bint IS_LITTLE = np.little_endian
 cdef uint64_t NAN_BITS = 0x7FF8000000000000
-cdef int DEEP = 32  # from here on Python goes on, which knows how deep it may go
-cdef dict PLANS = {}  # by class: what is the same for all tokens of it
+cdef int DEEP = 32  # from here on Python continues, which knows how deep it may go
+cdef dict PLANS = {}  # by class: what all its tokens share
 
 
 cdef class Plan:
@@ -55,9 +55,9 @@ cdef struct Output:
 
 
 cdef class WaitingTokens(dict):
-    """``waiting[type(token)](token)`` is a token in bytes; those of one that cannot change are made once."""
+    """``waiting[type(token)](token)`` is a token in bytes; one that cannot change is encoded once."""
 
-    cdef dict _known  # bytes of tokens, with the tokens, by their id: while they are here, no other one has it
+    cdef dict _known  # bytes of tokens, with the tokens, by id: while they are here, no other object has it
 
     def __cinit__(self):
         self._known = {}
@@ -70,7 +70,7 @@ cdef class WaitingTokens(dict):
         return keep
 
     def _keep(self, token):
-        """A token in bytes; raises what makes that impossible."""
+        """A token in bytes; raises an exception if it cannot be encoded."""
         cdef Output out
         cdef object key = <size_t><void*>token
         known = self._known.get(key)
@@ -90,7 +90,7 @@ cdef class WaitingTokens(dict):
         return made
 
     def forget(self):
-        """No token waits any more."""
+        """No token waits any longer."""
         self._known.clear()
 
 

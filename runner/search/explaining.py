@@ -123,8 +123,11 @@ def explain(
     whole = runs.results(model.exactly)
     verdict = whole.monitors[monitor]
     if verdict.holds is not False:
-        state = "holds" if verdict.holds else f"cannot be judged, because {verdict.missing}"
-        raise EpicycleError(f"monitor {monitor} {state} in this run of {model.name}: there is nothing to explain")
+        state = "holds" if verdict.holds else "cannot be judged"
+        reason = f" ({verdict.missing})" if verdict.missing else ""
+        raise EpicycleError(
+            f"monitor {monitor} {state} in this run of {model.name}{reason}: there is nothing to explain"
+        )
 
     def breaks(names: frozenset[ActName]) -> bool:
         if tell is not None:

@@ -1,4 +1,4 @@
-"""What people see: of a run summary, figures, results folder; of what is installed, the reference."""
+"""Output for people: a run's summary, figures and results folder, and the reference of what is installed."""
 
 from ..catalogue import Figure
 from .figures import Histogram, TimeSeries

@@ -1,4 +1,4 @@
-"""Figures over time and of how often values come, drawn from the signals of a run."""
+"""Figures of a run's signals: over time, and histograms."""
 
 from __future__ import annotations
 
@@ -31,15 +31,15 @@ from .sheet import (
     set_log,
 )
 
-MAX_STATES = 24  # in a legend
-_LETTERS = 30  # in a line at a vertical axis
+MAX_STATES = 24  # per legend
+_LETTERS = 30  # per line at a vertical axis
 
 
 class TimeSeries(Figure):
-    """Signals over time: each number in their tokens a line, each text, truth value or enumeration a strip of states.
+    """Signals over time: a line for each number in their tokens, a strip for each text, truth value or enumeration.
 
-    A strip has the colour of the state of the moment; None leaves a gap, and so does what is no state of anything.
-    Where there are more values than a line could show, a band holds all of them, and the line is their mean.
+    The colour of a strip shows the current state; None leaves a gap, as does any value that is not a state.  If there
+    are more values than a line can show, a band spans all of them, and the line is their mean.
     """
 
     signals = texts_parameter(doc="which signals (patterns)")
@@ -47,12 +47,12 @@ class TimeSeries(Figure):
         str,
         "steps",
         choices=("steps", "line", "points"),
-        doc="whether a value stays until the next one, leads straight to it, or stands for its moment only",
+        doc="whether a value holds until the next one, leads straight to it, or is only valid at its time",
     )
-    label = Parameter(str, "", doc="what the vertical axis shows, with its unit; the signal's name if left out")
-    start: Parameter[float | None] = Parameter(float, None, unit="s", doc="where the time axis begins")
-    end: Parameter[float | None] = Parameter(float, None, unit="s", doc="where the time axis ends")
-    separate = Parameter(bool, False, doc="whether each line has a panel of its own")
+    label = Parameter(str, "", doc="label of the vertical axis, with its unit; the signal's name if left out")
+    start: Parameter[float | None] = Parameter(float, None, unit="s", doc="start of the time axis")
+    end: Parameter[float | None] = Parameter(float, None, unit="s", doc="end of the time axis")
+    separate = Parameter(bool, False, doc="whether each line has its own panel")
     log_y = Parameter(bool, False, doc="whether the vertical axis is logarithmic")
 
     def signal_patterns(self) -> tuple[str, ...]:
@@ -63,7 +63,7 @@ class TimeSeries(Figure):
         groups = [[name] for name in [*lines][:MAX_PANELS]] if self.separate and lines else [[*lines]]
         if strips and not lines:
             groups = []
-        # Strips have a part of the sheet of their own, below the lines if there are any.
+        # Strips have their own part of the sheet, below any lines.
         heights = [3.0 if len(groups) == 1 else 1.6] * len(groups)
         heights += [0.3 + 0.3 * len(strips)] if strips else []
         sheet = Sheet(["" for _ in heights], heights=heights, same_x=True)
@@ -80,7 +80,7 @@ class TimeSeries(Figure):
         sheet.save([path])
 
     def _view(self, lines: Numbers, strips: States, over: float) -> tuple[float, float]:
-        """From when until when something is in view."""
+        """The start and end of the visible time."""
         columns = [times for times, _ in (*lines.values(), *strips.values()) if len(times)]
         first = min((times[0] for times in columns), default=0.0)
         last = max((times[-1] for times in columns), default=0.0)
@@ -88,13 +88,13 @@ class TimeSeries(Figure):
         return begin, max(over, last) if self.end is None else self.end
 
     def _lines(self, sheet: Sheet, axes: Any, names: list[str], lines: Numbers, begin: float, end: float) -> str:
-        """Draw the lines of a panel; what is to be said of how."""
+        """Draw the lines of a panel; returns a note on how they are drawn."""
         look = {"steps": {"drawstyle": "steps-post"}, "line": {}, "points": {"linestyle": "none", "marker": "."}}
         shades, handles, said = colours(len(names)), [], ""
         for shade, name in zip(shades, names, strict=True):
             times, values = (np.frombuffer(column) for column in lines[name])
             if self.style == "steps":
-                # What is over at the moment at which it comes is not seen; the last value holds to the run's end.
+                # A value that ends when it starts is not visible; the last value holds until the end of the run.
                 is_last = np.append(times[1:] != times[:-1], True)
                 times, values = times[is_last], values[is_last]
             found = envelope(times, values, begin, end, holds=self.style == "steps")
@@ -126,7 +126,7 @@ class TimeSeries(Figure):
 
 
 def _strips(sheet: Sheet, strips: States, begin: float, end: float, over: float) -> None:
-    """Draw rows of states, each state in the same colour in all of them."""
+    """Draw rows of states; each state has the same colour in all of them."""
     from matplotlib.patches import Patch
 
     axes = sheet.axes[-1]
@@ -151,14 +151,14 @@ def _strips(sheet: Sheet, strips: States, begin: float, end: float, over: float)
 
 
 class Histogram(Figure):
-    """How often values of a signal come, in bins of equal width; of several signals, one over the other.
+    """How often values of a signal occur, in bins of equal width; several signals are drawn over each other.
 
-    Where there are no numbers, but states (texts, truth values, enumerations), how often each of them comes.
+    If there are no numbers but states (texts, truth values, enumerations), how often each of them occurs.
     """
 
     signals = texts_parameter(doc="which signals (patterns)")
-    bins = Parameter(int, 40, min=1, max=10_000, doc="how many bins there are")
-    label = Parameter(str, "", doc="what the values are, with their unit; the signal's name if left out")
+    bins = Parameter(int, 40, min=1, max=10_000, doc="number of bins")
+    label = Parameter(str, "", doc="name of the values, with their unit; the signal's name if left out")
     log_x = Parameter(bool, False, doc="whether the horizontal axis is logarithmic, with bins of equal width on it")
     log_y = Parameter(bool, False, doc="whether the vertical axis is logarithmic")
 
@@ -182,7 +182,7 @@ class Histogram(Figure):
             columns = {name: values[values > 0.0] for name, values in columns.items()}
         ends = [end for values in columns.values() if len(values) for end in (values.min(), values.max())]
         if self.log_x and not ends:
-            raise EpicycleError("no value is positive, so that the horizontal axis cannot be logarithmic")
+            raise EpicycleError("no value is positive, so the horizontal axis cannot be logarithmic")
         if self.log_x:
             edges = np.geomspace(min(ends), max(ends) if max(ends) > min(ends) else 2 * min(ends), self.bins + 1)
         else:
@@ -232,7 +232,7 @@ class Histogram(Figure):
 
 
 def _shared(names: Sequence[str]) -> str:
-    """What stands at the axis of signals that are not called otherwise."""
+    """The axis label for signals without a ``label``."""
     return abridged(names[0] if len(names) == 1 else in_common(names)[0], 80)
 
 
@@ -241,10 +241,10 @@ def _about(values: Floats) -> str:
 
 
 def _legible(state: str) -> str:
-    """A state in a legend, which leaves out what is empty or begins with an underscore."""
+    """A state in a form that the legend shows: it leaves out texts that are empty or start with an underscore."""
     return short(state) if state.strip() and not state.startswith("_") else repr(state)
 
 
 def title_of(results: Results) -> str:
-    """What stands above the figure of a run."""
+    """The title of a run's figure."""
     return f"{abridged(results.model, 60)}, seed {results.seed}, {results.end:g} s"

@@ -1,4 +1,4 @@
-"""What a run leaves: its summary for people and for programs, and its folder of manifest, signals and figures."""
+"""The output of a run: its summary for people and programs, and its folder with manifest, signals and figures."""
 
 from __future__ import annotations
 
@@ -23,12 +23,12 @@ from ..results import Results, plain, write_signals
 from ..shown import finite, in_words
 from .pen import FigureError, draw
 
-MAX_NAME = 60  # letters of a file's name, which file systems bound
+MAX_NAME = 60  # characters of a file name; file systems limit it
 WIDEST = 400  # characters of a text in the table
 
 
 def summary_object(results: Results) -> dict[str, Any]:
-    """What ``--json`` prints; NaN and infinities become null, which JSON lacks."""
+    """The output of ``--json``; NaN and infinities, which JSON lacks, become null."""
     result: dict[str, Any] = finite(
         {
             "model": results.model,
@@ -49,7 +49,7 @@ def summary_object(results: Results) -> dict[str, Any]:
 
 
 def summary_table(model: Model, results: Results) -> Group:
-    """What a person sees at the end of a run."""
+    """The summary printed at the end of a run."""
     head = Text.assemble(
         (visible(results.model), "bold"),
         f"  seed {results.seed}, {results.end:g} s of model time, ended by {visible(results.stopped)}",
@@ -78,14 +78,14 @@ def summary_table(model: Model, results: Results) -> Group:
 
 
 def shown(value: Any) -> str:
-    """A metric's value in few characters."""
+    """A metric's value in a few characters."""
     return in_words(plain(value), digits=4, nothing="-")
 
 
 def check_folder(folder: Path, model: str, command: list[str]) -> str:
-    """What is to be said before a command writes to a folder, as it replaces the results of another one.
+    """The message before a command replaces the results of another one in a folder.
 
-    Raises ``EpicycleError`` where there are results of another model, or of something else.
+    Raises ``EpicycleError`` if the folder holds results of another model, or of something else.
     """
     path = folder / "manifest.json"
     choose = "\n   help: choose another folder with --out, or delete this one"
@@ -96,14 +96,14 @@ def check_folder(folder: Path, model: str, command: list[str]) -> str:
     except FileNotFoundError:
         return ""
     except (OSError, ValueError, LookupError, TypeError, RecursionError):
-        raise EpicycleError(f"{folder} holds other results than those of a run{choose}") from None
+        raise EpicycleError(f"{folder} holds results that are not from a run{choose}") from None
     if known != model:
-        raise EpicycleError(f"{folder} holds results of the model {known!r}, not of {model!r}: {shown}{choose}")
+        raise EpicycleError(f"{folder} holds results of the model {known!r}, not {model!r}: {shown}{choose}")
     return "" if before == command else f"replacing the results of '{shown}' in {folder}"
 
 
 def write_folder(folder: Path, results: Results, command: Iterable[str], error: str = "") -> list[Path]:
-    """Write ``manifest.json`` and ``signals.parquet``; the files that were written.
+    """Write ``manifest.json`` and ``signals.parquet``; returns the paths.
 
     Each file is written aside and then moved into place, so a folder never holds half a file.
     """
@@ -120,7 +120,7 @@ def write_folder(folder: Path, results: Results, command: Iterable[str], error: 
 
 
 def draw_figures(folder: Path, results: Results, figures: dict[str, Figure]) -> tuple[list[Path], list[FigureError]]:
-    """Draw a PNG for each figure, when all else is safe; the files that were written, and what could not be drawn."""
+    """Draw a PNG for each figure, after everything else is saved; returns the files and the figures that failed."""
     written, failed = [], []
     for name, figure in figures.items():
         file = f"{abridged(name, MAX_NAME)}.png"

@@ -1,4 +1,4 @@
-"""The pen of all pictures, matplotlib: one style, text drawn as it stands, files that are the same each time."""
+"""Drawing with matplotlib: one style, text drawn literally, reproducible files."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ from ..results import Results
 from ..text import Position, describe, raised_at, told_raised
 
 FORMATS = ("png", "svg")
-_UNWRITABLE = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ufffe\uffff]")  # which no XML file may hold
-# What matplotlib would write into a file of its own accord: names, versions, times.
+_UNWRITABLE = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ufffe\uffff]")  # not allowed in XML files
+# What matplotlib would write into a file by default: names, versions, times.
 _METADATA = {
     "svg": ("Creator", "Date", "Format", "Type"),
     "png": ("Software",),
@@ -30,7 +30,7 @@ _METADATA = {
 
 
 def open_matplotlib() -> None:
-    """Import matplotlib, also where MPLBACKEND asks for what there is not: our canvases need no backend."""
+    """Import matplotlib even if MPLBACKEND names a missing backend: our canvases need none."""
     if "matplotlib" in sys.modules:
         return
     asked = os.environ.pop("MPLBACKEND", None)
@@ -40,25 +40,25 @@ def open_matplotlib() -> None:
         if asked is not None:
             os.environ["MPLBACKEND"] = asked
     if asked is not None:
-        with suppress(ValueError):  # for what users draw themselves
+        with suppress(ValueError):  # for users' own drawings
             matplotlib.rcParams["backend"] = asked
 
 
 @contextmanager
 def style(further: Mapping[str, Any] = MappingProxyType({})) -> Iterator[None]:
-    """What is drawn meanwhile looks as all our pictures do, whatever a user has set for plots of their own."""
+    """Apply the style of all our pictures, regardless of what users have set for their own plots."""
     open_matplotlib()
     import matplotlib.style
 
     ours = Path(__file__).with_suffix(".mplstyle")
     with matplotlib.style.context(["default", ours, dict(further)]), warnings.catch_warnings():
-        warnings.filterwarnings("ignore", message="Glyph")  # a box stands for what the font lacks
+        warnings.filterwarnings("ignore", message="Glyph")  # the font shows a box for missing characters
         yield
 
 
 @lru_cache(maxsize=16)
 def font(size: float, bold: bool = False) -> Any:
-    """The font that comes with matplotlib, in a size."""
+    """The font that comes with matplotlib, in a given size."""
     open_matplotlib()
     from matplotlib.font_manager import FontProperties
 
@@ -83,18 +83,18 @@ def new_canvas(width: float, height: float) -> Any:
 
 
 def save(canvas: Any, path: Path, **options: Any) -> None:
-    """Write a matplotlib figure; the ending decides the format, and the same figure gives the same bytes."""
+    """Write a matplotlib figure; the ending determines the format, and equal figures give equal bytes."""
     kind = path.suffix.lower().removeprefix(".")
     if kind == "png":
         options = {"pil_kwargs": {"optimize": True}, **options}
     canvas.savefig(path, format=kind, metadata=dict.fromkeys(_METADATA.get(kind, ())), **options)
     if kind == "svg" and _UNWRITABLE.search(text := path.read_text(encoding="utf-8")):
-        # Texts are in comments, too, as they are.
+        # Comments contain the texts, too, without escapes.
         path.write_text(_UNWRITABLE.sub(lambda found: visible(found[0]), text), encoding="utf-8")
 
 
 class FigureError(EpicycleError):
-    """A figure cannot be drawn; ``raised`` is the line of a user's class from which the exception comes."""
+    """A figure cannot be drawn; ``raised`` is the line of a user's class that raised the exception."""
 
     def __init__(self, name: str, reason: str, raised: Position | None = None) -> None:
         super().__init__(name, reason, raised)
@@ -108,7 +108,7 @@ class FigureError(EpicycleError):
 
 
 def draw(name: str, figure: Figure, results: Results, path: Path) -> None:
-    """Draw a figure into a file; raises ``FigureError`` for whatever its class raises."""
+    """Draw a figure to a file; raises ``FigureError`` for any exception of its class."""
     try:
         with style():
             figure.draw(results, path)

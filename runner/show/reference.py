@@ -36,20 +36,20 @@ from ..temporal import Requirement
 
 
 def described(types: Mapping[str, type[Configurable]]) -> list[TypeReference]:
-    """What types declare, topic by topic."""
+    """The declarations of types, topic by topic."""
     found = [describe(name, cls) for name, cls in types.items()]
     return sorted(found, key=topic_order)
 
 
 def parts_described(types: Iterable[type[Configurable]]) -> dict[str, list[TypeReference]]:
-    """What the parts declare that parameters of these types take, by the base of the parts."""
+    """The declarations of parts that parameters of these types take, by the base class of the parts."""
     return {
         base.__name__: [describe(name, cls) for name, cls in known.items()] for base, known in parts_of(types).items()
     }
 
 
 def by_group(references: Iterable[TypeReference]) -> Iterator[tuple[tuple[str, str], Iterator[TypeReference]]]:
-    """The topics with what is said of each, and their types."""
+    """The topics with their descriptions, and the types in each."""
     return groupby(references, key=attrgetter("group", "about_group"))
 
 
@@ -57,7 +57,7 @@ def by_group(references: Iterable[TypeReference]) -> Iterator[tuple[tuple[str, s
 
 
 def overview(references: Sequence[TypeReference]) -> Group:
-    """A line for each type under the heading of its topic."""
+    """One line for each type, under the heading of its topic."""
     width = max((len(each.name) for each in references), default=0)
     blocks: list[RenderableType] = []
     for (group, about), members in by_group(references):
@@ -72,7 +72,7 @@ def overview(references: Sequence[TypeReference]) -> Group:
 
 
 def detail(reference: TypeReference, parts: Mapping[str, Sequence[TypeReference]]) -> Group:
-    """All that is declared by one type, and by the parts that its parameters take."""
+    """Everything declared by one type, and by the parts that its parameters take."""
     head = Text.assemble((reference.name, "bold"), f"  {reference.kind}, {reference.group}")
     blocks: list[RenderableType] = [head, *_about(reference)]
     for base, known in parts.items():
@@ -90,7 +90,7 @@ def _about(reference: TypeReference) -> list[RenderableType]:
 
 
 def weaving(model: Model) -> RenderableType:
-    """Which aspects stand at each port and actor of a model, in the order in which a token or a firing meets them."""
+    """The aspects attached to each port and actor of a model, in the order in which a token or a firing meets them."""
     if not model.aspects:
         return Text(f"{model.name} has no aspects")
     rows = [
@@ -100,11 +100,11 @@ def weaving(model: Model) -> RenderableType:
     ]
     idle = [each for each in model.aspects if not each.places]
     table = columns(("at", "", "aspect", "type", "parameters"), rows, whole=("at",))
-    return Group(table, *(Text(f"{each.name} ({each.kind}) stands nowhere") for each in idle))
+    return Group(table, *(Text(f"{each.name} ({each.kind}) is not attached to anything") for each in idle))
 
 
 def aspects_at(model: Model) -> dict[str, list[tuple[str, str, str]]]:
-    """For each place where aspects stand, their names, types and given parameters, the outermost first."""
+    """For each place with aspects, their names, types and set parameters, the outermost first."""
     found: dict[str, list[tuple[str, str, str]]] = {}
     for woven in model.aspects:
         written = as_written(woven.aspect)
@@ -113,7 +113,7 @@ def aspects_at(model: Model) -> dict[str, list[tuple[str, str, str]]]:
             here = {**given, **({} if woven.model is None else woven.model.at(path))}
             parameters = ", ".join(f"{name}: {shown(value)}" for name, value in here.items())
             found.setdefault(path, []).append((woven.name, woven.kind, parameters))
-    places = dict.fromkeys((*model.graph.ports, *model.graph.actors, *found))  # the others come last
+    places = dict.fromkeys((*model.graph.ports, *model.graph.actors, *found))  # any others come last
     return {path: found[path] for path in places if path in found}
 
 
@@ -122,16 +122,16 @@ def aspects_at(model: Model) -> dict[str, list[tuple[str, str, str]]]:
 INTRODUCTION = """\
 # Reference
 
-Everything that a model may name, as declared in the code. This file is made by `make reference`; `epicycle actors`
-and `epicycle aspects` print the same for what is installed, with the types of other packages.
+Everything that a model may name, as declared in the code. `make reference` generates this file; `epicycle actors`
+and `epicycle aspects` print the same for everything installed, including types from other packages.
 """
 
 
 METRICS = """\
 ## Metrics
 
-One number of a run: `name: {of: port, take: ..., ...}`. What counts *tokens* weighs each of them the same; what counts
-*time* weighs each value by how long it stands. Of a state, such as the size of a queue, the mean over time is meant.
+One number per run: `name: {of: port, take: ..., ...}`. Metrics that count *tokens* weigh each token equally; those that
+count *time* weigh each value by its duration. For a state, such as the size of a queue, use the mean over time.
 """
 
 
@@ -163,7 +163,7 @@ def markdown(
 
 
 def _metrics() -> list[str]:
-    """What a metric can take, and what else is said of one."""
+    """What a metric can take, and its other options."""
     takes = [
         [name, each.over, each.doc, ", ".join(f"`{option}`" for option in each.options), each.unit]
         for name, each in TAKES.items()
@@ -191,16 +191,16 @@ def _cell(text: str) -> str:
 
 
 def _markdown(reference: TypeReference) -> list[str]:
-    """One type under a heading of its own."""
+    """One type under its own heading."""
     tables = [_rows(heading, rows) for heading, rows in sections(reference)]
     return [f"### {reference.name}\n", f"{reference.doc}\n", *tables, *(f"{line}\n" for line in facts(reference))]
 
 
-# -- what both say --------------------------------------------------------------------------------------------------
+# -- common to both --------------------------------------------------------------------------------------------------
 
 
 def sections(reference: TypeReference) -> Iterator[tuple[Sequence[str], list[list[str]]]]:
-    """The tables of a type, as far as they have rows: ports and parameters, with their headings."""
+    """The tables of a type that have rows: ports and parameters, with their headings."""
     for direction in ("input", "output"):
         if rows := [_port_row(port) for port in reference.ports if port.direction == direction]:
             yield (f"{direction} port", "type", "", "what it is"), rows
@@ -209,11 +209,11 @@ def sections(reference: TypeReference) -> Iterator[tuple[Sequence[str], list[lis
 
 
 def facts(reference: TypeReference) -> list[str]:
-    """What else there is to say of a type."""
-    found = ["Further ports follow from its parameters."] if reference.has_own_ports else []
+    """Other facts about a type."""
+    found = ["Its parameters determine further ports."] if reference.has_own_ports else []
     if reference.stands_at:
         where = "actors" if "actor" in reference.stands_at else f"{' and '.join(reference.stands_at)} ports"
-        found.append(f"Stands at {where}{', and at parameters' if reference.alters_parameters else ''}.")
+        found.append(f"Attaches to {where}{', and to parameters' if reference.alters_parameters else ''}.")
     if reference.events:
         found.append(f"Events: {', '.join(reference.events)}.")
     if reference.reports:
@@ -236,13 +236,13 @@ def _port_row(port: PortReference) -> list[str]:
 
 
 def _notes(port: PortReference) -> list[str]:
-    """What there is to say of a port."""
+    """The properties of a port that are not the default."""
     is_input, inputs = port.direction == "input", port.depends_on
     notes = {
         "optional": is_input and not port.required,
         "does not trigger": is_input and not port.triggers,
         "keeps what is not taken out": is_input and port.keep,
-        # Such a port may stand in a loop.
+        # Such a port may be part of a loop.
         f"depends at once on {' and '.join(inputs or ()) or 'no input'}": not is_input and inputs is not None,
         "any number of connections": port.multi,
     }

@@ -1,4 +1,4 @@
-"""What figures read from signals: numbers, states and positions, thinned to what a picture can show."""
+"""Reads numbers and states from signals for figures, thinned to what a picture can show."""
 
 from __future__ import annotations
 
@@ -14,13 +14,13 @@ from epicycle.aspects import STAMP
 from ..results import Results, cell, leaves
 from ..text import select
 
-COLUMNS = 700  # of pixels, about, that a panel is wide
-_DENSE = 4  # samples in a column, from which on they are drawn as an envelope
+COLUMNS = 700  # approximate width of a panel in pixels
+_DENSE = 4  # samples per column above which they are drawn as an envelope
 
 Floats: TypeAlias = NDArray[np.float64]
 Numbers: TypeAlias = dict[str, tuple["array[float]", "array[float]"]]  # times and values
 States: TypeAlias = dict[str, tuple["array[float]", list[str | None]]]  # times and names
-Span: TypeAlias = tuple[float, float, str]  # from when, until when, a state
+Span: TypeAlias = tuple[float, float, str]  # start, end, state
 
 
 def selected(patterns: tuple[str, ...], results: Results) -> list[str]:
@@ -29,9 +29,9 @@ def selected(patterns: tuple[str, ...], results: Results) -> list[str]:
 
 
 def read(patterns: tuple[str, ...], results: Results) -> tuple[Numbers, States]:
-    """All numbers and all states in tokens, by signal and place in them, but for what says of when a token is.
+    """All numbers and states in tokens, by signal and place in the token, except time stamps.
 
-    A state is None where there is something else; what never is one is left out.
+    A state is None where the value is something else; a place that never holds a state is left out.
     """
     numbers: Numbers = {}
     states: States = {}
@@ -56,11 +56,11 @@ def read(patterns: tuple[str, ...], results: Results) -> tuple[Numbers, States]:
     return numbers, {where: column for where, column in states.items() if any(each is not None for each in column[1])}
 
 
-# -- thinned ----------------------------------------------------------------------------------------------------------
+# -- thinning ---------------------------------------------------------------------------------------------------------
 
 
 class Envelope(NamedTuple):
-    """Of each column of a panel its middle, the least and the greatest value, and the mean."""
+    """For each column of a panel: its middle, the least and the greatest value, and the mean."""
 
     times: Floats
     low: Floats
@@ -70,15 +70,15 @@ class Envelope(NamedTuple):
 
 
 def envelope(times: Floats, values: Floats, begin: float, end: float, *, holds: bool) -> Envelope | None:
-    """The envelope of samples that are too many to be told apart; None if they are not.
+    """The envelope of samples that are too many to distinguish; None if they are few.
 
-    ``holds``: a value stays until the next one, so that it counts in the columns between, and by how long it stands.
+    ``holds``: a value lasts until the next one, so it counts in the columns between, weighted by its duration.
     """
     first, last = np.searchsorted(times, [begin, end])
     if last - first <= _DENSE * COLUMNS or not end > begin:
         return None
     edges = np.linspace(begin, end, COLUMNS + 1)
-    if holds:  # a sample more at each edge: what stands there
+    if holds:  # one more sample at each edge: the value there
         edges = edges[edges >= times[0]]
         before = np.searchsorted(times, edges[:-1], side="right") - 1
         times, values = np.concatenate([times, edges[:-1]]), np.concatenate([values, values[before]])
@@ -93,12 +93,12 @@ def envelope(times: Floats, values: Floats, begin: float, end: float, *, holds: 
     low, high = np.minimum.reduceat(values, starts), np.maximum.reduceat(values, starts)
     mean = np.add.reduceat(values * weights, starts) / np.where(whole > 0.0, whole, 1.0)
     middle = (edges[:-1] + edges[1:])[column[starts]] / 2
-    # What takes no time has no mean of its own.
+    # A value without duration has no weight.
     return Envelope(middle, low, high, np.where(whole > 0.0, mean, (low + high) / 2), float(edges[1] - edges[0]))
 
 
 def spans_of(times: Sequence[float], states: Sequence[str | None], end: float) -> Iterator[Span]:
-    """How long each state stands; the same one again goes on, and what takes no time is left out."""
+    """The span of each state; equal successive states are merged, and states without duration are left out."""
     last: Span | None = None
     for since, until, state in zip(times, [*times[1:], end][: len(times)], states, strict=True):
         if until <= since:
@@ -114,7 +114,7 @@ def spans_of(times: Sequence[float], states: Sequence[str | None], end: float) -
 
 
 def longest_spans(spans: Sequence[Span], begin: float, end: float) -> list[Span]:
-    """Spans that are in view; of very many, in each column of the panel the state that stands longest."""
+    """The visible spans; if there are very many, the state that lasts longest in each column of the panel."""
     seen = [(max(since, begin), min(until, end), state) for since, until, state in spans if until >= begin]
     seen = [each for each in seen if each[0] <= each[1]]
     if len(seen) <= _DENSE * COLUMNS:

@@ -1,10 +1,12 @@
-"""Sheets: panels of axes, keys beside or above them, and tips, the texts that a pointer finds in a picture."""
+"""Sheets: panels of axes, legends beside or above them, and tips, texts that appear under the pointer."""
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from contextvars import ContextVar
 from pathlib import Path
 from textwrap import fill
 from typing import Any, Literal, NamedTuple
@@ -20,23 +22,35 @@ PALETTE = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#0
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
 DASHES = ("-", "--", "-.", ":", (0, (5, 1)), (0, (3, 1, 1, 1)), (0, (1, 1)), (0, (7, 2, 1, 2)))
 LIMIT = "#a00000"
-FEW = len(PALETTE)  # lines that colours of their own tell apart; more have those of a scale
-MAX_LINES = 40  # in one panel of a study
+FEW = len(PALETTE)  # lines that distinct colours tell apart; more lines get colours from a scale
+MAX_LINES = 40  # per panel of a study
 MAX_PANELS = 24
-MAX_TEXT = 200  # characters of a label
-MAX_TIPS = 3000  # of a picture
-WIDTH = 7.0  # inches
-_MAX_NAME = 36  # letters of a name beside an axis
-_LONG = 30  # letters in a line beside an axis
+MAX_TEXT = 200  # characters per label
+MAX_TIPS = 3000  # per picture
+WIDTH, NARROW = 7.0, 3.7  # inches; the latter is for the screen of a telephone
+_MAX_NAME = 36  # characters of a name beside an axis
+_LONG = 30  # characters per line beside an axis
 _LONGEST = {1: 90, 2: 46, 3: 30}  # and above a panel, by the number of columns
+_LONGEST_NARROW = 44
 _NAMED = 26  # rows of a band that are named
-_PAD = 0.06  # inches around what is drawn
+_PAD = 0.06  # inches around the drawing
 _SVG = "http://www.w3.org/2000/svg"
 _INDEX = re.compile(r"\[(\d+)\]")
+_is_narrow: ContextVar[bool] = ContextVar("is_narrow", default=False)
+
+
+@contextmanager
+def narrow() -> Iterator[None]:
+    """Within this, sheets are narrow: their panels are below each other."""
+    token = _is_narrow.set(True)
+    try:
+        yield
+    finally:
+        _is_narrow.reset(token)
 
 
 def colours(count: int) -> list[str]:
-    """Colours for some lines: the palette, or a scale from dark to light for more than it has."""
+    """Colours for a number of lines: the palette, or a scale from dark to light if there are more."""
     if count <= FEW:
         return [*PALETTE[:count]]
     import matplotlib
@@ -47,7 +61,7 @@ def colours(count: int) -> list[str]:
 
 
 class Tip(NamedTuple):
-    """A text that a pointer finds at a place of a picture, counted in points from its top left corner."""
+    """A text that appears under the pointer; its place is in points from the top left corner of the picture."""
 
     x: float
     y: float
@@ -57,8 +71,8 @@ class Tip(NamedTuple):
 class Sheet:
     """Panels in rows and columns, with letters if there are several; used within ``style``.
 
-    With ``heights`` (inches) the panels stand below each other and belong together: one has the title of all, and the
-    key of each stands beside it.
+    With ``heights`` (inches), the panels are below each other and belong together: the top one carries the title, and
+    each has its legend beside it.
     """
 
     def __init__(
@@ -71,28 +85,29 @@ class Sheet:
         same_x: bool = False,
         same_y: bool | Literal["row"] = False,
     ) -> None:
-        count = len(panels)
+        count, is_narrow = len(panels), _is_narrow.get()
         few = {0: 1, 4: 2}.get(count, min(count, 3))
-        self.columns = 1 if heights else columns or (few if count <= 12 else 4)
+        self.columns = 1 if heights or is_narrow else columns or (few if count <= 12 else 4)
         rows = math.ceil(count / self.columns)
         tall = sum(heights) if heights else rows * height * {1: 1.25, 2: 1.0, 3: 1.0}.get(self.columns, 0.85)
-        self.canvas = new_canvas(WIDTH, 0.5 + tall)
+        self.canvas = new_canvas(NARROW if is_narrow else WIDTH, 0.5 + tall)
         self.canvas.set_layout_engine("constrained", h_pad=0.06, w_pad=0.06)
         grid = self.canvas.subplots(
             rows, self.columns, squeeze=False, sharex=same_x, sharey=same_y, height_ratios=heights or None
         )
         self.axes: list[Any] = list(grid.flat)[:count]
-        self.are_alike = True  # the axes of all panels, or of all in a row
+        self.are_alike = True  # whether all panels, or all in a row, share their axes
         self._tips: list[tuple[Any, float, float, str]] = []
         for axes in list(grid.flat)[count:]:
             axes.remove()
         for index, (axes, title) in enumerate(zip(self.axes, panels, strict=True)):
             letter = f"({chr(ord('a') + index)}) " if 1 < count <= 26 and not heights else ""
             if letter or title:
-                axes.set_title(fill(f"{letter}{title}", _LONGEST.get(self.columns, 22)), loc="left")
+                longest = _LONGEST_NARROW if is_narrow else _LONGEST.get(self.columns, 22)
+                axes.set_title(fill(f"{letter}{title}", longest), loc="left")
 
     def call(self, axes: Any, x: str, y: str) -> None:
-        """Say what the axes of a panel are, where it is not said beside or below: panels that are alike say it once."""
+        """Label the axes of a panel; panels with the same axes are labelled only once."""
         index = self.axes.index(axes)
         has_below, has_before = index < len(self.axes) - self.columns, index % self.columns > 0
         axes.set_xlabel("" if self.are_alike and has_below else x)
@@ -101,20 +116,22 @@ class Sheet:
             axes.tick_params(labelbottom=True)
 
     def call_axes(self, x: str, y: str) -> None:
-        """Say what the axes of all panels are."""
+        """Label the axes of all panels."""
         for axes in self.axes:
             self.call(axes, x, y)
 
     def legend(self, handles: Sequence[Any], labels: Sequence[str], title: str = "") -> None:
-        """Above the panels, where it hides nothing."""
+        """Add a legend above the panels, where it hides nothing."""
         if not handles:
             return
         long = max(map(len, labels)) > 22
         columns = min(len(handles), 2 if long else 5 if self.columns > 1 else 4)
+        if _is_narrow.get():
+            columns = 1 if long else 2
         self.canvas.legend(handles, labels, title=title or None, loc="outside upper center", ncols=columns)
 
     def band(self, names: Sequence[str], shades: Sequence[str], title: str) -> None:
-        """A band of colours beside all panels in place of a legend."""
+        """Add a band of colours beside all panels in place of a legend."""
         from matplotlib.cm import ScalarMappable
         from matplotlib.colors import BoundaryNorm, ListedColormap
 
@@ -128,17 +145,17 @@ class Sheet:
         bar.ax.set_title(fill(title, 18), loc="left", fontsize=8)
 
     def tip(self, axes: Any, places: Iterable[tuple[float, float]], texts: Iterable[str]) -> None:
-        """Texts that a pointer finds at places of a panel, in its own coordinates."""
+        """Add tips at places of a panel, in its coordinates."""
         self._tips += [(axes, x, y, text) for (x, y), text in zip(places, texts, strict=True)]
 
     def save(self, paths: Sequence[Path]) -> None:
-        """Write the files, whose endings decide the format; tips are in those that are SVG."""
+        """Write the files, whose endings determine the format; SVG files contain the tips."""
         from matplotlib.text import Text
 
-        for text in self.canvas.findobj(Text):  # whatever a model is called: a sheet grows with the texts on it
+        for text in self.canvas.findobj(Text):  # the sheet grows with its texts, however long names are
             text.set_text(shortened(text.get_text(), MAX_TEXT))
         self.canvas.draw_without_rendering()
-        self.canvas.set_layout_engine("none")  # all files have the same one, by which tips are placed
+        self.canvas.set_layout_engine("none")  # all files keep the layout for which tips are placed
         box = self.canvas.get_tightbbox().padded(_PAD)
         tips = list(self._placed(box))
         for path in paths:
@@ -147,7 +164,7 @@ class Sheet:
                 _add_tips(path, tips)
 
     def _placed(self, box: Any) -> Iterable[Tip]:
-        """The tips that are in view, of very many only some."""
+        """The visible tips; only a part if there are very many."""
         inside = []
         for axes, x, y, text in self._tips:
             across, up = axes.transData.transform((x, y))
@@ -157,7 +174,7 @@ class Sheet:
 
 
 def _add_tips(path: Path, tips: Iterable[Tip]) -> None:
-    """Add tips to an SVG file, as shapes that are not seen and have a title."""
+    """Add tips to an SVG file as invisible shapes with titles."""
     shapes = (
         f'<circle cx="{tip.x:.1f}" cy="{tip.y:.1f}" r="4"><title>{escape(visible_lines(tip.text))}</title></circle>\n'
         for tip in tips
@@ -176,7 +193,7 @@ class Tipped(NamedTuple):
 
 
 def tips_of(svg: bytes) -> Tipped | None:
-    """The size and the tips of a picture; None if it is not of a size that it says."""
+    """The size and the tips of a picture; None if it does not state its size."""
     try:
         root = ElementTree.fromstring(svg)
         _, _, width, height = map(float, root.attrib["viewBox"].replace(",", " ").split())
@@ -190,18 +207,21 @@ def tips_of(svg: bytes) -> Tipped | None:
     return Tipped(width, height, found)
 
 
-# -- keys -------------------------------------------------------------------------------------------------------------
+# -- legends ----------------------------------------------------------------------------------------------------------
 
 
 def legend_beside(axes: Any, **options: Any) -> None:
-    """A legend to the right of the axes, as long as need be."""
-    found = axes.legend(loc="upper left", bbox_to_anchor=(1.02, 1.0), borderaxespad=0.0, **options)
+    """A legend to the right of the axes, of any length."""
+    where = {"loc": "upper left", "bbox_to_anchor": (1.02, 1.0), "borderaxespad": 0.0}
+    if _is_narrow.get():  # below
+        where = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.2)}
+    found = axes.legend(**where, **options)
     for text in found.get_texts():
         text.set_text(fill(abridged(text.get_text(), 2 * _MAX_NAME), _MAX_NAME))
 
 
 def band_beside(axes: Any, names: Sequence[str], shades: Sequence[str]) -> None:
-    """A band of colours to the right of the axes in place of a legend: names that are many, the first one on top."""
+    """A band of colours to the right of the axes, in place of a legend with many names; the first one is on top."""
     from matplotlib.colors import ListedColormap
 
     title, rows = in_common(names)
@@ -226,7 +246,7 @@ def key_beside(axes: Any, names: Sequence[str], handles: Sequence[Any], shades: 
 
 
 def in_common(names: Sequence[str]) -> tuple[str, list[str]]:
-    """What the names of an array's elements have in common, and the index of each; otherwise the names."""
+    """The common part of the names of an array's elements and their indices; otherwise the names."""
     parts = [_INDEX.split(name) for name in names]
     alike = {len(each) for each in parts}
     varying = [place for place, column in enumerate(zip(*parts, strict=False)) if len(set(column)) > 1]
@@ -248,9 +268,9 @@ def set_log(axes: Any, *, x: bool, y: bool) -> None:
         low, high = getattr(axes.dataLim, f"minpos{which}"), getattr(axes.dataLim, f"interval{which}")[1]
         if not high > 0.0 or not math.isfinite(low):
             side = "horizontal" if which == "x" else "vertical"
-            raise EpicycleError(f"no value on the {side} axis is positive, so that it cannot be logarithmic")
+            raise EpicycleError(f"no value on the {side} axis is positive, so it cannot be logarithmic")
         getattr(axes, f"set_{which}scale")("log", nonpositive="clip")
         axis = getattr(axes, f"{which}axis")
         axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0) if high < 300.0 * low else (1.0,)))
-        axis.set_major_formatter(lambda value, _: f"{value:g}")  # the usual one writes formulas
+        axis.set_major_formatter(lambda value, _: f"{value:g}")  # the default one writes formulas
         axis.set_minor_formatter(NullFormatter())

@@ -1,4 +1,4 @@
-"""What of a run stands in space, taken from tokens: positions, estimates, plans, lines of sight."""
+"""Reads the spatial content of a run from tokens: positions, estimates, plans, lines of sight."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from ..results import Signal
 
 Rows = NDArray[np.float64]
 
-DEVIATIONS = 2.0  # of an estimate, to each side
+DEVIATIONS = 2.0  # shown around an estimate
 
 
 def positions(signal: Signal) -> Rows:
-    """The positions in a signal, shape (n, 2): the tokens' ``position``, or tokens that are x, y themselves.
+    """The positions in a signal, shape (n, 2): the tokens' ``position``, or tokens that are pairs x, y.
 
     Raises ``EpicycleError`` for other signals.
     """
     try:
         return np.array([_position(token) for token in signal.tokens], dtype=float).reshape(-1, 2)
     except (AttributeError, LookupError, TypeError, ValueError):
-        raise EpicycleError(f"the tokens of {signal.name} have no 'position', and are no x, y") from None
+        raise EpicycleError(f"the tokens of {signal.name} have no 'position' and are not pairs x, y") from None
 
 
 def _position(token: Any) -> Any:
@@ -44,9 +44,9 @@ def ellipses(signal: Signal) -> Rows:
 
 
 def tubes(signal: Signal, period: float, initial: float, growth: float) -> Rows:
-    """Plans as circles x, y, radius, one for each control; the radius grows by ``growth`` from one to the next.
+    """Plans as circles x, y, radius, one for each control; the radius grows by ``growth`` at each step.
 
-    A plan is rolled out as the robots do it: each acceleration acts for a period.
+    A plan is rolled out as in the robots: each acceleration acts for one period.
     """
     rows = []
     for token in signal.tokens:
@@ -62,7 +62,7 @@ def tubes(signal: Signal, period: float, initial: float, growth: float) -> Rows:
 
 
 def sights(signal: Signal) -> tuple[list[int], Rows]:
-    """Measurements of a relative position as lines from the sensor to what it saw, and which tokens they are."""
+    """Measurements of a relative position as lines from the sensor to its target, and the indices of their tokens."""
     found = [
         (number, (*token.observer, token.observer[0] + token.value[0], token.observer[1] + token.value[1]))
         for number, token in enumerate(signal.tokens)

@@ -18,29 +18,29 @@ from .samples import Floats, selected
 from .sheet import FEW, LIMIT, Sheet, band_beside, colours, legend_beside
 from .space import ellipses, positions, sights, tubes
 
-TIMES = 8  # that are written at a path
+TIMES = 8  # written beside a path
 _APART = 34.0  # pixels between times
 
 
 class Trajectories(Figure):
-    """The paths of all robots around an obstacle, in the manner of the paper's Figs. 6 and 8.
+    """The paths of all robots around an obstacle, in the style of the paper's Figs. 6 and 8.
 
-    A path begins with a circle and ends with an arrowhead; a dot on it marks every second, and times are written at
-    the first one.  The ellipses are where the estimate puts the obstacle, at two standard deviations; the discs are the
-    obstacle with the distance to keep, once a second.
+    A path starts with a circle and ends with an arrowhead; dots mark every second, and times are written beside the
+    first path.  Ellipses show the estimate of the obstacle at two standard deviations; discs show the obstacle with the
+    distance to keep, once a second.
     """
 
-    robots = texts_parameter(doc="signals of the robots' states (patterns); the first robot is drawn strongest")
+    robots = texts_parameter(doc="signals of the robots' states (patterns); the first robot is emphasized")
     obstacle = Parameter(str, "", doc="signal of the obstacle's state")
     estimate = Parameter(str, "", doc="signal of an estimate of the obstacle")
-    goal = array_parameter((2,), (0.0, 0.0), unit="m", doc="where the first robot is to arrive")
+    goal = array_parameter((2,), (0.0, 0.0), unit="m", doc="destination of the first robot")
     safe_distance = Parameter(float, 2.0, unit="m", min=0.0, doc="radius of the obstacle's disc")
     interval = Parameter(float, 1.0, unit="s", min=1e-3, doc="time between dots, discs and ellipses")
     plans = texts_parameter((), doc="signals of the robots' plans (patterns), which the page of a run shows as tubes")
     sights = texts_parameter((), doc="signals of measurements (patterns), which the page shows as lines of sight")
-    period = Parameter(float, 0.1, unit="s", min=1e-9, doc="time for which each control of a plan acts")
-    tube_initial = Parameter(float, 0.0, unit="m", min=0.0, doc="radius of a plan's tube where it begins")
-    tube_growth = Parameter(float, 0.0, unit="m", min=0.0, doc="by how much the radius grows in a period")
+    period = Parameter(float, 0.1, unit="s", min=1e-9, doc="duration of each control of a plan")
+    tube_initial = Parameter(float, 0.0, unit="m", min=0.0, doc="radius of a plan's tube at its start")
+    tube_growth = Parameter(float, 0.0, unit="m", min=0.0, doc="growth of the radius per period")
 
     def signal_patterns(self) -> tuple[str, ...]:
         return tuple(pattern for pattern in (*self.robots, self.obstacle, self.estimate) if pattern)
@@ -49,7 +49,7 @@ class Trajectories(Figure):
         return (*self.plans, *self.sights)
 
     def marks(self, results: Results) -> Iterator[Mark]:
-        owners: dict[str, int] = {}  # the colour of what a robot sends is its own
+        owners: dict[str, int] = {}  # what a robot sends has the robot's colour
         for name in selected(self.robots, results):
             owners[name.rpartition(".")[0]] = len(owners)
 
@@ -86,7 +86,7 @@ class Trajectories(Figure):
             self._path(sheet, results.signals[name], shade, is_first=index == 0, named=len(robots) <= FEW)
         axes.plot(*self.goal, marker="*", markersize=15, color=LIMIT, linestyle="none", label="goal", zorder=6)
         sheet.call_axes("x (m)", "y (m)")
-        # One metre is as long in x as in y; the sheet takes the shape of what is on it.
+        # One metre is as long in x as in y; the shape of the sheet follows its content.
         axes.set_aspect("equal")
         (left, right), (low, high) = axes.get_xlim(), axes.get_ylim()
         sheet.canvas.set_size_inches(7.0, max(2.4, min(6.5, 4.8 * (high - low) / (right - left)) + 0.8))
@@ -141,13 +141,13 @@ class Trajectories(Figure):
 
 
 def every(times: Floats, interval: float) -> list[int]:
-    """Indices of the tokens that come at multiples of an interval, or first after these."""
+    """Indices of the first tokens at or after multiples of an interval."""
     steps = np.floor(np.asarray(times) / interval + 1e-9)
     return [int(index) for index in np.unique(steps, return_index=True)[1]]
 
 
 def round_step(about: float) -> float:
-    """A time of one, two or five tenths, seconds, tens of seconds and so on, not less than another one."""
+    """The smallest time that is 1, 2 or 5 times a power of ten and not less than the given one."""
     if not about > 0.0:
         return 1.0
     power = 10.0 ** math.floor(math.log10(about))
@@ -155,26 +155,26 @@ def round_step(about: float) -> float:
 
 
 def arrows(axes: Any, points: Floats, shade: str, *, size: float = 11.0, zorder: float = 4.5) -> None:
-    """Arrowheads half way along a path and where it ends, in the direction in which it comes there."""
+    """Arrowheads halfway along a path and at its end, in the direction of the path."""
     walked = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(points, axis=0).T))])
     look = {"arrowstyle": "-|>", "color": shade, "mutation_scale": size, "linewidth": 0, "shrinkA": 0, "shrinkB": 0}
     for share in (0.5, 1.0):
         tip = int(np.searchsorted(walked, share * walked[-1]))
-        # Not from the last step alone, which may be as short as a rounding error.
+        # The last step alone may be as short as a rounding error.
         tail = int(np.searchsorted(walked, walked[tip] - 0.01 * walked[-1], side="right")) - 1
         if 0 <= tail < tip:
             axes.annotate("", points[tip], points[tail], arrowprops=look, zorder=zorder)
 
 
 def tip_path(sheet: Sheet, axes: Any, name: str, times: Floats, points: Floats, most: int = 150) -> None:
-    """Say when a path is where, at so many places at most."""
+    """Add tips that show the time at places of a path, at most ``most`` of them."""
     each = math.ceil(len(points) / most) or 1
     texts = [f"{name}\n{time:.4g} s at ({x:.4g}, {y:.4g}) m" for time, (x, y) in zip(times, points, strict=True)]
     sheet.tip(axes, points[::each], texts[::each])
 
 
 def write_times(axes: Any, points: Floats, times: Floats, marks: Sequence[int], shade: str) -> None:
-    """Write times at some dots of a path, to the left of its direction, where there is room between them."""
+    """Write times beside dots of a path, to the left of its direction, where there is space."""
     transform, taken = axes.transData.transform, list[Floats]()
     for index in marks[:: math.ceil(len(marks) / TIMES) or 1]:
         place = transform(points[index])

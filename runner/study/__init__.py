@@ -1,6 +1,6 @@
-"""Studies: many runs of a model under many conditions, which survive whatever happens to them.
+"""Studies: many runs of a model under many conditions, whose results survive any interruption.
 
-``plan`` says what is to be run, ``run`` makes the runs and keeps what came of them, ``judge`` says what that means.
+``plan`` determines the runs, ``run`` makes them and keeps their results, ``judge`` evaluates these.
 """
 
 from .inference import Estimate, half_width, holm, mean, paired_difference, with_interval

@@ -1,6 +1,6 @@
 """Statistics of replications: intervals of means and rates, and comparisons of conditions in pairs.
 
-Runs that failed or have no number are counted apart by the callers, never averaged in.
+Callers count runs that failed or have no number separately; they never enter an average.
 Source: A. M. Law, *Simulation Modeling and Analysis*, chapters 4, 9 and 10.
 """
 
@@ -69,7 +69,7 @@ def with_interval(estimate: Estimate) -> str:
 
 
 def bootstrap_mean(values: Sequence[float], level: float = LEVEL, *, resamples: int = 9_999) -> Estimate:
-    """The mean with the bias-corrected and accelerated bootstrap interval, which may lie unevenly around it.
+    """The mean with the bias-corrected and accelerated bootstrap interval, which need not be symmetric.
 
     Source: B. Efron, Better Bootstrap Confidence Intervals, J. American Statistical Association 82, 1987.
     """
@@ -80,7 +80,8 @@ def bootstrap_mean(values: Sequence[float], level: float = LEVEL, *, resamples: 
     gaps = [value - plain.value for value in values]
     squares = math.fsum(gap * gap for gap in gaps)
     acceleration = math.fsum(gap * gap * gap for gap in gaps) / (6.0 * squares * math.sqrt(squares))
-    rounding = 1e-12 * max(map(abs, values))  # of few values, many a resample has each of them once: the same mean
+    # With few values, many resamples have each of them once, and so the same mean.
+    rounding = 1e-12 * max(map(abs, values))
     at_or_below = bisect_left(means, plain.value - rounding) + bisect_right(means, plain.value + rounding)
     below = at_or_below / (2.0 * resamples)
     bias = normal_quantile(min(max(below, 0.5 / resamples), 1.0 - 0.5 / resamples))
@@ -94,7 +95,7 @@ def bootstrap_mean(values: Sequence[float], level: float = LEVEL, *, resamples: 
 
 
 def resampled_sums(values: Sequence[float], number: int) -> NDArray[np.float64]:
-    """Sums of bootstrap samples, in order; as many values are drawn alike wherever this is called."""
+    """Sums of bootstrap samples, in order; every call with equally many values makes the same draws."""
     import numpy as np
 
     known, sums = np.asarray(values, float), np.zeros(number)
@@ -107,7 +108,7 @@ def resampled_sums(values: Sequence[float], number: int) -> NDArray[np.float64]:
 
 
 def _draws(count: int, number: int) -> Iterator[tuple[int, NDArray[np.int64]]]:
-    """Which values bootstrap samples take, a million of choices at a time: (choice, sample), from the first one on."""
+    """The choices of bootstrap samples, a million at a time: (choice, sample)."""
     import numpy as np
 
     stream, rows = random_stream(0, "resampling"), max(1, 1_000_000 // count)
@@ -120,7 +121,7 @@ _few_draws = lru_cache(maxsize=2)(lambda count, number: list(_draws(count, numbe
 
 
 def rate(successes: int, count: int, level: float = LEVEL) -> Estimate:
-    """A share with Wilson's interval, which holds for rare events and few runs, too."""
+    """A share with Wilson's interval, which is valid for rare events and few runs, too."""
     if count == 0:
         return Estimate(math.nan, math.nan, 0.0, 1.0, 0)
     share, z = successes / count, normal_quantile((1.0 + level) / 2.0)
@@ -134,17 +135,17 @@ def rate(successes: int, count: int, level: float = LEVEL) -> Estimate:
 
 @dataclass(frozen=True)
 class Difference:
-    """The mean of ``second`` less ``first`` over common replications, and the p-value of its being zero."""
+    """The mean of ``second`` less ``first`` over common replications, and the p-value for a mean of zero."""
 
     estimate: Estimate
     p: float
 
 
 def paired_difference(first: dict[int, float], second: dict[int, float], level: float = LEVEL) -> Difference:
-    """How much greater one condition's numbers are than another's, by replication, with Student's paired test.
+    """How much greater the numbers of one condition are than another's, by replication, with Student's paired test.
 
-    Replications that only one of them has are left out.  If all differences are the same, there is no spread by which
-    Student's test could judge them, and the p-value is that of the sign test.
+    Replications that only one of them has are left out. If all differences are equal, they have no spread for Student's
+    test, and the p-value is that of the sign test.
     """
     common = sorted(first.keys() & second.keys())
     scale = max((max(abs(first[each]), abs(second[each])) for each in common), default=0.0)
@@ -158,7 +159,7 @@ def paired_difference(first: dict[int, float], second: dict[int, float], level: 
 
 
 def without_rounding(values: Iterable[float], scale: float) -> list[float]:
-    """Differences of numbers of some size, without what rounding has left: 4.8 - 4.7 and 5.0 - 4.9 are the same."""
+    """Differences of numbers of some size, cleaned of rounding errors: 4.8 - 4.7 and 5.0 - 4.9 are equal."""
     if not scale:
         return list(values)
     quantum = math.ldexp(1.0, math.frexp(scale)[1] - 42)
@@ -166,7 +167,7 @@ def without_rounding(values: Iterable[float], scale: float) -> list[float]:
 
 
 def holm(p_values: Sequence[float]) -> list[float]:
-    """The p-values of tests that were made together, corrected for their number; those that are NaN do not count.
+    """The p-values of tests made together, corrected for their number; NaNs do not count.
 
     Source: S. Holm, *A simple sequentially rejective multiple test procedure*, Scand. J. Statist. 6 (1979).
     """

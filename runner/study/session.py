@@ -1,4 +1,4 @@
-"""A session of a study: what is not there yet is made, and what there is then is reported."""
+"""A session of a study: missing runs are made, and the state is reported."""
 
 from __future__ import annotations
 
@@ -23,21 +23,21 @@ from .run.pulse import duration
 from .run.store import lock, prepare
 
 LOCAL, DASK = "local", "dask"  # executors
-MANY = 100_000  # runs that nobody asks for by mistake
-_TRIAL = 5.0  # s that are spent at most to find out how long a run takes
+MANY = 100_000  # runs; larger studies need confirmation
+_TRIAL = 5.0  # s, at most, for measuring how long a run takes
 
 
 class TooManyRunsError(EpicycleError):
-    """A study that is larger than its author may think."""
+    """A study larger than its author may think."""
 
 
 @dataclass
 class Outcome:
-    """What a session has done: runs by status, those that it made and those that were there."""
+    """The outcome of a session: runs by status, those that it made and those that existed."""
 
     made: int
     there: int
-    failed: int  # of both
+    failed: int  # new and existing
     stopped_early: int
     table: Path
 
@@ -53,13 +53,13 @@ def run_study(
     executor: str = LOCAL,
     scheduler: str | None = None,
 ) -> Outcome:
-    """Make all runs of a plan that are not in the folder yet, in ``jobs`` processes at a time (default: one a core).
+    """Make all runs of a plan that are not yet in the folder, in ``jobs`` processes at a time (default: one per core).
 
     A run that raises gets a row with the status ``failed``, one that takes longer than ``timeout`` seconds a row
-    ``timeout``.  One whose process dies is tried again, and after three times gets a row ``killed``; ``retry`` makes
-    both of these again.  ``tell`` is called now and then.  ``executor``: ``local``, or ``dask`` for the workers of the
-    Dask ``scheduler`` at that address, or for a cluster of its own on this machine.
-    Raises ``StoreError`` and ``WorkerError``, and ``EpicycleError`` where Dask is wanted and not installed.
+    ``timeout``.  One whose process dies is repeated, and after three attempts gets a row ``killed``; ``retry`` repeats
+    both kinds.  ``tell`` is called now and then.  ``executor``: ``local``, or ``dask`` for the workers of the Dask
+    ``scheduler`` at that address or, without one, a cluster on this machine. Raises ``StoreError`` and ``WorkerError``,
+    and ``EpicycleError`` if Dask is requested but not installed.
     """
     make = _maker(executor, scheduler)  # before anything is written
     with lock(folder):
@@ -74,14 +74,14 @@ def run_study(
 
 
 def _maker(executor: str, scheduler: str | None) -> Callable[[Keeper, int, Callable[[], None]], None]:
-    """What makes all runs of a backlog, so many at a time, and calls now and then what it is given last.
+    """A function that makes all runs of a backlog, ``jobs`` at a time, and now and then calls its last argument.
 
     Raises ``EpicycleError`` if what an executor needs is not installed.
     """
     if executor != DASK:
         return make_here
-    # Here, and not with this package, which several threads of a Dask worker may import at once: whoever asks for
-    # `parcel` first must not find that the package waits for it.
+    # Imported here, not with this package, which several threads of a Dask worker may import at once: the first to
+    # import `parcel` must not find the package waiting for it.
     from .run.cluster import Cluster, distributed_module
 
     distributed_module()
@@ -89,7 +89,7 @@ def _maker(executor: str, scheduler: str | None) -> Callable[[Keeper, int, Calla
 
 
 def manifest_of(plan: Plan) -> dict[str, Any]:
-    """All that the folder is to know: the plan, and what its results are made with."""
+    """The contents of the manifest: the plan, and what its results are made with."""
     study = plan.study
     return {
         "format": FORMAT,
@@ -102,16 +102,16 @@ def manifest_of(plan: Plan) -> dict[str, Any]:
 
 
 def plan_of_folder(folder: Path) -> Plan:
-    """The plan of a results folder that is to be resumed.
+    """The plan of a results folder to resume.
 
-    Raises ``StoreError`` if its model, or Epicycle, is not the same any more.
+    Raises ``StoreError`` if its model or Epicycle has changed.
     """
     manifest = read_manifest(folder)
     before = Plan.of_manifest(manifest)
     if (version := epicycle_version()) != before.made_with:
         raise StoreError(
-            f"{folder} was made with Epicycle {before.made_with}, and this is Epicycle {version}\n"
-            f"   help: install that one, or make all runs anew: 'epicycle study {before.study.path} --out ANOTHER'"
+            f"{folder} was made with Epicycle {before.made_with}, but this is Epicycle {version}\n"
+            f"   help: install that version, or repeat all runs: 'epicycle study {before.study.path} --out ANOTHER'"
         )
     plan = Plan.made(before.study)
     if changed := sorted(name for name, digest in plan.sources.items() if before.sources.get(name) != digest):
@@ -128,7 +128,7 @@ def available_cores() -> int:
 
 
 def check_size(plan: Plan, jobs: int) -> None:
-    """Raise ``TooManyRunsError`` for a study of very many runs, with how long it would take."""
+    """Raise ``TooManyRunsError`` for a study of very many runs, with an estimate of its duration."""
     if plan.size <= MANY:
         return
     seconds = seconds_of_a_run(plan) * plan.size / jobs
@@ -140,7 +140,7 @@ def check_size(plan: Plan, jobs: int) -> None:
 
 
 def seconds_of_a_run(plan: Plan) -> float:
-    """How long the first run takes, or seems to take after a few seconds of it."""
+    """The duration of the first run, or its estimate after a few seconds."""
     condition = plan.condition(0)
     model = plan.load(condition)
     started = time.perf_counter()
@@ -151,5 +151,5 @@ def seconds_of_a_run(plan: Plan) -> float:
                 reached = simulation.tag.seconds
                 return taken * model.stop / reached if model.stop and reached else taken
     except EpicycleError:
-        pass  # the first run fails; others may not
+        pass  # the first run fails; others may succeed
     return time.perf_counter() - started

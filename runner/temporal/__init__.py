@@ -5,12 +5,12 @@
 
 from .judge import Finding, Judge
 from .operators import Source
-from .property import Condition, Property, Sends, leaves
+from .property import Condition, Property, Sends, leaves, looks_ahead
 from .requirement import HOLD, LINEAR, Requirement, RequirementOptions
 from .signal import TINY, Line, Piece
 from .syntax import WORDS, PropertyError, property_of
 
 __all__ = [
     "HOLD", "LINEAR", "TINY", "WORDS", "Condition", "Finding", "Judge", "Line", "Piece", "Property", "PropertyError",
-    "Requirement", "RequirementOptions", "Sends", "Source", "leaves", "property_of",
+    "Requirement", "RequirementOptions", "Sends", "Source", "leaves", "looks_ahead", "property_of",
 ]  # fmt: skip

@@ -21,6 +21,7 @@ _HOLD: Final[dict[str, Callable[[Any, Any], bool]]] = {
     "<": operator.lt, "<=": operator.le, ">": operator.gt, ">=": operator.ge, "==": operator.eq, "!=": operator.ne,
 }  # fmt: skip
 OPERATORS: Final = tuple(_HOLD)
+_EXACT: Final = 2**53
 
 
 @dataclass(frozen=True)
@@ -50,8 +51,10 @@ class Condition:
         side of the truth.  Raises ``EpicycleError``.
         """
         if self.difference is not None:
-            try:
-                found = self.difference(values)
+            try:  # as floats, in which whole numbers of this size are exact, for these are fast
+                found = self.difference(
+                    [float(each) if type(each) is int and -_EXACT <= each <= _EXACT else each for each in values]
+                )
             except EpicycleError:  # of texts, say
                 found = None
             if type(found) is float and found != 0.0:
@@ -134,6 +137,27 @@ class Until:
 
 
 Property: TypeAlias = Condition | Sends | Not | Junction | Quantified | Until
+
+
+def looks_ahead(tree: Property) -> bool:
+    """Whether more than the present decides when it breaks: it is not ``always`` of something that is only of now."""
+    match tree:
+        case Junction():
+            return looks_ahead(tree.left) or looks_ahead(tree.right)
+        case Quantified(any=False):
+            return not _is_of_now(tree.of)
+        case _:
+            return True
+
+
+def _is_of_now(tree: Property) -> bool:
+    match tree:
+        case Not():
+            return _is_of_now(tree.of)
+        case Junction():
+            return _is_of_now(tree.left) and _is_of_now(tree.right)
+        case _:
+            return isinstance(tree, (Condition, Sends))
 
 
 def leaves(tree: Property) -> list[Condition | Sends]:

@@ -299,17 +299,17 @@ def test_channels(actor: str, feeds: Feeds, outputs: int, expected: list[Any]) -
     [
         ("values: [1, 2]", [("input", [[0, 1], [1, 2], [2, 3]])], ""),
         ("values: [1, 2], follow: false", [("input", [[0, 1], [1, 2], [2, 3]])],
-         "token 2 is 3, but only 2 are expected"),
+         "token 2 is 3, expected only 2 tokens"),
         ("values: [[1, a], [2, b]], together: true", [("input", [[0, 1], [1, 2]]), ("input", [[0, "a"], [1, "b"]])],
          ""),
         ("values: [[1, a], [2, b]], together: true", [("input", [[0, 1], [1, 2]]), ("input", [[0, "a"], [1, "c"]])],
          "token 1 is [2, 'c'], expected [2, 'b'] within 1e-09"),
         ("values: [[1, a], [2, b]], together: true", [("input", [[0, 1], [1, 2]]), ("input", [[0, "a"]])],
-         "for value 1 no token came on channel 1"),
+         "no token came for value 1 on channel 1"),
         ("values: [{x: 1.0, y: [2]}]", [("input", [[0, {"x": 1 + 1e-12, "y": [2]}]])], ""),
         ("values: [{x: 1.0}]", [("input", [[0, {"y": 1.0}]])],
          "token 0 is {'y': 1.0}, expected {'x': 1.0} within 1e-09"),
-        ("values: [1, 2]", [("input", [[0, 1]])], "1 of 2 expected tokens came, the next was to be 2"),
+        ("values: [1, 2]", [("input", [[0, 1]])], "1 of 2 expected tokens came; the next should have been 2"),
     ],
 )  # fmt: skip
 def test_checks(test: str, feeds: Feeds, message: str) -> None:
@@ -321,19 +321,18 @@ def test_checks(test: str, feeds: Feeds, message: str) -> None:
 @pytest.mark.parametrize(
     ("actor", "feeds", "message"),
     [
-        ("AddSubtract", [("plus", [[0, [1]]]), ("plus", [[0, [1, 2]]])], "[1] has 1 items and [1, 2] has 2"),
-        ("AddSubtract", [("plus", [[0, 1]]), ("minus", [[0, "a"]])], "1 and 'a' do not go together"),
-        ("Scale, factor: 2", [("input", [[0, "a"]])], "'a' and 2 do not go together"),
+        ("AddSubtract", [("plus", [[0, [1]]]), ("plus", [[0, [1, 2]]])], "[1] has 1 item, but [1, 2] has 2"),
+        ("AddSubtract", [("plus", [[0, 1]]), ("minus", [[0, "a"]])], "1 and 'a' cannot be combined"),
+        ("Scale, factor: 2", [("input", [[0, "a"]])], "'a' and 2 cannot be combined"),
         ("Spread", [("input", [[0, "abc"]])], "'abc' is not a list"),
-        ("Filter", [("input", [[0, 1]])], "'token' gives 1 for 1, not true or false"),
+        ("Filter", [("input", [[0, 1]])], "'token' gives 1 for 1, expected true or false"),
         ("BlockExpression, expression: 'block[0]', items: true", [("input", [[0, 1]])],
          "'block[0]' gives 1, which is not a list of items to send"),
         ("TextFunction, function: replace, other: a", [("text", [[0, "a" * 200]]), ("new", [[0, "b" * 1000]])],
-         "the text becomes longer than 100,000 characters"),
+         "the result is longer than 100,000 characters"),
         ("Ramp", [("trigger", [[0, 0], [1, 0], [2, 0]]), ("step", [[0, 0.5]])],
-         ("init and step are whole numbers, and so is what is sent, but a step of 0.5 has come; write 'init: 0.0' for "
-          "numbers that are not whole")),
-        ("Derivative", [("input", [[0, 1], [0, 2]])], "1 and 2 come at one time: a jump has no slope"),
+         ("init and step are whole numbers, but a step of 0.5 came; write 'init: 0.0' to allow fractions")),
+        ("Derivative", [("input", [[0, 1], [0, 2]])], "1 and 2 came at the same time, and a jump has no slope"),
     ],
 )  # fmt: skip
 def test_messages(actor: str, feeds: Feeds, message: str) -> None:
@@ -345,15 +344,17 @@ def test_messages(actor: str, feeds: Feeds, message: str) -> None:
 @pytest.mark.parametrize(
     ("actor", "message"),
     [
-        ("Pulse, indexes: [1, 0]", "indexes: [1, 0] is not an ascending list of whole numbers from 0 on"),
-        ("RecordAssembler, fields: [input], onto: input", "onto: 'input' is one of the fields"),
-        ("BlockExpression, expression: token", "expression: it knows 'block' and 'past', not 'token'"),
-        ("HoldingExpression, expression: input, held: {index: 1}", "held: 'index' is not in the expression 'input'"),
+        ("Pulse, indexes: [1, 0]", "indexes: [1, 0] is not an ascending list of whole numbers >= 0"),
+        ("RecordAssembler, fields: [input], onto: input", ("onto: 'input' is also one of the fields; choose another "
+                                                          "name")),
+        ("BlockExpression, expression: token", "expression: 'token' is unknown; the names are 'block' and 'past'"),
+        ("HoldingExpression, expression: input, held: {index: 1}", ("held: 'index' is not a name in the expression "
+                                                                   "'input'")),
         ("Pulse, indexes: [0]", "values: 2 values for 1 of 'indexes'; give one for each"),
-        ("Pulse, indexes: [], values: []", "values: the list is empty, there is nothing to send"),
+        ("Pulse, indexes: [], values: []", "values: the list is empty; give at least one value"),
         ("Sequence, values: [1], repeat: true, hold: true",
-         "repeat and hold cannot both be true: after the last value comes the first, or itself"),
-        ("Test, values: [1], together: true", "values: value 0 is 1, no list of a token on each channel"),
+         "repeat and hold cannot both be true: after the last value comes either the first or the last one again"),
+        ("Test, values: [1], together: true", "values: value 0 is 1, expected a list with a token for each channel"),
     ],
 )  # fmt: skip
 def test_parameters_that_do_not_go_together(actor: str, message: str) -> None:

@@ -82,12 +82,18 @@ def test_an_expression_without_names_has_nothing_to_wait_for() -> None:
         (
             "[x]",
             1,
-            "it failed in fire() at (1 s, 1): '[x]' gives [1], which is not a number: say so with 'gives'",
+            (
+                "it failed in fire() at (1 s, 1): '[x]' gives [1], which is not a number; set 'gives' to the type of "
+                "the value"
+            ),
         ),
         (
             "x",
             True,
-            "it failed in fire() at (1 s, 1): 'x' gives True, which is not a number: say so with 'gives'",
+            (
+                "it failed in fire() at (1 s, 1): 'x' gives True, which is not a number; set 'gives' to the type of "
+                "the value"
+            ),
         ),
         (
             "sqrt(x)",
@@ -118,7 +124,7 @@ def test_a_number_of_numpy_divides_as_any_other(number: Any) -> None:
         ("x.real", None),
         ("max + x", "it.expression: 'max + x' is not an expression: 'max' is a function: write max(...)"),
         ([1], "it.expression: [1] is not an expression"),
-        ("output + 1", "it: there would be two ports called 'output'"),
+        ("output + 1", "it: there would be two ports named 'output'"),
     ],
 )
 def test_a_bad_expression_is_refused_at_load(expression: Any, message: str | None) -> None:
@@ -223,14 +229,14 @@ def test_a_model_calls_only_functions_that_are_offered(monkeypatch: pytest.Monke
     (problem,) = caught.value.problems
     known = ", ".join(sorted(["hypotenuse", "magnitude", f"{__name__}:magnitude"]))
     assert problem.message == (
-        "it.function: 'os:system' is not a function that models may call; they may call "
-        f"{known}; a package offers its functions as entry points of the group "
-        "'epicycle.functions', Python gives them with load_model(types=[Function.knowing(f)])"
+        "it.function: 'os:system' is not a function that models may call; they may call: "
+        f"{known}; packages offer functions as entry points of the group "
+        "'epicycle.functions', Python programs with load_model(types=[Function.knowing(f)])"
     )
     with pytest.raises(ModelError) as caught:
         model_of({"type": "Function", "function": "any_number"}, {}, [Function.knowing(any_number)])
     assert caught.value.problems[0].message == (
-        "it: function: any_number takes any number of arguments (values), which gives no ports"
+        "it: function: any_number takes any number of arguments (values), so its ports are unknown"
     )
 
 
@@ -268,7 +274,7 @@ def test_multiply_divide_and_scale() -> None:
     inputs = {"multiply": [seconds(3, 5), seconds(2, 1)], "divide": seconds(4)}
     _, sent, _ = feed({"type": "MultiplyDivide"}, inputs)
     assert tokens(sent) == [1.5, 5]
-    with pytest.raises(ActorError, match=r"it failed in fire\(\) at \(1 s, 1\): 3 is to be divided by 0"):
+    with pytest.raises(ActorError, match=r"it failed in fire\(\) at \(1 s, 1\): 3 cannot be divided by 0"):
         feed({"type": "MultiplyDivide"}, {"multiply": seconds(3), "divide": seconds(0)})
     _, sent, _ = feed({"type": "Scale", "factor": 2, "offset": 1}, {"input": seconds(1, 2, 3), "factor": [(3.0, -1.5)]})
     assert tokens(sent) == [3, 5, -3.5]

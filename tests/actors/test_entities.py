@@ -82,5 +82,5 @@ def test_what_cannot_be(actor: str, feeds: Feeds, message: str) -> None:
 
 
 def test_records_without_fields() -> None:
-    assert problem("{type: RecordAssembler, fields: []}") == "it: fields: the list is empty"
-    assert problem("{type: RecordDisassembler, fields: [a, a]}") == "it: fields: 'a' is named twice"
+    assert problem("{type: RecordAssembler, fields: []}") == "it: fields: the list is empty; name at least one field"
+    assert problem("{type: RecordDisassembler, fields: [a, a]}") == "it: fields: 'a' is listed twice"

@@ -79,10 +79,10 @@ def test_among_the_shortest_queues_one_is_drawn() -> None:
 @pytest.mark.parametrize(
     ("router", "message"),
     [
-        ("weights: [1, 2]", "weights: it is for the policy 'random', and the policy is 'round robin'"),
-        ("policy: random, channel: token", "channel: it is for the policy 'expression', and the policy is 'random'"),
-        ("policy: expression", "policy: 'expression' needs 'channel', which says which channel a token goes to"),
-        ("policy: random, weights: [0]", "weights [0.0] are not all 0 or more with a finite sum above 0"),
+        ("weights: [1, 2]", "weights: it is for the policy 'random', but the policy is 'round robin'"),
+        ("policy: random, channel: token", "channel: it is for the policy 'expression', but the policy is 'random'"),
+        ("policy: expression", "policy: 'expression' needs 'channel', an expression for the channel of a token"),
+        ("policy: random, weights: [0]", "weights [0.0]: expected numbers >= 0 with a finite sum > 0"),
     ],
 )
 def test_wrong_routers(router: str, message: str) -> None:
@@ -93,8 +93,8 @@ def test_wrong_routers(router: str, message: str) -> None:
     ("router", "message"),
     [
         ("policy: shortest queue",
-         "it.output has 2 channels and it.load has 0; 'shortest queue' needs to be told of each"),
-        ("policy: random, weights: [1, 2, 3]", "it.output has 2 channels, and there are 3 weights"),
+         "it.output has 2 channels and it.load has 0; 'shortest queue' needs one load for each channel"),
+        ("policy: random, weights: [1, 2, 3]", "it.output has 2 channels, but there are 3 weights; give one for each"),
         ("policy: expression, channel: token + channels",
          "'token + channels' gives 3 for 1, but it.output has 2 channels, counted from 0"),
     ],
@@ -105,7 +105,7 @@ def test_routers_at_work(router: str, message: str) -> None:
     assert caught.value.reason == message
 
 
-ALIKE = "they must have equally many, for each channel of the input leads to one of the output"
+ALIKE = "give both the same number of channels, because each channel of the input leads to one of the output"
 
 
 @pytest.mark.parametrize(
@@ -129,4 +129,4 @@ def test_wrong_channels(actor: str, feeds: Feeds, message: str) -> None:
 
 def test_a_policy_by_its_former_name() -> None:
     actor = "{type: Router, policy: in turn}"
-    assert problem(actor, [("input", [])]) == "it.policy: 'in turn' is called 'round robin' now"
+    assert problem(actor, [("input", [])]) == "it.policy: 'in turn' is now called 'round robin'"

@@ -224,16 +224,18 @@ def test_messages() -> None:
     drawn = "{type: Random, distribution: {type: Gamma}, generator: {type: JavaRandom, seed: 5}}"
     with pytest.raises(ActorError) as caught:
         behave(drawn, [("trigger", [[0, 0]])])
-    assert caught.value.reason == "a generator of another program has no 'gamma': leave 'generator' out"
+    assert caught.value.reason == "a generator of another program has no 'gamma'; leave out 'generator'"
     wrong = "{type: PoissonClock, generator: {type: Java, seed: 5}}"
     assert problem(wrong) == "it.generator: 'Java' is not one of DRand, JavaRandom"
     many = "{type: Random, distribution: {type: Poisson, mean: 10}, generator: {type: DRand, seed: 5}}"
     with pytest.raises(ActorError) as caught:
         behave(many, [("trigger", [[0, 0]])])
-    assert caught.value.reason == ("DRand draws Poisson numbers whose mean is below 10, not 10: leave 'generator' out")
+    assert caught.value.reason == (
+        "DRand draws Poisson numbers only with a mean below 10, not 10; leave out 'generator'"
+    )
     narrow = "{type: Random, distribution: {type: VonMises, concentration: 1e7}, generator: {type: DRand, seed: 5}}"
     with pytest.raises(ActorError) as caught:
         behave(narrow, [("trigger", [[0, 0]])])
     assert caught.value.reason == (
-        "DRand draws angles whose concentration is from 1e-6 to 1e6, not 1e+07: leave 'generator' out"
+        "DRand draws angles only with a concentration from 1e-6 to 1e6, not 1e+07; leave out 'generator'"
     )

@@ -76,11 +76,12 @@ def test_a_sender_sends_anew_what_is_late() -> None:
         ("Link, rate: 1 bit/s, size: length", [("input", [[0, {"lenght": 1}]])],
          ("'length': the token {'lenght': 1} has no field 'length', did you mean 'lenght'? it has lenght, and token, "
           "time are known")),
-        ("Link, rate: 1 bit/s, size: token", [("input", [[0, -1]])], "'token' gives -1 for -1, but a size is >= 0"),
+        ("Link, rate: 1 bit/s, size: token", [("input", [[0, -1]])], ("'token' gives -1 for -1, but a size must be >= "
+                                                                     "0")),
         ("ArqReceiver", [("input", [[0, {"number": 0}]])],
          "the token {'number': 0} has no field 'data'; it has number"),
         ("ArqReceiver", [("input", [[0, {"number": 0.5, "data": 1}]])],
-         "the number of a frame is 0.5, but they are counted 0, 1, 2, ..."),
+         "the number of a frame is 0.5, expected 0, 1, 2, ..."),
         ("NetworkSwitch, port: token", [("input", [[0, 2]])],
          "'token' gives 2 for 2, but it.output has 2 channels, counted from 0"),
     ],

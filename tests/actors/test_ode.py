@@ -66,8 +66,8 @@ def test_a_ball_that_comes_to_rest_is_told_of() -> None:
     message = str(caught.value).partition("\n")[0]
     assert message.startswith("it failed in fire() at (12.8")
     assert message.endswith(
-        "which is less than min_interval, 1e-06 s: it may go on so without end (Zeno); "
-        "stop before, for example when 'bounce' has come often enough"
+        "which is less than min_interval, 1e-06 s: it may repeat without end (Zeno); "
+        "end the run earlier, for example after a number of 'bounce'"
     )
 
 
@@ -217,7 +217,7 @@ def test_a_loop_through_the_states_needs_no_delay() -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"initial": {}}, "it: initial: there is no state"),
+        ({"initial": {}}, "it: initial: the mapping is empty; give at least one state"),
         ({"initial": [1]}, "it.initial: [1] is not a mapping of names to number"),
         ({"initial": {"height": "x", "speed": 0}}, "it.initial: height: 'x' is not a number"),
         ({"derivatives": {"height": "speed"}}, "it: derivatives: 'speed' is missing"),
@@ -244,11 +244,11 @@ def test_a_loop_through_the_states_needs_no_delay() -> None:
         ({"held": {"u": 1}}, "it: held: there is no input 'u'; inputs: none"),
         (
             {"crossings": {"height": "speed"}, "directions": {}, "resets": {}},
-            "it: crossings: 'height' is the name of a state, too",
+            "it: crossings: 'height' is also the name of a state",
         ),
         (
             {"derivatives": {"height": "bounce", "speed": 1}},
-            "it: 'bounce' asks for 'bounce', which is a crossing and has no value",
+            "it: 'bounce' uses 'bounce', which is a crossing and has no value",
         ),
     ],
 )
@@ -258,7 +258,7 @@ def test_what_is_wrong_is_told_at_load(change: dict[str, Any], message: str) -> 
     assert [problem.message for problem in caught.value.problems] == [message]
 
 
-TOO_SMALL = "Required step size is less than spacing between numbers."
+TOO_SMALL = "the required step is shorter than the spacing between numbers"
 
 
 @pytest.mark.parametrize("method", ["DOP853", "RK45"])

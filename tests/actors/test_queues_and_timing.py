@@ -128,10 +128,10 @@ def test_rounding_does_not_add_up_while_a_server_is_busy() -> None:
 @pytest.mark.parametrize(
     ("server", "message"),
     [
-        ("servers: 2, capacity: 1", "capacity: 1 is less than 2 servers; it counts those that are served as well"),
+        ("servers: 2, capacity: 1", "capacity: 1 is less than 'servers' (2), but it includes tokens in service"),
         ("servers: null, capacity: 1",
-         "capacity: 1 is less than any number of servers; it counts those that are served as well"),
-        ("distribution: {type: Bernoulli}", "distribution: Bernoulli does not give numbers alone"),
+         "capacity: 1 is less than 'servers' (unlimited), but it includes tokens in service"),
+        ("distribution: {type: Bernoulli}", "distribution: Bernoulli gives values other than numbers"),
     ],
 )  # fmt: skip
 def test_wrong_servers(server: str, message: str) -> None:
@@ -142,12 +142,12 @@ def test_wrong_servers(server: str, message: str) -> None:
     ("actor", "feeds", "message"),
     [
         ("Server, distribution: {type: Constant, value: -1}", [("input", [[0, 1]])],
-         "-1.0 drawn from Constant(value=-1.0) is not a service time in s, a number >= 0"),
+         "-1.0 drawn from Constant(value=-1.0) is not a service time in s: it must be a number >= 0"),
         ("Server", [("input", [[0, 1]]), ("service_time", [[0, -1]])],
          "it.service_time: -1 is out of bounds, expected a number in s >= 0"),
         ("TimeDelay", [("input", [[0, 1]]), ("delay", [[0, "soon"]])],
          "it.delay: 'soon' is not a number with a unit, expected a time in s"),
-        ("Timer", [("input", [[0, -1]])], "ValueError: it.input is -1 s: a timer cannot run for less than no time"),
+        ("Timer", [("input", [[0, -1]])], "ValueError: it.input is -1 s, but a timer needs a time >= 0"),
     ],
 )  # fmt: skip
 def test_times_that_are_none(actor: str, feeds: Feeds, message: str) -> None:

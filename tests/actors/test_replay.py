@@ -50,14 +50,14 @@ def test_rows_come_at_their_times(
     ("table", "options", "message"),
     [
         ("time,x\n1,1\n0.5,2\n", "", "row 2: time is 0.5, which is before the row above"),
-        ("time,x\n-1,1\n", "", "row 1: time is -1, not a time in s from 0 on"),
-        ("time,x\nsoon,1\n", "", "row 1: time is 'soon', not a time in s from 0 on"),
-        ("time,x\n0,1\n,1\n", "", "row 2: time is empty, not a time in s from 0 on"),
-        ("time,x\n0,1\ninf,1\n", "", "row 2: time is inf, not a time in s from 0 on"),
-        ("times,x\n0,1\n", "", "there is no column 'time', did you mean 'times'?; columns: times, x"),
-        ("time,x\n0,1\n", ", columns: [x, weight]", "there is no column 'weight'; columns: time, x"),
-        ("time\n0\n", "", "there is no column of values beside 'time'"),
-        ("time,x,x\n0,1,2\n", "", "two columns have the same name: time, x, x"),
+        ("time,x\n-1,1\n", "", "row 1: time is -1, expected a time in s >= 0"),
+        ("time,x\nsoon,1\n", "", "row 1: time is 'soon', expected a time in s >= 0"),
+        ("time,x\n0,1\n,1\n", "", "row 2: time is empty, expected a time in s >= 0"),
+        ("time,x\n0,1\ninf,1\n", "", "row 2: time is inf, expected a time in s >= 0"),
+        ("times,x\n0,1\n", "", "it has no column 'time', did you mean 'times'?; columns: times, x"),
+        ("time,x\n0,1\n", ", columns: [x, weight]", "it has no column 'weight'; columns: time, x"),
+        ("time\n0\n", "", "it has no column of values, only 'time'"),
+        ("time,x,x\n0,1,2\n", "", "two of its columns have the same name: time, x, x"),
         ("time,x\n0,1,2\n", "", "CSV parse error: Expected 2 columns, got 3: 0,1,2"),
         ("", "", "Empty CSV file"),
     ],
@@ -79,9 +79,7 @@ def test_wrong_files(tmp_path: Path) -> None:
     model.write_text("model: m\nactors: {it: {type: Replay, file: t.txt}}\n")
     with pytest.raises(ModelError) as caught:
         load_model(model)
-    assert [problem.message for problem in caught.value.problems] == [
-        "it: file: 't.txt' ends neither in .csv nor in .parquet"
-    ]
+    assert [problem.message for problem in caught.value.problems] == ["it: file: 't.txt' must end in .csv or .parquet"]
 
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes here")

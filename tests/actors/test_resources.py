@@ -127,21 +127,21 @@ def test_who_asks_a_line_gets_it() -> None:
     ("actor", "feeds", "message"),
     [
         ("Pool", [("acquire", [[0, "a"]]), ("release", [[1, 0], [2, "again"]])],
-         "it.release got 'again' on channel 0, from which there is no request"),
+         "it.release got 'again' on channel 0, which has no request"),
         ("Pool, key: token", [("acquire", [[0, "a"]]), ("release", [[1, "b"]])],
-         "it.release got 'b' on channel 0, from which there is no request with the key 'b'"),
+         "it.release got 'b' on channel 0, which has no request with the key 'b'"),
         ("Pool, amount: token", [("acquire", [[0, 2]]), ("release", [])],
-         "2 asks for 2 of 1 unit: it would wait for ever"),
+         "2 requests 2 of 1 unit and would wait for ever"),
         ("Pool, amount: token", [("acquire", [[0, 0.5]]), ("release", [])],
-         "'token' gives 0.5, but an amount is a whole number of units, 1 or more"),
+         "'token' gives 0.5, but an amount must be a whole number >= 1"),
         ("Pool, order: rank", [("acquire", [[0, {"rnk": 2}]]), ("release", [])],
          ("'rank': the token {'rnk': 2} has no field 'rank', did you mean 'rnk'? it has rnk, and token, time, channel "
           "are known")),
         ("Pool, order: token", [("acquire", [[0, "first"]]), ("release", [])],
          "'token' gives 'first', but an order must be a finite number"),
         ("Pool, balking: waiting + 2", [("acquire", [[0, 0], [0, 1]]), ("release", [])],
-         "'waiting + 2' gives 2, but balking is a condition, or a probability"),
-        ("WaitingLine, size: token", [("input", [[0, -1]])], "'token' gives -1, but a size is >= 0"),
+         "'waiting + 2' gives 2, but balking must be true or false, or a probability from 0 to 1"),
+        ("WaitingLine, size: token", [("input", [[0, -1]])], "'token' gives -1, but a size must be >= 0"),
     ],
 )  # fmt: skip
 def test_what_cannot_be(actor: str, feeds: Feeds, message: str) -> None:
@@ -154,17 +154,17 @@ def test_channels_that_do_not_belong_together() -> None:
     with pytest.raises(ActorError) as caught:
         behave("{type: Pool}", [("acquire", []), ("acquire", []), ("acquire", []), ("release", []), ("release", [])])
     assert caught.value.reason == (
-        "it.acquire has 3 channels and it.release has 2; it must have 1 or as many, for who has asked on a channel "
-        "releases on it"
+        "it.acquire has 3 channels and it.release has 2; give it 1 channel, or as many, because units are released "
+        "on the channel of their request"
     )
     with pytest.raises(ActorError) as caught:
         behave("{type: WaitingLine}", [("input", []), ("trigger", []), ("trigger", [])], outputs=3)
     assert caught.value.reason == (
-        "it.trigger has 2 channels and it.output has 3; they must have equally many, for what is asked for on a "
-        "channel is sent on it"
+        "it.trigger has 2 channels and it.output has 3; give both the same number of channels, because requests on a "
+        "channel are answered on it"
     )
     assert problem("{type: Pool, patience: {type: Bernoulli}}", ASKS[:1]) == (
-        "it: patience: Bernoulli does not give numbers alone"
+        "it: patience: Bernoulli gives values other than numbers"
     )
 
 

@@ -76,10 +76,10 @@ def test_histogram_is_that_of_numpy() -> None:
             {"values": [1.5, 2.5, 3.5], "times": [1, 2, 2], "tolerance": 0},
             "it failed in fire() at (1 s, 1): token 1 came at 1 s, expected at 2 s",
         ),
-        ({"values": [1.5]}, "it failed in fire() at (1 s, 1): token 1 is 2.5, but only 1 are expected"),
+        ({"values": [1.5]}, "it failed in fire() at (1 s, 1): token 1 is 2.5, expected only 1 token"),
         (
             {"values": [1.5, 2.5, 3.5, 4.5]},
-            "it failed in wrapup() at (2 s, 2): 3 of 4 expected tokens came, the next was to be 4.5",
+            "it failed in wrapup() at (2 s, 2): 3 of 4 expected tokens came; the next should have been 4.5",
         ),
     ],
 )
@@ -153,7 +153,7 @@ def test_nan_and_texts_are_something_else_by_default() -> None:
 
 
 def test_test_says_how_many_times_are_missing() -> None:
-    with pytest.raises(ModelError, match="it: 1 time for 2 values"):
+    with pytest.raises(ModelError, match="it: times: 1 time for 2 values; give one for each"):
         model_of({"type": "Test", "values": [1, 2], "times": [1]}, {"input": EVENTS})
 
 

@@ -54,7 +54,7 @@ def test_a_clock_does_not_drift() -> None:
         ("offsets: [1 s, 0]", "it: offsets: [1.0, 0.0] is not an ascending list of times"),
         ("offsets: []", "it: offsets: [] is not an ascending list of times"),
         ("offsets: [0, 2.5 s]", "it: offsets: 2.5 s is not within the period of 2 s"),
-        ("values: []", "it: values: the list is empty, there is nothing to send"),
+        ("values: []", "it: values: the list is empty; give at least one value"),
     ],
 )
 def test_wrong_clocks(clock: str, message: str) -> None:
@@ -187,15 +187,15 @@ NAMES = (
 @pytest.mark.parametrize(
     ("distribution", "message"),
     [
-        ("{type: Uniform, low: 2}", "low is 2 and high is 1: low may not be above high"),
-        ("{type: RandomInteger, low: 2}", "low is 2 and high is 1: low may not be above high"),
-        ("{type: Triangular, mode: 2}", "mode is 2 and high is 1: mode may not be above high"),
+        ("{type: Uniform, low: 2}", "low is 2 and high is 1: low must not be above high"),
+        ("{type: RandomInteger, low: 2}", "low is 2 and high is 1: low must not be above high"),
+        ("{type: Triangular, mode: 2}", "mode is 2 and high is 1: mode must not be above high"),
         ("{type: Gamma, shape: 0}", "Gamma.shape: 0 is out of bounds, expected a number > 0"),
-        ("{type: Choice, values: []}", "Choice.values: the list is empty, there is nothing to choose from"),
+        ("{type: Choice, values: []}", "Choice.values: the list is empty; give at least one value"),
         ("{type: Choice, values: [1, 2], weights: [1]}",
-         "Choice.weights: [1.0] does not give a weight to each of 2 values"),
+         "Choice.weights: [1.0] must have one weight for each of 2 values"),
         ("{type: Choice, values: [1, 2], weights: [0, 0]}",
-         "Choice.weights: [0.0, 0.0] does not give a weight to each of 2 values"),
+         "Choice.weights: [0.0, 0.0] must have one weight for each of 2 values"),
         ("{type: Gaussian}", f"'Gaussian' is not one of {NAMES}"),
     ],
 )  # fmt: skip

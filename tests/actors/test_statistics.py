@@ -33,15 +33,18 @@ def test_lookup_by_index_and_beyond_the_ends() -> None:
     table = {"type": "LookupTable", "values": ["a", "b", "c"]}
     _, sent, _ = feed({**table, "outside": "nothing"}, {"input": seconds(2, 0, 3, -1, 1)})
     assert tokens(sent) == ["c", "a", "b"]
-    with pytest.raises(ActorError, match=r"3 lies outside of the table, which goes from 0 to 2"):
+    with pytest.raises(ActorError, match="3 is outside the table, which goes from 0 to 2"):
         feed(table, {"input": seconds(3)})
     with pytest.raises(ActorError, match=r"0.5 is not an index"):
         feed(table, {"input": seconds(0.5)})
     for wrong, message in [
-        ({"values": []}, "it: values: the table is empty"),
-        ({"values": [1, 2], "at": [1]}, "it: at: 1 argument for 2 values"),
-        ({"values": [1, 2], "at": [1, 1]}, "it: at: [1.0, 1.0] does not ascend"),
-        ({"values": ["a"], "at": [1]}, "it: values: only numbers can be interpolated"),
+        ({"values": []}, "it: values: the table is empty; give at least one value"),
+        ({"values": [1, 2], "at": [1]}, "it: at: 1 argument for 2 values; give one for each"),
+        ({"values": [1, 2], "at": [1, 1]}, "it: at: [1.0, 1.0] is not ascending"),
+        (
+            {"values": ["a"], "at": [1]},
+            "it: values: they must be numbers to be interpolated; leave out 'at' to look them up by index",
+        ),
     ]:
         with pytest.raises(ModelError) as caught:
             model_of({"type": "LookupTable", **wrong}, {"input": seconds(0)})
@@ -100,9 +103,9 @@ def test_statistics_over_a_time_window() -> None:
     assert tokens(sent) == [1.0, 1.5, 3.0, 6.0, 16.0]
     _, sent, _ = feed({"type": "MovingAverage", "span": "1.5 s", "size": 1}, {"input": events})
     assert tokens(sent) == [1.0, 2.0, 4.0, 8.0, 16.0]
-    with pytest.raises(ModelError, match="give the window: 'size', a number of tokens, or 'span', a time, or both"):
+    with pytest.raises(ModelError, match="give a window: 'size', a number of tokens, or 'span', a time, or both"):
         model_of({"type": "MovingAverage"}, {"input": events})
-    with pytest.raises(ActorError, match="nan has no place in a statistic"):
+    with pytest.raises(ActorError, match="nan is not a finite number, and cannot be part of a statistic"):
         load_and_run_nan()
 
 

@@ -110,8 +110,8 @@ def test_a_model_that_is_made_takes_no_changes() -> None:
     with pytest.raises(EpicycleError) as caught:
         epicycle.run(epicycle.load("mm1"), set={"load": 0.9}, disturb="wifi_burst")
     assert str(caught.value) == (
-        "the model mm1 is made already and takes no set, disturb\n"
-        "   help: give the name or file of a model with these, or load it with them"
+        "the model mm1 exists already and takes no set, disturb\n"
+        "   help: give the name or file of the model instead, or pass them to load"
     )
     with pytest.raises(EpicycleError, match=r"^until -1: expected a time from 0 s to 1e9 s$"):
         epicycle.run("mm1", until=-1)
@@ -164,7 +164,7 @@ def test_variants_run_with_the_same_seeds() -> None:
     both = [each for each in found.differences() if each.name == "mean_wait"]
     assert [(each.variant, each.difference) for each in both] == [("a", None), ("b", test.estimate)]
     assert test.p <= both[1].p <= 5 * test.p  # five metrics
-    assert "<th>difference to a</th>" in found._repr_html_()
+    assert "<th>difference from a</th>" in found._repr_html_()
     epicycle.save(found, "runs.csv")
     rows = list(csv.DictReader(Path("runs.csv").read_text().splitlines()))
     assert [row["variant"] + row["seed"] for row in rows] == ["a1", "b1", "a2", "b2", "a3", "b3", "a4", "b4"]
@@ -201,12 +201,15 @@ def test_a_list_names_disturbances() -> None:
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"variants": {"a": {}}}, "a comparison needs two variants or more"),
+        ({"variants": {"a": {}}}, "a comparison needs at least two variants"),
         (
             {"variants": ["wifi_brust", "none"]},
             "error: there is no packaged disturbance 'wifi_brust', did you mean 'wifi_burst'?",
         ),
-        ({"variants": ["none", "wifi_burst"], "replications": 0}, "replications: 0 is not a whole number from 1 on"),
+        (
+            {"variants": ["none", "wifi_burst"], "replications": 0},
+            "replications: 0 is not a whole number of at least 1",
+        ),
     ],
 )
 def test_what_is_no_comparison(options: dict[str, object], message: str) -> None:
@@ -302,7 +305,7 @@ def test_a_page_of_none_or_three() -> None:
     assert str(caught.value) == "a page shows one run or two, not 0"
     with pytest.raises(EpicycleError) as caught:
         epicycle.view("mm1", "mg1", names=["one"])
-    assert str(caught.value) == "names: 1 for 2 models"
+    assert str(caught.value) == "names: 1 given for 2 models"
 
 
 def test_compare_writes_a_page_of_the_first_two(capsys: pytest.CaptureFixture[str]) -> None:

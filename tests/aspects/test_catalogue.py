@@ -89,7 +89,11 @@ def test_tokens_of_every_kind_keep_their_type() -> None:
     ("aspect", "token", "message"),
     [
         (Bias(by=1), object(), "a token of type object holds no numbers to alter"),
-        (Bias(by=1, fields=["x"]), 1.0, "a token of type float has no fields; leave out 'fields' to alter all of it"),
+        (
+            Bias(by=1, fields=["x"]),
+            1.0,
+            "a token of type float has no fields; leave out 'fields' to alter all its numbers",
+        ),
         (Bias(by=1, fields=["x"]), Reading("a", 1.0), "Reading has no field 'x'; its fields: name, value, valid"),
     ],
 )
@@ -104,12 +108,12 @@ def test_tokens_that_cannot_be_altered(aspect: Aspect, token: Any, message: str)
     [
         (lambda: GilbertElliott(p=1.5), "GilbertElliott.p: 1.5 is out of bounds, expected a number from 0 to 1"),
         (lambda: Latency(delay=-1), "Latency.delay: -1 is out of bounds, expected a number in s >= 0"),
-        (lambda: Saturate(low=2, high=1), "low 2 is above high 1"),
+        (lambda: Saturate(low=2, high=1), "low is 2 and high is 1: low must not be above high"),
         (
             lambda: MeasurementFailure(probability=0.9, burst=2),
             (
-                "a failure probability of 0.9 cannot come in runs of 2 in the mean: a working sensor works for one "
-                "measurement at least; burst must be >= 9"
+                "failures with probability 0.9 cannot come in runs of 2 on average: a working sensor works for at "
+                "least one measurement; burst must be >= 9"
             ),
         ),
     ],

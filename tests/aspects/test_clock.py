@@ -188,7 +188,7 @@ def test_a_crash_and_a_delay_beside_a_wrong_clock() -> None:
     assert not any(10_050_000_000 < time < 12_050_000_000 for time in seen)
 
 
-WHOLE = "a clock is wrong from the beginning of a run to its end: leave out "
+WHOLE = "a clock is wrong for the whole run; leave out "
 
 
 @pytest.mark.parametrize(

@@ -178,11 +178,15 @@ def test_outage(groups: dict[str, Any], sender: str, passes: bool) -> None:
 @pytest.mark.parametrize(
     ("positions", "sender", "message"),
     [
-        (["a.at", "c.at"], "b", "b: no port tells where it is; 'positions' selects a.at, c.at"),
-        (["b.at"], "b", "a: no port tells where it is; 'positions' selects b.at"),
-        (["a.at", "b.x.at", "b.y.at"], "b", "b: several ports tell where it may be: b.x.at, b.y.at"),
-        (["a.at", "b.at"], "", "sender: token.robot is '', but the path of the sender is needed"),
-        (["a.at", "w.at"], "w", "w.at sends no position: numbers, or a token with such a field 'position'"),
+        (["a.at", "c.at"], "b", "b: no port sends its position; 'positions' selects a.at, c.at"),
+        (["b.at"], "b", "a: no port sends its position; 'positions' selects b.at"),
+        (["a.at", "b.x.at", "b.y.at"], "b", "b: several ports could send its position: b.x.at, b.y.at"),
+        (["a.at", "b.at"], "", "sender: token.robot gives '', expected the path of the sender"),
+        (
+            ["a.at", "w.at"],
+            "w",
+            "w.at does not send a position: expected numbers, or a token with such a field 'position'",
+        ),
     ],
 )
 def test_nobody_knows_where(positions: list[str], sender: str, message: str) -> None:

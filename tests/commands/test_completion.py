@@ -67,7 +67,7 @@ def test_the_other_shells_read_theirs(shell: str, capsys: pytest.CaptureFixture[
 
 
 def test_every_option_is_there(capsys: pytest.CaptureFixture[str]) -> None:
-    """What a command's own help says, the scripts say, too."""
+    """The scripts have everything that the commands' own help has."""
     texts = {shell: script(shell, capsys) for shell in ("bash", "zsh", "fish")}
     for each in COMMANDS:
         with pytest.raises(SystemExit):

@@ -180,13 +180,13 @@ def run(how: str, *more: str) -> int:
 @pytest.mark.parametrize("how", RUNNING)
 def test_what_fails_in_a_run_is_told_with_its_line(how: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(how) == 1
-    assert capsys.readouterr().err == "what was recorded until then is in out\n" + RUNNING[how]
+    assert capsys.readouterr().err == "what was recorded before is in out\n" + RUNNING[how]
     assert Path("out/signals.parquet").is_file()
     assert run(how, "--debug") == 1
     replaced, kept, said = capsys.readouterr().err.split("\n", 2)
     command = f"epicycle run m.yaml --types own_of_mine.py --set how={how} --out out"
     assert replaced == f"replacing the results of '{command}' in out"
-    assert kept == "what was recorded until then is in out"
+    assert kept == "what was recorded before is in out"
     assert said.startswith("Traceback (most recent call last):\n")
     assert said.endswith(RUNNING[how])
     assert said.count("own_of_mine.py") > 1
@@ -229,7 +229,7 @@ def test_a_study_tells_the_line_and_repeats_the_run_for_its_traceback(capsys: py
     assert main(command) == 1
     said = capsys.readouterr().err
     told = RUNNING["fire"].removeprefix("error: ").replace("m.yaml", f"{os.getcwd()}/m.yaml")
-    assert said.startswith(f"failed: {told}   repeat it: epicycle replay out ")
+    assert said.startswith(f"failed: {told}   to repeat it: epicycle replay out ")
     assert "Traceback (most recent call last):\n" in said
     assert said.endswith("ZeroDivisionError: division by zero\nerror: 1 run failed\n")
 

@@ -22,7 +22,7 @@ pytestmark = pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no pipes here
 
 @pytest.fixture(autouse=True)
 def _folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """A folder with a model; whoever waits in it is interrupted."""
+    """A folder with a model; code that waits in it is interrupted."""
     monkeypatch.chdir(tmp_path)
     Path("m.yaml").write_text(MODEL)
 
@@ -42,7 +42,7 @@ def kind(request: pytest.FixtureRequest) -> str:
     for name in ("x.yaml", "x.py"):
         if request.param == KINDS[0]:
             os.mkfifo(name)
-        else:  # a device of our own is nothing that anybody may make
+        else:  # not everybody may create a device
             Path(name).symlink_to("/dev/zero")
     return str(request.param)
 
@@ -66,7 +66,7 @@ def test_on_the_command_line(words: str, message: str, kind: str, capsys: pytest
 def test_an_included_part(kind: str, capsys: pytest.CaptureFixture[str]) -> None:
     Path("m.yaml").write_text(f"include: [x.yaml]\n{MODEL}")
     assert main(["run", "m.yaml"]) == 2
-    if "device" in kind:  # the link leads out of the model's folder, and nobody looks what is there
+    if "device" in kind:  # the link leads out of the model's folder, and is not followed
         assert capsys.readouterr().err == (
             "m.yaml:1:11: error: 'x.yaml' cannot be included\n    1 | include: [x.yaml]\n      |           ^^^^^^\n"
             "   help: included files are .yaml files in or below the model's folder\n"

@@ -1,4 +1,4 @@
-"""Runs that would take hours, on a terminal: they say so, show how far they are, and end at Ctrl-C."""
+"""Runs that would take hours, on a terminal: they report it, show their progress, and end at Ctrl-C."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def on_a_terminal(arguments: list[str], folder: Path, is_over: Callable[[str], b
         while select.select([ours], [], [], 60.0)[0]:
             try:
                 piece = os.read(ours, 65_536)
-            except OSError:  # there is nobody any more
+            except OSError:  # the process has ended
                 break
             printed += piece.decode()
             if not typed and is_over(printed):
@@ -76,7 +76,7 @@ def on_a_terminal(arguments: list[str], folder: Path, is_over: Callable[[str], b
         (
             CLOCK,
             r"long (0|[0-9.e-]+) s of model time .*",
-            rf"after 1 s the run is at [0-9.e-]+ s of 10 s: at this pace it takes [0-9,.]+ h more; {KEPT}",
+            rf"after 1 s the run is at [0-9.e-]+ s of 10 s: at this pace it takes another [0-9,.]+ h; {KEPT}",
         ),
         (ODE, "long 0 s of model time .*", f"after 1 s the run is still at 0 s of 10 s; {KEPT}"),
     ],
@@ -88,7 +88,7 @@ def test_steps_of_a_nanosecond(tmp_path: Path, model: str, progress: str, word: 
     bar = [line for line in lines if re.fullmatch(progress, line)]
     first, *others = [line for line in lines if line not in bar]
     assert re.fullmatch(word, first)
-    assert others == ["what was recorded until then is in results/long", "interrupted"]
+    assert others == ["what was recorded before is in results/long", "interrupted"]
     assert len(bar) > 3
     if model is CLOCK:
         assert len({line.split()[1] for line in bar}) > 3
@@ -99,7 +99,8 @@ def test_steps_of_a_nanosecond(tmp_path: Path, model: str, progress: str, word: 
 
 def test_what_is_said_of_runs_that_take_long() -> None:
     assert (
-        outlook(5.0, 0.001, 1.0) == f"after 5 s the run is at 0.001 s of 1 s: at this pace it takes 1.4 h more; {KEPT}"
+        outlook(5.0, 0.001, 1.0)
+        == f"after 5 s the run is at 0.001 s of 1 s: at this pace it takes another 1.4 h; {KEPT}"
     )
     assert outlook(5.0, 0.0, 1.0) == f"after 5 s the run is still at 0 s of 1 s; {KEPT}"
     assert outlook(5.0, 0.01, 1.0) == ""

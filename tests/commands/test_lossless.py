@@ -38,7 +38,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def count(path: Path) -> int:
-    """How many records there are in a log; each has to be readable."""
+    """The number of records in a log, each of which must be readable."""
     if path.suffix == ".parquet":
         return int(pq.read_table(path).num_rows)
     with path.open(encoding="utf-8", newline="") as file:
@@ -82,7 +82,7 @@ def test_a_model_that_may_end_is_not_warned_of(
 
 @pytest.mark.parametrize("ending", ["jsonl", "csv", "parquet"])
 def test_an_interrupt_ends_a_run_without_an_end(ending: str, folder: Path) -> None:
-    """What was recorded and logged until then is there, whole."""
+    """What was recorded and logged before is complete."""
     process = subprocess.Popen(
         [sys.executable, "-m", "epicycle.runner.cli", "run", "tick.yaml", "--out", "out", "--log", f"log.{ending}"],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
@@ -95,7 +95,7 @@ def test_an_interrupt_ends_a_run_without_an_end(ending: str, folder: Path) -> No
     assert process.returncode == 130
     assert said == (
         f"{NO_END}\n   help: end it with Ctrl-C, which keeps what was recorded, or run it with --until\n"
-        "what was recorded until then is in out\ninterrupted\n"
+        "what was recorded before is in out\ninterrupted\n"
     )
     manifest = json.loads((folder / "out" / "manifest.json").read_text())
     assert (manifest["stopped"], manifest["error"]) == ("interrupted", "interrupted")
@@ -108,7 +108,7 @@ def test_a_study_of_a_model_without_an_end_is_warned_of(folder: Path, caplog: py
     (folder / "s.yaml").write_text("study: s\nmodel: ./tick.yaml\nmetrics: {number: events}\n")
     assert main(["validate", "s.yaml"]) == 0
     assert [record.getMessage() for record in caplog.records] == [
-        f"warning: {NO_END}\n   help: set 'stop' in its section 'run'; --run-timeout gives up runs"
+        f"warning: {NO_END}\n   help: set 'stop' in its section 'run'; --run-timeout ends runs that take too long"
     ]
 
 
@@ -190,15 +190,15 @@ def test_results_of_another_command_are_not_replaced_silently(folder: Path, caps
     assert run("mm1", "--out", "my out") == (
         2,
         (
-            "error: my out holds results of the model 'tick', not of 'mm1': epicycle run tick.yaml --until 0.01 "
+            "error: my out holds results of the model 'tick', not 'mm1': epicycle run tick.yaml --until 0.01 "
             f"--out 'my out' --seed 2{choose}"
         ),
     )
     assert (folder / "my out" / "manifest.json").read_bytes() == before
     for text in ("{}", "[", "[1]", '{"study": "x", "model": {}}', '{"command": [1], "model": "tick"}'):
         (folder / "my out" / "manifest.json").write_text(text)
-        assert run(*first) == (2, f"error: my out holds other results than those of a run{choose}")
+        assert run(*first) == (2, f"error: my out holds results that are not from a run{choose}")
     os.mkfifo(folder / "results.fifo")
     (folder / "my out" / "manifest.json").unlink()
     (folder / "results.fifo").rename(folder / "my out" / "manifest.json")
-    assert run(*first) == (2, f"error: my out holds other results than those of a run{choose}")
+    assert run(*first) == (2, f"error: my out holds results that are not from a run{choose}")

@@ -60,8 +60,8 @@ def test_models_know_a_package_once_it_is_installed(tmp_path: Path) -> None:
         ),
         (["class"], "error: 'class' is not a name\n   help: use letters, digits and _, and no digit first\n"),
         (["../up"], "error: '../up' is not a name\n   help: use letters, digits and _, and no digit first\n"),
-        (["here"], "error: here.yaml is there already\n   help: choose another name, or another folder\n"),
-        (["folder", "--package"], "error: folder is there already\n   help: choose another name, or another folder\n"),
+        (["here"], "error: here.yaml already exists\n   help: choose another name or another folder\n"),
+        (["folder", "--package"], "error: folder already exists\n   help: choose another name or another folder\n"),
     ],
 )
 def test_nothing_is_written_where_it_cannot_be(

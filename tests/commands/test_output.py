@@ -1,4 +1,4 @@
-"""What is printed: text of models is neither obeyed nor taken for style, and no stream is too poor or too short."""
+"""Printing: text of models is never obeyed or read as markup, and every stream will do, however limited."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def test_what_is_no_model_is_told_in_clean_words(capsys: pytest.CaptureFixture[s
     assert main(["actors", EVIL]) == 2
     assert capsys.readouterr().err == (
         f"error: there is no actor type {CLEAN.replace(chr(92), chr(92) * 2)!r}\n".replace(chr(92) * 4, chr(92))
-        + "   help: 'epicycle actors' lists them\n   help: one of your own is known after '--types FILE.py'\n"
+        + "   help: 'epicycle actors' lists them\n   help: for your own types, add '--types FILE.py'\n"
     )
 
 
@@ -87,7 +87,7 @@ def test_display_and_tables_outside_of_the_command_line(caplog: pytest.LogCaptur
 
 
 class Ascii(io.TextIOWrapper):
-    """A terminal that knows nothing but ASCII."""
+    """A terminal with only ASCII."""
 
     def __init__(self) -> None:
         super().__init__(io.BytesIO(), encoding="ascii")
@@ -104,7 +104,7 @@ class Ascii(io.TextIOWrapper):
         (["run", "umlaut.yaml", "--json"], lambda text: json.loads(text)["metrics"] == {"what": "Käfer 🐞"}),
         (["graph", "collision_avoidance"], lambda text: r"\xabpacket_loss\xbb" in text),
         (["schema"], lambda text: len(json.loads(text)) > 5),
-        (["status", "out"], lambda text: text.startswith(r"studie: 2 of 2 runs are over (2 ok)")),
+        (["status", "out"], lambda text: text.startswith(r"studie: 2 of 2 runs are finished (2 ok)")),
         (["status", "out", "--conditions"], lambda text: r"(t=K\xe4fer): 1 ok of 1" in text),
         (["aspects", "PacketLoss"], lambda text: "PacketLoss" in text),
     ],

@@ -160,7 +160,7 @@ def test_aspects_of_a_model_in_order(capsys: pytest.CaptureFixture[str]) -> None
             ("actors", "Clok"),
             (
                 "error: there is no actor type 'Clok', did you mean 'Clock'?\n   help: 'epicycle actors' lists them\n"
-                "   help: one of your own is known after '--types FILE.py'\n"
+                "   help: for your own types, add '--types FILE.py'\n"
             ),
         ),
         (
@@ -176,7 +176,7 @@ def test_aspects_of_a_model_in_order(capsys: pytest.CaptureFixture[str]) -> None
             (
                 "error: there is no aspect type or packaged model 'PacketLos', did you mean 'PacketLoss'?\n"
                 "   help: 'epicycle aspects' lists them\n"
-                "   help: one of your own is known after '--types FILE.py'\n"
+                "   help: for your own types, add '--types FILE.py'\n"
             ),
         ),
         (

@@ -1,4 +1,4 @@
-"""`epicycle run` on the packaged scenario: the same bits every time, and aspects that only do what they say."""
+"""`epicycle run` on the packaged scenario: the same bits every time, and aspects that do only what they declare."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ SHORT = ("--set", "observers=2", "--until", "1.5", "--seed", "7")
 
 
 def epicycle(*arguments: str, cwd: Path | None = None, **environment: str) -> subprocess.CompletedProcess[str]:
-    """Run the command line in a process of its own."""
+    """Run the command line in a new process."""
     return subprocess.run(
         [sys.executable, "-m", "epicycle.runner.cli", *arguments],
         capture_output=True,
@@ -164,16 +164,16 @@ def test_log_formats(tmp_path: Path, ending: str) -> None:
         ),
         (
             ("run", "collision_avoidance", "--log", "log.txt"),
-            "error: log.txt is no log file: its name must end in .parquet, .csv, .jsonl\n",
+            "error: log.txt is not a log file: its name must end in .parquet, .csv, .jsonl\n",
         ),
         (
             ("run", "collision_avoidance", "--log-where", "aspect=packet_loss"),
-            "error: --log-where aspect=packet_loss needs --log FILE, to which the log is written\n",
+            "error: --log-where aspect=packet_loss needs --log FILE, the file to write the log to\n",
         ),
         (
             ("run", "collision_avoidance", "--log", "log.csv", "--log-where", "aspect=packet_los"),
             (
-                "error: aspect=packet_los fits no aspect of the model, did you mean 'packet_loss'?; "
+                "error: aspect=packet_los matches no aspect of the model, did you mean 'packet_loss'?; "
                 "aspects: plans_due, plans_heard, packet_loss, measurement_failure\n"
             ),
         ),
@@ -232,7 +232,7 @@ def test_a_small_run_imports_and_searches_only_what_it_needs(tmp_path: Path) -> 
 
 
 def test_what_a_program_imports_is_never_garbage(tmp_path: Path) -> None:
-    """A command that is called by a program of somebody else's leaves the garbage collector as it was."""
+    """A command called by another program leaves the garbage collector as it was."""
     script = "import gc, sys\nfrom epicycle.runner.cli import main\nbefore = gc.get_threshold()\n"
     told = "print(gc.get_freeze_count() > 10_000, gc.isenabled(), gc.get_threshold() == before)"
     program = f"{script}sys.argv = ['epicycle', 'run', 'tiny.yaml']\nassert main() == 0\n{told}"

@@ -83,9 +83,9 @@ def test_variants_are_compared(capsys: pytest.CaptureFixture[str]) -> None:
         == """\
 m: none, period=1 s; seeds 5 to 6
 
-metric  variant     mean  unit  difference to none  p (Holm)  runs
-ticks   none        9                                         2
-ticks   period=1 s  5           -4                  0.5       2
+metric  variant     mean  unit  difference from none  p (Holm)  runs
+ticks   none        9                                           2
+ticks   period=1 s  5           -4                    0.5       2
 """
     )
     found = json.loads(printed(capsys, *words, "--json"))
@@ -98,7 +98,7 @@ ticks   period=1 s  5           -4                  0.5       2
 
 def test_what_cannot_be_compared_is_told(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["compare", "m.yaml"]) == 2
-    assert capsys.readouterr().err == "error: a comparison needs two variants or more\n"
+    assert capsys.readouterr().err == "error: a comparison needs at least two variants\n"
     assert main(["compare", "m.yaml", "--disturb", "none", "--disturb", "nothing"]) == 2
     assert capsys.readouterr().err.startswith("error: there is no packaged disturbance 'nothing'\n")
 

@@ -46,12 +46,12 @@ def test_trace_in_columns(model: str, capsys: pytest.CaptureFixture[str]) -> Non
     assert (
         capsys.readouterr().out
         == """\
-(0 s, 1)           clock      <- wake-up                       asked for in initialize
+(0 s, 1)           clock      <- wake-up                       requested in initialize
                               -> output                        0
 (0.1 s, 1)         room.merge <- input[0]   clock.output       0  sent at (0 s, 1)
                               -> output                        0
 (0.35 s, 1)        sink       <- input[0]   room.merge.output  0  sent at (0.1 s, 1)
-(0.5 s, 1)         clock      <- wake-up                       asked for at (0 s, 1)
+(0.5 s, 1)         clock      <- wake-up                       requested at (0 s, 1)
                               -> output                        1
 (0.6 s, 1)         room.merge <- input[0]   clock.output       1  sent at (0.5 s, 1)
                               -> output                        1
@@ -60,7 +60,7 @@ def test_trace_in_columns(model: str, capsys: pytest.CaptureFixture[str]) -> Non
 
 
 def test_trace_as_json(model: str, capsys: pytest.CaptureFixture[str]) -> None:
-    """A composite stands for all that is in it; the end is the model's."""
+    """A composite selects everything in it; the end is the model's."""
     arguments = ["--actor", "room", "--actor", "sink", "--from", "600 ms", "--to", "9", "--json"]
     assert main(["trace", model, *arguments]) == 0
 
@@ -97,7 +97,7 @@ def test_wrong_options(arguments: list[str], message: str, model: str, capsys: p
 
 
 def test_a_run_in_real_time(model: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """It takes its time, and sends what it sends otherwise."""
+    """It takes its time, and sends the same as otherwise."""
     digests = []
     for arguments in ([], ["--realtime", "4"]):
         began = time.perf_counter()
@@ -129,7 +129,7 @@ def test_an_interrupted_run_keeps_what_it_recorded(
     monkeypatch.setattr(Pace, "wait_for", wait_for)
     folder, log = tmp_path / "out", tmp_path / "log.jsonl"
     assert main(["run", model, "--realtime", "--out", str(folder), "--log", str(log)]) == 130
-    assert capsys.readouterr().err == f"what was recorded until then is in {folder}\ninterrupted\n"
+    assert capsys.readouterr().err == f"what was recorded before is in {folder}\ninterrupted\n"
     manifest = json.loads((folder / "manifest.json").read_text(encoding="utf-8"))
     assert (manifest["stopped"], manifest["error"], manifest["end"]) == ("interrupted", "interrupted", 0.5)
     assert len(log.read_text(encoding="utf-8").splitlines()) == manifest["events"] > 0
@@ -141,6 +141,6 @@ def test_a_wrong_pace(text: str, model: str, capsys: pytest.CaptureFixture[str])
         main(["run", model, f"--realtime={text}"])
     assert caught.value.code == 2
     assert capsys.readouterr().err.splitlines()[-1] == (
-        f"epicycle run: error: argument --realtime: {text!r} is not a number of 1e-09 or more "
+        f"epicycle run: error: argument --realtime: {text!r} is not a number of at least 1e-09 "
         "(write MODEL before --realtime)"
     )

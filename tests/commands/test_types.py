@@ -135,4 +135,4 @@ def test_a_command_ends_though_a_thread_of_the_run_does_not() -> None:
     command = [sys.executable, "-m", "epicycle.runner.cli", "run", "m.yaml", "--types", "threads_of_mine.py", "--json"]
     done = subprocess.run(command, check=False, capture_output=True, text=True, timeout=60)
     assert done.returncode == 0
-    assert done.stderr.endswith("threads that the run has started are still at work, and are ended: mine\n")
+    assert done.stderr.endswith("threads that the run started are still running and are ended: mine\n")

@@ -109,7 +109,7 @@ m.yaml:17:73: error: c.distribution: Gamma.shape: '3 min' is a time, expected a 
    17 |   c: {type: Server, distribution: {type: Gamma, mean: "${wait}", shape: "${wait}"}}
       |                                                                         ^^^^^^^^^
 
-m.yaml:18:35: error: d.distribution: low is 61 and high is 60: low may not be above high
+m.yaml:18:35: error: d.distribution: low is 61 and high is 60: low must not be above high
    18 |   d: {type: Server, distribution: {type: Uniform, low: 61, high: 1 min}}
       |                                   ^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^
 

@@ -1,4 +1,4 @@
-"""`epicycle view`: of a model, of results, of two; and what it says when something is wrong."""
+"""`epicycle view` of a model, of results, of two; and its errors."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def test_results_are_made_again_as_their_manifest_says(line: str, capsys: pytest
     assert main(["run", line, "--set", "clock.period=0.25", "--until", "2", "--out", "made"]) == 0
     capsys.readouterr()
     assert said(capsys, "made", "-o", "page.html") == "wrote page.html\n"
-    # Other settings make another run, of which nothing is said; another model gives itself away.
+    # Other settings make another run, without a warning; another model is noticed.
     assert said(capsys, "made", "--set", "clock.period=1", "-o", "page.html") == "wrote page.html\n"
     Path(line).write_text(MODEL.replace("Clock, period", "Clock, offset: 0.1, period"), encoding="utf-8")
     assert said(capsys, "made", "-o", "page.html") == (
@@ -90,23 +90,23 @@ def test_a_run_that_fails_is_shown_up_to_there(capsys: pytest.CaptureFixture[str
 
 def test_what_is_no_result_of_a_run(line: str, capsys: pytest.CaptureFixture[str]) -> None:
     Path("empty").mkdir()
-    message = "error: empty holds no results of a run: there is no manifest.json in it\n"
+    message = "error: empty holds no results of a run: it has no manifest.json\n"
     assert said(capsys, "empty", code=2) == message
     (Path("empty") / "manifest.json").write_text("{", encoding="utf-8")
     broken = said(capsys, "empty", code=2)
-    assert broken.startswith("error: empty/manifest.json is no manifest of a run: Expecting property name")
+    assert broken.startswith("error: empty/manifest.json is not the manifest of a run: Expecting property name")
     told = {"command": ["epicycle", "study", "table_1"], "digest": ""}
     (Path("empty") / "manifest.json").write_text(json.dumps(told), encoding="utf-8")
     assert said(capsys, "empty", code=2) == "error: empty holds results of 'epicycle study', not of a run\n"
     told = {"command": ["epicycle", "run", line, "--types", "own.py"], "digest": ""}
     (Path("empty") / "manifest.json").write_text(json.dumps(told), encoding="utf-8")
     assert said(capsys, "empty", code=2) == (
-        "error: the run in empty used types of its own\n   help: add --types own.py\n"
+        "error: the run in empty used types of its own\n   help: to let their code run, add --types own.py\n"
     )
     told = {"command": ["epicycle", "run", line, "--unheard", "--seed"], "digest": ""}
     (Path("empty") / "manifest.json").write_text(json.dumps(told), encoding="utf-8")
     assert said(capsys, "empty", code=2) == (
-        "error: empty/manifest.json names a command that this version does not know: "
+        "error: empty/manifest.json names a command that is unknown to this version: "
         "epicycle run line.yaml --unheard --seed\n"
     )
 
@@ -158,7 +158,7 @@ def test_other_viewers_are_shown_one_run(line: str, capsys: pytest.CaptureFixtur
         (
             "--rerun",
             "rerun",
-            "a recording of rerun needs the package rerun-sdk, which is not installed: pip install 'epicycle[rerun]'",
+            "a recording for rerun needs the package rerun-sdk, which is not installed: pip install 'epicycle[rerun]'",
         ),
     ],
 )

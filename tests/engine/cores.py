@@ -23,7 +23,7 @@ CORES = {
     "compiled, without native forms": {"EPICYCLE_CORE": "compiled", "EPICYCLE_FORMS": "off"},
 }
 WAYS = ("run", "run", "steps", "snapshot")
-BATCH = 50  # networks that are asked for at once
+BATCH = 50  # networks per request
 
 
 class Worker:
@@ -49,7 +49,7 @@ class Worker:
         self.process.stdin.flush()
 
     def answers(self, number: int) -> list[list[str]]:
-        """What they have come to."""
+        """Their results."""
         assert self.process.stdout is not None
         return [json.loads(self.process.stdout.readline()) for _ in range(number)]
 
@@ -69,7 +69,7 @@ def workers() -> Iterator[dict[str, Worker]]:
 def differences(
     at: dict[str, Worker], questions: list[dict[str, Any]]
 ) -> list[tuple[dict[str, Any], dict[str, list[str]]]]:
-    """The runs that differ, and what each core makes of them."""
+    """The runs that differ, with the result of each core."""
     for each in at.values():
         each.ask(questions)
     answers = {name: each.answers(len(questions)) for name, each in at.items()}

@@ -1,4 +1,4 @@
-"""Random networks of actors, and what their runs come to: the same with every core.
+"""Random networks of actors, and the results of their runs: the same with every core.
 
 As a program it makes runs with the core that EPICYCLE_CORE asks for: a line of JSON in, one out.
 """
@@ -228,7 +228,7 @@ AT_ACTORS: list[dict[str, Any]] = [
 
 
 def network(numbers: Numbers) -> dict[str, Any]:
-    """A model, as a file in JSON holds it, which need not be a good one."""
+    """A model, as in a JSON file; it need not be valid."""
     actors: dict[str, Any] = {}
     sources: list[str] = []
     connections: list[dict[str, Any]] = []
@@ -299,7 +299,7 @@ def network(numbers: Numbers) -> dict[str, Any]:
 
 
 def outcome(model: dict[str, Any], way: str) -> list[str]:
-    """All that a run comes to, as texts; ``way``: at once, in steps, or by way of a snapshot."""
+    """The results of a run as texts; ``way``: at once, in steps, or via a snapshot."""
     try:
         path = Path(tempfile.gettempdir()) / f"network-{os.getpid()}.yaml"
         path.write_text(json.dumps({"model": "network", **model}), encoding="utf-8")

@@ -144,9 +144,9 @@ def test_acts_of_aspects_and_places_that_are_not_there(tmp_path: Path) -> None:
         "    3 |   - {aspect: losy, at: probe.input, token: 1}\n"
         "      |              ^^^^\n"
         "   help: the aspects: lossy, slow\n\n"
-        "./exactly.yaml:4:25: error: exactly: aspect lossy does not stand at 'probe.inputt', did you mean "
+        "./exactly.yaml:4:25: error: exactly: aspect lossy does not attach to 'probe.inputt', did you mean "
         "'probe.input'?\n"
         "    4 |   - {aspect: lossy, at: probe.inputt, token: 2}\n"
         "      |                         ^^^^^^^^^^^^\n"
-        "   help: it stands at probe.input"
+        "   help: it attaches to probe.input"
     )

@@ -1,4 +1,4 @@
-"""The compiled core and Python make the same runs, and each says which one it is."""
+"""The compiled core and the Python core make the same runs, and each reports which one it is."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ from tests.engine.cores import ROOT, WAYS, Worker, differences, workers
 from tests.engine.networks import network
 
 MODULE = runpy.run_path(str(ROOT / "actors" / "compiled.py"), run_name="setup")
-CHANGED = "the sources have changed since the core was compiled; install Epicycle once more"
-MISSING = "the core was not compiled at install; install Epicycle once more where there is a C compiler"
+CHANGED = "the sources have changed since the core was compiled; reinstall Epicycle"
+MISSING = "the core was not compiled at installation; reinstall Epicycle where a C compiler is available"
 
 
 def is_there() -> bool:
@@ -78,7 +78,7 @@ def run(*words: str, **environment: str) -> subprocess.CompletedProcess[str]:
 def test_the_version_says_which_core() -> None:
     done = run("--version", EPICYCLE_CORE="python")
     version = f"Python {sys.version_info.major}.{sys.version_info.minor}.{sys.version_info.micro}"
-    assert (done.stdout, done.stderr) == (f"epicycle 0.1.0, python core (EPICYCLE_CORE says so), {version}\n", "")
+    assert (done.stdout, done.stderr) == (f"epicycle 0.1.0, python core (chosen by EPICYCLE_CORE), {version}\n", "")
     if is_there():
         done = run("--version")
         assert (done.stdout, done.stderr) == (f"epicycle 0.1.0, compiled core, {version}\n", "")
@@ -87,7 +87,7 @@ def test_the_version_says_which_core() -> None:
 def test_a_core_that_cannot_be_had() -> None:
     done = run("run", "mm1", EPICYCLE_CORE="fast")
     assert (done.returncode, done.stdout) == (2, "")
-    assert done.stderr == "error: EPICYCLE_CORE=fast: the cores are python and compiled\n"
+    assert done.stderr == "error: EPICYCLE_CORE=fast is unknown; the cores are python and compiled\n"
 
 
 @pytest.mark.parametrize(
@@ -100,7 +100,7 @@ def test_a_core_that_cannot_be_had() -> None:
         (lambda root: (root / "actors/core/moment.pxd").unlink(), CHANGED),
         (
             lambda root: (root / "actors/compiled.json").write_text('{"python": "cpython-27"}'),
-            "the core was compiled for cpython-27; install Epicycle once more",
+            "the core was compiled for cpython-27; reinstall Epicycle",
         ),
     ],
 )

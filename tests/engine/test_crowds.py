@@ -1,4 +1,4 @@
-"""Tokens that multiply: how many one tag may hold, and what is told of who multiplies them."""
+"""Tokens that multiply: how many one tag may hold, and how the error names the actors that multiply them."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from tests.engine.engine_parts import load
 
 
 def failure(text: str) -> str:
-    """How the run of a model ends that holds too much, with the least that is allowed."""
+    """The end of a run that holds too much, with the least permitted limit."""
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "m.yaml"
         file.write_text(f"model: m\n{text}", encoding="utf-8")
@@ -49,12 +49,12 @@ def test_duplicates_one_upon_the_other() -> None:
         "actors:\n  c: {type: Clock, period: 1}\n  r: {type: Recorder}\nconnections: [c.output -> r.input]\n"
         f"aspects:\n{stack}"
     )
-    most = "more than 10,000 tokens that are on their way, most of them at aspect d2"
+    most = "more than 10,000 tokens on their way, most of them at aspect d2"
     assert told == f"too much at (0 s, 3): {most}; {RAISE_IT}"
 
 
 def test_duplicates_that_come_apart_in_time() -> None:
-    """No tag holds much then, and no time is far away."""
+    """Then no tag holds much, and no time is far away."""
     stack = "".join(
         f"  d{n}: {{type: Duplicate, probability: 1, copies: 1000, spacing: 1 ns, at: r.input}}\n" for n in range(6)
     )
@@ -62,7 +62,7 @@ def test_duplicates_that_come_apart_in_time() -> None:
         "actors:\n  c: {type: Clock, period: 1}\n  r: {type: Recorder}\nconnections: [c.output -> r.input]\n"
         f"aspects:\n{stack}"
     )
-    most = "more than 50,000 tokens that are on their way, to all times, most of them at aspect d4"
+    most = "more than 50,000 tokens on their way, over all times, most of them at aspect d4"
     assert told == f"too much at (2e-09 s, 1): {most}; {RAISE_IT}"
 
 

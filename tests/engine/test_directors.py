@@ -1,4 +1,4 @@
-"""Composites with a director of their own: one actor outside, own order and time inside."""
+"""Composites with their own director: one actor outside, their own order and time inside."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class Sampler(Actor):
 
 
 class Nap(Process):
-    """Counts with a SimPy timeout of 1 s, and says what SimPy's time is."""
+    """Counts with a SimPy timeout of 1 s, and sends SimPy's time."""
 
     is_source: ClassVar[bool] = True
     output: OutputPort[Any] = OutputPort(Any)

@@ -1,4 +1,4 @@
-"""Small things of the engine, exactly: quantiles by weight, sizes of tokens, cells of tables, long signals in short."""
+"""Small parts of the engine, exactly: quantiles by weight, sizes of tokens, cells of tables, long signals in short."""
 
 from __future__ import annotations
 

@@ -145,8 +145,8 @@ IN, OUT = "t.output -> a.input", "t.output -> c.in"
             IN,
             "",
             (
-                "a failed in fire() at (0 s, 1): a token of type object has no value that could be logged: make it a "
-                "dataclass, or give it a __repr__ that shows what is in it"
+                "a failed in fire() at (0 s, 1): a token of type object has no value that can be logged: make it a "
+                "dataclass, or give it a __repr__ that shows its contents"
                 + raised("self.output.send(things[self.where])")
                 + "declared at m.yaml:12:3"
             ),

@@ -1,4 +1,4 @@
-"""Ctrl-C: a run ends between two firings, and what it recorded can be read wherever it was broken off."""
+"""Ctrl-C: a run ends between two firings, and its records can be read wherever it was interrupted."""
 
 import os
 import signal
@@ -36,7 +36,7 @@ class Interrupted(Actor):
 
 
 class Slow(Interrupted):
-    """Goes on for longer than a user waits."""
+    """Runs for longer than a user waits."""
 
     seconds = 30.0
 
@@ -129,7 +129,7 @@ def test_a_signal_can_be_read_wherever_it_was_broken_off(tokens: list[Any]) -> N
 
 
 def test_a_run_that_is_all_in_c_can_be_interrupted() -> None:
-    """No line of an actor is Python's in it: the director sees to it that signals are handled."""
+    """None of its actors runs Python code: the director makes sure that signals are handled."""
     model = load(
         "actors: {clock: {type: Clock, period: 1 us}, hold: {type: TimeDelay}, seen: {type: Recorder, capacity: 0}}\n"
         "connections: [clock.output -> hold.input, hold.output -> seen.input]\nrun: {stop: 1000 s}\n"

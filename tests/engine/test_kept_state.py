@@ -1,4 +1,4 @@
-"""What snapshots keep of actors and aspects of one's own, and what they refuse."""
+"""What snapshots keep of user-defined actors and aspects, and what they refuse."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ from tests.engine.test_snapshots import assert_goes_on
 
 
 class Gatherer(Actor):
-    """Keeps what comes in many ways."""
+    """Keeps tokens in many ways."""
 
     input: InputPort[Any] = InputPort(Any)
     output: OutputPort[Any] = OutputPort(Any)
@@ -230,8 +230,8 @@ def refused(doing: Callable[[], object], error: type[EpicycleError] = SnapshotEr
 def test_what_cannot_be_copied_is_named() -> None:
     simulation = Simulation(written(Writer))
     simulation.step()
-    reason = "lock, which cannot be copied (cannot pickle '_thread.lock' object): let its class say how, with "
-    reason += "__deepcopy__, or name the attribute in copies_share for copies of the run to have it in common"
+    reason = "lock, which cannot be copied (cannot pickle '_thread.lock' object): define __deepcopy__ in "
+    reason += "its class, or name the attribute in copies_share to let copies of the run share it"
     assert refused(simulation.snapshot, CopyError) == f"w.held holds a {reason}"
     assert simulation.run().end == 4  # nothing has happened to it
     assert_goes_on(written(Sharer), 4)
@@ -265,8 +265,8 @@ def test_processes_go_back_by_way_of_the_beginning(monkeypatch: pytest.MonkeyPat
     assert repr(snapshot) == f"<Snapshot of m, seed 0, at {simulation.tag}>"
     model.graph.actors["t"].period = 0.5  # type: ignore[attr-defined]
     assert refused(lambda: simulation.restore(snapshot)) == (
-        f"m has processes, so a run goes back to {snapshot.tag} by way of its beginning, but came to something else "
-        "there: the model was changed, or something depends on more than model and seed"
+        f"m has processes, so its run was repeated from the start to go back to {snapshot.tag}, but the repeated run "
+        "is different: the model was changed, or something depends on more than model and seed"
     )
     simulation.run()  # it is where it was
 
@@ -276,7 +276,7 @@ def test_processes_go_back_by_way_of_the_beginning(monkeypatch: pytest.MonkeyPat
 
 def test_what_cannot_be_kept() -> None:
     model = load("actors: {t: {type: Ticker, limit: 3}}")
-    untold = "the run of m is told to log_to or to a tracer, which cannot be untold: leave them out"
+    untold = "the run of m reports to log_to or to a tracer, which cannot be undone: leave them out"
     records: list[Any] = []
     for options in ({"keep_log": True, "log_to": records.append}, {"tracer": Tracer(model.graph.actors, print)}):
         simulation = Simulation(model, **options)
@@ -304,6 +304,6 @@ def test_parts_that_are_not_there() -> None:
     model = load("actors: {ticker: {type: Ticker}}")
     simulation = Simulation(model)
     assert simulation["ticker"] is simulation.actors["ticker"] is not model.graph.actors["ticker"]
-    assert refused(lambda: simulation["tiker"], EpicycleError) == "tiker is no part of m, did you mean 'ticker'?"
-    assert refused(lambda: simulation[Ticker("ticker")], EpicycleError) == "Ticker() is no part of m"
-    assert refused(lambda: simulation[Echo()], EpicycleError) == "Echo() is no part of m"
+    assert refused(lambda: simulation["tiker"], EpicycleError) == "tiker is not part of m, did you mean 'ticker'?"
+    assert refused(lambda: simulation[Ticker("ticker")], EpicycleError) == "Ticker() is not part of m"
+    assert refused(lambda: simulation[Echo()], EpicycleError) == "Echo() is not part of m"

@@ -342,7 +342,7 @@ def test_ports_that_keep_tokens_without_a_model() -> None:
     assert (port.get(1), port.present) == (2, True)
     with pytest.raises(PortError) as caught:
         port.get(1)
-    assert str(caught.value) == "p. has no token on channel 1; ask 'waiting' before 'get'"
+    assert str(caught.value) == "p. has no token on channel 1; check 'waiting' before calling 'get'"
     # What an execution aspect takes out is what has come since the actor fired; what was left stays before it.
     port.put_in_line()
     port.receive(5, 1)

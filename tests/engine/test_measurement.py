@@ -1,4 +1,4 @@
-"""Metrics are what their definitions say, over tokens and over time; where there is no value, the reason is told."""
+"""Metrics follow their definitions, over tokens and over time; where there is no value, the reason is given."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ SEQUENCES = st.lists(st.tuples(GAPS, NUMBERS), min_size=1, max_size=40)
 
 
 def measured(tokens: list[tuple[str, int, Any]], end: int, ports: tuple[str, ...] = ("a.out",), **said: Any) -> Outcome:
-    """What a metric comes to over tokens of ports at times in ns."""
+    """The value of a metric over tokens of ports at times in ns."""
     measurement = Measurement(Metric("m", list(ports), Measure(**said)))
     for port, time, token in tokens:
         measurement.add(port, time, token)
@@ -43,7 +43,7 @@ def timed(sequence: list[tuple[int, Any]]) -> list[tuple[str, int, Any]]:
 
 
 def spells(tokens: list[tuple[str, int, Any]], start: int, end: int) -> list[tuple[Any, int]]:
-    """Each value with the ns for which it stands between start and end."""
+    """Each value with its duration in ns between start and end."""
     edges = [time for _, time, _ in tokens[1:]] + [end]
     return [
         (value, min(edge, end) - max(time, start))
@@ -140,24 +140,24 @@ def test_of_several_ports_each_counts_for_its_own_time() -> None:
         ({"take": "mean"}, [(1, math.nan)], "a.out sent nan at 1 s"),
         ({"take": "max"}, [(1, math.nan)], "a.out sent nan at 1 s"),
         ({"take": "time_std"}, [(0, 1.0), (1, -math.inf)], "a.out sent -inf at 1 s"),
-        ({"take": "sum"}, [(1, "many")], "a.out sent many, which is no number, at 1 s"),
-        ({"take": "mean"}, [(1, np.zeros(2))], "a.out sent [0, 0], which is no number, at 1 s"),
-        ({"take": "mean"}, [(0, 1e308), (1, 1e308)], "it is beyond all numbers"),
-        ({"take": "sum"}, [(0, 10**400)], "a.out sent " + repr(10**400)[:97] + "..., which is no number, at 0 s"),
-        ({"take": "std"}, [(0, 1e300), (1, -1e300)], "it is beyond all numbers"),
-        ({"take": "mean", "after": "mser5"}, [(0, 1.0)], "MSER-5 needs 50 tokens, and 1 came"),
+        ({"take": "sum"}, [(1, "many")], "a.out sent many, which is not a number, at 1 s"),
+        ({"take": "mean"}, [(1, np.zeros(2))], "a.out sent [0, 0], which is not a number, at 1 s"),
+        ({"take": "mean"}, [(0, 1e308), (1, 1e308)], "it is too large for a number"),
+        ({"take": "sum"}, [(0, 10**400)], "a.out sent " + repr(10**400)[:97] + "..., which is not a number, at 0 s"),
+        ({"take": "std"}, [(0, 1e300), (1, -1e300)], "it is too large for a number"),
+        ({"take": "mean", "after": "mser5"}, [(0, 1.0)], "MSER-5 needs 50 tokens, but 1 came"),
         ({"take": "time_mean", "after": "mser5"}, [(1, 1.0)] * 60, "MSER-5 needs time between tokens"),
         (
             {"take": "mean", "after": "mser5"},
             [(1, float(each)) for each in range(100)],
-            "it does not settle in the first half of the run, says MSER-5: make it longer",
+            "by MSER-5, it does not settle in the first half of the run: make the run longer",
         ),
         (
             {"take": "share", "when": "value > 0"},
             [(0, "up")],
             (
-                "a.out sent up, of which 'value > 0' cannot be told ('value > 0': value > 0: > cannot compare a text "
-                "with a number, with value = 'up'), at 0 s"
+                "a.out sent up, for which 'value > 0' cannot be evaluated ('value > 0': value > 0: > cannot compare a "
+                "text with a number, with value = 'up'), at 0 s"
             ),
         ),
     ],
@@ -185,7 +185,7 @@ def test_a_run_is_not_lost_for_a_metric_of_something_odd() -> None:
         until=2.5,
     )
     assert results.metrics["up"] is None
-    assert results.outcomes["up"].missing.startswith("odd.output sent 0/0, of which 'value > 0' cannot be told")
+    assert results.outcomes["up"].missing.startswith("odd.output sent 0/0, for which 'value > 0' cannot be evaluated")
     assert results.metrics["last"] == 3
 
 
@@ -304,7 +304,7 @@ def test_too_few_tokens_have_no_interval_and_too_short_a_run_is_told() -> None:
     assert (found.value, found.interval) == (9.0, None)
     assert found.remarks == ["no interval, because 19 tokens are too few for 20 batches"]
     found = measured(tokens, 40 * SECOND, take="time_mean", interval=0.9)
-    assert found.remarks == ["90 % interval, autocorrelation 0.85 (too much: make the run longer)"]
+    assert found.remarks == ["90 % interval, autocorrelation 0.85 (too high: make the run longer)"]
     same = measured([("a.out", place, 3.0) for place in range(40)], 40, take="mean", interval=0.9)
     assert same.interval is not None
     assert (same.interval.low, same.interval.high, same.interval.autocorrelation) == (3.0, 3.0, 0.0)

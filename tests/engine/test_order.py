@@ -213,5 +213,5 @@ def test_a_simulation_runs_once_and_a_model_often() -> None:
     assert first.run().digest == second.run().digest == Simulation(model).run().digest
     with pytest.raises(RuntimeError, match="runs once"):
         first.run()
-    with pytest.raises(ValueError, match="a seed is a whole number from 0 up"):
+    with pytest.raises(ValueError, match="a seed is a whole number of at least 0"):
         Simulation(model, seed=-1)

@@ -1,4 +1,4 @@
-"""Runs held to the wall clock, which is an imagined one here."""
+"""Runs limited to a simulated wall clock."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ START = 128.0
 
 
 class Wall:
-    """A clock that only sleeping and work move on."""
+    """A clock that only sleep and work advance."""
 
     def __init__(self) -> None:
         self.now = START
@@ -72,7 +72,7 @@ def test_the_real_clock() -> None:
 def test_a_pace_that_is_none(factor: float) -> None:
     with pytest.raises(ValueError, match="a pace is") as caught:
         Pace(factor)
-    message = f"a pace is a number of model seconds in a second, 1e-09 or more, not {factor:g}"
+    message = f"a pace is a number of model seconds per second, at least 1e-09, not {factor:g}"
     assert str(caught.value) == message
 
 

@@ -1,4 +1,4 @@
-"""Ties as they were posted, and what else a director does that is like Ptolemy's."""
+"""Ties in the order of posting, and other behaviour of a director like Ptolemy's."""
 
 from __future__ import annotations
 
@@ -72,7 +72,7 @@ HEAD = "director: {ties: posted}\n"
 
 
 def order(text: str, time: float, until: float | None = None) -> list[str]:
-    """Who sends at a time, in their order."""
+    """The actors that send at a time, in order."""
     _, results = simulate(text, until=until, types=TYPES)
     return [port.partition(".")[0] for when, _, port, _ in sends(results) if when == time]
 
@@ -94,7 +94,7 @@ def test_who_has_asked_first_fires_first() -> None:
 
 
 def test_what_was_called_off_was_not_posted() -> None:
-    """The first asks anew, for the same time: it counts from then on."""
+    """The first one repeats its request for the same time, which takes its place in the order from then on."""
     text = """
 actors:
   a: {type: Asker, asks: [[0, 5], [2, 5]], calls_off: [[2, 5]]}

@@ -1,4 +1,4 @@
-"""Connections that are one channel for all that they join."""
+"""Connections that are one channel for all their ends."""
 
 from __future__ import annotations
 

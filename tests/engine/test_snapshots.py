@@ -1,4 +1,4 @@
-"""Runs that are stepped, kept, gone back to and forked: from there on everything is as in a run that nobody touched."""
+"""Runs that are stepped, saved, restored and forked: they continue exactly as an undisturbed run."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ metrics:
 
 
 def told(simulation: Simulation) -> tuple[Any, ...]:
-    """All that a run comes to in the end."""
+    """The final results of a run."""
     results = simulation.run()
     signals = {name: (signal.tags, list(map(repr, signal.tokens))) for name, signal in results.signals.items()}
     return (
@@ -85,7 +85,7 @@ def steps_of(model: Model, until: int = 1_000_000) -> int:
 
 
 def assert_goes_on(model: Model, number: int, seed: int = 0, keep_log: bool = True) -> None:
-    """Snapshots at so many random tags, and forks at some of them, go on as the run did."""
+    """Snapshots at random tags, and forks at some of them, continue as the run did."""
     expected = told(Simulation(model, keep_log=keep_log))
     steps = steps_of(model)
     places = sorted(random.Random(seed).sample(range(steps + 1), min(number, steps + 1)))

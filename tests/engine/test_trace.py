@@ -1,4 +1,4 @@
-"""A traced run says why, and is otherwise the same."""
+"""A traced run reports causes, and is otherwise the same."""
 
 from __future__ import annotations
 
@@ -85,7 +85,7 @@ def test_wake_ups_say_when_they_were_asked_for() -> None:
 
 
 def test_borders_and_aspects_on_the_way() -> None:
-    """What a border or an aspect has kept comes from its sender all the same, and an aspect's own act is told."""
+    """A token kept by a border or an aspect still comes from its sender, and an aspect's own act is reported."""
     text = """
 composites:
   C:

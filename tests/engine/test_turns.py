@@ -1,4 +1,4 @@
-"""An actor whose output does not depend on an input at once: wake-ups and tokens are firings of their own."""
+"""An actor whose output does not depend on an input at once: wake-ups and tokens are separate firings."""
 
 from __future__ import annotations
 

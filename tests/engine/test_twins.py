@@ -1,4 +1,4 @@
-"""Reactive and process actors mean the same: models in which one stands for the other send the same, tag by tag."""
+"""Reactive and process actors are equivalent: models that exchange them send the same, tag by tag."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Multiports, composites and what is heard of them; errors of actors."""
+"""Multiports, composites and what they send; errors of actors."""
 
 from __future__ import annotations
 
@@ -218,7 +218,7 @@ def test_nothing_is_sent_before_and_after(method: str, monkeypatch: pytest.Monke
         simulate("actors: {a: {type: Plan}}")
     assert str(caught.value).splitlines()[0] == (
         f"a failed in {method}() at (0 s, 1): a.output cannot send now: "
-        "tokens are sent in fire() or run() of a running model"
+        "send tokens only in fire() or run() of a running model"
     )
 
 

@@ -292,9 +292,9 @@ def test_a_guard_that_is_at_once_at_its_border_again_is_told() -> None:
     }
     with pytest.raises(ActorError) as caught:
         sent(ball)
-    assert str(caught.value).splitlines()[0].partition(" is ")[2] == (
-        "on its border again at once after a transition that took it off: it may go on so without end (Zeno); "
-        "leave the mode before"
+    assert str(caught.value).splitlines()[0].partition("): ")[2] == (
+        "in mode 'falling', 'speed < 0' returned to its border at once after a transition had moved it off: it may "
+        "repeat without end (Zeno); leave the mode earlier"
     )
 
 

@@ -52,7 +52,7 @@ def test_the_draws_of_probabilities_are_a_stream_of_their_own() -> None:
             "0.5",
             "in mode 'a', the probabilities of transitions that are enabled at once add up to 1.1, more than 1",
         ),
-        ("x", "a -> b: 5 is no probability, which is from 0 to 1"),
+        ("x", "a -> b: 5 is not a probability, which is from 0 to 1"),
         ("'x'", "a -> b probability: \"'x'\" gives 'x', which is not a number"),
     ],
 )

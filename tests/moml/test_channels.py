@@ -41,7 +41,8 @@ def test_a_channel_ends_at_a_director_unless_it_is_global(tmp_path: Path) -> Non
     with pytest.raises(MomlError) as refused:
         imported(tmp_path, hears(director=True))
     assert str(refused.value) == (
-        "m.xml cannot be imported:\n   - Hears.Deep.Subscriber hears nothing: no Publisher within reach has its channel"
+        "m.xml cannot be imported:\n"
+        "   - Hears.Deep.Subscriber receives nothing: no Publisher within reach has its channel"
     )
     text = hears(prop("global", "true"), director=True)
     assert recorded(tmp_path, text, "Hears.Deep.Recorder") == [(0.0, 1, 1), (1.0, 1, 1)]

@@ -53,7 +53,7 @@ def test_a_model_as_a_person_would_have_written_it(tmp_path: Path) -> None:
         imported(tmp_path, QUEUE).text
         == """\
 # Imported from m.xml, a model of Ptolemy II; left out: layout, 1 view.
-# - unused is left out: it never fires, for nothing sends to its input
+# - unused is left out: it never fires because nothing sends to its input
 model: m
 parameters: {interval: 2}
 director: {like: ptolemy}
@@ -147,7 +147,7 @@ def test_names_that_are_none_here(tmp_path: Path) -> None:
     actors = entity("my clock", "DiscreteClock") + entity("3rd", "Recorder") + entity("3rd!", "Recorder")
     links = "".join(f'<link port="{each}" relation="r0"/>' for each in ("my clock.output", "3rd.input", "3rd!.input"))
     text = model(actors, wires(""), links, stop=0)
-    assert notes(tmp_path, text) == ["my clock is called my_clock", "3rd is called _3rd", "3rd! is called _3rd_2"]
+    assert notes(tmp_path, text) == ["my clock is renamed my_clock", "3rd is renamed _3rd", "3rd! is renamed _3rd_2"]
 
 
 def test_what_has_no_counterpart_is_told(tmp_path: Path) -> None:
@@ -167,9 +167,9 @@ def test_what_has_no_counterpart_is_told(tmp_path: Path) -> None:
         wires("Clock.output Ramp.trigger", "Ramp.output Recorder.input"),
     )
     assert notes(tmp_path, text) == [
-        "Ramp.trigger.defaultValue = '3': has no counterpart",
-        "Ramp.odd = '\"x\"': has no counterpart",
-        "strange, a StrangeAttribute: has no counterpart",
+        "Ramp.trigger.defaultValue = '3' has no counterpart",
+        "Ramp.odd = '\"x\"' has no counterpart",
+        "strange, a StrangeAttribute, has no counterpart",
     ]
 
 
@@ -197,9 +197,9 @@ def test_all_that_cannot_be_said_is_told_at_once(tmp_path: Path) -> None:
 m.xml cannot be imported:
    - inner.Magic is a ptolemy.actor.lib.MagicSource, which has no counterpart
    - Python is a ptolemy.actor.lib.python.PythonScript, which has no counterpart: a script is a program, and \
-nothing in an imported file is run
-   - Expression: expression: the function 'random' is not known here
-   - Clock.period = 'unheard': 'unheard' is not known"""
+no program in an imported file is run
+   - Expression: expression: the function 'random' is not supported
+   - Clock.period = 'unheard': unknown name 'unheard'"""
     )
 
 
@@ -217,7 +217,7 @@ def test_a_result_that_does_not_load_is_refused_with_the_reason(tmp_path: Path) 
     assert (
         refusal(tmp_path, text)
         == """\
-m.xml cannot be imported: what comes of it is no valid model
+m.xml cannot be imported: the result is not a valid model
 m.yaml:7:5: error: a loop without delay: Scale -> Scale
     7 |   - Scale.output -> Scale.input
       |     ^^^^^^^^^^^^
@@ -255,7 +255,7 @@ def test_the_command(tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeyp
     assert main(["import", "m.xml", "-o", "m.yaml"]) == 0
     out, err = capsys.readouterr()
     assert out == "wrote m.yaml\n"
-    assert err.splitlines()[0] == "note: unused is left out: it never fires, for nothing sends to its input"
+    assert err.splitlines()[0] == "note: unused is left out: it never fires because nothing sends to its input"
     assert err.splitlines()[-1] == "note: left out: layout, 1 view"
     assert main(["run", "m.yaml", "--until", "4"]) == 0
 
@@ -277,7 +277,7 @@ def test_a_refused_model_is_not_written(tmp_path: Path, capsys: pytest.CaptureFi
     )
     assert not out.exists()
     assert main(["import", str(tmp_path / "m.xml"), "-o", str(tmp_path / "m.txt")]) == 2
-    assert capsys.readouterr().err == f"error: {tmp_path}/m.txt is not the name of a model file: it ends in .yaml\n"
+    assert capsys.readouterr().err == f"error: {tmp_path}/m.txt is not a name for a model file: it must end in .yaml\n"
 
 
 def test_help_does_not_load_much() -> None:
@@ -336,7 +336,7 @@ def test_an_sdf_composite(tmp_path: Path) -> None:
         wires("Clock.output C.in", "C.out Recorder.input"),
         stop=1,
     )
-    assert notes(tmp_path, text) == ["C.SDF, a SDFDirector: what is inside fires by the rules of DE"]
+    assert notes(tmp_path, text) == ["C.SDF, a SDFDirector: the actors inside fire by the rules of DE"]
     assert recorded(tmp_path, text) == [(0.0, 1, 6), (1.0, 1, 6)]
 
 

@@ -153,7 +153,7 @@ def test_the_machine_of_former_versions(tmp_path: Path) -> None:
     assert "  M: {type: StateMachine, modes: [a, b], initial: b, transitions: [b -> a else do out = 7]}\n" in written(
         tmp_path, text
     )
-    assert notes(tmp_path, text) == ["M: in is called in_", "M: in is left out: nothing reads it"]
+    assert notes(tmp_path, text) == ["M: in is renamed in_", "M: in is left out: nothing reads it"]
 
 
 def test_words_that_could_be_mistaken(tmp_path: Path) -> None:
@@ -176,15 +176,15 @@ def test_what_of_machines_has_no_counterpart(tmp_path: Path) -> None:
     )
     text = around(machine(parts))
     assert notes(tmp_path, text) == [
-        "M: t: other = 1 is left out: other is no output and no variable here",
-        "M: t: b.gain = 2 is left out: b.gain is no output and no variable here",
-        "M: t: the action 'nonsense' is not understood, and left out",
-        "M: in is called in_",
+        "M: t: other = 1 is left out: other is neither an output nor a variable",
+        "M: t: b.gain = 2 is left out: b.gain is neither an output nor a variable",
+        "M: t: the action 'nonsense' is not an assignment and is left out",
+        "M: in is renamed in_",
     ]
     wrong = around(machine(state("a", isInitialState="true"), transition("t", "a", "a", "random() > 0.5")))
     with pytest.raises(MomlError) as caught:
         imported(tmp_path, wrong)
-    assert str(caught.value) == "m.xml cannot be imported:\n   - M.t: the function 'random' is not known here"
+    assert str(caught.value) == "m.xml cannot be imported:\n   - M.t: the function 'random' is not supported"
 
 
 def test_a_machine_that_the_director_names(tmp_path: Path) -> None:
@@ -245,7 +245,7 @@ def test_states_that_are_never_entered_and_ways_out_of_final_ones(tmp_path: Path
         "M: lost is left out: no transition leads there",
         "M: also is left out: no transition leads there",
         "M: the transition u is left out: nothing leaves a final state",
-        "M: in is called in_",
+        "M: in is renamed in_",
     ]
     assert recorded(tmp_path, text) == [(1.0, 1, 2)]
 
@@ -289,7 +289,7 @@ def test_channels_of_a_machine(tmp_path: Path) -> None:
     )
     assert notes(tmp_path, text) == [
         "M: t: out(2) = 1 is left out: out has no such channel",
-        "M: in is called in_",
+        "M: in is renamed in_",
     ]
     assert recorded(tmp_path, text, "R1") == [(0.0, 1, 5), (1.0, 1, 12)]
     assert recorded(tmp_path, text, "R2") == [(0.0, 1, 1), (0.0, 1, 5)]
@@ -329,7 +329,7 @@ def test_an_action_for_a_channel_that_is_none(tmp_path: Path) -> None:
     parts = state("a", isInitialState="true") + transition("t", "a", "a", "in_isPresent", "out(0.5) = 1")
     with pytest.raises(MomlError) as caught:
         imported(tmp_path, around(machine(parts)))
-    assert str(caught.value) == "m.xml cannot be imported:\n   - M.t: out(0.5) = ...: 0.5 is no channel"
+    assert str(caught.value) == "m.xml cannot be imported:\n   - M.t: out(0.5) = ...: 0.5 is not a channel"
 
 
 def test_probabilities(tmp_path: Path) -> None:
@@ -355,7 +355,7 @@ def test_probabilities(tmp_path: Path) -> None:
     wrong = machine(state("a", isInitialState="true") + transition("t", "a", "a", "in > 1 || probability(0.5)"))
     with pytest.raises(MomlError) as caught:
         imported(tmp_path, around(wrong))
-    assert str(caught.value) == "m.xml cannot be imported:\n   - M.t: the function 'probability' is not known here"
+    assert str(caught.value) == "m.xml cannot be imported:\n   - M.t: the function 'probability' is not supported"
 
 
 def together(made: str, values: str, number: int) -> str:

@@ -160,4 +160,4 @@ def test_fields_that_nothing_is_wired_to_do_not_count(tmp_path: Path) -> None:
 
 def test_what_cannot_be_measured_is_told(tmp_path: Path) -> None:
     text = fed("ExecutionTime", {"trigger": {0: "1"}}, ("output",))
-    assert notes(tmp_path, text) == ["A sends how long a computation took, in ms: here 0"]
+    assert notes(tmp_path, text) == ["A: in Ptolemy, it sends the real time of a computation, in ms; here, 0"]

@@ -42,7 +42,7 @@ def test_a_test_in_training_checks_nothing(tmp_path: Path) -> None:
         entity("Test", "Test", correctValues="{7}", trainingMode="true"),
         wires("a.output Test.input"),
     )
-    assert notes(tmp_path, text) == ["Test is in training mode: it checks nothing"]
+    assert notes(tmp_path, text) == ["Test is in training mode and checks nothing"]
     assert "  Test: {type: Recorder}\n" in written(tmp_path, text)
 
 
@@ -181,7 +181,7 @@ def test_functions_of_the_model_are_written_out(tmp_path: Path) -> None:
         ("{1, nil}", "nil cannot be written"),
         ("NaN", "NaN cannot be written"),
         ("f", "a function cannot be written"),
-        ("'q' + f", "it cannot be computed: it has no text"),
+        ("'q' + f", "it cannot be evaluated: it has no text form"),
     ],
 )
 def test_values_that_cannot_be_written(tmp_path: Path, said: str, why: str) -> None:

@@ -61,9 +61,9 @@ def test_instances_of_one_composite(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("number", "why"),
     [
-        ("unheard", "M.nInstances: 'unheard' is not known"),
-        ("1.5", "M.nInstances = 1.5: it is no whole number"),
-        ("100000", "M: its instances come to more than 20,000 entities"),
+        ("unheard", "M.nInstances: unknown name 'unheard'"),
+        ("1.5", "M.nInstances = 1.5 is not a whole number"),
+        ("100000", "M: its instances have more than the maximum of 20,000 entities"),
     ],
 )
 def test_instances_that_cannot_be_counted(tmp_path: Path, number: str, why: str) -> None:
@@ -112,7 +112,7 @@ def test_a_port_that_nobody_knows_is_told(tmp_path: Path) -> None:
     text = model(
         CLOCK, entity("A", "Scale"), RECORDER, wires("Clock.output A.input A.strange", "A.output Recorder.input")
     )
-    assert notes(tmp_path, text) == ["A.strange has no counterpart: its wires are left out"]
+    assert notes(tmp_path, text) == ["A.strange has no counterpart; its wires are left out"]
 
 
 def test_widths_that_ports_of_an_actor_have_in_common(tmp_path: Path) -> None:
@@ -147,7 +147,9 @@ def test_a_thread_of_its_own_is_a_delay(tmp_path: Path) -> None:
     )
     assert values(tmp_path, text) == [(0.5, 3), (1.5, 6)]
     late = text.replace('value="0.5"', 'value="UNDEFINED"')
-    assert notes(tmp_path, late) == ["T: its outputs come when a thread has computed them, here at the next microstep"]
+    assert notes(tmp_path, late) == [
+        "T: in Ptolemy, it sends when its thread has finished; here, at the next microstep"
+    ]
 
 
 def case(control: str) -> str:
@@ -206,7 +208,7 @@ def test_a_model_of_iterations(tmp_path: Path, parameters: dict[str, object], ex
 def test_a_model_of_endless_iterations(tmp_path: Path) -> None:
     with pytest.raises(MomlError) as caught:
         imported(tmp_path, whole(entity("Ramp", "Ramp"), RECORDER, wires("Ramp.output Recorder.input"), iterations=0))
-    assert str(caught.value).endswith("   - m: endless iterations at one time have no counterpart")
+    assert str(caught.value).endswith("   - m: endlessly many iterations at one time have no counterpart")
 
 
 def test_a_delay_of_one_iteration_in_a_loop(tmp_path: Path) -> None:

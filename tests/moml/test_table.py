@@ -41,11 +41,11 @@ PORTS_FED = {
     "standardDeviation": "1.0", "upperBound": "2.0", "max": "2.0", "mode": "1.5", "p": "0.5", "trueProbability": "0.5",
 }  # fmt: skip
 SAID = {
-    "ExecutionTime": ["A sends how long a computation took, in ms: here 0"],
-    "WallClockTime": ["A sends how long the run has taken, in s: here 0.0"],
-    "SequenceToArray": ["A.arrayLength has no counterpart: its wires are left out"],
-    "TestActorPortDepth": ["A sends the depths of all actors and ports there: here an empty text"],
-    "SingleEvent": ["A.trigger has no counterpart: its wires are left out"],
+    "ExecutionTime": ["A: in Ptolemy, it sends the real time of a computation, in ms; here, 0"],
+    "WallClockTime": ["A: in Ptolemy, it sends the real time since the start of the run, in s; here, 0.0"],
+    "SequenceToArray": ["A.arrayLength has no counterpart; its wires are left out"],
+    "TestActorPortDepth": ["A: in Ptolemy, it sends the depths of all actors and ports; here, an empty text"],
+    "SingleEvent": ["A.trigger has no counterpart; its wires are left out"],
 }
 
 

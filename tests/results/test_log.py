@@ -278,8 +278,8 @@ def test_a_token_without_a_value_is_refused(monkeypatch: pytest.MonkeyPatch) -> 
     with pytest.raises(ActorError) as caught:
         simulate("actors: {a: {type: Plan}}")
     assert str(caught.value).splitlines()[0] == (
-        "a failed in fire() at (0 s, 1): a token of type object has no value that could be logged: "
-        "make it a dataclass, or give it a __repr__ that shows what is in it"
+        "a failed in fire() at (0 s, 1): a token of type object has no value that can be logged: "
+        "make it a dataclass, or give it a __repr__ that shows its contents"
     )
 
 
@@ -382,16 +382,16 @@ def test_filter(texts: list[str], fits: Callable[[Record], bool]) -> None:
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("aspect=los", "aspect=los fits no aspect of the model, did you mean 'loss'?; aspects: loss, noise"),
-        ("actor=c[*]", "actor=c[*] fits no actor of the model; actors: t, a, b"),
+        ("aspect=los", "aspect=los matches no aspect of the model, did you mean 'loss'?; aspects: loss, noise"),
+        ("actor=c[*]", "actor=c[*] matches no actor of the model; actors: t, a, b"),
         (
             "event=drop",
-            ("event=drop fits no event of the model, did you mean 'dropped'?; events: send, dropped, replaced"),
+            ("event=drop matches no event of the model, did you mean 'dropped'?; events: send, dropped, replaced"),
         ),
-        ("port=a.output", "port=a.output fits no port of the model, did you mean 'output'?; ports: output, input"),
-        ("actor=a..b", "'a..b' is no pattern: '' is not a name, a name with an index, '*' or '**'"),
-        ("loss", "'loss' is no filter of the log: write COLUMN=PATTERN, such as aspect=packet_loss"),
-        ("aspect=", "'aspect=' is no filter of the log: write COLUMN=PATTERN, such as aspect=packet_loss"),
+        ("port=a.output", "port=a.output matches no port of the model, did you mean 'output'?; ports: output, input"),
+        ("actor=a..b", "'a..b' is not a pattern: '' is not a name, a name with an index, '*' or '**'"),
+        ("loss", "'loss' is not a filter of the log: write COLUMN=PATTERN, such as aspect=packet_loss"),
+        ("aspect=", "'aspect=' is not a filter of the log: write COLUMN=PATTERN, such as aspect=packet_loss"),
         (
             "actr=a",
             "the log has no column 'actr' to filter by, did you mean 'actor'?; columns: event, actor, port, aspect",
@@ -405,7 +405,7 @@ def test_wrong_filters(text: str, message: str) -> None:
 
 
 def test_paths_of_logs(tmp_path: Path) -> None:
-    with pytest.raises(LogError, match="is no log file: its name must end in"):
+    with pytest.raises(LogError, match="is not a log file: its name must end in"):
         check_log_path(tmp_path / "log.txt")
     with pytest.raises(LogError, match="there is no folder"):
         check_log_path(tmp_path / "no" / "log.csv")
@@ -428,5 +428,5 @@ def test_a_token_that_a_loop_wraps_again_and_again_ends_at_a_limit_of_ours() -> 
     with pytest.raises(TokenError) as raised:
         EventLog().add(Tag(0, 1), "send", "a", "output", None, "", {"inside": token})
     assert str(raised.value) == (
-        "the token is nested more than 64 levels deep; does a loop put it into a list again and again?"
+        "the token is nested more than 64 levels deep; does a loop keep putting it into a list?"
     )

@@ -59,7 +59,7 @@ def test_trajectories_of_what_has_no_position(tmp_path: Path) -> None:
     model = load_model("mm1")
     with pytest.raises(FigureError) as caught:
         draw("way", Trajectories(robots="server.size"), Simulation(model).run(until=100.0), tmp_path / "way.png")
-    told = "the tokens of server.size have no 'position', and are no x, y"
+    told = "the tokens of server.size have no 'position' and are not pairs x, y"
     assert str(caught.value) == f"figure way cannot be drawn: {told}"
 
 

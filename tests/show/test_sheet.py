@@ -183,11 +183,11 @@ def test_logarithmic_axes(tmp_path: Path, sheets: list[Sheet]) -> None:
     np.testing.assert_allclose(axes.patches[0].get_data().edges, [1, 10, 100, 1000, 10_000])
     with pytest.raises(FigureError) as caught:
         draw("f", TimeSeries(signals="powers.below", log_y=True), results, tmp_path / "f.svg")
-    said = "figure f cannot be drawn: no value on the vertical axis is positive, so that it cannot be logarithmic"
+    said = "figure f cannot be drawn: no value on the vertical axis is positive, so it cannot be logarithmic"
     assert str(caught.value) == said
     with pytest.raises(FigureError) as caught:
         draw("f", Histogram(signals="powers.below", log_x=True), results, tmp_path / "f.svg")
-    said = "figure f cannot be drawn: no value is positive, so that the horizontal axis cannot be logarithmic"
+    said = "figure f cannot be drawn: no value is positive, so the horizontal axis cannot be logarithmic"
     assert str(caught.value) == said
     draw("f", Histogram(signals=["powers.below", "powers.output"], log_x=True), results, tmp_path / "f.svg")
     assert sheets[-1].axes[0].get_title(loc="left").endswith("9 s, 10 values that are not positive are left out")

@@ -1,4 +1,4 @@
-"""A study with its results, which many tests read and some spoil."""
+"""A study with its results, which many tests read and some damage."""
 
 from __future__ import annotations
 
@@ -22,6 +22,6 @@ def done(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture
 def copied(done: Path, tmp_path: Path) -> Path:
-    """Results to spoil."""
+    """Results to damage."""
     shutil.copytree(done, tmp_path, dirs_exist_ok=True)
     return tmp_path

@@ -1,4 +1,4 @@
-"""A real scheduler of Dask with real workers on loopback, each in an empty folder of its own."""
+"""A real Dask scheduler with real workers on loopback, each in its own empty folder."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from typing import Any
 
 @dataclass
 class Cluster:
-    """The processes of Dask, and where the scheduler listens."""
+    """The processes of Dask, and the address of the scheduler."""
 
     folder: Path
     address: str = ""
@@ -38,14 +38,14 @@ class Cluster:
             )
 
     def add_worker(self, nanny: str = "--no-nanny", **environment: str) -> subprocess.Popen[Any]:
-        """One more, with one thread; without a nanny it stays dead when it is killed."""
+        """Another worker, with one thread; without a nanny it stays dead when killed."""
         local = ("--local-directory", str(self.folder))
         self.workers.append(self.start("worker", self.address, "--nthreads=1", nanny, *local, **environment))
         return self.workers[-1]
 
 
 def without_epicycle(folder: Path) -> dict[str, str]:
-    """What to set for a process that is not to find Epicycle."""
+    """The environment of a process that should not find Epicycle."""
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "sitecustomize.py").write_text("import sys\n\nsys.modules['epicycle'] = None\n")
     return {"PYTHONPATH": os.pathsep.join([str(folder), *sys.path])}
@@ -53,7 +53,7 @@ def without_epicycle(folder: Path) -> dict[str, str]:
 
 @contextmanager
 def a_cluster(folder: Path, workers: int = 0) -> Iterator[Cluster]:
-    """A scheduler, which need not know Epicycle, with workers; until the end."""
+    """A scheduler, possibly without Epicycle, with workers; until the end."""
     folder.mkdir(exist_ok=True)
     unknowing = without_epicycle(folder / "without")
     found = Cluster(folder)

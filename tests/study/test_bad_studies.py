@@ -78,7 +78,7 @@ def test_names_of_the_other_kind(tmp_path: Path, capsys: pytest.CaptureFixture[s
         "   help: packaged studies: ...; a path to a file ends in .yaml\n"
     )
     assert main(["validate", "table_1", "--without", "packet_loss"]) == 2
-    assert capsys.readouterr().err == "error: --without is for models: a study says itself what it changes\n"
+    assert capsys.readouterr().err == "error: --without is for models: a study states in its file what it changes\n"
 
 
 def test_packaged_studies_are_valid(capsys: pytest.CaptureFixture[str]) -> None:

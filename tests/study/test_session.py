@@ -27,18 +27,18 @@ def test_extension_makes_only_what_is_new(done: Path, tmp_path: Path, capsys: py
         assert study(tmp_path, *arguments) == 0
         return capsys.readouterr().out.splitlines()[0]
 
-    assert said() == "walks: 2 conditions, 0 new runs, 10 there before"
-    assert said("--replications", 7) == "walks: 2 conditions, 4 new runs, 10 there before"
+    assert said() == "walks: 2 conditions, 0 new runs, 10 already there"
+    assert said("--replications", 7) == "walks: 2 conditions, 4 new runs, 10 already there"
     (tmp_path / "walks.yaml").write_text(STUDY.replace("[0 m/s,", "[-1 m/s, 0 m/s,"))
-    assert said() == "walks: 3 conditions, 5 new runs, 10 there before"
+    assert said() == "walks: 3 conditions, 5 new runs, 10 already there"
     after = open_study(tmp_path / "out").table().to_pylist()
     assert [
         row | {"condition": row["condition"] - 1} for row in after[5:] if row["replication"] < 5
     ] == before  # fmt: skip
     # Anything that a run hangs on makes it another one.
-    assert said("--set", "fails=[9]") == "walks: 3 conditions, 15 new runs, 0 there before"
+    assert said("--set", "fails=[9]") == "walks: 3 conditions, 15 new runs, 0 already there"
     (tmp_path / "walk.yaml").write_text(MODEL + "# as it was, but who knows\n")
-    assert said("--replications", 1) == "walks: 3 conditions, 3 new runs, 0 there before"
+    assert said("--replications", 1) == "walks: 3 conditions, 3 new runs, 0 already there"
 
 
 def test_identity_hangs_on_content_and_not_on_place(
@@ -62,7 +62,7 @@ def test_another_first_seed_is_that_of_a_study_that_says_so(tmp_path: Path, caps
     )
     # The folder knows it, whatever the file says.
     assert main(["resume", str(tmp_path / "asked")]) == 0
-    assert "0 new runs, 4 there before" in capsys.readouterr().out
+    assert "0 new runs, 4 already there" in capsys.readouterr().out
     write(tmp_path, STUDY.replace("seed: 20", "seed: 120"))
     assert study(tmp_path, "--replications", 2, out="said") == 0
     tables = [(tmp_path / out / "table.parquet").read_bytes() for out in ("asked", "said")]
@@ -106,11 +106,11 @@ def test_results_of_another_version_are_read_and_not_gone_on_with(
     assert open_study(copied / "out").table() == before
     assert main(["resume", str(copied / "out")]) == 2
     assert message(capsys, copied) == (
-        f"error: out was made with Epicycle {manifest['epicycle']}, and this is Epicycle 47.11\n"
-        "   help: install that one, or make all runs anew: 'epicycle study walks.yaml --out ANOTHER'\n"
+        f"error: out was made with Epicycle {manifest['epicycle']}, but this is Epicycle 47.11\n"
+        "   help: install that version, or repeat all runs: 'epicycle study walks.yaml --out ANOTHER'\n"
     )
     assert study(copied) == 0
-    assert capsys.readouterr().out.startswith("walks: 2 conditions, 10 new runs, 0 there before\n")
+    assert capsys.readouterr().out.startswith("walks: 2 conditions, 10 new runs, 0 already there\n")
 
 
 def test_a_thousand_million_runs_are_asked_back(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,7 +1,7 @@
 """Elementary functions with the same bits on every machine.
 
-They are made of + - * / and square roots, which IEEE 754 rounds in one way only, and of what is exact; no C library has
-a say.  Python runs this source and numba compiles it, to the same results.
+They use + - * / and square roots, which IEEE 754 rounds in one way only, and exact operations, but no C library.
+Python runs this source and numba compiles it, to the same results.
 """
 
 from .arcs import acos, asin, atan, atan2

@@ -57,7 +57,7 @@ def _far_arc(above: float, along: float, sign: float) -> float:
 
 
 def _arc(side: float, base: float, table: int) -> float:
-    """atan(side / base), at most pi/4, taken from or added to the multiple of pi/2 that the table begins with.
+    """atan(side / base), at most pi/4, subtracted from or added to the multiple of pi/2 at the start of the table.
 
     With c = i / 64 next to the ratio, it is atan(c) + atan(t), t = (side - c base) / (base + c side), as a pair.
     """

@@ -1,6 +1,7 @@
 """sin, cos and tan.
 
-x = n pi/2 + r + low with |r| <= pi/4, where low is what r misses; polynomials give the sine and the cosine of r.
+x = n pi/2 + r + low with |r| <= pi/4, where low is the rounding error of r; polynomials give the sine and the cosine of
+r.
 """
 
 from __future__ import annotations
@@ -23,7 +24,7 @@ def cos(x: float) -> float:
 
 
 def _wave(x: float, quarters: int) -> float:
-    """The sine of x, moved on by some quarters of a turn."""
+    """The sine of x plus a number of quarter turns."""
     if -0.7853981633974483 <= x <= 0.7853981633974483:
         n, r, low = quarters, x * 1.0, 0.0
     else:
@@ -33,7 +34,7 @@ def _wave(x: float, quarters: int) -> float:
     if n & 1:
         p = -2.7557314148611675e-07 + z * (2.0875696570502526e-09 - z * 1.1358310367104587e-11)
         p = 0.041666666666666595 + z * (-0.0013888888888872895 + z * (2.4801587288748162e-05 + z * p))
-        first = (r + 100663296.0) - 100663296.0  # a multiple of 2**-26: half its square taken from 1 is exact
+        first = (r + 100663296.0) - 100663296.0  # a multiple of 2**-26: 1 minus half its square is exact
         rest = r - first
         result = (1.0 - 0.5 * first * first) - ((rest * (0.5 * (r + first)) + r * low) - z * z * p)
     else:
@@ -59,7 +60,7 @@ def _reduced(x: float) -> tuple[int, float, float]:
 
 
 def _nearly_whole(n: int, start: float, step: float) -> tuple[int, float, float]:
-    """Next to a multiple of pi/2, where nearly all digits cancel out."""
+    """Near a multiple of pi/2, where nearly all digits cancel."""
     middle = start - step
     part = middle - start
     missed = (start - (middle - part)) - (step + part)
@@ -73,11 +74,11 @@ def _nearly_whole(n: int, start: float, step: float) -> tuple[int, float, float]
 
 
 def _far_reduced(x: float) -> tuple[int, float, float]:
-    """By the digits of x times those of 2/pi: first without and then with the sign that the rest turns out to have."""
+    """By the digits of x times those of 2/pi: first without, and then with the sign of the rest."""
     if x - x != 0.0:
         return 0, undefined(x) if x == x else x * 1.0, 0.0
     _, e = frexp(x)
-    place = (e - 1) // 24  # the first digit of x stands for multiples of 2**(24 place)
+    place = (e - 1) // 24  # the first digit of x counts multiples of 2**(24 place)
     digits = abs(x) * POWERS[2048 - 24 * place]
     a = int(digits)
     digits = (digits - a) * 16777216.0
@@ -88,7 +89,7 @@ def _far_reduced(x: float) -> tuple[int, float, float]:
     mask, n, high, low = 0, 0, 0.0, 0.0
     for _ in range(2):
         carry, high, low = 0, 0.0, 0.0
-        for k in range(place + 12, place + 2, -1):  # a column stands for multiples of 2**(24 (place + 3 - k))
+        for k in range(place + 12, place + 2, -1):  # a column counts multiples of 2**(24 (place + 3 - k))
             carry += a * TWO_OVER_PI[k] + b * TWO_OVER_PI[k - 1] + c * TWO_OVER_PI[k - 2] + d * TWO_OVER_PI[k - 3]
             n = carry & 16777215
             carry >>= 24

@@ -1,6 +1,6 @@
-"""Arithmetic with pairs: a number as the sum of two doubles, the second what the first misses.
+"""Arithmetic with pairs: a number as the sum of two doubles, of which the second is the rounding error of the first.
 
-134217729 is 2**27 + 1: multiplying by it and taking the excess away halves the digits of a double (Veltkamp), and the
+134217729 is 2**27 + 1: multiplying by it and subtracting the excess halves the digits of a double (Veltkamp), and the
 products of halves are exact (Dekker).
 """
 

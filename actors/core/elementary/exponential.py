@@ -57,7 +57,7 @@ def scaled(high: float, low: float, power: int) -> float:
         return (high + low) * POWERS[power + 2048]
     if power < -1080:
         return 0.0
-    high *= POWERS[power + 3070]  # in units of 2**-1022: what lies below 2**-52 of them is rounded away by adding 1
+    high *= POWERS[power + 3070]  # in units of 2**-1022: adding 1 rounds away what is below 2**-52 of them
     low *= POWERS[power + 3070]
     total = 1.0 + high
     total += ((1.0 - total) + high) + low

@@ -1,6 +1,6 @@
 """Tells numba how to compile the elementary functions: from the source that Python runs, with tables as arrays.
 
-numba calls ``register`` by itself before it compiles anything: it is an entry point of the package.
+numba calls ``register``, an entry point of the package, before it compiles anything.
 """
 
 from __future__ import annotations
@@ -38,7 +38,7 @@ def _frexp(x: float) -> tuple[float, int]:
     """math.frexp of a finite number but 0."""
     bits, shift = _bits(x), 1022
     if (bits >> 52) & 2047 == 0:
-        bits, shift = _bits(x * 18014398509481984.0), 1076  # 2**54 times, as it is below the smallest normal number
+        bits, shift = _bits(x * 18014398509481984.0), 1076  # times 2**54, as it is below the smallest normal number
     return _double((bits & -9218868437227405313) | 4602678819172646912), ((bits >> 52) & 2047) - shift
 
 
@@ -46,7 +46,7 @@ _inner_frexp = numba.njit(**_OPTIONS)(_frexp)
 
 
 def _twin(function: Callable[..., Any]) -> Callable[..., Any]:
-    """The same code with arrays for tables, which numba indexes quickly, and its own frexp."""
+    """The same code with arrays as tables, which numba indexes quickly, and with numba's frexp."""
     names = {
         name: np.array(value) if isinstance(value, tuple) else _inner_frexp if value is math.frexp else value
         for name, value in function.__globals__.items()
@@ -60,7 +60,7 @@ def _compile_as(function: Callable[..., Any], twin: Callable[..., Any]) -> None:
 
 @functools.cache
 def register() -> None:
-    """Let compiled code call the elementary functions by the names that Python code calls."""
+    """Let compiled code call the elementary functions by the same names as Python code."""
     for module in (arcs, circle, double, exponential, gamma, logarithm, powers):
         for function in list(vars(module).values()):
             if inspect.isfunction(function) and function.__module__ == module.__name__:

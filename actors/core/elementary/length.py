@@ -1,4 +1,5 @@
-"""Euclidean lengths: the square root of a sum of squares, put right by what its own square misses of that sum."""
+"""Euclidean lengths: the square root of a sum of squares, corrected by the difference between its square and that
+sum."""
 
 from __future__ import annotations
 
@@ -16,7 +17,7 @@ def hypot(x: float, y: float = 0.0, *more: float) -> float:
 
 
 def distance(one: Sequence[float], other: Sequence[float]) -> float:
-    """The Euclidean distance of two points with as many coordinates each."""
+    """The Euclidean distance of two points with the same number of coordinates."""
     if len(one) == 2 == len(other):
         return _plane(one[0] - other[0], one[1] - other[1])
     return _length([a - b for a, b in zip(one, other, strict=True)])
@@ -48,7 +49,7 @@ def _plane(x: float, y: float) -> float:
 
 
 def _brought_near(a: float, b: float) -> tuple[float, float, float]:
-    """Sides of about 1 and the power of two taken out of them, or the length in its place if it is 0 or not finite."""
+    """Sides scaled to about 1 and the power of two, or the length itself if it is 0 or not finite."""
     if inf in (a, b):
         return 1.0, 0.0, inf
     if a == 0.0 or a != a or b != b:
@@ -73,7 +74,7 @@ def _length(vector: Sequence[float]) -> float:
     _, e = frexp(largest)
     total = missed = 0.0
     for x in sizes:
-        x = ldexp(x, -e)  # what this loses of a small one is nothing beside the largest
+        x = ldexp(x, -e)  # what a small one loses here is negligible beside the largest
         c = x * 134217729.0
         first = c - (c - x)
         rest = x - first

@@ -1,4 +1,5 @@
-"""Where a function has no value, or none that a double can hold: Python raises, compiled code gets NaN or infinity."""
+"""Arguments where a function has no value, or none that a double can hold: Python raises, compiled code gets NaN or
+infinity."""
 
 from __future__ import annotations
 

@@ -56,7 +56,7 @@ def _far_power(x: float, y: float) -> float:
 
 
 def power(base: Any, exponent: Any) -> Any:
-    """``base ** exponent`` of whole numbers and floats, as Python has it, but a ``ValueError`` where it is complex."""
+    """``base ** exponent`` of whole numbers and floats, as in Python, but with a ``ValueError`` where it is complex."""
     if isinstance(base, int) and isinstance(exponent, int) and exponent >= 0:
         return base**exponent
     if base == 0 and exponent < 0:

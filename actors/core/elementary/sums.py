@@ -1,4 +1,4 @@
-"""Sums in the order of their terms: from Python 3.12 on, the built-in ``sum`` of floats carries its rounding errors."""
+"""Sums in the order of their terms: from Python 3.12 on, the built-in ``sum`` of floats compensates rounding errors."""
 
 from __future__ import annotations
 
@@ -9,5 +9,5 @@ from typing import Any
 
 
 def total(numbers: Iterable[Any]) -> Any:
-    """The sum, each number added to that of those before it; whole numbers stay whole, and of none it is 0."""
+    """The sum, added from left to right; whole numbers stay whole, and the empty sum is 0."""
     return reduce(add, numbers, 0)

@@ -1,7 +1,7 @@
 """The tables of the elementary functions, made on import from whole numbers alone, so every machine has the same.
 
-A fixed-point number is a whole number of 2**-128.  A *pair* is the double next to a number and the double next to what
-that leaves.
+A fixed-point number is a whole number of 2**-128.  A *pair* is the double nearest to a number and the double nearest to
+the difference.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ def _series(numerator: int, denominator: int, sign: int, one: int = _ONE) -> int
     """artanh (``sign`` 1) or arctan (-1) of a small ratio, by its power series."""
     power, total, odd = one * numerator // denominator, 0, 1
     above, below = sign * numerator * numerator, denominator * denominator
-    while power not in (0, -1):  # -1 is what is left of a negative one
+    while power not in (0, -1):  # a negative number ends up at -1
         total += power // odd
         power = power * above // below
         odd += 2
@@ -41,18 +41,18 @@ def _running(start: int, steps: list[int]) -> list[int]:
     return numbers
 
 
-# Powers of two: 2**(k - 2048) stands at k; below 2**-1074 is 0.
+# Powers of two: 2**(k - 2048) is at k; 0 below 2**-1074.
 POWERS = tuple(ldexp(1.0, k - 2048) if k > 900 else 0.0 for k in range(3072))
 
-# The logarithm of i / 512 stands at i, 256 to 512, and so does 512 / i.  The first of each pair has 42 binary places,
-# so that sums of them are exact.
+# The logarithm of i / 512 is at i, 256 to 512, and so is 512 / i.  The first of each pair has 42 binary places, so
+# that sums of them are exact.
 _growth = [2 * _series(1, 2 * i + 1, 1) for i in range(256, 512)]
 _LN_2 = sum(_growth)
 LOG_HIGH, LOG_LOW = _pairs([0] * 256 + _running(-_LN_2, _growth), bits=42)
 INVERSES = (0.0,) * 256 + tuple(512 / i for i in range(256, 513))
 LN_2_HIGH, LN_2_LOW = _pair(_LN_2, bits=42)
 
-# 2**(j / 128) stands at j.
+# 2**(j / 128) is at j.
 _root = 2 * _ONE
 for _ in range(7):
     _root = isqrt(_root << _BITS)
@@ -62,7 +62,7 @@ for _ in range(127):
 ROOT_HIGH, ROOT_LOW = _pairs(_roots, bits=52)
 STEP_HIGH, STEP_LOW = _pair(_LN_2 >> 7, bits=42)  # ln 2 / 128
 
-# The arc tangent of i / 64 stands at i, 0 to 64; then pi/2 minus it, pi minus it, and pi/2 plus it.
+# The arc tangent of i / 64 is at i, 0 to 64; then pi/2 minus it, pi minus it, and pi/2 plus it.
 _arcs = _running(0, [_series(64, 4096 + i * (i + 1), -1) for i in range(64)])
 _QUARTER = 2 * _arcs[-1]
 ARC_HIGH, ARC_LOW = _pairs(
@@ -72,12 +72,12 @@ ARC_HIGH, ARC_LOW = _pairs(
     + [_QUARTER + arc for arc in _arcs]
 )
 
-# pi by Machin's formula, with so many digits that angles of any size can be reduced.
+# pi by Machin's formula, with enough digits to reduce angles of any size.
 _LONG_BITS = 1280
 _LONG = 1 << _LONG_BITS
 _PI = 4 * (4 * _series(1, 5, -1, _LONG) - _series(1, 239, -1, _LONG))
 
-# 2/pi in 52 digits of 24 bits, which stand after 4 zeros.
+# 2/pi in 52 digits of 24 bits, after 4 zeros.
 _TWO_OVER_PI = 2 * _LONG * _LONG // _PI
 TWO_OVER_PI = (0,) * 4 + tuple(_TWO_OVER_PI >> (_LONG_BITS - 24 * (k + 1)) & 0xFFFFFF for k in range(52))
 

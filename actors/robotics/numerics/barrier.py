@@ -5,17 +5,17 @@ The problem is not convex, so two things are done beyond the textbook:
 * A Newton step uses the exact gradient and the exact second derivatives, summed per prediction step into one 2x2
   block for each of position, velocity and control; a block that is not positive semidefinite is replaced by its
   nearest one that is.  The step then always descends, and near a minimum with full curvature it is Newton's own.
-* *Restoration* comes first when the start breaks a constraint: it minimises half the sum of the squared violations
-  of f3-f5 (metres), with f1 and f2 kept by their barriers.  If some violation is left, the problem is infeasible:
-  each constraint then gets its violation in that restoration as its bound, and the objective is minimised within
-  these bounds.  So least violation comes first and progress second, and the two are never traded against each other.
+* *Restoration* comes first if the start breaks a constraint: it minimises half the sum of the squared violations
+  of f3-f5 (metres), with f1 and f2 kept by their barriers.  If some violation remains, the problem is infeasible: each
+  constraint then gets its violation in that restoration as its bound, and the objective is minimised within these
+  bounds.  So least violation comes first and progress second, and the two are never traded against each other.
 
-Every start is first moved a little towards braking.  A plan shifted by one step lies on the boundary of f1 or f2 to
-rounding wherever it drives or accelerates at full rate; from there Newton's method can only double its distance to
-the boundary in a step, and it stops far from the optimum, or at once when the Hessian has lost its digits.
+Every start is first moved a little towards braking.  A plan shifted by one step is on the boundary of f1 or f2, up to
+rounding, wherever it drives or accelerates at full rate; from there Newton's method can only double its distance to the
+boundary in a step, and it stops far from the optimum, or at once if the Hessian has lost its digits.
 
-Where only the first of the controls are free and the last of them is held, a start is one in which those held are
-replaced by their mean: it keeps f1 and f2 where the start does.
+If only the first controls are free and the last of these is held, the held controls of a start are replaced by their
+mean: the result keeps f1 and f2 if the start does.
 """
 
 from __future__ import annotations
@@ -46,27 +46,27 @@ from .task import (
     take,
 )
 
-TOLERANCE = 1e-6  # m; violations below this count as none
-_SLACK = 1e-4  # m that an infeasible problem's bounds get, and that restoration goes beyond keeping a constraint
-_NEARLY = 1e-3  # m; a violation that may be all due to the barriers of f1 and f2
+TOLERANCE = 1e-6  # m; smaller violations count as none
+_SLACK = 1e-4  # m; added to an infeasible problem's bounds, and the margin of restoration
+_NEARLY = 1e-3  # m; a violation that may be entirely due to the barriers of f1 and f2
 _CENTRING = 0.1  # how far a start is moved towards braking before anything else
 _RESTORE_FROM, _RESTORE_TO = 0.1, 1e-7  # barrier parameters of restoration
-_RESTORE_ON = 1e-10  # where it goes on to if so little is left that the barriers of f1 and f2 may be all in the way
+_RESTORE_ON = 1e-10  # further ones, if the remaining violation may be due to the barriers of f1 and f2
 _OPTIMISE_FROM = 0.03  # relative gap, constraints times barrier parameter, at which optimisation begins
 _REDUCTION = 0.03  # of the barrier parameter from one minimisation to the next
-_CLOSE = 0.5  # decrease, in barrier parameters, that a minimisation but the last of them may leave
+_CLOSE = 0.5  # decrease, in barrier parameters, that each minimisation except the last may leave
 _NEWTON_STEPS = 40  # per barrier parameter
-# Where a crowd stands all around, the last digits of how much is violated tell nothing.  No scenario comes near, but
-# the worst of 10,000 problems of tests/actors/robotics/numerics/robustness.py takes 14 times as long as the median with
-# these, and 22 times without them (goal: 20); with 64 peers, the median takes half as long.
+# In a crowd, the last digits of the violation are meaningless.  No scenario comes near, but the worst of 10,000
+# problems of tests/actors/robotics/numerics/robustness.py takes 14 times as long as the median with these, and 22 times
+# without them (goal: 20); with 64 peers, the median takes half as long.
 _CROWD = 60  # constraints within reach; more are a crowd
-_HOPELESS = 1e3  # m^2; where a crowd's squared violations sum up to more, it is enough to know them roughly:
+_HOPELESS = 1e3  # m^2; if a crowd's squared violations add up to more, a rough value is enough:
 _ROUGH = 1e-3  # the share of them that a minimisation may leave, and
 _ROUGH_TO = 1e-5  # the barrier parameter, divided by them, at which restoration ends
 
 
 class Solution(NamedTuple):
-    """What a solver returns: the plan and how good it is."""
+    """The result of a solver: the plan and its quality."""
 
     controls: Array  # (N, 2) U_{t+1} .. U_{t+N}
     violation: float  # largest violation of f3-f5, metres; 0 when feasible
@@ -78,12 +78,12 @@ PROGRESS, LEAST_VIOLATION, BRAKE = 0, 1, 2
 
 
 class Rules(NamedTuple):
-    """What the paper leaves open of its barrier method."""
+    """Settings of the barrier method that the paper leaves open."""
 
     gap: float = 1e-5  # relative (and absolute below 1e-2) gap to the optimum at which it stops
     last_parameter: float = 0.0  # the barrier parameter at which it stops instead, in units of the objective; 0: by gap
-    free: int = 0  # how many controls are free, the last of which is held to the end of the horizon; 0: all
-    infeasible: int = PROGRESS  # or LEAST_VIOLATION or BRAKE: what answers a problem that no plan solves
+    free: int = 0  # number of free controls, the last of which is held to the end of the horizon; 0: all
+    infeasible: int = PROGRESS  # or LEAST_VIOLATION or BRAKE: the answer to a problem that no plan solves
 
 
 _RULES = Rules()
@@ -91,21 +91,21 @@ _RULES = Rules()
 
 @borrower
 def _is_hopeless(task: Task, squared: float) -> bool:
-    """Whether a crowd is violated by so much, m^2."""
+    """Whether a crowd's squared violations, m^2, exceed the limit."""
     return squared > _HOPELESS and task.constraints.shape[0] > _CROWD
 
 
 @borrower
 def _minimise(task: Task, phase: Phase, mu: float, dual: float, tolerance: float) -> int:
-    """Newton's method with backtracking (0.05, 0.5) from the controls taken; returns the steps it took.
+    """Newton's method with backtracking (0.05, 0.5) from the accepted controls; returns the number of steps.
 
-    Where the previous barrier parameter ``dual`` was larger, its curvature is kept for the first step.  At the
-    minimum of that one, a constraint's multiplier is dual / slack; with it in the Hessian the step is the tangent of
-    the central path, which lowers the slacks of active constraints to mu / dual of themselves and no further.  With
-    the curvature of ``mu`` the step leaves the domain, and every reduction costs several more.
+    If the previous barrier parameter ``dual`` was larger, its curvature is kept for the first step.  At the minimum of
+    that one, a constraint's multiplier is dual / slack; with it in the Hessian the step is the tangent of the central
+    path, which lowers the slacks of active constraints to mu / dual of themselves and no further.  With the curvature
+    of ``mu`` the step leaves the domain, and every reduction costs several more.
     """
     value = evaluate(task, phase, mu, dual, math.inf)
-    if not value < math.inf:  # numbers too large to be squared, or none
+    if not value < math.inf:  # NaN, or numbers too large to be squared
         return 0
     for iteration in range(_NEWTON_STEPS):
         descent = newton_step(task.stages, task.period, task.free)
@@ -129,7 +129,8 @@ def _minimise(task: Task, phase: Phase, mu: float, dual: float, tolerance: float
 
 @borrower
 def _brake(task: Task, share: float) -> None:
-    """Take controls that brake with at most ``share`` of f2's limit, and in a step with that of the speed left."""
+    """Accept controls that brake with at most ``share`` of f2's limit, and in one step with at most that share of the
+    remaining speed."""
     plan = task.plan
     speed = hypot(task.velocity[0], task.velocity[1])
     moving = 1e-9 < speed < math.inf
@@ -143,7 +144,7 @@ def _brake(task: Task, share: float) -> None:
 
 @borrower
 def _restore(task: Task) -> tuple[int, float]:
-    """Minimise the squared violations: (Newton steps, the sum left of them), 0 left when strictly feasible.
+    """Minimise the squared violations; returns (Newton steps, the remaining sum), 0 if strictly feasible.
 
     The barrier parameter has to become small: near the limits of f1 and f2 a larger one costs decimetres of
     violation that full braking would have avoided.
@@ -169,16 +170,16 @@ def _restore(task: Task) -> tuple[int, float]:
         if _is_hopeless(task, left):
             least = _ROUGH_TO * left
             last = last or mu <= least
-        if last or taken == _NEWTON_STEPS:  # in circles, as it would at smaller parameters
+        if last or taken == _NEWTON_STEPS:  # in circles, as it would be at smaller parameters
             break
         dual, mu = mu, max(_REDUCTION * mu, least)
-    # A plan that touches a bound without breaking it still ranks behind a strictly feasible one.
+    # A plan that touches a bound without breaking it still ranks after a strictly feasible one.
     return iterations, max(left, TOLERANCE * TOLERANCE)
 
 
 @borrower
 def _optimise(task: Task, gap: float, last_parameter: float) -> tuple[int, float]:
-    """Minimise the objective within each constraint's present violation: (Newton steps, objective)."""
+    """Minimise the objective within each constraint's present violation; returns (Newton steps, objective)."""
     constraints = task.constraints
     look(task)
     for i in range(constraints.shape[0]):
@@ -192,7 +193,7 @@ def _optimise(task: Task, gap: float, last_parameter: float) -> tuple[int, float
     mu = dual = max(1e-3, max(_OPTIMISE_FROM, gap) * abs(objective) / count, last_parameter)
     while True:
         least = max(last_parameter, gap * max(1e-2, abs(objective)) / count)
-        last = not mu > 1.1 * least  # also if it is not a number
+        last = not mu > 1.1 * least  # also if it is NaN
         iterations += _minimise(task, Phase.OPTIMISE, mu, dual, (0.1 if last else _CLOSE) * mu)
         look(task)
         objective = objective_of(task)
@@ -203,7 +204,7 @@ def _optimise(task: Task, gap: float, last_parameter: float) -> tuple[int, float
 
 @borrower
 def _hold(task: Task) -> None:
-    """Replace the controls that are held by the mean of those that move the robot within the horizon."""
+    """Replace the held controls by the mean of those that move the robot within the horizon."""
     plan, first = task.plan, task.free - 1
     steps = plan.shape[0]
     if first + 1 >= steps:
@@ -218,7 +219,7 @@ def _hold(task: Task) -> None:
 
 @borrower
 def _read(plan: Array, controls: Array) -> None:
-    """Write the controls taken."""
+    """Write the accepted controls."""
     for s in range(plan.shape[0]):
         controls[s, 0], controls[s, 1] = plan[s, TAKEN], plan[s, TAKEN + 1]
 
@@ -227,10 +228,10 @@ def solve(problem: HorizonProblem, starts: Array, rules: Rules = _RULES) -> Solu
     """Solve from the first of ``starts`` (k, N, 2) that is feasible, or else from the least violating restoration.
 
     A start that breaks f1 or f2 is skipped; if all do (the vehicle is faster than it may be), the answer is the
-    hardest braking that f2 allows.  Never raises, and the controls are finite and keep f2 whatever is asked; where
-    numbers of the problem are not finite, or too large to be squared, the violation may be inf.
+    hardest braking that f2 allows.  Never raises, and the controls are always finite and keep f2; if numbers of the
+    problem are not finite, or too large to be squared, the violation may be inf.
     """
-    return Solution(*_solve(*problem, *rules, starts))  # field by field, as numba takes 4 us longer for a named tuple
+    return Solution(*_solve(*problem, *rules, starts))  # field by field, as a named tuple takes numba 4 us longer
 
 
 @entry(
@@ -273,14 +274,14 @@ def _search(problem: HorizonProblem, rules: Rules, starts: Array, best: Array, r
     if least == math.inf or (least > 0.0 and rules.infeasible == BRAKE):
         task = new_task(
             problem, starts.shape[1], free, math.inf, room
-        )  # what is out of reach is so within f1 and f2 only
+        )  # what is out of reach is so only within f1 and f2
         _brake(task, 0.999)
         _read(task.plan, best)
         return max(0.0, look(task)), math.inf, iterations
     for s in range(plan.shape[0]):
         plan[s, TAKEN], plan[s, TAKEN + 1] = best[s, 0], best[s, 1]
     if least > 0.0 and rules.infeasible == LEAST_VIOLATION:
-        look(task)  # drives it: what was tried last may be another start
+        look(task)  # the last start tried may be another one
         taken, objective = 0, objective_of(task)
     else:
         taken, objective = _optimise(task, rules.gap, rules.last_parameter)

@@ -22,14 +22,16 @@ Function = TypeVar("Function", bound=Callable[..., object])
 
 
 def options(**others: bool) -> dict[str, Any]:
-    """How all is compiled, and ``others``; ``error_model="numpy"`` gives inf and NaN instead of exceptions."""
+    """The options of every compilation, and ``others``; ``error_model="numpy"`` gives inf and NaN instead of
+    exceptions."""
     return {"error_model": "numpy", "fastmath": False, **others}
 
 
 def _compiled(function: Function, **others: bool) -> Function:
-    """Strict, with ``_nrt`` (whether references to arrays are counted) given: numba takes its caller's for it else.
+    """Strict, with explicit ``_nrt`` (whether references to arrays are counted): numba would otherwise use its
+    caller's.
 
-    A way in from C, which nobody takes, is a tenth of the time of compiling.
+    The unused entry from C would take a tenth of the time of compiling.
     """
     compiler: Any = numba.njit
     return cast(Function, compiler(**options(no_cfunc_wrapper=True, **others))(function))
@@ -38,7 +40,7 @@ def _compiled(function: Function, **others: bool) -> Function:
 def folder() -> Path:
     """Where numba keeps compiled code; named after all sources of this package and of the elementary functions.
 
-    By itself numba looks only at the file of a kernel, and would keep using old code that it calls from others.
+    By itself, numba checks only the file of a kernel, and would keep using old code that it calls from others.
     """
     if _FOLDER:  # the user's own, NUMBA_CACHE_DIR
         above = Path(_FOLDER)
@@ -51,7 +53,7 @@ def folder() -> Path:
 
 @contextmanager
 def cached() -> Iterator[None]:
-    """What is declared meanwhile is cached in the ``folder``."""
+    """Kernels declared in this context are cached in the ``folder``."""
     before = config.CACHE_DIR
     config.CACHE_DIR = str(folder())
     try:
@@ -67,15 +69,17 @@ def kernel(function: Function, counts: bool = True) -> Function:
 
 
 def inner(function: Function) -> Function:
-    """Like ``kernel``, for what only kernels call: without the way in from Python, which takes long to compile.
+    """Like ``kernel``, for functions that only kernels call: without the entry from Python, which takes long to
+    compile.
 
-    It is not cached on disk by itself, as it is in the cached code of every kernel that calls it.
+    It is not cached on disk by itself, as the cached code of every calling kernel contains it.
     """
     return _compiled(function, no_cpython_wrapper=True, _nrt=True)
 
 
 def borrower(function: Function) -> Function:
-    """Like ``inner``, for what makes no array and returns none: it does not count who holds those it is given.
+    """Like ``inner``, for functions that neither make nor return arrays: they do not count references to their
+    arguments.
 
     Counting is an atomic operation for each array of a tuple at each call; it took a third of a solve.
     """
@@ -83,7 +87,7 @@ def borrower(function: Function) -> Function:
 
 
 def inlined(function: Function) -> Function:
-    """A ``borrower`` that becomes a part of its callers, where it is called for each of many things."""
+    """A ``borrower`` that is inlined in its callers, for calls in long loops."""
     return _compiled(function, no_cpython_wrapper=True, _nrt=False, forceinline=True)
 
 

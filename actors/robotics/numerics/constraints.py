@@ -8,23 +8,24 @@ from .compiled import Array, borrower, inlined
 from .horizon import HorizonProblem
 from .terms import Term, keep_away, keep_away_uncertain, stay_near
 
-ROUNDING = 1e-6  # m; a constraint that is kept by less than this is not left out
+ROUNDING = 1e-6  # m; a constraint kept by less than this is not left out
 
-# Columns of the table of constraints, which has a row for each of them at each step where it can be broken.
-OTHER = 0  # whom it is about: 0 is the own plan (f3), then come all obstacles (f4), then all peers (f5)
+# Columns of the table of constraints, with a row for each constraint at each step where it can be broken.
+OTHER = 0  # subject: 0 is the own plan (f3), then come all obstacles (f4), then all peers (f5)
 WHEN = 1  # row of the arrays over the horizon
-X, Y = 2, 3  # m, where the other is
-DISTANCE = 4  # m, that is to be kept from it, or at most if it is the own plan
+X, Y = 2, 3  # m, position of the other body
+DISTANCE = 4  # m, the distance to keep from it, or the largest distance from the own plan
 MARGIN = 5  # alpha, if it is an obstacle; 0 otherwise
 XX, XY, YY = 6, 7, 8  # m^2, the obstacle's covariance
-BOUND = 9  # m, what a solver lets the constraint's value be at most
-VALUE = 10  # m, the value where the solver has looked at it last
-CONSTRAINT = 11  # columns in all
+BOUND = 9  # m, the bound that a solver sets for the constraint's value
+VALUE = 10  # m, the value at the solver's latest point
+CONSTRAINT = 11  # number of columns
 
 
 @borrower
 def constraints_of(problem: HorizonProblem, spare: float, table: Array) -> int:
-    """Write all that bind but those that any plan keeps by more than ``spare``, which may be inf; returns how many.
+    """Write all binding constraints except those that any plan keeps by more than ``spare``, which may be inf; returns
+    how many.
 
     Steps 1 and 2 are decided before U_{t+1} acts: none bind there.
     """
@@ -62,11 +63,11 @@ def _within_reach(
 ) -> bool:
     """Whether a plan within f1 and f2 can break a constraint at step s, or keep it by less than ``spare``.
 
-    The constraint is to stay ``near`` (x, y), or away from it.  Leaving out one that every such plan keeps changes no
-    optimum.  Step s (counted from 0) lies at ``P + s h V + h^2 sum_{j < s - 1} (s - 1 - j) U_j``.  As |U_j| <= Amax,
-    this is at most ``Amax h^2 s (s - 1) / 2`` from ``P + s h V``; and as the speed is at most Vmax from the second step
-    on, it is at most ``(s - 1) h Vmax`` from ``P + h V``.  A distance to a point changes by no more than that, and the
-    deviation along any direction is at most the root of the covariance's largest eigenvalue.
+    The constraint is to stay ``near`` (x, y), or away from it.  Leaving out one that every such plan keeps does not
+    change the optimum.  Step s (counted from 0) lies at ``P + s h V + h^2 sum_{j < s - 1} (s - 1 - j) U_j``.  As |U_j|
+    <= Amax, this is at most ``Amax h^2 s (s - 1) / 2`` from ``P + s h V``; and as the speed is at most Vmax from the
+    second step on, it is at most ``(s - 1) h Vmax`` from ``P + h V``.  A distance to a point changes by no more than
+    that, and the deviation along any direction is at most the root of the covariance's largest eigenvalue.
     """
     h = problem.period
     px, py = problem.position[0], problem.position[1]
@@ -95,14 +96,15 @@ def term(table: Array, i: int, x: float, y: float) -> Term:
 
 @inlined
 def circle(table: Array, i: int) -> tuple[bool, float]:
-    """Where the i-th constraint reaches its bound, if it has no margin: whether inside is right, and the radius."""
+    """The circle where the i-th constraint, without margin, reaches its bound: whether the inside is feasible, and the
+    radius."""
     near = table[i, OTHER] == 0.0
     return near, table[i, DISTANCE] + (table[i, BOUND] if near else -table[i, BOUND])
 
 
 @borrower
 def certainly_kept(table: Array, i: int, x: float, y: float) -> bool:
-    """Whether the i-th constraint is at most its bound at (x, y), without a root; an obstacle's is not looked at."""
+    """Whether the i-th constraint is at most its bound at (x, y), without a root; obstacles are not checked."""
     dx, dy = x - table[i, X], y - table[i, Y]
     squared, (near, radius) = dx * dx + dy * dy, circle(table, i)
     if near:

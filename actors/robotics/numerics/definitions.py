@@ -1,8 +1,9 @@
-"""The paper's equations as they are read there, one function for each; docs/paper.md says which kernel computes which.
+"""The paper's equations as written there, one function for each; docs/paper.md says which kernel computes which.
 
-Nothing here is fast.  The compiled kernels are tested against it, and the solver ``Casadi`` makes its program of it:
-the functions take arrays of numbers and arrays of symbols.  Lengths are in metres, times in seconds, information in
-nats.  N is the number of prediction steps s = 1..N, a row of an array each; step s lies at t + tau, tau = s * period.
+Nothing here is fast.  The compiled kernels are tested against this module, and the solver ``Casadi`` builds its program
+from it: the functions take arrays of numbers and arrays of symbols.  Lengths are in metres, times in seconds,
+information in nats.  N is the number of prediction steps s = 1..N, a row of an array each; step s lies at t + tau, tau
+= s * period.
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import numpy as np
 from .compiled import Array
 from .horizon import REACH_GOAL, HorizonProblem
 
-_TINY = 1e-18  # m^2; gives a root a slope at zero, too, and changes it by less than 1e-9 m
+_TINY = 1e-18  # m^2; gives a root a slope also at zero, and changes it by less than 1e-9 m
 
 
 def _norm(offsets: Any) -> Any:
@@ -23,13 +24,13 @@ def _norm(offsets: Any) -> Any:
 
 
 def target_after(state: Any, period: float) -> Any:
-    """Eq. (1): the target's state (x, y, vx, vy) a period later, but for its process noise omega."""
+    """Eq. (1): the target's state (x, y, vx, vy) a period later, without its process noise omega."""
     position, velocity = state[:2], state[2:]
     return np.concatenate([position + period * velocity, velocity])
 
 
 def measured_range(target: Any, robot: Any) -> Any:
-    """z_t of eq. (1), m: the ranges of targets (..., 2) from robots (..., 2), but for their noise eta."""
+    """z_t of eq. (1), m: the ranges of targets (..., 2) from robots (..., 2), without their noise eta."""
     return _norm(target - robot)
 
 
@@ -63,17 +64,17 @@ def f2(controls: Any, max_acceleration: Any) -> Any:
 
 
 def f3(positions: Any, planned: Any, radius: Any) -> Any:
-    """Eq. (2), (N,) in m: the distance to the standing plan Rs (N, 2) less its ``radius`` sigma_r (N,)."""
+    """Eq. (2), (N,) in m: the distance to the standing plan Rs (N, 2) minus its ``radius`` sigma_r (N,)."""
     return _norm(planned - positions) - radius
 
 
 def f4(positions: Any, obstacle: Any, safe_distance: Any) -> Any:
-    """Eq. (2), (N,) in m: Dmin less the distance to the obstacle Po (N, 2)."""
+    """Eq. (2), (N,) in m: Dmin minus the distance to the obstacle Po (N, 2)."""
     return safe_distance - _norm(obstacle - positions)
 
 
 def f5(positions: Any, peer: Any, safe_distance: Any) -> Any:
-    """Eq. (2), (N,) in m: Dmin less the distance to another robot Ro_i (N, 2)."""
+    """Eq. (2), (N,) in m: Dmin minus the distance to another robot Ro_i (N, 2)."""
     return safe_distance - _norm(peer - positions)
 
 
@@ -95,19 +96,19 @@ def sigma_5(radius: Array, growth: float, lost: int) -> Array:
 
 
 def f6(positions: Any, obstacle: Any, reach: Any) -> Any:
-    """Eq. (5), (N,) in m: max(0, distance to the obstacle Po (N, 2) less Dmax)."""
+    """Eq. (5), (N,) in m: max(0, distance to the obstacle Po (N, 2) minus Dmax)."""
     return np.maximum(0.0, out_of_reach(positions, obstacle, reach))
 
 
 def out_of_reach(positions: Any, obstacle: Any, reach: Any) -> Any:
-    """Eq. (5), (N,) in m: what f6 compares with 0."""
+    """Eq. (5), (N,) in m: the term that f6 compares with 0."""
     return _norm(obstacle - positions) - reach
 
 
 def misfit(points: Any, robots: Any, variance: Any) -> Any:
     """Eq. (5), (M, M): -log PDF(z_i; z_j, eta) for ranges of sigma points (M, 2) from robots (n, 2), of variance eta.
 
-    Without the constant of the normal density, which moves the information by a constant and no optimum.
+    Without the constant of the normal density, which shifts the information but not the optimum.
     """
     z = measured_range(points[:, np.newaxis], robots)  # (M, n)
     difference = z[:, np.newaxis] - z
@@ -124,9 +125,9 @@ def mutual_information(own: Any, points: Any, weights: Any, variance: Any, other
 
 
 def objective(problem: HorizonProblem, positions: Any, beyond: Any = None) -> Any:
-    """What is minimised: the sum of f0 of eq. (2), in m^2; or eq. (5), in nats, which is 0 while no obstacle is known.
+    """The objective: the sum of f0 of eq. (2), in m^2; or eq. (5), in nats, which is 0 while no obstacle is known.
 
-    ``beyond`` (N,) stands for f6 where a solver has variables of its own for it.
+    ``beyond`` (N,) replaces f6 if a solver has variables for it.
     """
     if problem.objective == REACH_GOAL:
         return f0(positions, problem.goal).sum()
@@ -140,7 +141,7 @@ def objective(problem: HorizonProblem, positions: Any, beyond: Any = None) -> An
 
 
 def constraints(problem: HorizonProblem, positions: Any) -> Any:
-    """f3, f4 of each obstacle and f5 of each peer with their margins alpha * sigma, in m: <= 0 is kept.
+    """f3, f4 of each obstacle and f5 of each peer with their margins alpha * sigma, in m: satisfied where <= 0.
 
     (1 + K + n, N - 2): the positions at steps 1 and 2 are decided before the first unknown control acts.
     ``peer_distance`` of the problem is Dmin with the margin of f5.  sigma_1 to sigma_3 are zero.

@@ -1,8 +1,8 @@
-"""The way from Python into a kernel.
+"""The entry from Python into a kernel.
 
-Numba's own looks at the type of each argument, counts who holds each array, and takes 0.5 us for each that a kernel
-returns.  The compiled core calls a kernel by its address instead, with a row of words that says where all numbers are
-(``Entry`` in ``arrays.pyx``); there, only that is compiled.
+Numba's own entry checks the type of each argument, counts references to each array, and takes 0.5 us for each array
+that a kernel returns.  The compiled core calls a kernel by its address instead, with a row of words that locate all
+numbers (``Entry`` in ``arrays.pyx``); with it, only this entry is compiled.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from ..arrays import entered
 from .compiled import cached, config, kernel, options
 
 Function = TypeVar("Function", bound=Callable[..., object])
-# What numba says of their types does not do.
+# numba's declarations of their types are not sufficient.
 types: Any = numba.types
 _code: Any = numba.core.cgutils
 _arrays: Any = numba.np.arrayobj
@@ -30,9 +30,9 @@ _KINDS = {types.float64: "d", types.int64: "i", types.boolean: "b"}
 
 
 def entry(signature: str) -> Callable[[Function], Function]:
-    """A ``kernel`` that Python calls again and again, with the types of a signature of numba's.
+    """A ``kernel`` that Python calls often, with the types of a numba signature.
 
-    It takes and returns floats, ints, bools, and arrays of floats whose numbers lie in order.
+    It takes and returns floats, ints, bools, and contiguous arrays of floats.
     """
 
     def decorate(function: Function) -> Function:
@@ -54,7 +54,7 @@ def _kinds(each: Any) -> str:
 
 
 def _compile(function: Any, takes: Any) -> Any:
-    """The code of ``_enter`` for a kernel, with its ``address``; it stands in the cache as a part of its module."""
+    """The code of ``_enter`` for a kernel, with its ``address``; it is in the cache as a part of its module."""
     compiler: Any = numba.njit
     names = {
         "_kernel": compiler(**options(_nrt=True, no_cpython_wrapper=True, no_cfunc_wrapper=True))(function),
@@ -72,13 +72,14 @@ def _compile(function: Any, takes: Any) -> Any:
 
 
 def _enter(words: Any) -> int:
-    """Call the kernel with what the words say, and put what it returns in their place; 0 if it has failed."""
+    """Call the kernel with the arguments in the words, and put its results in their place; returns 0 if it has
+    failed."""
     _put(words, _kernel(*_taken(words)))  # type: ignore[name-defined]  # noqa: F821
     return 1
 
 
 def _reader(takes: Any) -> Any:
-    """A function for compiled code that makes arguments of words: an array is an address and its shape."""
+    """A function for compiled code that makes arguments from words: an array is an address and its shape."""
     made = types.Tuple(takes)
 
     def lower(context: Any, builder: Any, _: Any, given: Any) -> Any:
@@ -106,17 +107,17 @@ def _reader(takes: Any) -> Any:
 
 
 def _as(builder: Any, value: Any, wanted: Any) -> Any:
-    """The same bits as of another type, which may be narrower or wider."""
+    """The same bits as another type, which may be narrower or wider."""
     if not hasattr(value.type, "width") or not hasattr(wanted, "width"):
         return builder.bitcast(value, wanted)
     return builder.trunc(value, wanted) if wanted.width < value.type.width else builder.zext(value, wanted)
 
 
 def _write(typing: Any, words: Any, result: Any) -> Any:
-    """Write what a kernel returns; of an array, the object that the function at the first word makes of it."""
+    """Write the results of a kernel; for an array, the object that the function at the first word makes of it."""
     results = _each(result)
     if any(isinstance(each, types.Array) and each.layout != "C" for each in results):
-        raise TypeError(f"a kernel returns {result}, whose numbers may not lie in order")
+        raise TypeError(f"a kernel returns {result}, which may not be contiguous")
 
     def lower(context: Any, builder: Any, signature: Any, given: Any) -> Any:
         several = isinstance(result, types.BaseTuple)

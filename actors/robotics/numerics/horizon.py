@@ -21,7 +21,7 @@ INFORM = 1
 class HorizonProblem(NamedTuple):
     """One robot's optimisation problem at one time; every length in metres, every time in seconds.
 
-    The comment behind a field is its shape and the paper's symbol.
+    The comment after a field is its shape and the paper's symbol.
     """
 
     period: float  # Delta t
@@ -53,7 +53,7 @@ class HorizonProblem(NamedTuple):
     def to_inform(
         self, points: Array, weights: Array, others: Array, variance: float, gamma: float, reach: float
     ) -> HorizonProblem:
-        """The same problem with the objective of eq. (5), where ``others`` (n, N, 2) end to measure as well."""
+        """The same problem with the objective of eq. (5), in which ``others`` (n, N, 2) also measure at their ends."""
         return self._replace(
             objective=INFORM,
             sigma_positions=points,

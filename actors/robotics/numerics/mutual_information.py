@@ -23,7 +23,7 @@ from .terms import Term
 
 @entry("f8[:, ::1](f8[:, ::1], f8[:, :, ::1], f8)")
 def pairwise_distance(sigma_positions: Array, robots: Array, variance: float) -> Array:
-    """``others_distance``: (M, M) from sigma points (M, 2) and the ends of the other robots' ways (n, N, 2)."""
+    """``others_distance``: (M, M) from sigma points (M, 2) and the ends of the other robots' paths (n, N, 2)."""
     count, last = sigma_positions.shape[0], robots.shape[1] - 1
     distance = np.zeros((count, count))
     ranges = np.empty(count)
@@ -38,7 +38,7 @@ def pairwise_distance(sigma_positions: Array, robots: Array, variance: float) ->
     return distance
 
 
-# Columns of a table of sigma points, one a row.
+# Columns of a table of sigma points, one per row.
 _PLACE = 0  # x, y
 _WEIGHT = 2
 _RANGE = 3  # r, the distance from the own position
@@ -51,7 +51,7 @@ PAIRS = 12  # others_distance_ij for all j < i, each followed by exp(-E_ij)
 
 @borrower
 def new_points(sigma_positions: Array, weights: Array, others_distance: Array, points: Array) -> int:
-    """Write the sigma points that have a weight, in rows with room for ``informed``; returns how many."""
+    """Write the sigma points with a weight, in rows with room for ``informed``; returns how many."""
     count = 0
     for i in range(weights.shape[0]):
         if weights[i] == 0.0:
@@ -71,9 +71,9 @@ def new_points(sigma_positions: Array, weights: Array, others_distance: Array, p
 def informed(points: Array, x: float, y: float, variance: float) -> Term:
     """-I at own position (x, y) with its gradient and Hessian: (value, d/dx, d/dy, xx, xy, yy).
 
-    The density's constant factor (2 pi eta)^(-n/2) is left out: it moves I by a constant and no optimum.
-    Derivation: with E_ij = (r_i - r_j)^2 / (2 eta) + others_distance_ij and q_ij = w_j exp(-E_ij) normalised over j,
-    grad(-I) = -sum_i w_i sum_j q_ij grad E_ij; the Hessian follows by the usual log-sum-exp rule.
+    The density's constant factor (2 pi eta)^(-n/2) is left out: it shifts I but not the optimum.  Derivation: with E_ij
+    = (r_i - r_j)^2 / (2 eta) + others_distance_ij and q_ij = w_j exp(-E_ij) normalised over j, grad(-I) = -sum_i w_i
+    sum_j q_ij grad E_ij; the Hessian follows by the usual log-sum-exp rule.
     E is symmetric and zero on the diagonal, so each pair is visited once, and no exponential overflows.
     """
     count = points.shape[0]

@@ -19,7 +19,7 @@ Quadratic = tuple[float, float, float, float, float]  # gradient and Hessian in 
 
 _CURVATURE = 1e-9  # smallest eigenvalue of a repaired block
 
-# Columns of the table of stages, which has a row for each prediction step.  It is one array, as seven would be five
+# Columns of the table of stages, with a row for each prediction step.  It is one array, as seven would need five
 # times the words at every call; and it is indexed, never sliced: a slice costs as much as a whole term.
 POSITION = 0  # a quadratic function of the position at the step
 VELOCITY = 5  # a quadratic function of the velocity at the step
@@ -33,7 +33,7 @@ STAGE = 27  # columns in all; zeros are the zero function
 
 @borrower
 def clear(stages: Array) -> None:
-    """Make it zero in the positions."""
+    """Make the function zero in the positions."""
     for s in range(stages.shape[0]):
         for c in range(5):
             stages[s, POSITION + c] = 0.0
@@ -41,7 +41,7 @@ def clear(stages: Array) -> None:
 
 @inlined
 def put(stages: Array, s: int, column: int, function: Quadratic) -> None:
-    """Write what the function is in the velocity or the control of step ``s``."""
+    """Set the function in the velocity or the control of step ``s``."""
     for c in range(5):
         stages[s, column + c] = function[c]
 
@@ -90,7 +90,7 @@ def _sum(p: Quadratic, q: Quadratic) -> Quadratic:
 
 @inlined
 def _of_times(k: float, q: Quadratic) -> Quadratic:
-    """What q of k times a vector is as a function of the vector."""
+    """The function q(k v) of a vector v."""
     return k * q[0], k * q[1], k * k * q[2], k * k * q[3], k * k * q[4]
 
 
@@ -129,7 +129,7 @@ def _applied(m: Matrix, v: Vector) -> Vector:
 
 @borrower
 def newton_step(stages: Array, period: float, free: int) -> float:
-    """Write the step in the controls; returns gradient . step (negative), or 0 if there is no descent.
+    """Write the step in the controls; returns gradient . step (negative), or 0 without a descent.
 
     Only the first ``free`` controls are variables; the last of them is held from there on.
 
@@ -139,7 +139,8 @@ def newton_step(stages: Array, period: float, free: int) -> float:
     barriers are convex.
 
     A control dU that is held from step f on moves step f + k by k h dU in velocity and by k (k - 1) / 2 h^2 dU in
-    position, beside what dV of step f and dP of the next one do, so that all that follows is summed in these three.
+    position, in addition to the effects of dV of step f and dP of the next one, so everything that follows is summed in
+    these three.
     """
     h, descent = period, 0.0
     A = C = U = (0.0, 0.0, 0.0, 0.0, 0.0)

@@ -1,4 +1,5 @@
-"""Where robots can be at each prediction step, from their plans, eqs. (3) and (4), and where the target will be."""
+"""The positions that robots can reach at each prediction step, from their plans, eqs. (3) and (4), and the positions of
+the target."""
 
 from __future__ import annotations
 
@@ -12,12 +13,12 @@ from .horizon import trajectory
 from .ukf import constant_velocity, mapped, predict, sigma_points, turned
 
 OLDEST = 100_000.0  # periods
-_SAME = 1e-6  # periods: a difference between times that is due to rounding
+_SAME = 1e-6  # periods: a difference of times due to rounding
 
 
 @inner
 def _age(elapsed: float, period: float, oldest: float) -> int:
-    """How many periods have passed, ``oldest`` at most."""
+    """How many periods have passed, at most ``oldest``."""
     return round(min(max(elapsed / period, 0.0), oldest))
 
 
@@ -26,13 +27,13 @@ def standing_plan(
     position: Array, velocity: Array, controls: Array, elapsed: float, radius: Array, moving: Array, speed: float,
     max_acceleration: float, period: float,
 ) -> tuple[Array, Array, Array]:  # fmt: skip
-    """What a plan from ``position`` and ``velocity`` with ``controls`` (N, 2) is good for, ``elapsed`` seconds later.
+    """The use of a plan from ``position`` and ``velocity`` with ``controls`` (N, 2), ``elapsed`` seconds later.
 
-    f3: centres (N, 2) and radii (N,) of the tube around it, which binds where the plan reaches, with the ``radius``
+    f3: centres (N, 2) and radii (N,) of the tube around it, which binds up to the end of the plan, with the ``radius``
     (N,) of eq. (3), and is free beyond.
 
-    Where a solver may start, (2, N, 2), the best guess first: the controls from now on, zero where they end; then
-    braking from the present velocity ``moving``, whose length is ``speed``, as fast as f2 allows, with 5 % to spare.
+    Starts for a solver, (2, N, 2), the best guess first: the controls from now on, then zeros; and braking from the
+    present velocity ``moving``, of length ``speed``, as fast as f2 allows, with 5 % to spare.
     """
     steps = radius.shape[0]
     centres, radii, guesses = np.zeros((steps, 2)), np.empty(steps), np.zeros((2, steps, 2))
@@ -58,13 +59,13 @@ def standing_plan(
 def peer_tubes(
     plans: Array, now: float, period: float, radius: Array, growth: float, safe_distance: float, margin: float
 ) -> tuple[Array, Array]:
-    """f5: where n peers will be at steps 1..N from now on (n, N, 2), and the distances to keep from them (n, N).
+    """f5: the positions of n peers at steps 1..N from now on (n, N, 2), and the distances to keep from them (n, N).
 
-    Each row of ``plans`` is one plan: x, y, vx, vy when it was made, the time (s) of that, how many controls follow,
-    and these, the accelerations from then on; past the last of them the velocity is kept.  To the ``radius`` (N,) of
-    eq. (3), eq. (4) adds ``growth`` for every period that has passed since but one, which is normal latency.  Plans
-    older than ``OLDEST`` count as that old: what they say is lost in the distance to keep.  A peer whose periods begin
-    at other times is where it is on its way between two of its steps.
+    Each row of ``plans`` is one plan: x, y, vx, vy when it was made, that time (s), the number of controls, and these,
+    the accelerations from then on; after the last one, the velocity is kept.  To the ``radius`` (N,) of eq. (3), eq.
+    (4) adds ``growth`` for every period since then except one, which is normal latency.  Plans older than ``OLDEST``
+    count as that old: the distance to keep exceeds any information in them.  For a peer whose periods begin at other
+    times, the position between two of its steps is used.
     """
     count, steps = plans.shape[0], radius.shape[0]
     positions, distances = np.empty((count, steps, 2)), np.empty((count, steps))
@@ -109,7 +110,8 @@ def propagate(
 
 @inner
 def _after(mean: Array, covariance: Array, noise: Array, periods: float, period: float) -> tuple[Array, Array]:
-    """An estimate so many periods later (or before), as its filter predicts it: period by period, and what is left."""
+    """An estimate a number of periods later (or earlier), as its filter predicts it: period by period, then the
+    remainder."""
     transition, whole = constant_velocity(period), int(max(periods, 0.0) + _SAME)
     for _ in range(whole):
         mean, covariance = predict(mean, covariance, transition, noise)
@@ -130,14 +132,14 @@ def expected_target(
     mean: Array, covariance: Array, noise: Array, is_widened: bool, kappa: float, period: float, elapsed: float,
     steps: int,
 ) -> tuple[Array, Array, Array, Array]:  # fmt: skip
-    """What f4 and eq. (5) need of a target with constant velocity, from an estimate ``elapsed`` seconds before now.
+    """Data for f4 and eq. (5) of a target with constant velocity, from an estimate made ``elapsed`` seconds ago.
 
     Means (1, N, 2) and covariances (1, N, 3) at steps 1..N from now on; the positions (M, 2) of its sigma points at
-    step N, and their weights (M,).  ``noise`` is the process noise of a period.  Up to now the estimate is predicted
-    with it, as its filter does it; over the horizon only if the covariance ``is_widened`` by it.  The sigma points are
-    then those of the state at step N, and otherwise have gone there from those of the state now.
+    step N, and their weights (M,).  ``noise`` is the process noise of a period.  Up to now, the estimate is predicted
+    with it, as its filter does; over the horizon only if the covariance ``is_widened`` by it.  The sigma points are
+    then those of the state at step N; otherwise, they are the propagated ones of the present state.
     """
-    # Copies, as tokens are read-only, and what they are handed to would be compiled once more for that.
+    # Copies, as tokens are read-only, and kernels would be compiled again for read-only arrays.
     periods = min(max(elapsed / period, -OLDEST), OLDEST)
     now, spread = _after(mean.copy(), covariance.copy(), noise, periods, period)
     gained = noise if is_widened else np.zeros(noise.shape)

@@ -1,4 +1,4 @@
-"""A horizon problem as a solver works on it: the plan, what is minimised over it, and how far a step may go."""
+"""The working state of a solver: the plan, the function to minimise, and how far a step may go."""
 
 from __future__ import annotations
 
@@ -14,27 +14,27 @@ from .mutual_information import PAIRS, informed, new_points
 from .newton import CONTROL, STAGE, STEP, VELOCITY, Quadratic, Vector, add, clear, put
 from .terms import Term, smoothed, stay_near
 
-_SHARE = 0.8  # of the way to the nearest limit that a step goes at most
+_SHARE = 0.8  # largest share of the way to the nearest limit in one step
 
-# Columns of the table of a plan, which has a row for each prediction step: vectors (x, y).
+# Columns of the table of a plan, with a row for each prediction step: vectors (x, y).
 _POSITION = 0
 _VELOCITY = 2
 _TRIED = 4  # the controls that position and velocity follow from
 TAKEN = 6  # the best controls so far
 _SHIFT = 8  # of the position, by a whole Newton step
-_TARGET = 10  # where the obstacle is that f6 is about
-_COLUMNS = 12  # in all
+_TARGET = 10  # position of the obstacle in f6
+_COLUMNS = 12  # number of columns
 
 
 class Phase(IntEnum):
-    """What is minimised, within f1 and f2."""
+    """The function to minimise, within f1 and f2."""
 
     RESTORE = 0  # half the squared violations of f3-f5
     OPTIMISE = 1  # the objective, with f3-f5 kept
 
 
 class Task(NamedTuple):
-    """A problem as it is evaluated again and again: some numbers, and four tables that everything happens in."""
+    """A problem for repeated evaluation: some numbers, and four working tables."""
 
     period: float
     position: Vector  # at step 1
@@ -46,7 +46,7 @@ class Task(NamedTuple):
     variance: float
     penalty: float
     reach: float
-    free: int  # controls, the last of which is held
+    free: int  # free controls, the last of which is held
     plan: Array  # (N, 12)
     stages: Array  # of ``newton``
     constraints: Array  # of ``constraints``, those within reach
@@ -55,7 +55,7 @@ class Task(NamedTuple):
 
 @inlined
 def room_for(problem: HorizonProblem, steps: int) -> int:
-    """How many numbers there are in the tables of a task."""
+    """The number of numbers in the tables of a task."""
     binding: int = (1 + problem.obstacle_mean.shape[0] + problem.peer_mean.shape[0]) * problem.tube_radius.shape[0]
     points: int = problem.sigma_weights.shape[0]
     return steps * (_COLUMNS + STAGE) + binding * CONSTRAINT + points * (PAIRS + 2 * points)
@@ -63,7 +63,7 @@ def room_for(problem: HorizonProblem, steps: int) -> int:
 
 @borrower
 def new_task(problem: HorizonProblem, steps: int, free: int, spare: float, room: Array) -> Task:
-    """With its tables in ``room``, one after the other; for callers that do not count who holds them either."""
+    """A task with its tables in ``room``, one after the other; for callers that do not count references either."""
     binding = (1 + problem.obstacle_mean.shape[0] + problem.peer_mean.shape[0]) * problem.tube_radius.shape[0]
     weights, seeks = problem.sigma_weights, problem.objective == REACH_GOAL
     second = steps * _COLUMNS
@@ -101,7 +101,7 @@ def new_task(problem: HorizonProblem, steps: int, free: int, spare: float, room:
 
 @borrower
 def _drive(task: Task) -> None:
-    """Fill in the positions and velocities that follow from the controls tried."""
+    """Compute the positions and velocities for the trial controls."""
     plan = task.plan
     (px, py), (vx, vy) = task.position, task.velocity
     for s in range(plan.shape[0]):
@@ -115,7 +115,7 @@ def _drive(task: Task) -> None:
 
 @borrower
 def move(task: Task, length: float) -> None:
-    """Try the controls that lie so much of the Newton step from those taken."""
+    """Try the accepted controls plus a share of the Newton step."""
     plan, stages = task.plan, task.stages
     for s in range(plan.shape[0]):
         for c in range(2):
@@ -133,9 +133,9 @@ def take(task: Task) -> None:
 
 @borrower
 def look(task: Task) -> float:
-    """Try the controls taken, and write the value of each of f3-f5 with them; returns the largest.
+    """Try the accepted controls, and write the value of each of f3-f5; returns the largest.
 
-    It is negative if all are kept strictly, and inf if one is no number.
+    It is negative if all are kept strictly, and inf if one is NaN.
     """
     plan, constraints = task.plan, task.constraints
     for s in range(plan.shape[0]):
@@ -154,7 +154,7 @@ def look(task: Task) -> float:
 
 @inlined
 def _beyond(task: Task, s: int) -> Term:
-    """How far the position is beyond reach of the obstacle, whose positive part is f6."""
+    """How far the position is beyond Dmax from the obstacle; the positive part is f6."""
     plan = task.plan
     x, y = plan[s, _POSITION], plan[s, _POSITION + 1]
     return stay_near(x, y, plan[s, _TARGET], plan[s, _TARGET + 1], task.reach)
@@ -162,7 +162,7 @@ def _beyond(task: Task, s: int) -> Term:
 
 @borrower
 def objective_of(task: Task) -> float:
-    """The objective of eq. (2) or (5) with the controls tried."""
+    """The objective of eq. (2) or (5) with the trial controls."""
     plan = task.plan
     steps, value = plan.shape[0], 0.0
     if task.seeks:
@@ -178,7 +178,7 @@ def objective_of(task: Task) -> float:
 
 @inlined
 def _less_log(value: float, product: float, mu: float) -> tuple[float, float]:
-    """``value`` - mu log(``product``), with the log put off until the product gets too small or too large."""
+    """``value`` - mu log(``product``), with the log deferred until the product gets too small or too large."""
     if 1e-100 < product < 1e100:
         return value, product
     return value - mu * log(product), 1.0
@@ -211,7 +211,7 @@ def _add_objective(task: Task, mu: float) -> float:
 
 @borrower
 def _ball(x: float, y: float, radius: float, mu: float, dual: float) -> tuple[float, Quadratic]:
-    """The barrier of f1 or f2, -mu log(1 - |(x, y)|^2 / radius^2): what the log is taken of, gradient and Hessian."""
+    """The barrier of f1 or f2, -mu log(1 - |(x, y)|^2 / radius^2): the argument of the log, gradient and Hessian."""
     inverse = 1.0 / (radius * radius)
     inside = 1.0 - inverse * (x * x + y * y)
     slope = 2.0 * inverse / inside
@@ -222,14 +222,14 @@ def _ball(x: float, y: float, radius: float, mu: float, dual: float) -> tuple[fl
 
 @borrower
 def evaluate(task: Task, phase: Phase, mu: float, dual: float, limit: float) -> float:
-    """The function the current phase minimises at the controls tried, with derivatives; inf outside its domain.
+    """The function that the current phase minimises at the trial controls, with derivatives; inf outside its domain.
 
-    The second derivatives of the barriers are taken with ``dual`` in place of ``mu``, see ``barrier``.  Where the
-    value is beyond ``limit``, it may be a smaller one that is so too.
+    The second derivatives of the barriers are taken with ``dual`` in place of ``mu``, see ``barrier``.  If the value
+    exceeds ``limit``, a smaller value above ``limit`` may be returned.
     """
     plan, stages, constraints = task.plan, task.stages, task.constraints
     clear(stages)
-    value, product = 0.0, 1.0  # of all arguments of logs: one log of a product for many of its factors
+    value, product = 0.0, 1.0  # of all arguments of logs: one log of a product instead of many of factors
     for s in range(plan.shape[0]):
         inside, barrier = _ball(plan[s, _TRIED], plan[s, _TRIED + 1], task.max_acceleration, mu, dual)
         if not inside > 0.0:
@@ -259,7 +259,7 @@ def evaluate(task: Task, phase: Phase, mu: float, dual: float, limit: float) -> 
         elif not slack >= 0.0:
             value += 0.5 * slack * slack
             add(stages, s, -slack, -slack, 1.0, kept)
-            if value > limit:  # what is to come is not negative
+            if value > limit:  # the remaining terms are not negative
                 break
     value -= mu * log(product)
     return value + _add_objective(task, mu) if phase == Phase.OPTIMISE else value
@@ -267,7 +267,7 @@ def evaluate(task: Task, phase: Phase, mu: float, dual: float, limit: float) -> 
 
 @borrower
 def _share(x: float, y: float, dx: float, dy: float, radius: float) -> float:
-    """How much of (dx, dy) it takes from (x, y) to the circle, where the whole crosses it."""
+    """The share of (dx, dy) from (x, y) to the circle, if the whole step crosses it."""
     a, b, c = dx * dx + dy * dy, x * dx + y * dy, x * x + y * y - radius * radius
     root = math.sqrt(max(b * b - a * c, 0.0))
     if c > 0.0:  # from outside, the nearer crossing
@@ -282,10 +282,10 @@ def _squared(x: float, y: float) -> float:
 
 @borrower
 def longest_step(task: Task, phase: Phase) -> float:
-    """How much of the step can be taken at most: all of it, or ``_SHARE`` of the way to the nearest limit.
+    """The largest share of the step that can be taken: all of it, or ``_SHARE`` of the way to the nearest limit.
 
-    All limits are circles but the obstacle's, whose margin changes with the direction; it is left to the backtracking,
-    as a step along it is far longer than one to the circle that has its present margin.
+    All limits are circles except the obstacle's, whose margin changes with the direction; it is left to the
+    backtracking, as a step along it is far longer than one to the circle with the present margin.
     """
     plan, stages, constraints, h = task.plan, task.stages, task.constraints, task.period
     share = 1.0
@@ -316,7 +316,7 @@ def longest_step(task: Task, phase: Phase) -> float:
 
 @borrower
 def keeps_limits(task: Task) -> bool:
-    """Whether the controls taken keep f1 and f2 strictly."""
+    """Whether the accepted controls keep f1 and f2 strictly."""
     plan = task.plan
     vx, vy = task.velocity
     for s in range(plan.shape[0]):

@@ -15,7 +15,7 @@ _TINY = 1e-9  # keeps the direction defined at distance zero
 
 @kernel
 def stay_near(x: float, y: float, cx: float, cy: float, radius: float) -> Term:
-    """f3, and f6's inside: distance to (cx, cy) less ``radius``."""
+    """f3, and the argument of f6: distance to (cx, cy) minus ``radius``."""
     dx, dy = x - cx, y - cy
     d = max(math.sqrt(dx * dx + dy * dy), _TINY)
     bend = 1.0 / d
@@ -25,7 +25,7 @@ def stay_near(x: float, y: float, cx: float, cy: float, radius: float) -> Term:
 
 @kernel
 def keep_away(x: float, y: float, cx: float, cy: float, distance: float) -> Term:
-    """f5 with its margin: ``distance`` less the distance to (cx, cy)."""
+    """f5 with its margin: ``distance`` minus the distance to (cx, cy)."""
     value, gx, gy, hxx, hxy, hyy = stay_near(x, y, cx, cy, distance)
     return -value, -gx, -gy, -hxx, -hxy, -hyy
 
@@ -37,7 +37,7 @@ def keep_away_uncertain(
     """f4 + alpha * sigma_4 of eqs. (2) and (4): the margin is the deviation along the line of sight.
 
     In polar coordinates around the obstacle, h(r, a) = distance - r + margin * sigma(a), where
-    sigma^2(a) = n(a)^T C n(a); derivatives are taken there and turned back.
+    sigma^2(a) = n(a)^T C n(a); derivatives are taken there and rotated back.
     """
     dx, dy = x - cx, y - cy
     r = max(math.sqrt(dx * dx + dy * dy), _TINY)
@@ -68,9 +68,9 @@ def keep_away_uncertain(
 
 @inlined
 def smoothed(gamma: float, g: float, mu: float) -> tuple[float, float]:
-    """Where f6 = max(0, g) of eq. (5) goes on the central path: t, which stands for f6, and t - g.
+    """f6 = max(0, g) of eq. (5) on the central path: t, which replaces f6, and t - g.
 
-    f6 has a kink, and is the least t with t >= 0 and t >= g.  With both bounds in the barrier, its price becomes
+    f6 has a kink, and is the least t with t >= 0 and t >= g.  With both bounds in the barrier, its cost becomes
 
         F(g) = min over t of  gamma t - mu log t - mu log(t - g),
 
@@ -80,9 +80,9 @@ def smoothed(gamma: float, g: float, mu: float) -> tuple[float, float]:
         t     = (2 mu + gamma g + root) / (2 gamma),  root = sqrt((gamma g)^2 + 4 mu^2)
         t - g = (2 mu - gamma g + root) / (2 gamma)
 
-    Of the two, one adds up numbers that are all positive; the other one, whose digits would cancel, follows from it by
-    the condition of the minimum.  As t is optimal, F' = mu / (t - g); and as the condition says that
-    dt/dg = t^2 / (t^2 + (t - g)^2), F'' = mu / (t^2 + (t - g)^2).
+    One of the two is a sum of positive numbers; the other one, whose digits would cancel, follows from it by the
+    condition of the minimum.  As t is optimal, F' = mu / (t - g); and as the condition implies that dt/dg = t^2 / (t^2
+    + (t - g)^2), F'' = mu / (t^2 + (t - g)^2).
     """
     root = math.sqrt(gamma * g * gamma * g + 4.0 * mu * mu)
     if g > 0.0:

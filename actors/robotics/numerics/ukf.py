@@ -13,12 +13,12 @@ from .entry import entry
 RELATIVE_POSITION = 0
 RANGE = 1
 
-# Columns of a table of measurements, one a row.
+# Columns of a table of measurements, one per row.
 _KIND = 0
 _OBSERVER = 1  # x, y
 _VALUE = 3  # x, y from there to the target, or the range and anything
 _ALONG = 5  # standard deviation along the line of sight
-_ACROSS = 6  # standard deviation across the line of sight; no part of a range
+_ACROSS = 6  # standard deviation across the line of sight; not used for a range
 
 
 @inner
@@ -68,8 +68,8 @@ def turned(a: Array, b: Array, onto: Array) -> Array:
 
 @borrower
 def _add_turned(result: Array, half: Array, a: Array, b: Array) -> None:
-    """Add a @ b @ a.T, of which ``half``, zeros, becomes a @ b; summed in index order, so that no BLAS decides the
-    last bits."""
+    """Add a @ b @ a.T; ``half``, zeros, becomes a @ b; summed in index order, so that the last bits do not depend on a
+    BLAS."""
     size, inside = a.shape
     for i in range(size):
         for k in range(inside):
@@ -103,7 +103,7 @@ def mapped(a: Array, x: Array) -> Array:
 
 @borrower
 def _symmetrise(a: Array) -> None:
-    """Take the mean of a and its transpose; in loops, as array expressions take seconds to compile."""
+    """Replace a by the mean of a and its transpose; in loops, as array expressions take seconds to compile."""
     for i in range(a.shape[0]):
         for j in range(i):
             a[i, j] = a[j, i] = 0.5 * (a[i, j] + a[j, i])
@@ -137,8 +137,8 @@ def measurement_noise(points: Array, weights: Array, measurements: Array) -> Arr
     A relative position has one deviation (sigma_d) on the line of sight and another (sigma_b) across it, so its
     covariance depends on where the target is.  It is averaged over the points.  With the sigma points it is the
     expected covariance: near a target whose direction is uncertain the ellipse is rounder than the one turned along
-    the mean, which would let the large deviation leak into the small one.  With the mean as the only point it is that
-    ellipse.
+    the mean, which would let the large deviation leak into the small one.  With the mean as the only point, it is the
+    ellipse turned along the mean.
     """
     noises = np.zeros((measurements.shape[0], 3))
     for m in range(measurements.shape[0]):
@@ -174,7 +174,7 @@ def update(mean: Array, covariance: Array, kappa: float, measurements: Array, no
 
 @inner
 def _fuse(mean: Array, covariance: Array, points: Array, weights: Array, measurements: Array, noises: Array) -> None:
-    """``update`` in place, with the sigma points, which are used up."""
+    """``update`` in place, with the sigma points, which are overwritten."""
     size, count = mean.shape[0], points.shape[0]
     rows = 0
     for m in range(measurements.shape[0]):
@@ -195,7 +195,7 @@ def _fuse(mean: Array, covariance: Array, points: Array, weights: Array, measure
             if width == 2:
                 images[i, row + 1] = dy
         row += width
-    for k in range(rows):  # from here on, all as seen from what is expected
+    for k in range(rows):  # from here on, all relative to the expected values
         expected = 0.0
         for i in range(count):
             expected += weights[i] * images[i, k]
@@ -239,8 +239,8 @@ def predict_and_fuse(
 ) -> tuple[Array, Array, bool]:  # fmt: skip
     """``predict``, then ``update`` with measurements (m, 7), and whether anything was fused.
 
-    All noises are as seen from the prediction, and ``averaged`` over its sigma points, or turned along its mean.  Where
-    the result would not be finite, the prediction stands.
+    All noises are as seen from the prediction, and ``averaged`` over its sigma points, or turned along its mean.  If
+    the result would not be finite, the prediction is kept.
     """
     mean, covariance = predict(mean, covariance, transition, process_noise)
     if measurements.shape[0] == 0:

@@ -28,13 +28,13 @@ _STEPS = 3
 
 @functools.cache
 def compile_kernels() -> None:
-    """Call every kernel of a run with small arrays; the first call of a process does it, later ones do nothing."""
+    """Call every kernel of a run with small arrays; only the first call in a process does something."""
     message = "compiling the numeric kernels (once, about 20 s) ..."
     notice = threading.Timer(_PATIENCE, _LOGGER.info, (message,))
     notice.daemon = True
     notice.start()
     was_enabled = gc.isenabled()
-    gc.disable()  # Numba makes millions of objects, and to look through them takes a sixth of the time
+    gc.disable()  # numba makes millions of objects, and garbage collection takes a sixth of the time
     try:
         _call_every_kernel()
     finally:
@@ -51,10 +51,10 @@ def _call_every_kernel() -> None:
 
 @contextmanager
 def _others_meanwhile() -> Iterator[None]:
-    """Where nothing is compiled yet, a second process compiles all but the solver, which takes longest.
+    """If nothing is compiled yet, a second process compiles everything except the solver, which takes longest.
 
-    Both write to the same cache, each the code of kernels that the other does not need.  If the second one cannot, all
-    is compiled here.
+    Both write to the same cache, each the code of kernels that the other does not need.  If the second one fails,
+    everything is compiled here.
     """
     if config.DISABLE_JIT or (os.cpu_count() or 1) == 1 or any(folder().rglob("*.nbc")):
         yield
@@ -64,7 +64,7 @@ def _others_meanwhile() -> Iterator[None]:
     null = subprocess.DEVNULL
     try:
         other = subprocess.Popen([sys.executable, "-c", program], env=environment, stdin=null, stdout=null, stderr=null)
-    except OSError:  # there may be no such program where Python is a part of another
+    except OSError:  # there may be no such program if Python is embedded in another one
         yield
         return
     with other:  # and wait for it
@@ -73,7 +73,7 @@ def _others_meanwhile() -> Iterator[None]:
 
 def _call_solver() -> None:
     zeros, steps = np.zeros, _STEPS
-    # Plans that solve it need no more than one Newton step, and compile as much.
+    # Plans that solve it need only one Newton step, and compile everything.
     problem = HorizonProblem(
         0.1, zeros(2), zeros(2), 1.0, 1.0, zeros((steps, 2)), np.ones(steps), 1.0, 1.0, zeros((1, steps, 2)) + 100.0,
         zeros((1, steps, 3)), zeros((1, steps, 2)) + 200.0, zeros((1, steps)), INFORM, zeros(2), zeros((9, 2)),
@@ -83,7 +83,7 @@ def _call_solver() -> None:
 
 
 def call_others() -> None:
-    """All but the solver."""
+    """Call every kernel except the solver."""
     period, zero, ones = 0.1, np.zeros(2), np.ones(_STEPS)
     mean, covariance, _ = predict_and_fuse(
         np.zeros(4), np.eye(4), constant_velocity(period), np.eye(4), 0.0, np.zeros((1, 7)), True

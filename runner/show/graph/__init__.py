@@ -1,14 +1,14 @@
-"""The model graph as a picture (SVG, PNG, PDF) or as Mermaid text, without any system package.
+"""Draws the model graph as a picture (SVG, PNG, PDF) or as Mermaid text, without any system package.
 
-Four steps: what is drawn (``outlines``), which layer it stands in (``layers``), where exactly (``places``, ``layout``),
-and how it looks (``picture``, ``mermaid_text``).
+Four steps: what is drawn (``outlines``), in which layer (``layers``), where exactly (``places``, ``layout``), and how
+it looks (``picture``, ``mermaid_text``).
 
-Why the layout is our own.  It needs nested boxes, ports at fixed sides, lines at right angles, trees for fan-out and
+Why we have our own layout: it needs nested boxes, ports on fixed sides, lines at right angles, trees for fan-out and
 room for badges.  Graphviz has no ports on clusters, and its right-angled lines ignore ports altogether; its builds for
-WebAssembly inherit that.  The Eclipse Layout Kernel can do all of it, but in Java and JavaScript; the Python port we
-tried (pyelk 0.3) leaves out connections of composite ports and lets boxes overlap.  graph-layout has ports only in a
-layout without layers and nesting, grandalf, graphlay and fast-sugiyama have none.  So only the graph algorithms
-(networkx), the linear programme (SciPy) and the drawing (matplotlib) come from libraries.
+WebAssembly inherit that.  The Eclipse Layout Kernel can do all of this, but in Java and JavaScript; the Python port
+that we tried (pyelk 0.3) omits connections of composite ports and lets boxes overlap. graph-layout supports ports only
+in a layout without layers and nesting; grandalf, graphlay and fast-sugiyama do not support them.  So only the graph
+algorithms (networkx), the linear programme (SciPy) and the drawing (matplotlib) come from libraries.
 """
 
 from __future__ import annotations
@@ -39,13 +39,13 @@ __all__ = [
 
 
 class GraphError(EpicycleError):
-    """A picture of the model graph that cannot be made."""
+    """A picture of the model graph cannot be made."""
 
 
 def check_graph_path(path: Path) -> None:
-    """Raise ``GraphError`` if a graph cannot be written there."""
+    """Raise ``GraphError`` if a graph cannot be written to this path."""
     if path.suffix.lower() not in (*PICTURES, *TEXTS):
-        raise GraphError(f"{path} is no picture: its name must end in {', '.join((*PICTURES, *TEXTS))}")
+        raise GraphError(f"{path} is not a picture: its name must end in one of {', '.join((*PICTURES, *TEXTS))}")
     if path.is_dir():
         raise GraphError(f"{path} cannot be written: it is a folder")
     if not path.parent.is_dir():
@@ -58,7 +58,7 @@ def mermaid(drawn: Outline | Statechart) -> str:
 
 
 def write_graph(drawn: Outline | Statechart, path: Path) -> None:
-    """Write an outline or a statechart into a file, whose ending decides the format; raises ``GraphError``."""
+    """Write an outline or a statechart to a file whose ending determines the format; raises ``GraphError``."""
     check_graph_path(path)
     try:
         if path.suffix.lower() in TEXTS:

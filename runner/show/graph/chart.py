@@ -1,4 +1,4 @@
-"""Statecharts: the modes of a machine and its transitions, as a picture or as Mermaid text."""
+"""Draws statecharts: the modes of a machine and its transitions, as a picture or as Mermaid text."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ INK = "#1a1a1a"
 SIZE, LEADING, WIDEST = 8.0, 10.5, 34  # of labels: points, points from line to line, letters
 NAME = 10.0
 FLAGS = ("else", "immediate", "nondeterministic", "preemptive", "history", "error")
-GAP = 120.0  # points between modes, beside what the labels need
+GAP = 120.0  # points between modes, in addition to the labels
 
 
 @dataclass
 class State:
-    """A mode: what is written into it, and where it stands."""
+    """A mode: its text and position."""
 
     name: str
     lines: list[str]
@@ -48,7 +48,7 @@ class Arrow:
 
 @dataclass(frozen=True)
 class Statechart:
-    """What is drawn of a machine."""
+    """The content of a machine's drawing."""
 
     path: str
     initial: State
@@ -57,7 +57,7 @@ class Statechart:
 
 
 def statechart(model: Model, path: str) -> Statechart:
-    """The statechart of a machine, or of a composite with modes; raises ``EpicycleError`` if that has none."""
+    """The statechart of a machine, or of a composite with modes; raises ``EpicycleError`` if there are none."""
     from epicycle.actors import StateMachine
 
     machines = {each: actor for each, actor in model.graph.actors.items() if isinstance(actor, StateMachine)}
@@ -115,12 +115,12 @@ def chart_text(chart: Statechart) -> str:
 
 
 def _plain(words: str) -> str:
-    """Words in which Mermaid sees no signs of its own."""
+    """Text without characters that Mermaid would interpret."""
     return words.replace(";", ",").replace(":", " ").replace("#", "")
 
 
 def write_statechart(chart: Statechart, path: Path) -> None:
-    """Draw into a file, whose ending decides the format."""
+    """Draw to a file whose ending determines the format."""
     _place(chart)
     arcs = [_Arc(arrow, chart) for arrow in chart.arrows]
     corners = [
@@ -130,7 +130,7 @@ def write_statechart(chart: Statechart, path: Path) -> None:
     corners.append((chart.initial.x - chart.initial.width / 2 - 30.0, chart.initial.y))
     left, top = min(x for x, _ in corners) - MARGIN, min(y for _, y in corners) - MARGIN - 2 * LEADING
     right, bottom = max(x for x, _ in corners) + MARGIN, max(y for _, y in corners) + MARGIN
-    from .picture import Painter  # and with it all that draws
+    from .picture import Painter  # which imports everything needed for drawing
 
     with style({"path.simplify": False}):
         canvas = new_canvas((right - left) / 72, (bottom - top) / 72)
@@ -147,7 +147,7 @@ def write_statechart(chart: Statechart, path: Path) -> None:
 
 
 def _place(chart: Statechart) -> None:
-    """Put the modes on an ellipse, in their order, the first one on the left."""
+    """Place the modes on an ellipse, in their order, with the first one on the left."""
     for state in chart.states:
         widths = [text_width(state.name, NAME), *(text_width(line, SIZE) for line in state.lines)]
         state.width = max(48.0, *widths) + 20.0
@@ -164,7 +164,7 @@ def _place(chart: Statechart) -> None:
 
 
 class _Arc:
-    """An arrow that bends aside, with its labels beside the middle."""
+    """A curved arrow with its labels beside the middle."""
 
     def __init__(self, arrow: Arrow, chart: Statechart) -> None:
         self.lines = [line for label in arrow.labels for line in textwrap.wrap(label, WIDEST)]
@@ -175,7 +175,7 @@ class _Arc:
         else:
             away = (target.x - source.x, target.y - source.y)
             length = math.hypot(*away)
-            aside = (away[1] / length, -away[0] / length)  # so that both ways between two modes are apart
+            aside = (away[1] / length, -away[0] / length)  # so that the two directions between modes are apart
             bend = 0.12 * length + 16.0
             control = ((source.x + target.x) / 2 + aside[0] * bend, (source.y + target.y) / 2 + aside[1] * bend)
             self.start, self.end = _edge(source, control), _edge(target, control)
@@ -185,7 +185,7 @@ class _Arc:
             self.middle = (at[0] + aside[0] * reach, at[1] + aside[1] * reach)
 
     def _loop(self, state: State, chart: Statechart) -> None:
-        """Back to the same mode, on the side where nothing else is."""
+        """An arrow back to the same mode, on its free side."""
         if state.x > 1 and abs(state.y) < 1:
             side = state.x + state.width / 2
             self.start, self.end = (side, state.y - 10.0), (side, state.y + 10.0)
@@ -200,7 +200,7 @@ class _Arc:
 
     @property
     def corners(self) -> list[Point]:
-        """Between which it is."""
+        """The corners of its bounding box."""
         x, y = self.middle
         half = LEADING * len(self.lines) / 2
         return [(x - self.width / 2, y - half), (x + self.width / 2, y + half), *self.bends]
@@ -227,7 +227,7 @@ def _quadratic(start: Point, control: Point, end: Point, at: float) -> Point:
 
 
 def _edge(state: State, towards: Point) -> Point:
-    """Where the line from the middle of a mode to a point leaves its box."""
+    """Where the line from the centre of a mode to a point leaves its box."""
     dx, dy = towards[0] - state.x, towards[1] - state.y
     share = min(
         (state.width / 2 + 1.0) / abs(dx) if dx else math.inf, (state.height / 2 + 1.0) / abs(dy) if dy else math.inf
@@ -244,7 +244,7 @@ def _head(painter: Painter, before: Point, tip: Point) -> None:
 
 
 def _begin(painter: Painter, state: State) -> None:
-    """The dot from which the machine begins."""
+    """The dot where the machine starts."""
     start, end = (state.x - state.width / 2 - 28.0, state.y), (state.x - state.width / 2 - 1.0, state.y)
     painter.sheet.add_artist(painter.shapes.Circle(start, 3.6, facecolor=INK, edgecolor="none", zorder=2.5))
     painter.path([(start, end)], INK, 0.9)

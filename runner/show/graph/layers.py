@@ -1,8 +1,8 @@
-"""Layers: which column each box stands in, and in which order the boxes of a column stand.
+"""Layers: the column of each box, and the order of the boxes in a column.
 
 The first steps of Sugiyama's method (Sugiyama, Tagawa, Toda 1981) for boxes with ports: break cycles, layer by longest
-path, let long nets pass through the layers between, reduce crossings by barycentres.  A net is a tree from one port to
-many; it has one place in each layer that it passes, however many branches it has.
+path, route long nets through the layers between, reduce crossings by barycentres.  A net is a tree from one port to
+many; it takes one place in each layer that it passes, regardless of its branches.
 """
 
 from __future__ import annotations
@@ -30,16 +30,16 @@ class Pin:
 
     @property
     def y(self) -> float:
-        """How far down it is, once its cell has a place."""
+        """Its height from the top; valid once its cell is placed."""
         return self.cell.y + self.offset
 
 
 @dataclass(eq=False)
 class Cell:
-    """What stands in a layer.
+    """An item in a layer.
 
-    A ``box``; an ``entry`` or ``exit``, which is a port of the frame around; a ``pass``, the place that a net takes in
-    a layer; a ``turn``, which only holds a place in the order where a net turns round.
+    A ``box``; an ``entry`` or ``exit``, which is a port of the surrounding frame; a ``pass``, the place that a net
+    takes in a layer; a ``turn``, which only reserves a position where a net turns round.
     """
 
     kind: str
@@ -52,7 +52,7 @@ class Cell:
     y: float = 0.0
 
     def pin(self, side: str) -> Pin:
-        """A new pin below the others of that side."""
+        """Add a pin below the others on that side."""
         made = Pin(self)
         (self.left if side == "left" else self.right).append(made)
         return made
@@ -60,7 +60,7 @@ class Cell:
 
 @dataclass(eq=False)
 class Net:
-    """A tree from a right pin to left pins; a ``label`` takes room in the layer next to the source."""
+    """A tree from a right pin to left pins; a ``label`` takes space in the layer next to the source."""
 
     source: Pin
     targets: list[Pin]
@@ -70,7 +70,7 @@ class Net:
 
 @dataclass(eq=False)
 class Run:
-    """The part of a net between two layers: the pins on the left and on the right that it joins."""
+    """The part of a net between two layers: the pins that it joins on the left and on the right."""
 
     net: Net
     left: list[Pin]
@@ -79,20 +79,20 @@ class Run:
 
 Layers: TypeAlias = list[list[Cell]]  # the cells of each layer from top to bottom
 Runs: TypeAlias = list[list[Run]]  # to the right of each layer
-Joints: TypeAlias = list[list[tuple[Pin, Pin]]]  # the pairs of pins that these join
+Joints: TypeAlias = list[list[tuple[Pin, Pin]]]  # the pairs of pins that runs join
 
 
 def layer(cells: Sequence[Cell], nets: Sequence[Net]) -> tuple[Layers, Runs]:
-    """Assign every cell to a layer, and make the passes of long nets.
+    """Assign every cell to a layer, and create the passes of long nets.
 
-    Entries stand in the first layer, exits in the last.  Nets that would close a cycle run backwards: those with a
-    label (a delay) first, then those declared last.
+    Entries are in the first layer, exits in the last.  Nets that would close a cycle run backwards: those with a label
+    (a delay) first, then those declared last.
     """
     graph = _forward(cells, nets)
     for cell in nx.topological_sort(graph):
         least = 0 if cell.kind == "entry" else 1
         cell.layer = max([least, *(before.layer + graph[before][cell]["span"] for before in graph.predecessors(cell))])
-    for cell in reversed(list(nx.topological_sort(graph))):  # sources go to where they are needed
+    for cell in reversed(list(nx.topological_sort(graph))):  # sources move to where they are needed
         after = [other.layer - graph[cell][other]["span"] for other in graph.successors(cell)]
         if cell.kind == "box" and after and graph.in_degree(cell) < len(after):
             cell.layer = min(after)
@@ -110,7 +110,7 @@ def layer(cells: Sequence[Cell], nets: Sequence[Net]) -> tuple[Layers, Runs]:
 
 
 def _forward(cells: Sequence[Cell], nets: Sequence[Net]) -> Any:
-    """The graph of the cells without what would close a cycle; ``span`` is the least distance of two layers."""
+    """The graph of the cells without edges that close a cycle; ``span`` is the minimum distance in layers."""
     graph: Any = nx.DiGraph()
     graph.add_nodes_from(cells)
     spans = [
@@ -126,7 +126,7 @@ def _forward(cells: Sequence[Cell], nets: Sequence[Net]) -> Any:
 
 
 def closing(graph: Any, edges: Sequence[tuple[T, T]]) -> Iterator[bool]:
-    """Of each edge, whether it would close a cycle in a graph to which the caller adds those that do not."""
+    """For each edge, whether it would close a cycle in a graph to which the caller adds the edges that do not."""
     every = graph.copy()
     every.add_edges_from(edges)
     knot = {node: number for number, knot in enumerate(nx.strongly_connected_components(every)) for node in knot}
@@ -139,7 +139,7 @@ def _spread(net: Net, layers: Layers, runs: Runs) -> None:
     start = net.source.cell.layer
     forward = [pin for pin in net.targets if pin.cell.layer > start]
     backward = [pin for pin in net.targets if pin.cell.layer <= start]
-    parts: dict[int, Run] = defaultdict(lambda: Run(net, [], []))  # by the layer on their left
+    parts: dict[int, Run] = defaultdict(lambda: Run(net, [], []))  # by the layer on the left
     parts[start].left.append(net.source)
     for number in (
         *range(start + 1, max((pin.cell.layer for pin in forward), default=start)),
@@ -163,9 +163,9 @@ def _spread(net: Net, layers: Layers, runs: Runs) -> None:
 
 
 def order(layers: Layers, runs: Runs, fixed: Iterable[Cell] = ()) -> None:
-    """Put the cells of each layer, and the pins of each box, into an order with few crossings.
+    """Order the cells of each layer, and the pins of each box, so that few nets cross.
 
-    ``fixed`` are entries and exits whose order is given: they keep it among themselves.
+    ``fixed`` are entries and exits with a given order, which they keep among themselves.
     """
     joints = [_joints(layers, number, here) for number, here in enumerate(runs)]
     given = {cell: place for place, cell in enumerate(fixed)}
@@ -198,7 +198,7 @@ def _restore(ordered: list[list[Any]], state: list[list[Any]]) -> None:
 
 
 def _joints(layers: Layers, number: int, runs: list[Run]) -> list[tuple[Pin, Pin]]:
-    """The pairs of pins that the runs to the right of a layer join; where one turns round, a cell holds its place."""
+    """The pairs of pins that the runs to the right of a layer join; where one turns round, a cell keeps its place."""
     pairs: list[tuple[Pin, Pin]] = []
     for run in runs:
         ends = []
@@ -213,7 +213,7 @@ def _joints(layers: Layers, number: int, runs: list[Run]) -> list[tuple[Pin, Pin
 
 
 def _sweep(layers: Layers, joints: Joints, given: dict[Cell, int], rightwards: bool) -> None:
-    """Order each layer by where its pins are connected to in the layer before it, in one direction or the other."""
+    """Order each layer by the connections of its pins to the layer before it, in the given direction."""
     last = len(layers) - 1
     for number in range(1, last + 1) if rightwards else range(last - 1, -1, -1):
         before = number - 1 if rightwards else number + 1
@@ -231,7 +231,7 @@ def _sweep(layers: Layers, joints: Joints, given: dict[Cell, int], rightwards: b
 
 
 def _sort(items: list[T], ranks: list[list[int]]) -> None:
-    """Sort by the mean of each item's ranks; what has none stays in its place."""
+    """Sort by the mean of each item's ranks; items without ranks stay where they are."""
     means = {index: sum(found) / len(found) for index, found in enumerate(ranks) if found}
     in_order = [items[index] for index in sorted(means, key=means.__getitem__)]
     for index, item in zip(sorted(means), in_order, strict=True):
@@ -239,7 +239,7 @@ def _sort(items: list[T], ranks: list[list[int]]) -> None:
 
 
 def _keep(cells: list[Cell], given: dict[Cell, int]) -> None:
-    """Bring the cells whose order is given back into it, in the places that they have among them."""
+    """Restore the given order of cells, using the positions that they hold together."""
     places = [index for index, cell in enumerate(cells) if cell in given]
     for index, cell in zip(places, sorted((cells[index] for index in places), key=given.__getitem__), strict=True):
         cells[index] = cell
@@ -251,9 +251,9 @@ def _ranks(cells: list[Cell], side: str) -> dict[Pin, int]:
 
 
 def _all_crossings(layers: Layers, joints: Joints) -> tuple[int, int]:
-    """How many lines cross, and how many of these pairs are both on their way between passes.
+    """How many lines cross, and in how many of these pairs both lines run between passes.
 
-    Near an end a line changes its height anyway, so there a crossing costs no bends.
+    Near its end a line changes its height anyway, so a crossing there costs no bends.
     """
     every = between = 0
     for number, pairs in enumerate(joints):
@@ -264,7 +264,7 @@ def _all_crossings(layers: Layers, joints: Joints) -> tuple[int, int]:
 
 
 def _crossings(left: list[Cell], right: list[Cell], pairs: list[tuple[Pin, Pin]]) -> int:
-    """How many pairs of straight lines between two layers would cross; those of one pin do not cross each other."""
+    """How many pairs of straight lines between two layers would cross; lines from one pin do not cross each other."""
     ranks, others = _ranks(left, "right"), _ranks(right, "left")
     crossings, above = 0, list[int]()
     for _, ends in groupby(sorted((ranks[one], others[other]) for one, other in pairs), key=itemgetter(0)):

@@ -1,8 +1,8 @@
-"""Layout: where every box, port, wire and badge of an outline stands; all lengths in points.
+"""Layout: the positions of all boxes, ports, wires and badges of an outline; all lengths in points.
 
-Composites are laid out from the outside in as to order (a composite's ports are sorted by what is outside of it, its
-inside follows) and from the inside out as to size.  Tokens enter and leave a composite only through its ports, so each
-composite is one flat drawing with a frame around.
+The order of composites is laid out from the outside in (a composite's ports are sorted by what is outside it, and its
+inside follows), their size from the inside out.  Tokens enter and leave a composite only through its ports, so each
+composite is one flat drawing with a frame around it.
 """
 
 from __future__ import annotations
@@ -17,10 +17,10 @@ from .outlines import Box, Link, Outline, Port, label
 from .places import Trunk, place, tracks
 
 NAME, KIND, PORT, PILL = 9.0, 7.5, 7.0, 6.5  # font sizes in points
-ROW = 14.0  # from port to port of an actor
-HEADER, TITLE = 28.0, 20.0  # heights of an actor's and of a composite's name
+ROW = 14.0  # distance between ports of an actor
+HEADER, TITLE = 28.0, 20.0  # heights of the names of an actor and a composite
 PILL_HEIGHT, PILL_GAP = 12.0, 3.0
-HEAD = 9.0  # room for an arrowhead
+HEAD = 9.0  # space for an arrowhead
 PADDING, TRACK = 10.0, 9.0  # beside and between the tracks of a channel
 MARGIN = 12.0
 
@@ -67,14 +67,14 @@ class Wire:
 
 @dataclass(frozen=True)
 class Pill:
-    """A badge on a line: an aspect where it stands, or the label of a connection (aspect is empty) with its delay."""
+    """A badge on a line: an aspect where it is attached, or a connection's label with its delay (``aspect`` is "")."""
 
     text: str
     aspect: str
     x: float
-    y: float  # of its middle
+    y: float  # of its centre
     delay: int | None = None  # ns
-    place: str = ""  # where the aspect stands: path of a port, or of an actor or composite
+    place: str = ""  # where the aspect is attached: path of a port, actor or composite
 
     @property
     def width(self) -> float:
@@ -83,7 +83,7 @@ class Pill:
 
 @dataclass(frozen=True)
 class Words:
-    """A line of text; ``y`` is where it stands, ``x`` is its beginning, middle or end as ``align`` says."""
+    """A line of text; ``y`` is its height; ``x`` is its start, middle or end, depending on ``align``."""
 
     text: str
     x: float
@@ -100,7 +100,7 @@ class Words:
 
 @dataclass
 class Drawing:
-    """Everything in its place, the origin at the top left."""
+    """Everything with its position; the origin is at the top left."""
 
     outline: Outline
     width: float = 0.0
@@ -132,7 +132,7 @@ class _Scope:
 
     def __init__(self, box: Box, inputs: Sequence[Port], outputs: Sequence[Port]) -> None:
         self.box = box
-        self.top = TITLE + MARGIN if box.path else 0.0  # where the inside begins
+        self.top = TITLE + MARGIN if box.path else 0.0  # where the inside starts
         self.inner: dict[Box, _Scope] = {}
         self.ends: dict[Pin, Port] = {}
         self.pins: dict[str, Pin] = {}  # by the paths of their ports
@@ -163,7 +163,7 @@ class _Scope:
         self.ends[pin] = port
 
     def _nets(self) -> dict[Net, Link]:
-        """The links that leave one port with one label are a net; the first of them stands for all."""
+        """The nets: all links that leave one port with one label, represented by the first of them."""
         groups: dict[tuple[str, str], list[Link]] = {}
         for link in self.box.links:
             groups.setdefault((link.source, label(link)), []).append(link)
@@ -174,7 +174,7 @@ class _Scope:
         return nets
 
     def _measure(self, child: Box, cell: Cell) -> None:
-        """Set the size of a box, and where its ports are; an open composite is laid out for that."""
+        """Set the size of a box and the positions of its ports; an open composite is laid out to do so."""
         if child.is_open:
             scope = self.inner[child] = _Scope(
                 child, [self.ends[pin] for pin in cell.left], [self.ends[pin] for pin in cell.right]
@@ -192,12 +192,12 @@ class _Scope:
         rows = max(len(cell.left), len(cell.right))
         hidden = max((pill_width(name) for name in child.aspects), default=0.0)
         names = max(text_width(child.name, NAME, bold=True), text_width(child.kind, KIND))
-        names += 16.0 if child.is_closed else 0.0  # beside the sign of a closed one
+        names += 16.0 if child.is_closed else 0.0  # beside the symbol of a closed one
         cell.width = max(names + 16.0, sum(widths) + 12.0 + (10.0 if all(widths) else 0.0), hidden + 16.0, 44.0)
         cell.height = HEADER + ROW * rows + 3.0 + (PILL_HEIGHT + PILL_GAP) * len(child.aspects)
 
     def _columns(self) -> float:
-        """Set where each layer begins and ends, and where the tracks between them are; the width of all."""
+        """Set the positions of the layers and of the tracks between them; returns the total width."""
         self.spans: list[tuple[float, float]] = []
         self.trunks: dict[Run, list[Trunk]] = {}
         x = 0.0 if self.layers[0] or not self.box.path else MARGIN
@@ -205,7 +205,7 @@ class _Scope:
             before = max((self._margin(cell, cell.left) for cell in cells), default=0.0)
             after = max((self._margin(cell, cell.right) for cell in cells), default=0.0)
             room = max((cell.width for cell in cells), default=0.0)
-            for cell in cells:  # boxes stand in the middle of their layer
+            for cell in cells:  # boxes are centred in their layer
                 cell.x = x + before + (room - cell.width) // 2
             self.spans.append((x, x + before + room + after))
             x = self.spans[-1][1]
@@ -219,7 +219,7 @@ class _Scope:
         return x if self.layers[-1] or not self.box.path else x + MARGIN
 
     def _margin(self, cell: Cell, pins: list[Pin]) -> float:
-        """The room that a box needs on one side for badges and arrowheads."""
+        """The space that a box needs on one side for badges and arrowheads."""
         if cell.kind != "box":
             return 0.0
         arrow = HEAD if pins is cell.left else 4.0
@@ -236,7 +236,7 @@ class _Scope:
         return x, pin.y
 
     def put(self, drawing: Drawing, x: float, y: float, level: int) -> None:
-        """Put everything into a drawing, the top left corner of this scope at (x, y)."""
+        """Add everything to a drawing, with the top left corner of this scope at (x, y)."""
         top = y + self.top
         linked = [*self.box.links, *(link for child in self.inner for link in child.links)]
         joined = {end for link in linked for end in (link.source, link.target)}
@@ -272,7 +272,7 @@ class _Scope:
                 drawing.pills.append(Pill(label(link), "", x + start + 4.0, at, delay=link.delay))
 
     def _names(self, box: Box, x: float, y: float, width: float) -> list[Words]:
-        """The name and type of a box: in one line above the inside of a composite, else one below the other."""
+        """The name and type of a box: on one line above the inside of a composite, otherwise on two."""
         if box.is_open:
             name = Words(box.name, x + MARGIN, y + 14.0, NAME, bold=True)
             return [name, Words(f": {box.kind}", name.x + name.width, name.y, NAME, is_soft=True)]
@@ -301,10 +301,10 @@ class _Scope:
         trunks = self.trunks.get(run, [])
         if not trunks:
             return [(left[0], right[0])]
-        # A trunk may be longer than what this run needs of it: runs to one port share it.
+        # A trunk may be longer than this run needs: runs to one port share it.
         tracks = [trunk.x for trunk in trunks]
         stops = [[height for _, height in left], [height for _, height in right]]
-        stops[1:1] = [trunk.right for trunk in trunks[:-1]]  # where a divided trunk goes over to its second track
+        stops[1:1] = [trunk.right for trunk in trunks[:-1]]  # where a divided trunk changes to its second track
         pieces: list[Piece] = [((x, height), (tracks[0], height)) for x, height in left]
         for x, (before, after) in zip(tracks, pairwise(stops), strict=True):
             pieces.append(((x, min(before + after)), (x, max(before + after))))
@@ -316,14 +316,14 @@ class _Scope:
 
 
 def _port_name(port: PlacedPort, is_open: bool) -> Words:
-    """The name of a port inside its box; inside of an open composite it stands above the line that goes on there."""
+    """The name of a port inside its box; in an open composite, above the line that continues there."""
     y = port.y - 3.0 if is_open else port.y + 0.35 * PORT
     x, align = (port.x + 6.0, "left") if port.side == "left" else (port.x - 6.0, "right")
     return Words(port.port.name, x, y, PORT, is_soft=not port.is_joined, align=align)
 
 
 def trace(pieces: Sequence[Piece]) -> tuple[tuple[Line, ...], tuple[Point, ...]]:
-    """The lines that horizontal and vertical pieces make up, and the points where three or more meet."""
+    """The lines formed by horizontal and vertical pieces, and the points where three or more meet."""
     on: dict[tuple[int, float], set[float]] = {}  # the corners on each horizontal (1) and vertical (0) line
     for piece in pieces:
         for corner in piece:

@@ -1,18 +1,21 @@
-"""Mermaid: an outline as text that GitHub, GitLab and many editors draw."""
+"""Writes an outline as Mermaid text, which GitHub, GitLab and many editors render."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterator
 
-from .outlines import Box, Link, Outline, Port, label
+from .outlines import Box, Link, Outline, Port, label, shared
 
 RESERVED = {"call", "class", "classDef", "click", "default", "direction", "end"}
 RESERVED |= {"flowchart", "graph", "href", "linkStyle", "style", "subgraph"}
 
 
 def mermaid(outline: Outline) -> str:
-    """A flowchart: composites as subgraphs with their ports, delayed connections dotted, aspects in guillemets."""
+    """A flowchart: composites as subgraphs with their ports, delayed connections dotted, aspects in guillemets.
+
+    A medium or processor that several places share is a hexagon, with dotted lines to these.
+    """
     return "\n".join(_Writer(outline).lines()) + "\n"
 
 
@@ -20,7 +23,7 @@ class _Writer:
     def __init__(self, outline: Outline) -> None:
         self.outline = outline
         self.names: dict[str, str] = {}  # of boxes, and of the ports of open composites, by path
-        self.marked: list[str] = []  # where aspects stand
+        self.marked: list[str] = []  # where aspects are attached
         self.boxes: dict[str, Box] = {  # by the paths of their ports
             port.path: box for box in outline.root.walk() for port in (*box.inputs, *box.outputs)
         }
@@ -31,12 +34,36 @@ class _Writer:
         yield "---"
         yield "flowchart LR"
         yield from self.inside(self.outline.root, "    ")
+        yield from self.media("    ")
         if self.marked:
             yield "    classDef aspect stroke:#D55E00,stroke-width:3px"
             yield f"    class {','.join(self.marked)} aspect"
 
+    def media(self, indent: str) -> Iterator[str]:
+        """What several places share, and where these are."""
+        groups: dict[tuple[str, ...], dict[str, None]] = {}
+        for woven in self.outline.model.aspects:
+            if key := shared(woven):
+                places = filter(None, map(self.shown, [*woven.ports, *woven.actors]))
+                groups.setdefault(key, {}).update(dict.fromkeys(places))
+        for (kind, *rest), nodes in groups.items():
+            if len(nodes) > 1:
+                name = self.name(f"shared {rest[-1]}")
+                yield f"{indent}{name}{{{{{_quoted(f'«{rest[-1]}»<br/>{kind}')}}}}}"
+                yield f"{indent}{name} -.- {' & '.join(nodes)}"
+
+    def shown(self, path: str) -> str:
+        """The node of a port or actor, or of the closed composite around it."""
+        while path:
+            if path in self.boxes:
+                return self.node(path)
+            if path in self.names:
+                return self.names[path]
+            path = path.rpartition(".")[0]
+        return ""
+
     def inside(self, box: Box, indent: str) -> Iterator[str]:
-        """The boxes in a composite, then their connections."""
+        """The boxes inside a composite, then their connections."""
         for port in (*box.inputs, *box.outputs):
             if box.path:
                 yield f"{indent}{self.name(port.path)}([{_quoted(_with_aspects(port))}])"
@@ -58,7 +85,7 @@ class _Writer:
             yield indent + self.link(link)
 
     def link(self, link: Link) -> str:
-        """A connection, labelled with what its ends do not say."""
+        """A connection, labelled with what its ends do not show."""
         ends = (self.end(link.source, "outputs"), self.end(link.target, "inputs"))
         words = ", ".join(part for part in (" to ".join(filter(None, ends)), label(link)) if part)
         arrow = "-->" if link.delay is None else "-.->"
@@ -66,17 +93,17 @@ class _Writer:
         return f"{self.node(link.source)} {between} {self.node(link.target)}"
 
     def end(self, path: str, side: str) -> str:
-        """What must be said of one end: the name of the port if the box has several, and aspects."""
+        """The label of one end: the name of the port if the box has several, and aspects."""
         box = self.boxes[path]
         ports: list[Port] = [] if box.is_open else getattr(box, side)
         return "".join(_with_aspects(port, named=len(ports) > 1) for port in ports if port.path == path)
 
     def node(self, port: str) -> str:
-        """The node at which a connection ends: a port of an open composite, or else the box."""
+        """The node at which a connection ends: a port of an open composite, otherwise the box."""
         return self.name(port if self.boxes[port].is_open else self.boxes[port].path)
 
     def name(self, path: str) -> str:
-        """A name for Mermaid that no other path has."""
+        """A unique Mermaid name for a path."""
         if path not in self.names:
             plain = re.sub(r"\W+", "_", path, flags=re.ASCII).strip("_")
             plain = f"{plain}_" if plain in RESERVED else plain

@@ -1,7 +1,6 @@
-"""What is drawn of a model: a tree of boxes with ports, and the links between them.
+"""What a drawing of a model contains: a tree of boxes with ports, and the links between them.
 
-A replicated array whose instances are all alike becomes one box that stands for all; a composite deeper than asked for
-becomes a closed box.
+A replicated array with identical instances becomes one box; a composite below the requested depth becomes a closed box.
 """
 
 from __future__ import annotations
@@ -11,16 +10,17 @@ from dataclasses import dataclass, field
 from itertools import accumulate, chain
 
 from epicycle.actors import InputPort, OutputPort, PortParameter, counted
+from epicycle.aspects import Medium, Processor
 
 from ...build import Model
-from ...graph import Clock, Hop
+from ...graph import Clock, Hop, WovenAspect
 
-MANY = 60  # boxes that a reader can take in; a larger model is folded if nothing else is asked for
+MANY = 60  # boxes that a reader can take in; a larger model is folded by default
 
 
 @dataclass(eq=False)
 class Port:
-    """A port of a box, with the names of the aspects that stand at it, in the order in which a token meets them."""
+    """A port of a box, with the names of the aspects attached to it, in the order in which a token meets them."""
 
     path: str
     name: str
@@ -32,7 +32,7 @@ class Port:
 class Link:
     """A connection; ``delay`` is in ns.
 
-    If it stands for several, ``count`` says how many if that is not one for each instance of the boxes at its ends.
+    If it represents several, ``count`` states how many, unless it is one for each instance of the boxes at its ends.
     """
 
     source: str
@@ -45,9 +45,9 @@ class Link:
 class Box:
     """An actor or a composite; the model itself is the outermost box, with an empty path.
 
-    ``kind`` is its type and, if it has a local clock, what that shows; ``has_director``: it fires as one actor.
-    ``count`` is how many instances of an array it stands for.  ``is_closed``: a composite whose inside is not shown.
-    ``aspects`` stand at the actor itself, or in the closed composite.
+    ``kind`` is its type and, if it has a local clock, the settings of that; ``has_director``: it fires as one actor.
+    ``count`` is the number of instances of an array that it represents.  ``is_closed``: a composite whose inside is not
+    shown.  ``aspects`` are attached to the actor itself, or inside the closed composite.
     """
 
     path: str
@@ -77,7 +77,7 @@ class Box:
 
 @dataclass
 class Outline:
-    """What is drawn: the outermost box, how deep it is opened, and how deep the model goes."""
+    """The content of a drawing: the outermost box, the depth to which it is opened, and the depth of the model."""
 
     model: Model
     root: Box
@@ -86,7 +86,7 @@ class Outline:
 
     @property
     def note(self) -> str:
-        """What a reader should know if not all is shown; else empty."""
+        """A note for the reader if not everything is shown; otherwise empty."""
         closed = sum(1 for box in self.root.walk() if box.is_closed)
         if not closed:
             return ""
@@ -97,12 +97,12 @@ class Outline:
 def outline(model: Model, depth: int | None = None, expand: bool = False) -> Outline:
     """The boxes and links of a model.
 
-    Composites in up to ``depth`` levels are opened; by default as many as keep the drawing readable.  Unless
-    ``expand``, arrays whose instances are alike are one box.
+    Composites down to ``depth`` levels are opened; the default keeps the drawing readable.  Without ``expand``, arrays
+    with identical instances are one box.
     """
     outliner = _Outliner(model, expand)
     root = outliner.box("")
-    rows = [[root]]  # the boxes, by how many composites they are in
+    rows = [[root]]  # the boxes at each depth
     while rows[-1]:
         rows.append([child for box in rows[-1] for child in box.children])
     levels = max(level for level, row in enumerate(rows) if any(box.is_composite for box in row))
@@ -116,7 +116,7 @@ def outline(model: Model, depth: int | None = None, expand: bool = False) -> Out
 
 
 class _Outliner:
-    """Makes boxes and links of what a model graph holds."""
+    """Makes boxes and links from a model graph."""
 
     def __init__(self, model: Model, expand: bool) -> None:
         self.model = model
@@ -125,17 +125,17 @@ class _Outliner:
         for woven in model.aspects:
             for path in dict.fromkeys((*woven.ports, *woven.actors, *map(_owner, woven.parameters))):
                 self.standing.setdefault(path, []).append(woven.name)
-        self.hops: dict[str, list[Hop]] = {}  # by the composite inside of which they lie
-        self.outside: dict[str, list[Hop]] = {}  # by the box at which they end
+        self.hops: dict[str, list[Hop]] = {}  # by the composite that contains them
+        self.outside: dict[str, list[Hop]] = {}  # by the box where they end
         for hop in chain.from_iterable(map(self.graph.outgoing, self.graph.ports)):
             owner = _owner(hop.source)
             scope = owner if self.graph.direction(hop.source) == "input" else _owner(owner)
             self.hops.setdefault(scope, []).append(hop)
             for end in {_owner(hop.source), _owner(hop.destination)} - {scope}:
                 self.outside.setdefault(end, []).append(hop)
-        # The arrays whose instances differ in nothing that is seen.  All are taken to be alike at first.  One that
-        # proves otherwise is drawn instance by instance, which may show a difference between the instances of another
-        # array; so the search goes on until nothing changes.
+        # The arrays whose instances look identical in the drawing.  At first, all are assumed identical.  An array that
+        # is not is drawn instance by instance, which may reveal differences between the instances of another array; so
+        # the search continues until nothing changes.
         composites = () if expand else ("", *self.graph.composites)
         arrays = [array for each in composites for array in self.graph.parts(each).values() if len(array) > 1]
         before = -1
@@ -145,11 +145,11 @@ class _Outliner:
             arrays = [array for array in arrays if len(set(map(self._look, array))) == 1]
 
     def _look(self, instance: str) -> frozenset[object]:
-        """What there is to see of an instance, its index left out: inside, aspects, and where it is connected to."""
+        """What a drawing shows of an instance, without its index: its inside, aspects, and connections."""
         index = instance.rpartition("[")[2]
 
         def inside(path: str) -> str:
-            """A path within the instance, indices of arrays that are one box left out."""
+            """A path inside the instance, without the indices of arrays that are one box."""
             parts, whole = [], instance
             for part in path[len(instance) :].split("."):
                 whole = f"{whole}.{part}" if part else whole
@@ -157,7 +157,7 @@ class _Outliner:
             return ".".join(parts)
 
         def beside(path: str) -> str:
-            """A port next to the instance: in arrays that are one box, only "the same index" or another counts."""
+            """A port next to the instance: in arrays that are one box, only "the same index" or another one matters."""
             owner, _, port = path.rpartition(".")
             if owner not in self.alike or owner == _owner(instance):
                 return path
@@ -205,7 +205,7 @@ class _Outliner:
         for side, paths in zip((box.inputs, box.outputs), self._ports(path), strict=True):
             for port_path in paths:
                 port = self.graph.ports[port_path].port
-                # That of a parameter need not be seen unless something is there.
+                # The port of a parameter is only shown if it is used.
                 is_parameter = port is not None and isinstance(
                     getattr(type(port.actor), port.name, None), PortParameter
                 )
@@ -232,14 +232,14 @@ class _Outliner:
         return tuple(dict.fromkeys(names))
 
     def _links(self, path: str) -> list[Link]:
-        """The connections inside a composite; those of instances that are one box are one link."""
+        """The connections inside a composite; those between instances in one box are one link."""
         links: dict[tuple[str, str, int | None], list[Hop]] = {}
         for hop in self.hops.get(path, ()):
             links.setdefault((self._shown(hop.source), self._shown(hop.destination), hop.delay), []).append(hop)
         return [Link(*key, self._how_many(path, *key[:2], hops)) for key, hops in links.items()]
 
     def _how_many(self, path: str, source: str, target: str, hops: list[Hop]) -> str:
-        """What to say of the connections that one link inside a composite stands for."""
+        """The label for the connections that one link inside a composite represents."""
         one, other = [1 if _owner(port) == path else len(self._instances(_owner(port))) for port in (source, target)]
         count = len(hops)
         if count == max(one, other):
@@ -256,16 +256,16 @@ class _Outliner:
         return f"×{count}"
 
     def _index(self, port: str) -> int:
-        """Which instance of its array the owner of a port is."""
+        """The index of a port's owner in its array."""
         owner = _owner(port)
         return self._instances(owner).index(owner)
 
     def _instances(self, path: str) -> list[str]:
-        """The instances for which the box of an actor or composite stands."""
+        """The instances that the box of an actor or composite represents."""
         return self.alike.get(path, [path])
 
     def _shown(self, port: str) -> str:
-        """The port that is drawn for a port."""
+        """The port that represents a port in the drawing."""
         owner, _, name = port.rpartition(".")
         return f"{self._instances(owner)[0]}.{name}"
 
@@ -279,7 +279,7 @@ def duration(nanoseconds: int) -> str:
 
 
 def label(link: Link) -> str:
-    """What is written on a connection."""
+    """The label of a connection."""
     parts = [] if link.delay is None else [duration(link.delay)]
     return ", ".join([*parts, link.count] if link.count else parts)
 
@@ -298,3 +298,11 @@ def _clock(clock: Clock) -> str:
 
 def _owner(path: str) -> str:
     return path.rpartition(".")[0]
+
+
+def shared(woven: WovenAspect) -> tuple[str, ...] | None:
+    """The medium or processor of an aspect, which other aspects may use, too; None if its places share nothing."""
+    if not isinstance(woven.aspect, Medium | Processor):
+        return None
+    name = getattr(woven.aspect, "medium", None)
+    return (woven.kind, woven.name.rpartition(".")[0], name) if name else (woven.kind, woven.name)

@@ -1,7 +1,7 @@
-"""Pictures: a drawing as SVG, PNG or PDF.
+"""Writes a drawing as SVG, PNG or PDF.
 
-All are made by matplotlib, so they look the same; text is drawn as shapes, so no font has to be there.
-Colours are Okabe and Ito's, which people with any colour vision can tell apart; every badge has its name as well.
+matplotlib makes all of them, so they look the same; text is drawn as shapes, so no font is needed.  The colours are
+Okabe and Ito's, which people with any colour vision can tell apart; every badge also shows its name.
 """
 
 from __future__ import annotations
@@ -14,24 +14,24 @@ from typing import Any, NamedTuple
 
 import networkx as nx
 
-from epicycle.aspects import Medium, Processor
+from epicycle.aspects import Processor
 
 from ...graph import WovenAspect, extent
 from ..pen import font, new_canvas, save, style, text_width
 from .layout import MARGIN, PILL, PILL_HEIGHT, PORT, Drawing, Line, Pill, PlacedBox, Point, Wire, Words, pill_width
-from .outlines import duration, short_name
+from .outlines import duration, shared, short_name
 
 INK, SOFT, FAINT = "#1a1a1a", "#5f6672", "#a9afb8"
 FRAMES = ("#f3f5f8", "#e9edf3", "#dfe5ed", "#d5dde7")
 ASPECTS = ("#E69F00", "#56B4E9", "#009E73", "#CC79A7", "#F0E442", "#D55E00", "#0072B2", "#999999")
-DARK = ("#D55E00", "#0072B2", "#009E73")  # on these, text is white
-# Of a PNG: whole pixels for a point, so that lines are sharp; how many pixels there may be, and on one side.
+DARK = ("#D55E00", "#0072B2", "#009E73")  # text on these is white
+# For a PNG: whole pixels per point, so that lines are sharp; the most pixels in all, and on one side.
 DPI, PIXELS, SIDE = (144, 72), 1.6e7, 12000
 LINE = 15.0  # height of a line of the legend
 
 
 def write_picture(drawing: Drawing, path: Path) -> None:
-    """Draw into a file, whose ending decides the format; the same drawing gives the same bytes."""
+    """Draw to a file whose ending determines the format; equal drawings give equal bytes."""
     aspects = aspects_seen(drawing)
     legend = legend_of(drawing, aspects)
     width = max([drawing.width, *(row.indent + text_width(row.explanation, PORT) + 2 * MARGIN for row in legend)])
@@ -47,7 +47,7 @@ def write_picture(drawing: Drawing, path: Path) -> None:
 
 
 def aspects_seen(drawing: Drawing) -> dict[str, list[WovenAspect]]:
-    """The aspects whose badges are in a drawing, by name, in the order of their declaration."""
+    """The aspects whose badges are in a drawing, by name, in order of declaration."""
     seen = {pill.aspect for pill in drawing.pills}
     found: dict[str, list[WovenAspect]] = {}
     for woven in drawing.outline.model.aspects:
@@ -57,7 +57,7 @@ def aspects_seen(drawing: Drawing) -> dict[str, list[WovenAspect]]:
 
 
 class Row(NamedTuple):
-    """A line of the legend: a sample of something in the drawing, and what it means."""
+    """A line of the legend: a sample from the drawing, and its meaning."""
 
     sample: str  # aspect, label, port, stack, director or closed
     words: str
@@ -65,20 +65,12 @@ class Row(NamedTuple):
 
     @property
     def indent(self) -> float:
-        """Where the explanation begins, beside the sample."""
+        """Where the explanation starts, beside the sample."""
         return 6.0 + (pill_width(self.words) if self.words else 14.0)
 
 
-def shared(woven: WovenAspect) -> tuple[str, ...] | None:
-    """The medium or processor of an aspect, which others may name, too; None if its places share nothing."""
-    if not isinstance(woven.aspect, Medium | Processor):
-        return None
-    name = getattr(woven.aspect, "medium", None)
-    return (woven.kind, woven.name.rpartition(".")[0], name) if name else (woven.kind, woven.name)
-
-
 def tied(drawing: Drawing) -> list[list[Pill]]:
-    """The badges of each medium and processor that several places share."""
+    """For each medium and processor that several places share, its badges."""
     groups: dict[tuple[str, ...], list[Pill]] = {}
     for woven in drawing.outline.model.aspects:
         if key := shared(woven):
@@ -93,7 +85,7 @@ def tied(drawing: Drawing) -> list[list[Pill]]:
 
 
 def ties(group: list[Pill]) -> Iterator[Line]:
-    """Lines that join badges: each to the nearest of those before it, along and then up or down."""
+    """Lines that join badges: each to the nearest earlier one, horizontally and then vertically."""
     middles = sorted((pill.x + pill.width / 2, pill.y) for pill in group)
     for number, (x, y) in enumerate(middles[1:], start=1):
         other, level = min(middles[:number], key=lambda end: abs(end[0] - x) + abs(end[1] - y))
@@ -101,7 +93,7 @@ def ties(group: list[Pill]) -> Iterator[Line]:
 
 
 def legend_of(drawing: Drawing, aspects: dict[str, list[WovenAspect]]) -> list[Row]:
-    """What needs to be explained of a drawing."""
+    """The lines that explain a drawing."""
     boxes = [placed.box for placed in drawing.boxes]
     rows = []
     for name, woven in aspects.items():
@@ -112,15 +104,15 @@ def legend_of(drawing: Drawing, aspects: dict[str, list[WovenAspect]]) -> list[R
         rows.append(Row("label", duration(delay), "delay of a connection"))
     signs = {
         "port": ("port for any number of connections", any(p.is_multi for b in boxes for p in (*b.inputs, *b.outputs))),
-        "stack": ("instances that are alike", any(box.count > 1 for box in boxes)),
-        "director": ("composite with a director of its own", any(box.has_director for box in boxes)),
-        "closed": ("composite whose inside is not shown", any(box.is_closed for box in boxes)),
+        "stack": ("identical instances", any(box.count > 1 for box in boxes)),
+        "director": ("composite with its own director", any(box.has_director for box in boxes)),
+        "closed": ("composite shown without its inside", any(box.is_closed for box in boxes)),
     }
     return rows + [Row(sample, "", explanation) for sample, (explanation, is_seen) in signs.items() if is_seen]
 
 
 def _sharing(woven: list[WovenAspect]) -> str:
-    """What to say if the places of aspects share something."""
+    """The explanation if the places of aspects share something."""
     found = {shared(each) for each in woven}
     if None in found or sum(len(each.places) for each in woven) < 2:
         return ""
@@ -138,7 +130,7 @@ class Painter:
         self.shapes = patches
         self.colours = colours  # of aspects
 
-    def paint(self, drawing: Drawing, legend: list[Row]) -> None:  # what lies below first
+    def paint(self, drawing: Drawing, legend: list[Row]) -> None:  # from bottom to top
         for placed in drawing.boxes:
             self.box(placed)
         for group in tied(drawing):
@@ -155,7 +147,7 @@ class Painter:
             self.row(row, MARGIN, drawing.height + MARGIN / 2 + LINE * (number + 0.5))
 
     def box(self, placed: PlacedBox) -> None:
-        """A box: white for an actor, shaded for a composite, doubled if that has a director."""
+        """A box: white for an actor, shaded for a composite, with a double border if it has a director."""
         box, x, y = placed.box, placed.x, placed.y
         fill = FRAMES[placed.level % len(FRAMES)] if box.is_composite else "white"
         for inset in (8.0, 4.0) if box.count > 1 else ():
@@ -169,26 +161,26 @@ class Painter:
     def rectangle(
         self, x: float, y: float, width: float, height: float, fill: str, radius: float = 3.0, **look: float
     ) -> None:
-        """A box with round corners."""
+        """A box with rounded corners."""
         style = f"round,pad=0,rounding_size={radius:g}"
         look = {"linewidth": 1.0, **look}
         box = self.shapes.FancyBboxPatch((x, y), width, height, style, facecolor=fill, edgecolor=INK, **look)
         self.sheet.add_artist(box)
 
     def closed(self, x: float, y: float) -> None:
-        """The sign of a composite that is drawn closed."""
+        """The symbol of a composite that is drawn closed."""
         self.path([((x, y), (x + 7, y), (x + 7, y + 7), (x, y + 7), (x, y))], SOFT, 0.7, radius=0.0)
         self.path([((x + 1.5, y + 3.5), (x + 5.5, y + 3.5)), ((x + 3.5, y + 1.5), (x + 3.5, y + 5.5))], SOFT, 0.7)
 
     def port(self, x: float, y: float, ink: str, is_multi: bool) -> None:
-        """A mark on the edge, white if any number of connections may meet there."""
+        """A mark on the edge, white if it takes any number of connections."""
         look: Any = {"facecolor": "white" if is_multi else ink, "edgecolor": ink, "linewidth": 0.8, "zorder": 3}
         self.sheet.add_artist(self.shapes.Rectangle((x - 2.2, y - 2.2), 4.4, 4.4, **look))
 
     def wires(self, wires: Iterable[Wire]) -> None:
-        """All lines, dots where one branches, and arrowheads where they end."""
+        """All lines, dots where they branch, and arrowheads where they end."""
         look: Any = {"facecolor": INK, "edgecolor": "none", "zorder": 2.5}
-        # Lines that share a port lie on each other in part: painted as one, they are no darker there.
+        # Lines that share a port partly overlap: painted as one path, they are not darker there.
         graph: Any = nx.Graph()
         for wire in wires:
             graph.add_edges_from((wire, end) for end in (wire.source, *wire.targets))
@@ -203,7 +195,7 @@ class Painter:
     def path(
         self, lines: Iterable[Line], colour: str, width: float, radius: float = 4.0, dashes: Sequence[float] = ()
     ) -> None:
-        """Lines with round corners."""
+        """Lines with rounded corners."""
         from matplotlib.path import Path as Outline
 
         corners: list[Point] = []
@@ -223,7 +215,7 @@ class Painter:
             self.sheet.add_artist(self.shapes.PathPatch(Outline(corners, codes), **look))
 
     def pill(self, words: str, aspect: str, x: float, y: float) -> None:
-        """A badge: coloured for an aspect, white for what belongs to the connection."""
+        """A badge: coloured for an aspect, white for a label of the connection."""
         fill, half, width = self.colours[aspect] if aspect else "white", PILL_HEIGHT / 2, pill_width(words)
         self.rectangle(x, y - half, width, PILL_HEIGHT, fill, half, linewidth=0.6, zorder=4)
         ink = "white" if fill in DARK else INK
@@ -250,6 +242,6 @@ class Painter:
 
 
 def _towards(start: Point, end: Point, way: float) -> Point:
-    """The point a little way from one towards another."""
+    """The point at a given distance from one point towards another."""
     share = way / (math.dist(start, end) or 1.0)
     return start[0] + (end[0] - start[0]) * share, start[1] + (end[1] - start[1]) * share

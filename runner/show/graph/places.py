@@ -1,12 +1,12 @@
-"""Places: how far down each cell stands, and on which track each net changes its height.
+"""Places: the height of each cell, and the track on which each net changes its height.
 
-Heights come from a linear programme: the vertical way of all nets is made as short as the order of the cells allows,
-which draws them straight wherever they can be.  Its solutions are whole numbers (every constraint is a difference of
+Heights come from a linear programme: it makes the vertical distances of all nets as short as the order of the cells
+allows, so nets are straight wherever possible.  Its solutions are whole numbers (every constraint is a difference of
 two variables), so rounding makes them exact.
 
-Between two layers a run has one vertical line, its trunk.  Trunks that meet in height take different tracks, in the
-order that crosses least (Sander, "Layout of directed hypergraphs with orthogonal hyperedges", 2003); where the ends of
-two runs lie at one height on opposite sides, that order also keeps their horizontal lines apart.
+Between two layers a run has one vertical line, its trunk.  Trunks whose heights overlap take different tracks, in the
+order with the fewest crossings (Sander, "Layout of directed hypergraphs with orthogonal hyperedges", 2003); if the ends
+of two runs are at one height on opposite sides, that order also keeps their horizontal lines apart.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ APART = 6.0  # lines nearer than this look like one
 
 
 def place(layers: Layers, runs: Runs) -> float:
-    """Set the ``y`` of every cell; the height of all of them."""
+    """Set the ``y`` of every cell; returns the total height."""
     cells = [cell for layer in layers for cell in layer]
     if not cells:
         return 0.0
@@ -47,7 +47,7 @@ def place(layers: Layers, runs: Runs) -> float:
     ]
     weights = np.array([weight for *_, weight in pulls])
     heights, bends = _shortest(len(cells), gaps, pulls, weights)
-    for _ in range(2):  # and again, with small bends dear: a reader minds many bends more than a long way
+    for _ in range(2):  # and again with small bends expensive: many bends disturb a reader more than a long line
         heights, bends = _shortest(len(cells), gaps, pulls, weights * (1.0 + 30.0 / (1.0 + bends)))
     for cell, y in zip(cells, heights, strict=True):
         cell.y = float(y)
@@ -57,11 +57,11 @@ def place(layers: Layers, runs: Runs) -> float:
 def _shortest(
     cells: int, gaps: list[tuple[int, int, float]], pulls: list[tuple[int, int, float, float]], weights: Floats
 ) -> tuple[Floats, Floats]:
-    """Solve the linear programme: the heights of the cells, and how much each pull is bent."""
+    """Solve the linear programme: the heights of the cells, and the bend of each pull."""
     from scipy.optimize import linprog
     from scipy.sparse import csr_matrix
 
-    # Variables: the top of each cell, then the bend of each pull; a little weight on the tops keeps all together.
+    # Variables: the top of each cell, then the bend of each pull; a small weight on the tops keeps everything together.
     rows: list[dict[int, float]] = [{above: 1.0, below: -1.0} for above, below, _ in gaps]
     bounds = [-gap for *_, gap in gaps]
     for index, (one, other, offset, _) in enumerate(pulls):
@@ -86,7 +86,7 @@ def _gap(above: Cell, below: Cell) -> float:
 
 
 def _pulls(run: Run) -> list[tuple[Pin, Pin, float]]:
-    """The pairs of pins that should be at one height, and how much: long nets should be straight before all."""
+    """The pairs of pins that should be at one height, with weights: long nets should be straight first."""
     if run.left and run.right:
         pairs = [(one, other) for one in run.left for other in run.right]
     else:
@@ -100,7 +100,7 @@ def _pulls(run: Run) -> list[tuple[Pin, Pin, float]]:
 
 @dataclass(eq=False)
 class Trunk:
-    """A vertical line of runs: the heights at which lines come to it from the left and from the right."""
+    """A vertical line of runs: the heights at which lines reach it from the left and from the right."""
 
     runs: tuple[Run, ...]
     left: list[float]
@@ -117,8 +117,8 @@ class Trunk:
 def tracks(runs: Sequence[Run]) -> tuple[list[Trunk], int]:
     """The trunks of the runs between two layers, and how many tracks they need.
 
-    Runs that lead from one pin each to the same pin share one.  A run that is one straight line has none, one that
-    cannot keep clear of the others on a single track has two.
+    Runs from single pins to the same pin share one.  A run that is one straight line has none; one that would touch
+    others on a single track has two.
     """
     groups: dict[object, list[Run]] = {}
     for run in runs:
@@ -144,19 +144,19 @@ def tracks(runs: Sequence[Run]) -> tuple[list[Trunk], int]:
 
 
 def _free_height(taken: list[float], wanted: float) -> float:
-    """The height nearest to a wanted one that is clear of all lines."""
+    """The height nearest to the wanted one that is free of lines."""
     between = [(low + high) / 2 for low, high in pairwise(taken) if high - low >= 2 * APART]
     outside = [taken[0] - 2 * APART, taken[-1] + 2 * APART]
     return min((*between, *outside), key=lambda height: abs(height - wanted))
 
 
 def _must_precede(one: Trunk, other: Trunk) -> bool:
-    """Whether ``one`` must be left of ``other``, or their horizontal lines would lie on each other."""
+    """Whether ``one`` must be left of ``other``, so that their horizontal lines do not overlap."""
     return any(abs(left - right) < APART for left in one.left for right in other.right)
 
 
 def _meeting(trunks: list[Trunk]) -> Iterator[tuple[int, int]]:
-    """The pairs of trunks that meet in height, and so cannot be on one track."""
+    """The pairs of trunks whose heights overlap, and which thus cannot share a track."""
     by_height = sorted(range(len(trunks)), key=lambda index: trunks[index].low)
     for place, one in enumerate(by_height):
         for other in by_height[place + 1 :]:
@@ -166,7 +166,7 @@ def _meeting(trunks: list[Trunk]) -> Iterator[tuple[int, int]]:
 
 
 def _knot(trunks: list[Trunk]) -> list[Trunk]:
-    """Trunks each of which must be left of another of them; empty if there are none."""
+    """A cycle of trunks that must each be left of another; empty if there is none."""
     graph: Any = nx.DiGraph()
     for one, other in _meeting(trunks):
         if trunks[one].runs is not trunks[other].runs:
@@ -176,7 +176,7 @@ def _knot(trunks: list[Trunk]) -> list[Trunk]:
 
 
 def _precedence(trunks: list[Trunk]) -> Any:
-    """Which trunk is left of which: what must be, then what saves most crossings."""
+    """Which trunk is left of which: first what is required, then what avoids most crossings."""
     graph: Any = nx.DiGraph()
     graph.add_nodes_from(range(len(trunks)))
     wishes: list[tuple[int, int, int]] = []
@@ -197,7 +197,7 @@ def _precedence(trunks: list[Trunk]) -> Any:
 
 
 def _crossings(one: Trunk, other: Trunk) -> int:
-    """How often lines cross if ``one`` is left of ``other``."""
+    """How many lines cross if ``one`` is left of ``other``."""
     return sum(other.low < height < other.high for height in one.right) + sum(
         one.low < height < one.high for height in other.left
     )

@@ -1,8 +1,9 @@
-"""The report of a study: runs are repeated for its figures, these are drawn, and all is put on one page."""
+"""Writes the report of a study: repeats runs for its figures, draws them, and puts everything on one page."""
 
 from __future__ import annotations
 
 import json
+import tempfile
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -15,6 +16,7 @@ from ...study import Replay, StudyResults, plan_of_folder, ranked, repeat, repla
 from ...text import ModelError, Problems, describe, raised_at
 from ..outcome import MAX_NAME
 from ..pen import FORMATS, FigureError, style
+from ..sheet import narrow
 from .data import Data
 from .declared import check_figures, figures_of_study, own_study_figures, study_figure_types
 from .figure import RunKey, SignalFigure, StudyFigure
@@ -34,7 +36,7 @@ __all__ = [
 
 @dataclass
 class Report:
-    """What was written, and what could not be."""
+    """The files that were written, and the problems."""
 
     files: list[Path] = field(default_factory=list)
     problems: list[str] = field(default_factory=list)
@@ -46,9 +48,9 @@ def write_report(
 ) -> Report:
     """Write ``report.html``, ``figures/`` and, if the study has claims, ``claims.json`` into a folder.
 
-    ``tell`` is told how many of the runs that figures need are repeated.
-    What keeps a figure from being drawn is a problem of the report, and stands in its place.  Raises ``ModelError`` for
-    figures that the study cannot have.
+    ``tell`` receives how many of the runs that figures need have been repeated.  If a figure cannot be drawn, the
+    reason is a problem of the report and appears in place of the figure.  Raises ``ModelError`` for figures that the
+    study cannot have.
     """
     report = Report()
     data = Data(results)
@@ -62,7 +64,7 @@ def write_report(
     for name, figure in figures.items():
         paths = [place / f"{abridged(name, MAX_NAME)}.{ending}" for ending in FORMATS]
         for path in paths:
-            path.unlink(missing_ok=True)  # of an earlier report
+            path.unlink(missing_ok=True)  # from an earlier report
         try:
             caption = _draw(name, figure, data, extracts.get(name, {}), paths)
         except EpicycleError as error:
@@ -70,7 +72,10 @@ def write_report(
             pictures.append(Picture(name, figure.doc, None, str(error)))
         else:
             report.files += paths
-            pictures.append(Picture(name, figure.doc, paths[FORMATS.index("svg")].read_bytes(), caption))
+            svg = paths[FORMATS.index("svg")].read_bytes()
+            pictures.append(
+                Picture(name, figure.doc, svg, caption, _narrow(name, figure, data, extracts.get(name, {})))
+            )
     judgements, recommendations = results.claims(), results.guideline()
     texts = {}
     if judgements or recommendations:
@@ -91,26 +96,34 @@ def write_report(
     return report
 
 
+def _narrow(name: str, figure: StudyFigure, data: Data, extracts: Mapping[RunKey, Any]) -> bytes:
+    """A figure for the screen of a telephone, as SVG."""
+    with tempfile.TemporaryDirectory() as folder, narrow():
+        path = Path(folder) / "narrow.svg"
+        _draw(name, figure, data, extracts, [path])
+        return path.read_bytes()
+
+
 def _draw(name: str, figure: StudyFigure, data: Data, extracts: Mapping[RunKey, Any], paths: list[Path]) -> str:
-    """Draw a figure into files; what is to be said of it.  Raises ``EpicycleError``."""
+    """Draw a figure to files; returns its caption.  Raises ``EpicycleError``."""
     for extract in extracts.values():
         if isinstance(extract, EpicycleError):
             raise extract
     if not any(condition.good for condition in data.where(figure.where)):
-        raise EpicycleError("none of the runs that it shows is there")
+        raise EpicycleError("none of the runs that it shows has been made")
     try:
         with style():
             return figure.draw(data, extracts, paths)
     except EpicycleError:
         raise
-    except Exception as error:  # of a class of a user's
+    except Exception as error:  # from a user's class
         raise FigureError(name, describe(error), raised_at(error)) from error
 
 
 def _extracts(
     data: Data, figures: Mapping[str, StudyFigure], jobs: int, tell: Callable[[int, int], None]
 ) -> dict[str, dict[RunKey, Any]]:
-    """What figures need of runs that are repeated, by figure and run; or an error that says why these cannot be."""
+    """What figures need from repeated runs, by figure and run; an error if the runs cannot be repeated."""
     wanted: dict[str, list[RunKey]] = {}
     readers: dict[RunKey, list[tuple[str, SignalFigure]]] = {}
     for name, figure in figures.items():
@@ -123,11 +136,11 @@ def _extracts(
     found: dict[str, dict[RunKey, Any]] = {name: {} for name in wanted}
     try:
         if replays:
-            plan_of_folder(data.results.folder)  # which says so if the model has changed
+            plan_of_folder(data.results.folder)  # which raises an error if the model has changed
             for replay, extracts in repeat(data.plan, replays, jobs, lambda number: tell(number, len(replays))):
                 for name, extract in extracts.items():
                     found[name][replay.condition, replay.replication] = extract
     except EpicycleError as error:
-        why = EpicycleError("its model cannot be loaded any more") if isinstance(error, ModelError) else error
+        why = EpicycleError("its model can no longer be loaded") if isinstance(error, ModelError) else error
         return {name: dict.fromkeys(runs, why) for name, runs in wanted.items()}
     return found

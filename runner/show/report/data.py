@@ -1,4 +1,4 @@
-"""What figures and tables of a report are made of: the rows of a study at one moment, and how they are called."""
+"""The data of a report: the rows of a study at one moment, and the names of its columns and levels."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ MAX_LABEL, MAX_LEVEL = 80, 40  # letters of a column's name, and of a level
 
 @dataclass
 class Condition:
-    """A condition of which runs are over."""
+    """A condition with finished runs."""
 
     index: int
     values: dict[str, Factor]
@@ -29,17 +29,17 @@ class Condition:
 
     @property
     def good(self) -> list[dict[str, Any]]:
-        """The rows of the runs that came to their end."""
+        """The rows of the runs that finished without an error."""
         return [row for row in self.rows if row["status"] == OK]
 
     def numbers(self, metric: str) -> list[float]:
-        """The numbers of a metric; runs that failed or have none are left out."""
+        """The values of a metric; runs that failed or have none are left out."""
         values = (row[metric] for row in self.good)
         return [value for value in values if value is not None and math.isfinite(value)]
 
 
 class Data:
-    """The table of a study, read once: what is added while a report is made is in none of it."""
+    """The table of a study, read once: rows added while the report is made are not included."""
 
     def __init__(self, results: StudyResults) -> None:
         self.results = results.freeze()
@@ -51,7 +51,7 @@ class Data:
             self.conditions[index] = Condition(index, self.plan.condition(index).values, [*rows])
 
     def where(self, fixed: Mapping[str, Any]) -> list[Condition]:
-        """The conditions that have these levels."""
+        """The conditions with these levels."""
         allowed = {name: levels if isinstance(levels, (list, tuple)) else (levels,) for name, levels in fixed.items()}
         return [
             each for each in self.conditions.values() if all(each.values[name] in allowed[name] for name in allowed)
@@ -69,27 +69,27 @@ class Data:
 
 @dataclass(frozen=True)
 class Names:
-    """How columns and levels are called in tables and figures."""
+    """The names of columns and levels in tables and figures."""
 
     plan: Plan
     labels: Mapping[str, str]
 
     def unit(self, column: str) -> str:
-        """What a column counts in; nothing for a pure number."""
+        """The unit of a column; empty for a pure number."""
         unit = self.plan.columns.get(column, Column()).unit
         return "" if unit == "1" else unit
 
     def doc(self, column: str) -> str:
-        """What a column is."""
+        """The description of a column."""
         return self.plan.columns.get(column, Column()).doc
 
     def words(self, column: str) -> str:
-        """What a column is called."""
+        """The name of a column."""
         label = self.labels.get(column) or self.plan.columns.get(column, Column()).label
         return abridged(label or column.replace("_", " "), MAX_LABEL)
 
     def axis(self, column: str) -> str:
-        """What stands at an axis: the name with its unit."""
+        """The label of an axis: the name with its unit."""
         unit = self.unit(column)
         return f"{self.words(column)} ({unit})" if unit else self.words(column)
 
@@ -99,17 +99,17 @@ class Names:
         return f"{shown(value)} {self.unit(column)}".rstrip() if is_number else shown(value)
 
     def place(self, values: Mapping[str, Factor]) -> str:
-        """Some levels: ``measurement range: 5 m, disturbance: 0``."""
+        """Several levels: ``measurement range: 5 m, disturbance: 0``."""
         return ", ".join(f"{self.words(name)}: {self.level(name, value)}" for name, value in values.items())
 
 
 def shown(value: Factor) -> str:
-    """A level as people write it."""
+    """A level in the form that people write."""
     return abridged(visible(in_words(value)), MAX_LEVEL)
 
 
 def estimated(estimate: Estimate) -> str:
-    """A number with its interval, to two digits of that: ``4.81 ± 0.06``."""
+    """A number with its interval, rounded to two digits of the interval: ``4.81 ± 0.06``."""
     width = estimate.high - estimate.low
     if estimate.count == 0 or not math.isfinite(width) or width == 0:
         return rounded(estimate.value, width)
@@ -122,5 +122,5 @@ def is_numeric(plan: Plan, factor: str) -> bool:
 
 
 def mean_of(what: str) -> str:
-    """What the mean of something is called; that of a mean is one, too."""
+    """The name of the mean of something; the mean of a mean is called a mean, too."""
     return what if what.startswith("mean ") else f"mean {what}"

@@ -1,4 +1,4 @@
-"""From the ``figures`` of a study file to figures that can be drawn; those of a study that names none."""
+"""Turns the ``figures`` of a study file into figures that can be drawn; provides defaults if there are none."""
 
 from __future__ import annotations
 
@@ -18,22 +18,22 @@ from .of_table import CURVES, Distributions, Means
 
 
 def own_study_figures() -> dict[str, type[StudyFigure]]:
-    """The figures of studies that Epicycle and the running program define, by name."""
+    """The study figures defined by Epicycle and the running program, by name."""
     known: dict[str, type[StudyFigure]] = variants(StudyFigure)
     return dict(sorted((name, cls) for name, cls in known.items() if cls.draw is not StudyFigure.draw))
 
 
 def study_figure_types() -> AnyMapping[str, type[StudyFigure]]:
-    """The figures that a study may ask for, by name."""
+    """The figures that a study may use, by name."""
     return with_offered(StudyFigure, "epicycle.study_figures", own_study_figures())
 
 
 def check_figures(plan: Plan) -> None:
-    """Raise ``ModelError`` with all that is wrong with the figures of a study; its model is loaded if they need it."""
+    """Raise ``ModelError`` with all problems of a study's figures; loads its model if they need it."""
     problems = Problems()
     found = figures_of_study(plan, problems)
     drawn = {name: figure for name, figure in found.items() if isinstance(figure, SignalFigure)}
-    # What one condition has, such as a second robot, another one may lack.
+    # One condition may have something, such as a second robot, that another lacks.
     models = [plan.load(plan.condition(index)) for index in sorted({0, plan.conditions - 1})] if drawn else []
     for name, figure in drawn.items():
         part = (plan.study.figures or {})[name]
@@ -55,7 +55,7 @@ def check_figures(plan: Plan) -> None:
 
 
 def figures_of_study(plan: Plan, problems: Problems) -> dict[str, StudyFigure]:
-    """The figures of a study by name; what is wrong with them is added to ``problems``."""
+    """The figures of a study by name; adds their problems to ``problems``."""
     if plan.study.figures is None:
         return default_figures(plan)
     known = study_figure_types()
@@ -74,7 +74,7 @@ def figures_of_study(plan: Plan, problems: Problems) -> dict[str, StudyFigure]:
 
 
 def _levels(node: Node, plan: Plan, factor: str) -> object:
-    """A level or a list of them, as the table holds them: what has a unit is counted in SI units."""
+    """A level or a list of levels, as in the table: with a unit, in SI units."""
     if isinstance(node, Sequence):
         return [_levels(item, plan, factor) for item in node.items]
     parts = split_number(node) if plan.study.factors.get(factor) in ("int", "float") else None
@@ -85,10 +85,10 @@ def _levels(node: Node, plan: Plan, factor: str) -> object:
 
 
 def default_figures(plan: Plan) -> dict[str, StudyFigure]:
-    """Of every metric the mean over what was varied, and the distribution.
+    """For every metric, the mean over the factors and the distribution.
 
-    Of points in a box (a Latin hypercube) there is a figure for each side of it, and no distribution: each point has
-    runs of its own.
+    For points in a box (a Latin hypercube), there is a figure for each side of it and no distribution, because each
+    point has its own runs.
     """
     dimensions = plan.study.dimensions
     boxes = [each for each in dimensions if len(each.columns) > 1 and set(each.columns.values()) <= {"int", "float"}]

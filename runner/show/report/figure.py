@@ -1,4 +1,4 @@
-"""Figures of a study: what its ``figures`` may ask for, and what they have in common."""
+"""The base classes of the figures of a study, and their layout."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from ...study import Plan
 from ..sheet import DASHES, FEW, MARKERS, MAX_LINES, MAX_PANELS, Sheet, colours
 from .data import MAX_LISTED, Condition, Data, Names, is_numeric, shown
 
-# The parameters of figures that name parts of the study, as far as a figure has them.
+# The parameters of figures that name parts of the study; a figure may have some of them.
 _NAMED = {
     "where": "factor",
     "lines": "factor",
@@ -31,7 +31,7 @@ RunKey = tuple[int, int]  # a condition's number, and a replication
 
 
 class Roles(NamedTuple):
-    """What each factor is for in a figure: along the axis, a line, a panel."""
+    """The role of each factor in a figure: along the axis, as lines, as panels."""
 
     over: str | None
     lines: str | None
@@ -39,20 +39,20 @@ class Roles(NamedTuple):
 
 
 class StudyFigure(Configurable):
-    """Base of the figures of a study: declare parameters, write ``draw``."""
+    """Base class of the figures of a study: declare parameters and write ``draw``."""
 
     reserved: ClassVar[frozenset[str]] = frozenset({"type"})
 
-    doc = Parameter(str, "", doc="what the figure shows, for the line under it")
+    doc = Parameter(str, "", doc="what the figure shows, for the caption")
     where: Parameter[Mapping[str, Any]] = MappingParameter(
-        Parameter(object), {}, doc="levels to which the figure keeps, such as {load: 0.5} or {load: [0.5, 0.9]}"
+        Parameter(object), {}, doc="levels that the figure is limited to, such as {load: 0.5} or {load: [0.5, 0.9]}"
     )
     labels: Parameter[Mapping[str, str]] = MappingParameter(
-        Parameter(str), {}, doc="what metrics and factors are called in it, without their units"
+        Parameter(str), {}, doc="names of metrics and factors in it, without their units"
     )
 
     def complaints(self, plan: Plan) -> Iterator[Complaint]:
-        """What is wrong with the figure in this study: names that it does not have, levels that do not occur."""
+        """Problems of the figure in this study: names that the study does not have, levels that do not occur."""
         factors, metrics = list(plan.study.factors), [metric.name for metric in plan.metrics]
         known = {"factor": factors, "metric": metrics, "column": factors + metrics}
         for parameter, noun in _NAMED.items():
@@ -65,7 +65,7 @@ class StudyFigure(Configurable):
             for level in wanted if isinstance(wanted, list) else [wanted]:
                 if dimension is not None and not _has(dimension, name, level):
                     yield Complaint(
-                        "where", f"{name} never is {shown(level)}", f"it is {_listed(dimension, name)}", name
+                        "where", f"{name} is never {shown(level)}", f"it is {_listed(dimension, name)}", name
                     )
 
     def named(self, parameter: str) -> tuple[str, ...]:
@@ -76,35 +76,35 @@ class StudyFigure(Configurable):
     def arranged(self, data: Data, *, has_axis: bool = False, metrics: Sequence[str] = ()) -> Layout:
         """The conditions in panels and lines; with ``metrics``, these are the lines."""
         over = getattr(self, "over", None) if has_axis else None
-        # A figure that has no such parameter draws one line a panel.
+        # A figure without this parameter draws one line per panel.
         lines = "" if metrics else getattr(self, "lines", "")
         found = roles(data.plan, self.where, over, lines, self.named("panels"), has_axis=has_axis)
         return Layout(data, self, found, metrics)
 
     def draw(self, data: Data, extracts: Mapping[RunKey, Any], paths: Sequence[Path]) -> str:
-        """Write the figure to the files, and return what is to be said of it; ``extracts`` are of repeated runs."""
+        """Write the figure to the files and return its caption; ``extracts`` come from repeated runs."""
         raise NotImplementedError
 
 
 class SignalFigure(StudyFigure):
-    """Base of the figures that are drawn from signals: a study keeps none, but runs can be repeated."""
+    """Base class of figures drawn from signals: a study keeps none, but runs can be repeated."""
 
-    signal_parameters: ClassVar[tuple[str, ...]] = ()  # those that hold patterns of output ports
+    signal_parameters: ClassVar[tuple[str, ...]] = ()  # parameters with patterns of output ports
 
     def runs_of(self, data: Data) -> list[RunKey]:
-        """The runs that it wants to be repeated."""
+        """The runs to be repeated."""
         raise NotImplementedError
 
     def ports(self, model: Model) -> tuple[str, ...]:
-        """The output ports that are to be recorded in these, as patterns."""
+        """The output ports to be recorded in these runs, as patterns."""
         return tuple(pattern for parameter in self.signal_parameters for pattern in self.named(parameter))
 
     def extract(self, model: Model, results: Results) -> Any:
-        """What it needs of one of them, as plain data; called in the process that has made the run."""
+        """What it needs from one of these runs, as plain data; called in the process that made the run."""
         raise NotImplementedError
 
     def check_model(self, model: Model) -> Iterator[Complaint]:
-        """What is wrong with it in this model, its signals apart."""
+        """Problems of the figure in this model, except those of its signals."""
         yield from ()
 
 
@@ -113,7 +113,7 @@ def _has(dimension: Dimension, factor: str, level: Any) -> bool:
         if len(dimension.columns) == 1:
             return dimension.find({factor: level}) is not None
         return any(dimension.level(index).values[factor] == level for index in range(dimension.size))
-    except (TypeError, ValueError, OverflowError):  # what is no number, or no finite one
+    except (TypeError, ValueError, OverflowError):  # not a number, or not a finite one
         return False
 
 
@@ -129,8 +129,9 @@ def _listed(dimension: Dimension, factor: str) -> str:
 def roles(
     plan: Plan, fixed: Mapping[str, Any], over: str | None, lines: str | None, panels: Sequence[str], *, has_axis: bool
 ) -> Roles:
-    """What each factor is for: as it is said, otherwise the first numbers are along the axis, the next factor makes
-    lines, and all others panels.  Columns that vary together count once."""
+    """The role of each factor: as declared; otherwise the first numeric factor is along the axis, the next one makes
+    lines, and all others make panels.  Columns that vary together count once.
+    """
     said = [name for name in (over, lines, *panels) if name]
     free = []
     for dimension in plan.study.dimensions:
@@ -147,16 +148,16 @@ def roles(
 
 
 class Panel(NamedTuple):
-    """One panel: its conditions, by the level of its lines."""
+    """One panel: its conditions by the level of its lines."""
 
     title: str
     lines: dict[Factor, list[Condition]]
 
 
 class Layout:
-    """The conditions of a figure, sorted into panels and lines; then what the legend shows.
+    """The conditions of a figure, sorted into panels and lines, and its legend.
 
-    More than can be told apart are left out, which ``omitted`` says.
+    More than a reader can distinguish are left out; ``omitted`` states how many.
     """
 
     def __init__(self, data: Data, figure: StudyFigure, found: Roles, metrics: Sequence[str] = ()) -> None:
@@ -180,40 +181,40 @@ class Layout:
                 panels.append(Panel(self.names.place(place), by_line))
         omitted = []
         if len(levels) > MAX_LINES:
-            omitted.append(f"Of {len(levels)} lines the first {MAX_LINES} are shown.")
+            omitted.append(f"Only the first {MAX_LINES} of {len(levels)} lines are shown.")
         if len(panels) > MAX_PANELS:
-            omitted.append(f"Of {counted(len(panels), 'panel')} the first {MAX_PANELS} are shown.")
+            omitted.append(f"Only the first {MAX_PANELS} of {counted(len(panels), 'panel')} are shown.")
         self.omitted = " ".join(omitted)
         self.panels, self.levels = panels[:MAX_PANELS], levels[:MAX_LINES]
         self.shades = colours(len(self.levels))
-        # Two factors make rows and columns.
+        # Two factors become rows and columns.
         self.columns = len(choices[1]) if len(choices) == 2 and 1 < len(choices[1]) <= 4 else None
 
     def sheet(self, **look: Any) -> Sheet:
         return Sheet(**{"panels": [panel.title for panel in self.panels] or [""], "columns": self.columns, **look})
 
     def look(self, number: int, *, marked: bool = False) -> dict[str, Any]:
-        """How a line is drawn: few differ in more than their colours."""
+        """The style of a line; if lines are few, they differ in more than colour."""
         few = number < FEW and len(self.levels) <= FEW
         look = {"color": self.shades[number], "linestyle": DASHES[number] if few else "-"}
         return {**look, "marker": MARKERS[number] if few else "."} if marked else look
 
     def called(self, level: Factor) -> str:
-        """What a line is called in the key."""
+        """The name of a line in the legend."""
         return self.names.words(str(level)) if self._metrics else self.names.level(self.roles.lines or "", level)
 
     def about(self, panel: Panel, level: Factor) -> str:
-        """Which panel and line a tip is of."""
+        """The panel and line that a tip belongs to."""
         line = self.names.place({self.roles.lines: level}) if self.roles.lines else ""
         return ", ".join(filter(None, (line, panel.title)))
 
     def show(self, level: Factor, handle: Any) -> None:
-        """Let the key say which line is that of a level."""
+        """Add the line of a level to the legend."""
         if self.roles.lines or self._metrics:
             self.handles.setdefault(self.called(level), handle)
 
     def finish(self, sheet: Sheet, paths: Sequence[Path], *said: str) -> str:
-        """Add the key, and write the files; what is said of the figure, and of what is left out of it."""
+        """Add the legend and write the files; returns the caption, including what is left out."""
         title = self.names.words(self.roles.lines) if self.roles.lines else ""
         if len(self.levels) > FEW:
             sheet.band([*map(self.called, self.levels)], self.shades, title)

@@ -1,4 +1,4 @@
-"""Figures of signals of a study: runs are repeated for them."""
+"""Figures of a study that show signals, for which runs are repeated."""
 
 from __future__ import annotations
 
@@ -38,37 +38,41 @@ from .figure import RunKey, SignalFigure
 
 TOKEN = "token"
 MOST, LEAST = "most", "least"
-_TIPS = 40  # of one line
-_GRID = 400  # points of a mean over time, where tokens come at more times than that
+_TIPS = 40  # per line
+_GRID = 400  # most points of a mean over time
 _FEWEST = 0.5  # share of the runs that a mean over time needs
 
 
 class RepeatedFigure(SignalFigure):
-    """Base of the figures that show the first runs of each condition, in lines or panels."""
+    """Base class of figures that show the first runs of each condition, in lines or panels."""
 
-    runs = Parameter(int, 10, min=1, max=10_000, doc="how many runs of each condition are shown, from the first one on")
-    panels = texts_parameter((), doc="factors with a panel for each level; all that are left, if left out")
+    runs = Parameter(
+        int, 10, min=1, max=10_000, doc="how many runs of each condition are shown, starting with the first"
+    )
+    panels = texts_parameter((), doc="factors with a panel for each level; all remaining ones if left out")
 
     def runs_of(self, data: Data) -> list[RunKey]:
         panels = self.arranged(data).panels
         return [run for panel in panels for line in panel.lines.values() for run in self.first(line)]
 
     def first(self, conditions: Iterable[Condition]) -> list[RunKey]:
-        """The runs of some conditions that are shown."""
+        """The runs of these conditions that are shown."""
         return [(each.index, row["replication"]) for each in conditions for row in each.good[: self.runs]]
 
 
 class Series(RepeatedFigure):
     """A number over time: its mean over runs with the 95 % interval of the mean (Student) as a band.
 
-    Of a run that is over nothing is known any more; the mean is drawn as long as half of the runs go on.
+    Runs no longer count after their end; the mean is drawn as long as half of the runs continue.
     """
 
     signal_parameters = ("signal",)
 
     signal = Parameter(str, doc="an output port")
-    value = PortFormulaParameter(TOKEN, given=(TOKEN,), doc="the number as an expression over its token: token.speed")
-    label = Parameter(str, "", doc="what the number is, with its unit; the expression if left out")
+    value = PortFormulaParameter(
+        TOKEN, given=(TOKEN,), doc="the number as an expression over its token, such as token.speed"
+    )
+    label = Parameter(str, "", doc="name of the number, with its unit; the expression if left out")
     lines: Parameter[str | None] = Parameter(
         str, None, doc="factor with a line for each level; the next one if left out"
     )
@@ -77,7 +81,7 @@ class Series(RepeatedFigure):
     def complaints(self, plan: Plan) -> Iterator[Complaint]:
         yield from super().complaints(plan)
         if self._formula.references:
-            yield Complaint("value", f"{self._formula.references[0]!r} is no part of the token", "write 'token.name'")
+            yield Complaint("value", f"{self._formula.references[0]!r} is not part of the token", "write 'token.name'")
 
     @property
     def _formula(self) -> PortFormula:
@@ -85,15 +89,17 @@ class Series(RepeatedFigure):
         return self.value
 
     def extract(self, model: Model, results: Results) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
-        """Times, values, and when the run was over."""
+        """Times, values, and when the run ended."""
         signal = results[self.signal]
         values = []
         for token in signal.tokens:
             value = self._formula((), token=token)
             if isinstance(value, bool) or not isinstance(value, (int, float)):
-                raise EpicycleError(f"{self._formula.source!r} is no number for a token of {self.signal}: {value!r}")
+                raise EpicycleError(
+                    f"{self._formula.source!r} gives {value!r}, not a number, for a token of {self.signal}"
+                )
             values.append(float(value))
-        # What was last sent holds up to the stop time, even if nothing happens between.
+        # The last value holds until the stop time, even if nothing else happens.
         end = results.end if results.stopped != "stop time" or model.stop is None else model.stop
         return signal.times, np.array(values), end
 
@@ -116,13 +122,13 @@ class Series(RepeatedFigure):
             set_log(axes, x=False, y=self.log_y)
         sheet.call_axes("time (s)", self.label or self._formula.source.replace(TOKEN, self.signal))
         said = f"Mean over the first {counted(self.runs, 'run')} of each condition, with its 95 % interval (Student)"
-        return arranged.finish(sheet, paths, f"{said}, as long as half of them go on.")
+        return arranged.finish(sheet, paths, f"{said}, as long as half of them continue.")
 
 
 def over_time(
     runs: Sequence[tuple[NDArray[np.float64], NDArray[np.float64], float]],
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-    """Times, means and half widths of their intervals; between two tokens of a run the first one holds."""
+    """Times, means and half widths of their intervals; a value of a run holds until its next token."""
     begun = [each for each in runs if len(each[0])]
     if not begun:
         return np.empty(0), np.empty(0), np.empty(0)
@@ -145,7 +151,7 @@ def over_time(
 
 
 class Way(NamedTuple):
-    """Where a thing was when."""
+    """The positions of a thing over time."""
 
     signal: str
     times: NDArray[np.float64]
@@ -153,22 +159,22 @@ class Way(NamedTuple):
 
 
 class Tracks(RepeatedFigure):
-    """The ways of moving things, the first runs of a condition in one panel, in the manner of the paper's Fig. 6.
+    """The paths of moving things, with the first runs of a condition in one panel, in the style of the paper's Fig. 6.
 
-    Signals are of states with a ``position``.  A way begins with a circle and has arrowheads; dots on it are as far
-    apart in time as the times that are written at the first one.
+    Signals carry states with a ``position``.  A path starts with a circle and has arrowheads; its dots are equally
+    spaced in time, and the times are written beside the first path.
     """
 
     signal_parameters = ("signals", "around")
 
-    signals = texts_parameter(doc="signals of the states whose ways are shown (patterns)")
-    around = texts_parameter((), doc="signals of further states, of the first run alone, as dashed lines (patterns)")
+    signals = texts_parameter(doc="signals of the states whose paths are shown (patterns)")
+    around = texts_parameter((), doc="signals of further states, dashed and only for the first run (patterns)")
     marks: Parameter[Mapping[str, Any]] = MappingParameter(
-        array_parameter((2,), unit="m"), {}, doc="places by what they are called, such as {goal: [0, 0]}"
+        array_parameter((2,), unit="m"), {}, doc="places by name, such as {goal: [0, 0]}"
     )
 
     def extract(self, model: Model, results: Results) -> dict[str, list[Way]]:
-        """Signals and ways, by what they are shown as."""
+        """Signals and paths, by their role in the figure."""
         ways = (("ways", self.signals), ("around", self.around))
         return {
             kind: [Way(name, results[name].times, positions(results[name])) for name in selected(patterns, results)]
@@ -221,16 +227,16 @@ class Tracks(RepeatedFigure):
 
 
 class SingleRun(SignalFigure):
-    """One run, drawn by a figure of the model: the one with the most or the least of a metric among the first runs."""
+    """One run, drawn by a figure of the model: the run with the highest or the lowest value of a metric."""
 
     figure = Parameter(str, doc="name of a figure of the model")
-    metric = Parameter(str, doc="column of the table by which the run is chosen")
-    choose = Parameter(str, MOST, choices=(MOST, LEAST), doc="whether it has the most or the least of it")
+    metric = Parameter(str, doc="column of the table that decides which run is chosen")
+    choose = Parameter(str, MOST, choices=(MOST, LEAST), doc="whether the run has the highest or the lowest value")
     runs: Parameter[int | None] = Parameter(
         int,
         None,
         min=1,
-        doc="among how many runs of each condition it is chosen, from the first one on; all if left out",
+        doc="how many runs of each condition, starting with the first, it is chosen from; all if left out",
     )
 
     def check_model(self, model: Model) -> Iterator[Complaint]:
@@ -266,7 +272,7 @@ class SingleRun(SignalFigure):
         return found[self.figure]
 
     def extract(self, model: Model, results: Results) -> dict[str, bytes]:
-        """The files, by their endings."""
+        """The files by their endings."""
         figure, files = self._drawn(model), {}
         with tempfile.TemporaryDirectory() as folder:
             for ending in FORMATS:
@@ -278,7 +284,7 @@ class SingleRun(SignalFigure):
     def draw(self, data: Data, extracts: Mapping[RunKey, Any], paths: Sequence[Path]) -> str:
         chosen = self._chosen(data)
         if chosen is None:
-            raise EpicycleError(f"no run has a {self.metric} by which one could be chosen")
+            raise EpicycleError(f"no run has a value of {self.metric}, so none can be chosen")
         condition, row = chosen
         for path in paths:
             path.write_bytes(extracts[condition.index, row["replication"]][path.suffix.removeprefix(".")])

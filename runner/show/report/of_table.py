@@ -19,31 +19,29 @@ from .data import Condition, Data, Names, estimated, is_numeric, mean_of
 from .figure import Layout, Panel, RunKey, StudyFigure
 
 BOXES, CURVES = "boxes", "curves"
-_TIPS = 60  # of a curve
-_LETTERS = 84  # in a line below a sheet
+_TIPS = 60  # per curve
+_LETTERS = 84  # per line below a sheet
 
 
 class TableFigure(StudyFigure):
-    """Base of the figures that are drawn from the table alone."""
+    """Base class of figures drawn from the table alone."""
 
     lines: Parameter[str | None] = Parameter(
         str, None, doc="factor with a line or colour for each level; the next one if left out"
     )
-    panels = texts_parameter((), doc="factors with a panel for each level; all that are left, if left out")
+    panels = texts_parameter((), doc="factors with a panel for each level; all remaining ones if left out")
 
 
 class Means(TableFigure):
     """The mean of a metric over a factor, with 95 % intervals (Student): a line for each level of another factor, and
     a panel for each level of a third.
 
-    Several metrics have a row of panels each, or are the lines of one panel.
+    Several metrics each get a row of panels, or become the lines of one panel.
     """
 
     metric = texts_parameter(doc="column of the table, or several")
-    over: Parameter[str | None] = Parameter(
-        str, None, doc="factor along the axis; the first one that is a number, if left out"
-    )
-    together = Parameter(bool, False, doc="whether several metrics are the lines of one panel; they need one unit")
+    over: Parameter[str | None] = Parameter(str, None, doc="factor along the axis; the first numeric one if left out")
+    together = Parameter(bool, False, doc="whether several metrics are the lines of one panel; they need the same unit")
     same_scale = Parameter(bool, True, doc="whether all panels have the same vertical axis")
     log_x = Parameter(bool, False, doc="whether the horizontal axis is logarithmic")
     log_y = Parameter(bool, False, doc="whether the vertical axis is logarithmic")
@@ -51,13 +49,13 @@ class Means(TableFigure):
     def complaints(self, plan: Plan) -> Iterator[Complaint]:
         yield from super().complaints(plan)
         if not self.metric:
-            yield Complaint("metric", "there is no metric in it", "name one at least")
+            yield Complaint("metric", "it names no metric", "name at least one")
         units = {plan.columns[name].unit for name in self.metric if name in plan.columns}
         if self.together and len(units) > 1:
             listed = ", ".join(f"{name} in {plan.columns[name].unit or '1'}" for name in self.metric)
-            yield Complaint("together", "metrics in one panel need one unit", listed)
+            yield Complaint("together", "metrics in one panel need the same unit", listed)
         if self.together and self.lines:
-            yield Complaint("lines", "the metrics are its lines already", "leave 'lines' or 'together' out")
+            yield Complaint("lines", "the metrics are already its lines", "leave out 'lines' or 'together'")
 
     def draw(self, data: Data, extracts: Mapping[RunKey, Any], paths: Sequence[Path]) -> str:
         arranged = self.arranged(data, has_axis=True, metrics=self.metric if self.together else ())
@@ -83,7 +81,7 @@ class Means(TableFigure):
         self, sheet: Sheet, axes: Any, axis: _Axis, arranged: Layout, panel: Panel, number: int, points: list[_Point]
     ) -> None:
         count, names = len(arranged.levels), arranged.names
-        # So that intervals stand beside each other.
+        # So that intervals are side by side.
         shift = 0.0 if self.log_x else axis.step * min(0.06, 0.5 / count) * (number - (count - 1) / 2)
         places = [(point.place + shift, point.estimate.value) for point in points]
         look = arranged.look(number, marked=True)
@@ -111,13 +109,13 @@ class _Point(NamedTuple):
 
     @property
     def half(self) -> float:
-        """Half of the interval, if it has one."""
+        """Half of its interval, if it has one."""
         half = self.estimate.high - self.estimate.value
         return half if math.isfinite(half) else 0.0
 
 
 def by_metric(arranged: Layout, metrics: Sequence[str], same_y: bool = True) -> tuple[Sheet, list[tuple[str, Panel]]]:
-    """A sheet with all panels for each metric, in rows if there are few."""
+    """A sheet with all panels of each metric, in rows if there are few."""
     panels = [(metric, panel) for metric in metrics for panel in arranged.panels or [Panel("", {})]]
     across = len(arranged.panels)
     is_grid = len(metrics) > 1 and 1 < across <= 4
@@ -133,22 +131,22 @@ def by_metric(arranged: Layout, metrics: Sequence[str], same_y: bool = True) -> 
 class Distributions(TableFigure):
     """How metrics are distributed over runs: boxes along a factor, or curves of the share of runs up to a value.
 
-    A box holds the middle half of the runs, with the median as a line; the whiskers hold nine tenths, and every run
+    A box spans the middle half of the runs, with the median as a line; the whiskers span nine tenths, and every run
     beyond them is a dot.
     """
 
-    metrics = texts_parameter(doc="columns of the table, each with panels of its own")
+    metrics = texts_parameter(doc="columns of the table, each with its own panels")
     style = Parameter(str, BOXES, choices=(BOXES, CURVES), doc="what is drawn")
     over: Parameter[str | None] = Parameter(
-        str, None, doc="factor along the axis of boxes; the first one that is a number, if left out"
+        str, None, doc="factor along the axis of boxes; the first numeric one if left out"
     )
-    limit: Parameter[float | None] = Parameter(float, None, doc="a value with a line, such as a distance to be kept")
-    log = Parameter(bool, False, doc="whether the axis of the values is logarithmic")
+    limit: Parameter[float | None] = Parameter(float, None, doc="a value to mark, such as a distance to keep")
+    log = Parameter(bool, False, doc="whether the axis of values is logarithmic")
 
     def complaints(self, plan: Plan) -> Iterator[Complaint]:
         yield from super().complaints(plan)
         if not self.metrics:
-            yield Complaint("metrics", "there is no metric in it", "name one at least")
+            yield Complaint("metrics", "it names no metric", "name at least one")
 
     def draw(self, data: Data, extracts: Mapping[RunKey, Any], paths: Sequence[Path]) -> str:
         has_axis = self.style == BOXES
@@ -160,8 +158,8 @@ class Distributions(TableFigure):
             else:
                 self._curves(sheet, axes, metric, panel, arranged)
             set_log(axes, x=self.log and not has_axis, y=self.log and has_axis)
-        boxes = "Boxes: the middle half of the runs with the median; whiskers: nine tenths; dots: the runs beyond."
-        said = [boxes if has_axis else "Share of the runs whose value is no greater."]
+        boxes = "Boxes: the middle half of the runs with the median; whiskers: nine tenths; dots: runs beyond them."
+        said = [boxes if has_axis else "Share of the runs with this value or less."]
         said.append(counts(arranged.chosen, self.metrics, arranged.names))
         if self.limit is not None:
             for metric in self.metrics:
@@ -236,7 +234,7 @@ def _numbers(conditions: Sequence[Condition], metric: str) -> list[float]:
 
 
 def _spread(values: Sequence[float], unit: str) -> str:
-    """What a box shows, in words."""
+    """The numbers that a box shows, in words."""
     low, middle, high = statistics.quantiles(values, method="inclusive") if len(values) > 1 else [values[0]] * 3
     return f"median {middle:.4g} {unit}".rstrip() + f", middle half {low:.4g} to {high:.4g}"
 
@@ -248,12 +246,12 @@ def listed(words: Iterable[str]) -> str:
 
 
 def capitalised(text: str) -> str:
-    """A sentence as it begins."""
+    """A text with a capital first letter."""
     return text[:1].upper() + text[1:]
 
 
 def counts(chosen: Sequence[Condition], metrics: Sequence[str], names: Names) -> str:
-    """How many runs stand behind a figure, and how many are in none of its numbers."""
+    """How many runs a figure is based on, and how many it excludes."""
     runs = sum(len(condition.rows) for condition in chosen)
     bad = runs - sum(len(condition.good) for condition in chosen)
     parts = [f"{counted(runs, 'run')} in {counted(len(chosen), 'condition')}"]
@@ -266,7 +264,7 @@ def counts(chosen: Sequence[Condition], metrics: Sequence[str], names: Names) ->
 
 
 class _Axis:
-    """Where conditions stand along the horizontal axis."""
+    """The positions of conditions along the horizontal axis."""
 
     def __init__(self, data: Data, arranged: Layout) -> None:
         self._factor = factor = arranged.roles.over
@@ -278,7 +276,7 @@ class _Axis:
         places = sorted(set(self._places))
         self.step = min((after - before for before, after in pairwise(places)), default=1.0)
         dimension = next((each for each in data.plan.study.dimensions if factor in each.columns), None)
-        # The points of a hypercube come in no order.
+        # The points of a hypercube are not ordered.
         self.is_connected = dimension is not None and (len(dimension.columns) == 1 or places == self._places)
 
     def _of(self, level: Factor) -> float:
@@ -290,9 +288,9 @@ class _Axis:
         return self._of(condition.values[self._factor]) if self._factor else 0.0
 
     def dress(self, axes: Any, columns: int, *, is_log: bool) -> None:
-        """Ticks where levels are: numbers only if they are few, and not strewn like the points of a hypercube."""
+        """Set ticks at the levels; for numbers, only if few and not scattered like the points of a hypercube."""
         if is_log and not self.is_numeric:
-            raise EpicycleError("the levels along the axis are not numbers, so that it cannot be logarithmic")
+            raise EpicycleError("the levels along the axis are not numbers, so it cannot be logarithmic")
         if is_log:
             return
         if not self.is_numeric or (self.is_connected and len(self._places) <= 12):
@@ -302,7 +300,7 @@ class _Axis:
 
 
 def _texts_along(axes: Any, places: Sequence[float], texts: Sequence[str], columns: int) -> None:
-    """Write texts at their places: numbers with room between them, and words aslant where they are long."""
+    """Write texts at their positions: numbers with space between them, and long words slanted."""
     longest, room = max(map(len, texts), default=0), _LETTERS // columns
     is_short = longest <= 6
     every = math.ceil(len(texts) * (longest + 2) / room) if is_short else math.ceil(len(texts) / 16)

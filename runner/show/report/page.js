@@ -1,5 +1,5 @@
 "use strict";
-// What moves on the page of a report: tips under the pointer, and pictures that are enlarged.
+// Interaction on the page of a report: tips under the pointer, and pictures that can be enlarged.
 (() => {
   const tip = document.createElement("div");
   tip.className = "tip";
@@ -7,7 +7,7 @@
   const stage = document.querySelector("dialog");
   const known = new WeakMap();
 
-  // Shapes with a title are for browsers without scripts; here the page shows it itself, and sooner.
+  // Titles of shapes serve browsers without scripts; here the page shows them itself, and sooner.
   for (const title of document.querySelectorAll(".tips title")) {
     title.parentNode.dataset.text = title.textContent;
     title.remove();

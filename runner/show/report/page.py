@@ -32,17 +32,18 @@ from ..sheet import tips_of
 from .data import Condition, Data, Names, estimated, mean_of, shown
 
 MAX_ROWS = 400  # of one table
-MAX_FAILURES = 50  # that are told one by one
-MAX_PIVOT = 10  # levels of a factor that are columns
+MAX_FAILURES = 50  # that are listed one by one
+MAX_PIVOT = 10  # levels of a factor that become columns
 
 
 class Picture(NamedTuple):
-    """A figure as it stands on the page: drawn, with what is said of it, or the reason why it is not."""
+    """A figure on the page: drawn, with its caption, or the reason why it is not."""
 
     name: str
     doc: str
     svg: bytes | None
     said: str
+    narrow: bytes | None = None  # the same for a narrow screen
 
 
 def report_page(
@@ -53,7 +54,7 @@ def report_page(
 ) -> str:
     study = data.plan.study
     figures = [_picture(number, each) for number, each in enumerate(pictures, start=1)]
-    sections: list[tuple[str, list[Html]]] = [  # answers before numbers, and these before where they come from
+    sections: list[tuple[str, list[Html]]] = [  # answers first, then numbers, then their origin
         ("Claims", list(claims(data.names, judgements))),
         ("Guideline", list(_guideline(data, recommendations))),
         ("Figures", [tag("div", figures, class_="figures")] if figures else []),
@@ -78,12 +79,12 @@ def report_page(
 
 
 def _beside(ending: str) -> str:
-    """The text of the page's own file with this ending."""
+    """The text of the file beside this module with this ending."""
     return Path(__file__).with_suffix(f".{ending}").read_text(encoding="utf-8")
 
 
 def _in_short(data: Data, judgements: Sequence[Judgement]) -> Iterable[Html]:
-    """What a reader should know first: what came of the claims, how much there is, and what is wrong with it."""
+    """What a reader should know first: the verdicts of the claims, and what is missing or failed."""
     verdicts = Counter(each.verdict for each in judgements)
     if verdicts:
         said = [[tag("b", f"{number} {verdict}", class_=_class(verdict)), " "] for verdict, number in _sorted(verdicts)]
@@ -92,10 +93,10 @@ def _in_short(data: Data, judgements: Sequence[Judgement]) -> Iterable[Html]:
     over = counts.total() - data.results.beyond()
     missing = plan.size - over if plan.study.until is None else 0
     if missing:
-        yield tag("p", f"The study is not finished: {counted(missing, 'run')} are missing.", class_="problem")
+        yield tag("p", f"The study is not finished: {counted(missing, 'run')} missing.", class_="problem")
     if bad := counts.total() - counts["ok"]:
         link = tag("a", f"{counted(bad, 'run')} without a result", href="#runs")
-        yield tag("p", link, ": in none of the numbers.", class_="problem")
+        yield tag("p", link, ", which no number includes.", class_="problem")
 
 
 def _sorted(verdicts: Counter[str]) -> list[tuple[str, int]]:
@@ -108,11 +109,11 @@ def _class(verdict: str) -> str:
 
 
 def _at_most(data: Data) -> str:
-    """What stands before numbers of runs of a study that ends when it knows enough."""
+    """The words before a number of runs if the study ends once it is precise enough."""
     return "" if data.plan.study.until is None else "at most "
 
 
-# -- what was asked, and of what --------------------------------------------------------------------------------------
+# -- the study and its runs -------------------------------------------------------------------------------------------
 
 
 def _what(data: Data) -> Iterable[Html]:
@@ -141,11 +142,11 @@ def _levels(data: Data, factor: str) -> str:
 def _seeds(data: Data) -> str:
     study = data.plan.study
     if not study.paired:
-        return f"Every run has a seed of its own, made of {study.seed}, its condition and its replication."
+        return f"Every run has its own seed, derived from {study.seed}, its condition and its replication."
     last = study.seed + max(data.plan.replications, 1 + max((row["replication"] for row in data.rows), default=0)) - 1
     return (
-        f"Seeds {study.seed} to {last}: replication r has the same one in every condition, so that differences "
-        "between conditions are seen in pairs of runs."
+        f"Seeds {study.seed} to {last}: replication r has the same seed in every condition, so differences between "
+        "conditions are seen in pairs of runs."
     )
 
 
@@ -169,8 +170,8 @@ def _runs(data: Data) -> Iterable[Html]:
     counts, plan, beyond = data.results.counts(), data.plan, data.results.beyond()
     over = counts.total() - beyond
     missing = plan.size - over if plan.study.until is None else 0
-    more = f", and {beyond:,} more of replications beyond those asked for." if beyond else "."
-    yield tag("p", f"{over:,} of {_at_most(data)}{counted(plan.size, 'run')} are over{more}")
+    more = f", and {beyond:,} more from replications beyond those requested." if beyond else "."
+    yield tag("p", f"{over:,} of {_at_most(data)}{counted(plan.size, 'run')} are finished{more}")
     rows = [[status, f"{number:,}"] for status, number in sorted(counts.items(), key=lambda each: each[0] != "ok")]
     if missing:
         rows.append(["missing", f"{missing:,}"])
@@ -192,7 +193,7 @@ def _failures(data: Data, failures: list[dict[str, Any]]) -> Iterable[Html]:
         for row in failures[:MAX_FAILURES]
     ]
     yield tag("h3", "Runs without a result")
-    yield note("They are in none of the numbers of this report.")
+    yield note("No number in this report includes them.")
     yield wide_table(["status", "condition", "seed", "what happened", "repeat it"], rows, class_="words")
     if more := len(failures) - len(rows):
         yield note(f"... and {more:,} more: epicycle status {folder}")
@@ -205,14 +206,16 @@ def _picture(number: int, picture: Picture) -> Html:
     if picture.svg is None:
         shown = tag("p", f"This figure could not be drawn: {picture.said}", class_="problem")
     else:
-        shown = _shown(picture.svg, what)
+        shown = _shown(picture.svg, what, "wide" if picture.narrow else "")
+        if picture.narrow:
+            shown = tag("div", shown, _shown(picture.narrow, what, "narrow"))
         caption += [" ", tag("span", picture.said, class_="note")]
         caption.insert(0, tag("button", "enlarge", type="button", class_="enlarge", aria_label=f"enlarge: {what}"))
     return tag("figure", shown, tag("figcaption", caption), id=f"figure-{picture.name}")
 
 
-def _shown(svg: bytes, what: str) -> Html:
-    """A picture that can be enlarged, and over it what a pointer finds: no part of it can be more than a picture."""
+def _shown(svg: bytes, what: str, screen: str) -> Html:
+    """A picture that can be enlarged, with tips over it; as an image, it cannot run anything."""
     source = f"data:image/svg+xml;base64,{base64.b64encode(svg).decode()}"
     found = tips_of(svg)
     if found is None:
@@ -224,17 +227,17 @@ def _shown(svg: bytes, what: str) -> Html:
         over = tag("svg", dots, class_="tips", aria_hidden="true", **view)
         image = tag("img", src=source, alt=what, width=width, height=height)
         frame = tag("div", image, over, class_="frame", tabindex="0")
-    return tag("div", frame, class_="scroll")
+    return tag("div", frame, class_=f"scroll {screen}".rstrip())
 
 
 def _means(data: Data) -> Iterable[Html]:
-    """A table for each metric with the levels of the last factor as columns, or one table with a row a condition."""
+    """A table for each metric with the levels of the last factor as columns, or one with a row per condition."""
     metrics, factors = data.results.metrics, data.results.factors
     if not data.conditions or not metrics:
         return
     yield note(
-        "Mean with its 95 % interval (Student). Where a number of runs stands below, only so many of those that are "
-        "over have a number."
+        "Mean with its 95 % interval (Student). A number of runs below a mean states how many of the finished runs "
+        "have a value."
     )
     columns = data.levels(factors[-1]) if factors else []
     is_grid = all(len(each.columns) == 1 for each in data.plan.study.dimensions)
@@ -248,7 +251,7 @@ def _means(data: Data) -> Iterable[Html]:
 
 
 def _source(data: Data, metric: str) -> Html:
-    """What a metric is, or how it is made."""
+    """The description of a metric, or its declaration."""
     source = data.results.manifest["metrics"][metric]
     doc = data.names.doc(metric)
     return tag("small", doc) if doc or source == metric else tag("code", source)
@@ -285,11 +288,11 @@ def _flat(data: Data) -> Iterable[Html]:
 def _long_table(head: list[str], rows: Iterable[list[Content]], names: int, count: int) -> Iterable[Html]:
     yield wide_table(head, islice(rows, MAX_ROWS), names=names)
     if count > MAX_ROWS:
-        yield note(f"... and {counted(count - MAX_ROWS, 'row')} more; table.parquet has all.")
+        yield note(f"... and {counted(count - MAX_ROWS, 'row')} more; table.parquet has them all.")
 
 
 def _cell(condition: Condition | None, metric: str) -> Content:
-    """A mean with its interval, and the number of runs behind it if that is not all that are over."""
+    """A mean with its interval, and the number of runs behind it if some have no value."""
     if condition is None:
         return ""
     values = condition.numbers(metric)
@@ -308,8 +311,8 @@ def claims(names: Names, judgements: Sequence[Judgement]) -> Iterable[Html]:
     if apart:
         yield _by_level(names, judgements)
         yield note(
-            "The best comes first: the fewest claims that are not reproduced; then the most that hold in the means, by "
-            "chance or not, the most that are reproduced, and the largest share of agreeing comparisons."
+            "The best comes first: it has the fewest claims not reproduced; then the most that hold in the means, by "
+            "chance or not; then the most reproduced; then the largest share of agreeing comparisons."
         )
     head = [*map(names.axis, apart), "claim", "verdict", "", "confirmed", "reversed", "undecided", "agreeing"]
     rows = [
@@ -326,10 +329,10 @@ def claims(names: Names, judgements: Sequence[Judgement]) -> Iterable[Html]:
     ]
     yield wide_table([*head, "weakest comparison"], rows, names=len(apart) + 1, class_="words")
     yield note(
-        "A comparison is a mean of differences between runs of the same replication, with Student's 95 % interval; the "
-        "p-values of one claim are corrected together (Holm). It is confirmed or reversed if the corrected p-value is "
-        "below 0.05, and no more than one run in twenty is missing; otherwise undecided. agreeing: how many point the "
-        "claimed way, by chance or not."
+        "A comparison is a mean of differences between runs of the same replication, with Student's 95 % interval; "
+        "the p-values of one claim are corrected together (Holm). It is confirmed or reversed if the corrected "
+        "p-value is below 0.05, and at most one run in twenty is missing; otherwise it is undecided. Agreeing "
+        "comparisons point the claimed way, by chance or not."
     )
     for each in judgements:
         place = names.place(each.where)
@@ -339,7 +342,7 @@ def claims(names: Names, judgements: Sequence[Judgement]) -> Iterable[Html]:
 
 
 def _by_level(names: Names, judgements: Sequence[Judgement]) -> Html:
-    """Which claims survive which level of what they are judged for, the best first."""
+    """Which claims hold at which level of the factors for which they are judged separately, the best first."""
     standings = ranked(judgements)
     claims = [each.name for each in standings[0].judgements]
     return wide_table(
@@ -413,7 +416,7 @@ def _value(finding: Finding) -> str:
 
 
 def _guideline(data: Data, found: Sequence[Recommendation]) -> Iterable[Html]:
-    """What to choose in each case, and how sure that is."""
+    """What to choose in each case, and with what confidence."""
     if not found:
         return
     names = data.names
@@ -429,7 +432,7 @@ def _guideline(data: Data, found: Sequence[Recommendation]) -> Iterable[Html]:
     )
     close = f", or of those within {tolerance:g}{f' {unit}' if unit else ''} of the best." if tolerance else "."
     yield note(
-        f"best: the {which} mean. confidence: how often it is the best if the replications are drawn anew. not worse: "
+        f"best: the {which} mean. confidence: how often it is the best when the replications are resampled. not worse: "
         "no other is significantly better, and the truly best is among these with a confidence of 95 %. enough: the "
         f"first of these in the order of the study{close}"
     )
@@ -439,7 +442,7 @@ def _row(each: Recommendation) -> list[Content]:
     best = next((option for option in each.options if option.is_fit and option.level == each.best), None)
     where = [shown(level) for level in each.where.values()]
     if best is None:
-        return [*where, "–", "too few runs have a number", "", "", ""]
+        return [*where, "–", "too few runs have a value", "", "", ""]
     return [
         *where,
         tag("b", shown(each.best)),

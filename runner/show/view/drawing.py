@@ -1,4 +1,4 @@
-"""The model graph as a page draws it: every composite open, so that any of them can be closed and opened there."""
+"""The model graph as a page draws it: every composite is open, so that each can be closed and opened there."""
 
 from __future__ import annotations
 
@@ -7,11 +7,11 @@ from typing import Any
 from ...build import Model
 from ..graph import Drawing, draw, outline
 
-MOST = 3_000  # boxes that are laid out one by one; above, arrays whose instances are alike are one box
+MOST = 3_000  # boxes laid out one by one; above this, arrays with identical instances are one box
 
 
 def drawn(model: Model) -> dict[str, Any]:
-    """Boxes with their ports, wires as trees of lines, and badges, all with places in points."""
+    """Boxes with their ports, wires as trees of lines, and badges, all with positions in points."""
     graph = model.graph
     everything = len(graph.actors) + len(graph.composites)
     drawing: Drawing = draw(outline(model, depth=len(graph.composites) + 1, expand=everything <= MOST))

@@ -1,7 +1,7 @@
-"""What other viewers are given of a run: its marks as points, discs and paths, its firings, the acts of its aspects.
+"""Prepares a run for other viewers: its marks as points, discs and paths, its firings, and the acts of its aspects.
 
-These viewers know neither figures nor superdense time.  A mark becomes scenes, each of which holds until the next;
-whoever looks at a later moment needs nothing but the latest scene.
+These viewers have neither figures nor superdense time.  A mark becomes scenes, each of which holds until the next; at
+any moment, a viewer needs only the latest scene.
 """
 
 from __future__ import annotations
@@ -23,16 +23,16 @@ from ..sheet import LIMIT, PALETTE
 from .recording import NOTHING, Recording
 from .writing import ViewError
 
-TRAIL = 200  # points of a trail, and how often it is drawn anew
-STALE = 1.6  # usual intervals after which a line of sight is over
-LATEST = 1e9  # s, as far as runs go
+TRAIL = 200  # points of a trail, and how often it is drawn again
+STALE = 1.6  # usual intervals after which a line of sight ends
+LATEST = 1e9  # s, later than any run
 
 Point = tuple[float, float]
 Colour = tuple[int, int, int]
 
 
 class Disc(NamedTuple):
-    """An ellipse: its middle, both half axes (m), and the angle (rad) of the first."""
+    """An ellipse: its centre, both half axes (m), and the angle (rad) of the first."""
 
     x: float
     y: float
@@ -43,7 +43,7 @@ class Disc(NamedTuple):
 
 @dataclass(frozen=True)
 class Scene:
-    """What there is of a mark from a time (ns) on."""
+    """The shapes of a mark from a time (ns) on."""
 
     time: int
     points: list[Point] = field(default_factory=list)
@@ -52,7 +52,7 @@ class Scene:
 
 
 class Thing(NamedTuple):
-    """A mark, or the trail of a body, over time; ``label`` stands beside its point."""
+    """A mark, or the trail of a body, over time; ``label`` is shown beside its point."""
 
     kind: str  # the mark's shape, or "trail"
     name: str
@@ -62,7 +62,7 @@ class Thing(NamedTuple):
 
 
 class Act(NamedTuple):
-    """What an aspect did at a port."""
+    """An act of an aspect at a port."""
 
     tag: Tag
     aspect: str
@@ -75,19 +75,19 @@ def parts(name: str) -> list[str]:
 
 
 def encodable(text: str) -> str:
-    """Text with a mark for what UTF-8 has no bytes for."""
+    """Text with a replacement for characters that UTF-8 cannot encode."""
     return text.encode("utf-8", "replace").decode()
 
 
 def results_of(recording: Recording) -> Results:
-    """The results of a run that has been made; raises ``ViewError``."""
+    """The results of a run; raises ``ViewError`` if it has not been made."""
     if recording.results is None:
-        raise ViewError("a file shows a run that has been made: call Recording.run first")
+        raise ViewError("a file needs a run that has been made: call Recording.run first")
     return recording.results
 
 
 def about(recording: Recording) -> dict[str, str]:
-    """The run in words: where it comes from, and what came of it."""
+    """The run in words: its origin and its results."""
     results = results_of(recording)
     left_out = sum(count for _, count in recording.gaps())
     said = {
@@ -103,7 +103,7 @@ def about(recording: Recording) -> dict[str, str]:
 
 
 def firings(recording: Recording) -> Iterator[tuple[Tag, str]]:
-    """When actors fired, in order."""
+    """The firings of actors, in order."""
     columns, tags, _ = recording.kept()
     places = list(recording.places)
     for tag, actor in zip(columns["firing_tag"], columns["firing_actor"], strict=True):
@@ -111,7 +111,7 @@ def firings(recording: Recording) -> Iterator[tuple[Tag, str]]:
 
 
 def acts(recording: Recording) -> Iterator[Act]:
-    """What aspects did, in order."""
+    """The acts of aspects, in order."""
     columns, tags, texts = recording.kept()
     places, ports = list(recording.places), list(recording.ports)
     aspects, events = list(recording.aspects), list(recording.events)
@@ -129,7 +129,7 @@ def acts(recording: Recording) -> Iterator[Act]:
 
 
 def things(recording: Recording) -> list[Thing]:
-    """All that figures of the model place in space; what two figures place is there once."""
+    """Everything that figures of the model place in space, each thing once."""
     results, found = results_of(recording), dict[tuple[str, str], Thing]()
     for figure in recording.figures.values():
         for mark in figure.marks(results):
@@ -139,7 +139,7 @@ def things(recording: Recording) -> list[Thing]:
 
 
 def extent(placed: list[Thing]) -> tuple[Point, Point]:
-    """The corners of the space in which points are."""
+    """The corners of the space that the points occupy."""
     points = [point for thing in placed for scene in thing.scenes for point in scene.points] or [(0.0, 0.0)]
     return (min(x for x, _ in points), min(y for _, y in points)), (
         max(x for x, _ in points),
@@ -184,7 +184,7 @@ def _scene(mark: Mark, time: int, row: list[float]) -> Scene:
 
 
 def _ending(scenes: list[Scene], end: int) -> Iterator[Scene]:
-    """Scenes that are over where the next one takes much longer than usual, up to the end of the run (ns)."""
+    """The scenes up to the end of the run (ns), ended early where the next one comes much later than usual."""
     gaps = np.diff([scene.time for scene in scenes])
     usual = int(STALE * np.median(gaps)) if len(gaps) else 0
     for scene, gap in zip(scenes, [*gaps.tolist(), math.inf], strict=True):
@@ -194,7 +194,7 @@ def _ending(scenes: list[Scene], end: int) -> Iterator[Scene]:
 
 
 def _trail(scenes: list[Scene]) -> Iterator[Scene]:
-    """Where a body has been; between two scenes of its trail, it moves on straight from the end of the last."""
+    """The past positions of a body; between two scenes of its trail, a straight line extends the last one."""
     step, way = 1 + len(scenes) // TRAIL, list[Point]()
     for place, scene in enumerate(scenes):
         if place % step == 0:

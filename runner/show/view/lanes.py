@@ -1,4 +1,4 @@
-"""Signals of a run as lanes over time: numbers as lines, states as strips, thinned to what a screen can show."""
+"""Prepares signals as lanes over time: numbers as lines, states as strips, thinned to what a screen can show."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from ...catalogue import Figure
 from ...results import Results
 from ..samples import read
 
-POINTS = 8_000  # of a line; above, its lowest and highest value in each of half as many parts of the run
-CHANGES = 20_000  # of a strip
+POINTS = 8_000  # per line; above this, the lowest and highest value in each of half as many parts of the run
+CHANGES = 20_000  # per strip
 MOST = 400  # lanes
 
 Floats = NDArray[np.float64]
@@ -21,13 +21,13 @@ Floats = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Lane:
-    """Numbers (``states`` is None) or places in ``states``, each from its time (s) on."""
+    """Numbers (``states`` is None) or indices of ``states``, each valid from its time (s) on."""
 
     name: str
     times: Floats
     values: Floats
     states: list[str] | None
-    is_line: bool  # whether a number leads straight to the next
+    is_line: bool  # whether numbers are joined by straight lines
     is_asked: bool  # whether a figure of the model shows it
     left_out: int  # samples
 
@@ -53,7 +53,7 @@ def _line(name: str, times: Floats, values: Floats, asked: dict[str, bool]) -> L
 
 
 def turning_points(times: Floats, values: Floats, parts: int) -> NDArray[np.int64]:
-    """Which samples show what a line does: the first, lowest, highest and last in each of so many parts of the time."""
+    """The samples that show the shape of a line: the first, lowest, highest and last in each part of the time."""
     span = (times[-1] - times[0]) or 1.0
     starts = np.flatnonzero(np.diff(np.minimum((times - times[0]) / span * parts, parts - 1).astype(int), prepend=-1))
     kept: list[int] = []

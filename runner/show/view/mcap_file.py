@@ -1,7 +1,7 @@
-"""A run as an MCAP file, which Foxglove and Lichtblick show: JSON messages, Foxglove's schemas where it has one.
+"""Writes a run as an MCAP file for Foxglove and Lichtblick: JSON messages, with Foxglove's schemas where they exist.
 
-Lichtblick reads a subset of JSON Schema: objects, and arrays of numbers, texts or objects.  What tokens hold beside
-these is made to fit: matrices are arrays, row by row, and what is of several types is text.
+Lichtblick reads a subset of JSON Schema: objects, and arrays of numbers, texts or objects.  Other content of tokens is
+converted: matrices become arrays, row by row, and values of several types become text.
 """
 
 from __future__ import annotations
@@ -27,15 +27,15 @@ from .writing import ViewError, replace_file
 if TYPE_CHECKING:
     from mcap.writer import Writer
 
-WORLD = "world"  # the frame in which positions are given
+WORLD = "world"  # the frame of all positions
 INFO = 2  # level of foxglove.Log
 LINE_STRIP = 0  # type of foxglove.LinePrimitive
 FAINT = 0.25  # opacity of discs
-MOST = 65_535  # channels of a file
-SHARE = 0.012  # of the whole space is a point's diameter
+MOST = 65_535  # channels per file
+SHARE = 0.012  # diameter of a point, relative to the whole space
 
 Schema = dict[str, Any]
-Message = tuple[int, int, Any]  # time (ns), channel, what is written as JSON
+Message = tuple[int, int, Any]  # time (ns), channel, content to write as JSON
 
 
 def write_mcap(recording: Recording, path: Path) -> None:
@@ -44,7 +44,7 @@ def write_mcap(recording: Recording, path: Path) -> None:
 
 
 def require_mcap() -> type[Writer]:
-    """What writes MCAP files; raises ``ViewError`` if it is not installed."""
+    """The class that writes MCAP files; raises ``ViewError`` if it is not installed."""
     try:
         from mcap.writer import Writer
     except ImportError:
@@ -55,7 +55,7 @@ def require_mcap() -> type[Writer]:
 
 
 def mcap(recording: Recording) -> bytes:
-    """The MCAP file of a run; equal for equal runs, with one version of the library."""
+    """The content of a run's MCAP file; equal for equal runs with the same version of the library."""
     file = BytesIO()
     writer = require_mcap()(file)
     writer.start(profile="", library="epicycle")
@@ -78,7 +78,7 @@ def mcap(recording: Recording) -> bytes:
 
 
 class Channels:
-    """The channels of a file, each with its schema, which is written once."""
+    """The channels of a file; each schema is written once."""
 
     def __init__(self, writer: Writer) -> None:
         self._writer = writer
@@ -89,7 +89,9 @@ class Channels:
         path = "/" + "/".join(topic)
         if path not in self._channels:
             if len(self._channels) == MOST:
-                raise ViewError(f"an MCAP file holds {MOST:,} channels, and the run has more signals and actors")
+                raise ViewError(
+                    f"an MCAP file holds at most {MOST:,} channels, and the run has more signals and actors"
+                )
             if name not in self._schemas:
                 data = json.dumps({"title": name, **schema}).encode()
                 self._schemas[name] = self._writer.register_schema(name, "jsonschema", data)
@@ -138,7 +140,7 @@ ENTITY = _object(
     cylinders=_array(CYLINDER),
     lines=_array(LINE),
     texts=_array(LABEL),
-    # Nothing of a run is one of these, but a viewer may count on them.
+    # A run has none of these, but a viewer may expect them.
     **{name: _array(_object(pose=POSE)) for name in ("arrows", "cubes", "triangles", "models")},
 )
 SCENE = _object(deletions=_array(_object(timestamp=TIME, type=INTEGER, id=TEXT)), entities=_array(ENTITY))
@@ -162,7 +164,7 @@ def _signal(signal: Signal, channels: Channels) -> Iterator[Message]:
 
 
 def _flat(value: Any) -> Any:
-    """A value in which no array holds arrays: what they hold stands in one, in order."""
+    """A value with nested arrays flattened into one, in order."""
     if isinstance(value, dict):
         return {key: _flat(each) for key, each in value.items()}
     if isinstance(value, list):
@@ -172,7 +174,7 @@ def _flat(value: Any) -> Any:
 
 
 def _schema(value: Any) -> Schema | None:
-    """What a value is; None if it says nothing of what others of its kind are."""
+    """The schema of a value; None if the value says nothing about others of its kind."""
     if value is None:
         return None
     if isinstance(value, dict):
@@ -186,7 +188,7 @@ def _schema(value: Any) -> Schema | None:
 
 
 def _common(one: Schema | None, other: Schema | None) -> Schema | None:
-    """What both are: texts if there is nothing else."""
+    """The schema that fits both: text if no other does."""
     if one is None or other is None or one == other:
         return one if other is None else other
     if one["type"] == other["type"] == "array":
@@ -199,7 +201,7 @@ def _common(one: Schema | None, other: Schema | None) -> Schema | None:
 
 
 def _settled(schema: Schema | None) -> Schema:
-    """A schema without anything open: what never was anything is a text, what is empty an array of numbers."""
+    """A complete schema: values that were never set are texts, and empty arrays hold numbers."""
     if schema is None:
         return TEXT
     if schema["type"] == "array":
@@ -210,7 +212,7 @@ def _settled(schema: Schema | None) -> Schema:
 
 
 def _fitted(value: Any, schema: Schema) -> Any:
-    """A value as its schema has it: a text where it is of another type."""
+    """A value that fits its schema: converted to text if it is of another type."""
     if schema["type"] == "string" and value is not None and not isinstance(value, str):
         return json.dumps(value, ensure_ascii=False)
     if isinstance(value, dict):
@@ -224,7 +226,7 @@ def _fitted(value: Any, schema: Schema) -> Any:
 
 
 def _size(placed: list[Thing]) -> float:
-    """The diameter of a point (m), which is a share of the space in which points are."""
+    """The diameter of a point (m), relative to the space that the points occupy."""
     (left, low), (right, high) = extent(placed)
     return SHARE * (max(right - left, high - low) or 1.0)
 
@@ -286,7 +288,7 @@ def _label(text: str, point: Point, size: float, paint: Schema) -> dict[str, Any
 
 
 def _frames(thing: Thing, channels: Channels) -> Iterator[Message]:
-    """A frame for each body, so that a viewer can follow it."""
+    """A frame for each body, which a viewer can follow."""
     number = channels.number(["frames", *parts(thing.name)], "foxglove.FrameTransform", FRAME)
     for scene in thing.scenes:
         for x, y in scene.points:

@@ -1,7 +1,7 @@
-"""Data of a page in columns: differences of whole numbers, bytes of one place together, all of it compressed.
+"""Packs data of a page in columns: differences of whole numbers, bytes of equal significance together, compressed.
 
-``browser/data.js`` reads what ``Pack`` writes.  Bytes of one place change little from row to row, which zlib uses
-well: an event takes a few bytes.
+``browser/data.js`` reads what ``Pack`` writes.  Bytes of equal significance change little from row to row, so zlib
+compresses them well: an event takes a few bytes.
 """
 
 from __future__ import annotations
@@ -16,34 +16,34 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-LEVEL = 6  # of compression: a higher one takes several times as long for a few per cent
+LEVEL = 6  # of compression: a higher one takes several times as long and saves a few per cent
 
-Column = tuple[str, int, int]  # its kind (i, f or d), where it begins, and how many numbers it holds
+Column = tuple[str, int, int]  # its kind (i, f or d), offset, and number of values
 
 
 class Pack:
-    """Takes columns of numbers and a JSON object that says where each is, and makes a text of them."""
+    """Packs columns of numbers, and a JSON object that states where each is, into one text."""
 
     def __init__(self) -> None:
         self._parts: list[bytes] = []
         self._size = 0
 
     def whole(self, numbers: Sequence[int]) -> Column:
-        """A column of whole numbers of 32 bits."""
+        """A column of 32-bit whole numbers."""
         values = np.asarray(numbers, dtype=np.int64)
-        return self._put("i", np.diff(values, prepend=0).astype("<i4"))  # which wraps, and is read so
+        return self._put("i", np.diff(values, prepend=0).astype("<i4"))  # wraps, and is read accordingly
 
     def exact(self, numbers: Sequence[float] | NDArray[np.float64]) -> Column:
-        """A column of numbers of 64 bits."""
+        """A column of 64-bit numbers."""
         return self._put("d", np.asarray(numbers, dtype="<f8").ravel())
 
     def rough(self, numbers: Sequence[float] | NDArray[np.float64]) -> Column:
-        """A column of numbers of 32 bits, as many as a screen can show."""
+        """A column of 32-bit numbers, precise enough for a screen."""
         with np.errstate(over="ignore"):
             return self._put("f", np.asarray(numbers, dtype=float).astype("<f4").ravel())
 
     def texts(self, texts: Iterable[str]) -> tuple[Column, Column]:
-        """Texts: a column of bytes, and one of how many belong to each."""
+        """Texts: a column of bytes, and one with the length of each."""
         coded = [text.encode("utf-8", "replace") for text in texts]
         joined = np.frombuffer(b"".join(coded), dtype=np.uint8)
         return self._put("b", joined), self.whole([len(each) for each in coded])
@@ -57,6 +57,6 @@ class Pack:
         return column
 
     def text(self, about: Any) -> str:
-        """All of it as base64."""
+        """Everything as base64."""
         head = json.dumps(about, ensure_ascii=True, separators=(",", ":"), allow_nan=False).encode()
         return b64encode(zlib.compress(b"".join((struct.pack("<I", len(head)), head, *self._parts)), LEVEL)).decode()

@@ -1,4 +1,4 @@
-"""One page of a run, or of two: data and program in one file, which loads nothing and runs nothing else."""
+"""Writes the page of one run or of two: data and program in one file that loads and runs nothing else."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from epicycle.actors import shortened, to_nanoseconds
 from ...catalogue import Figure
 from ...graph import ModelGraph
 from ...html import Html, tag
-from ...results import Results
+from ...results import Results, Verdict
 from ...shown import in_words, short
 from ..sheet import PALETTE
 from .drawing import drawn
@@ -26,7 +26,7 @@ from .packing import Pack
 from .recording import NOTHING, Recording
 from .writing import ViewError, replace_file
 
-# In this order, for each uses what stands before.
+# In this order, because each uses the ones before it.
 PARTS = ("data", "causes", "paint", "state", "space", "graph", "timeline", "lanes", "chart", "details", "main")
 
 
@@ -36,7 +36,7 @@ def write_page(recordings: Sequence[Recording], path: Path, *, names: Sequence[s
 
 
 def page_of(recordings: Sequence[Recording], *, names: Sequence[str] = ()) -> str:
-    """The page as text; ``names`` tell the runs apart."""
+    """The page as text; ``names`` distinguish the runs."""
     pack = Pack()
     runs = [_run(each, name, pack) for each, name in zip(recordings, [*names, "", ""], strict=False)]
     about = {
@@ -81,9 +81,9 @@ def _hash(text: str) -> str:
 def _run(recording: Recording, name: str, pack: Pack) -> dict[str, Any]:
     model, results, kept = recording.model, recording.results, recording.kept()
     if results is None:
-        raise ViewError("a page shows a run that has been made: call Recording.run first")
+        raise ViewError("a page needs a run that has been made: call Recording.run first")
     figures = recording.figures.values()
-    actors = [path for path in model.graph.actors if path not in recording.places]  # that never fired, but may have to
+    actors = [path for path in model.graph.actors if path not in recording.places]  # that never fired
     places = [*recording.places, *actors]
     numbers = {path: number for number, path in enumerate(places)}
     return {
@@ -96,6 +96,7 @@ def _run(recording: Recording, name: str, pack: Pack) -> dict[str, Any]:
         "digest": results.digest,
         "settings": [f"{key} = {short(value)}" for key, value in results.parameters.items()][:40],
         "metrics": _metrics(recording),
+        "monitors": [_monitor(recording, name, each) for name, each in results.monitors.items()],
         "firings": recording.firings,
         "records": recording.records,
         "gaps": recording.gaps(),
@@ -132,12 +133,27 @@ def _metrics(recording: Recording) -> list[list[str]]:
     ]
 
 
+def _monitor(recording: Recording, name: str, verdict: Verdict) -> dict[str, Any]:
+    """What a monitor says of the run, and when (ns) it was broken first."""
+    required = next(each.requirement for each in recording.model.monitors if each.name == name)
+    unit = f" {required.unit}" if required.unit else ""
+    margin = f", robustness {_four(verdict.robustness)}{unit}"
+    said = f"cannot be judged: {verdict.missing}" if verdict.missing else "holds" if verdict.holds else verdict.remark
+    time = None if verdict.time is None else to_nanoseconds(verdict.time)
+    return {
+        "name": name,
+        "property": required.property,
+        "text": (said or "broken") + ("" if verdict.missing else margin),
+        "time": None if verdict.holds else time,
+    }
+
+
 def _four(value: Any) -> str:
     return in_words(value, digits=4, nothing="–")
 
 
 def _port(graph: ModelGraph, path: str, name: str, numbers: Mapping[str, int]) -> dict[str, Any]:
-    """A port, and the actors to whose inputs its tokens lead; ``numbers`` are those of the places."""
+    """A port, and the actors that receive its tokens; ``numbers`` are those of the places."""
     actor = graph.actors.get(path)
     port = None if actor is None else {**actor.inputs, **actor.outputs}.get(name)
     leads: dict[str, None] = {}
@@ -183,7 +199,7 @@ def _marks(recording: Recording, results: Results, figure: Figure, pack: Pack) -
 
 
 def _difference(recordings: Sequence[Recording]) -> dict[str, Any] | None:
-    """The first record of the logs that differs: its number among those that are kept, and the record in words."""
+    """The first record in which the logs differ: its number among the kept ones, and the record in words."""
     one, other = (each.hashes for each in recordings[:2])
     same = next(
         (number for number, (a, b) in enumerate(zip(one, other, strict=False)) if a != b), min(len(one), len(other))
@@ -200,7 +216,7 @@ def _said(recording: Recording, record: int) -> str:
     """A record of the log in words."""
     number = recording.kept_record(record)
     if number < 0:
-        return "nothing more, the run is over" if record >= recording.records else "a record that this page leaves out"
+        return "the run has ended" if record >= recording.records else "a record that this page leaves out"
     columns, tags, texts = recording.kept()
     place, name = list(recording.ports)[columns["record_port"][number]]
     event, aspect = list(recording.events)[columns["record_event"][number]], columns["record_aspect"][number]

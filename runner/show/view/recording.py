@@ -1,8 +1,9 @@
-"""A run as a page shows it: who fired when, what was sent, and what led to it, in columns.
+"""Records a run for a page: which actors fired when, what they sent, and what caused it, in columns.
 
-A recording holds each firing, each record of the event log, each token that arrived and each wake-up.  Beyond a number
-of firings it is thinned as it grows: firings are kept in stretches, and whenever there are too many, every second
-stretch goes.  What is left is spread evenly over the run, whole within each stretch, and the page says what is missing.
+A recording holds each firing, each record of the event log, each token that arrived and each wake-up.  Above a number
+of firings, it is thinned as it grows: firings are kept in stretches, and whenever there are too many, every second
+stretch is dropped.  The rest is spread evenly over the run and complete within each stretch, and the page shows what is
+missing.
 """
 
 from __future__ import annotations
@@ -23,21 +24,21 @@ from ...text import select
 
 MOST = 1_600_000  # firings that are kept: a page of some 15 MB
 STRETCH = 512  # firings in a row that are kept or left out together
-LONGEST = 160  # characters of a token
-MISSING, NOTHING = -2, -1  # in a column of numbers: what was left out, and what there is not
+LONGEST = 160  # characters per token
+MISSING, NOTHING = -2, -1  # in a column of numbers: left out, or non-existent
 
 
 class Names(dict[Any, int]):
-    """Numbers the things that it is asked for, in the order in which they come."""
+    """Numbers things in the order in which they are first looked up."""
 
     def __missing__(self, key: Any) -> int:
         self[key] = number = len(self)
         return number
 
 
-# The columns of firings, of records, of tokens that arrived and of wake-ups.  Firings and records go by their numbers:
-# ``record_firing`` is whose doing a record is, ``record_about`` the send that an act of an aspect is about,
-# ``arrival_record`` the send of a token, ``wake_tag`` when a wake-up was asked for, if not in ``initialize``.
+# The columns of firings, of records, of tokens that arrived and of wake-ups.  Firings and records are referenced by
+# number: ``record_firing`` is the firing that caused a record, ``record_about`` the send that an act of an aspect
+# concerns, ``arrival_record`` the send of a token, ``wake_tag`` when a wake-up was requested, if not in ``initialize``.
 COLUMNS = {
     "firing": ("tag", "actor", "outside"),
     "record": ("tag", "firing", "port", "channel", "event", "aspect", "text", "about"),
@@ -48,12 +49,12 @@ OUTSIDE = ("", "resumed", "released")
 
 
 class Stretch:
-    """Firings in a row from a number on, and all that belongs to them, in columns."""
+    """Consecutive firings from a number on, and everything that belongs to them, in columns."""
 
     def __init__(self, firing: int, record: int) -> None:
         self.firing = firing
         self.record = record
-        self.tags, self.texts = Names(), Names()  # here, so that they go where the stretch goes
+        self.tags, self.texts = Names(), Names()  # here, so that they are dropped with the stretch
         self.columns = {f"{kind}_{name}": array("i") for kind, names in COLUMNS.items() for name in names}
 
     def add(self, kind: str, *row: int) -> None:
@@ -65,7 +66,7 @@ class Stretch:
 
 
 class Kept(NamedTuple):
-    """The columns of a recording; a tag and a text is its number among these."""
+    """The columns of a recording; tags and texts are given by their numbers."""
 
     columns: dict[str, array[int]]
     tags: list[Tag]
@@ -73,10 +74,10 @@ class Kept(NamedTuple):
 
 
 class Recording:
-    """One run of a model, recorded while it goes on; ``results`` are what came of it, too.
+    """One run of a model, recorded as it runs; ``results`` holds its results, too.
 
-    ``most`` is how many firings are kept.  The bits are those of any other run of the model and seed; signals that the
-    model's ``figures`` show in space are recorded as well.  With ``is_compared`` there are ``hashes`` of all
+    ``most`` is how many firings are kept.  The log is bit for bit that of any run with this model and seed; signals
+    that the model's ``figures`` show in space are recorded as well.  With ``is_compared``, there are ``hashes`` of all
     records, to find the first one in which two runs differ.
     """
 
@@ -94,17 +95,15 @@ class Recording:
         self.hashes = array("q")
         self._is_compared = is_compared
         self.results: Results | None = None
-        self.firings = self.records = 0  # that there were
+        self.firings = self.records = 0  # in the whole run
         self.events, self.aspects = Names(), Names()
         self.places = Names()  # of actors and composites
         self.ports = Names()  # (place, name)
         self._most = max(2, most // STRETCH)
-        self._stride = 1  # of so many stretches one is kept
+        self._stride = 1  # one stretch in so many is kept
         self._stretches: list[Stretch] = []
         self._last: Stretch | None = None
-        self._passing: list[
-            tuple[tuple[int, int, int], int, int]
-        ] = []  # acts at outputs, before what they pass is sent
+        self._passing: list[tuple[tuple[int, int, int], int, int]] = []  # acts at outputs before their token is sent
         patterns = [pattern for figure in figures.values() for pattern in figure.mark_patterns()]
         outputs = [path for path in model.graph.ports if model.graph.direction(path) == "output"]
         recorded = model.recorded
@@ -115,7 +114,7 @@ class Recording:
         model.recorded = recorded
 
     def run(self, *, until: float | None = None, progress: Callable[[float], None] | None = None) -> Results:
-        """Run to the end; an exception in an actor is raised as ``ActorError``, and what came before is recorded."""
+        """Run to the end; an exception in an actor is raised as ``ActorError``; everything before it is recorded."""
         try:
             self.results = self._simulation.run(until=until, progress=progress)
         except BaseException as error:
@@ -123,7 +122,7 @@ class Recording:
             raise
         return self.results
 
-    # -- what the tracer tells --------------------------------------------------------------------------------------
+    # -- events from the tracer -------------------------------------------------------------------------------------
 
     def _fired(self, firing: Firing) -> None:
         kept, number, actor = self._stretch(), self.firings, self.places[firing.actor]
@@ -158,7 +157,7 @@ class Recording:
         self.records += 1
 
     def _pass(self, kept: Stretch, port: int, channel: int, aspect: int) -> None:
-        """Find out what acts at an output are about: the send that follows; none, if the aspect acts anew before."""
+        """Assign acts at an output to the send that follows; to none if the aspect acts again before it."""
         own = (port, channel)
         if aspect != NOTHING:
             if any((*own, aspect) == key for key, _, _ in self._passing):
@@ -171,7 +170,7 @@ class Recording:
         self._passing = [each for each in self._passing if each[0][:2] != own]
 
     def _stretch(self) -> Stretch:
-        """The stretch to which what happens now belongs."""
+        """The stretch for what happens now."""
         place = self.firings // STRETCH
         if self._last is None or self._last.firing != place * STRETCH:
             self._last = Stretch(place * STRETCH, self.records)
@@ -182,10 +181,10 @@ class Recording:
                 self._stretches = [each for each in self._stretches if each.firing // STRETCH % self._stride == 0]
         return self._last
 
-    # -- what is left -------------------------------------------------------------------------------------------------
+    # -- kept data ----------------------------------------------------------------------------------------------------
 
     def kept(self) -> Kept:
-        """What was kept, whole: firings and records are counted anew, tags in their order."""
+        """Everything that was kept: firings and records are renumbered, tags are in order."""
         firings, records, texts = _Renumbered(), _Renumbered(), Names()
         for stretch in self._stretches:
             firings.add(stretch.firing, stretch.count("firing"))
@@ -208,14 +207,14 @@ class Recording:
         return Kept(columns, tags, list(texts))
 
     def kept_record(self, number: int) -> int:
-        """The number of a record among those that were kept; ``MISSING`` if it is left out, or there is none."""
+        """The number of a record among the kept ones; ``MISSING`` if it was left out or does not exist."""
         records = _Renumbered()
         for stretch in self._stretches:
             records.add(stretch.record, stretch.count("record"))
         return records.number(number)
 
     def gaps(self) -> list[tuple[int, int]]:
-        """Between which kept firings others are left out: the number of the first one after the gap, and how many."""
+        """The gaps between kept firings: the number of the first one after the gap, and how many are left out."""
         found, kept, before = [], 0, 0
         for stretch in self._stretches:
             if stretch.firing > before:
@@ -226,7 +225,7 @@ class Recording:
 
 
 class _Renumbered:
-    """What is left of things in a row: their numbers before and now."""
+    """The remaining things of a sequence: their old and new numbers."""
 
     def __init__(self) -> None:
         self._starts: list[int] = []
@@ -239,7 +238,7 @@ class _Renumbered:
         self._counts.append(count)
 
     def number(self, old: int) -> int:
-        """The number now of what had a number; ``MISSING`` if it is left out, ``NOTHING`` for nothing."""
+        """The new number for an old one; ``MISSING`` if it was left out, ``NOTHING`` for nothing."""
         at = bisect_right(self._starts, old) - 1
         if old < 0 or at < 0:
             return old if old < 0 else MISSING
@@ -248,6 +247,6 @@ class _Renumbered:
 
 
 def _text(token: Any) -> str:
-    if type(token) is float:  # as most are, and as ``json_line`` would have it
+    if type(token) is float:  # as most are, and as ``json_line`` writes it
         return f"{token:.6g}"
     return json_line(plain(token), LONGEST)

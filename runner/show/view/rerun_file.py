@@ -1,4 +1,4 @@
-"""A run as a recording of rerun: by time, and by tag, where each microstep has a place of its own."""
+"""Writes a run as a recording for rerun: by time, and by tag, where each microstep has its own place."""
 
 from __future__ import annotations
 
@@ -21,31 +21,31 @@ from .recording import Recording
 from .writing import ViewError, replace_file
 
 PIXELS = 5.0  # radius of a point
-AWAY = 1.4  # times the width of the space: from there the eye sees all of it
+AWAY = 1.4  # times the width of the space: from there, the camera sees all of it
 THICKNESS = 1.0  # radius of a line, in pixels
-PLACES = 128  # in the tokens of a signal, of which each is an entity; further ones are left out
-LAST = 2**62  # microstep, after all others of an instant
+PLACES = 128  # in the tokens of a signal, each an entity; further ones are left out
+LAST = 2**62  # microstep after all others of an instant
 
 
 def write_rerun(recording: Recording, path: Path) -> None:
-    """Write a recording of rerun; raises ``ViewError``."""
+    """Write a recording for rerun; raises ``ViewError``."""
     replace_file(path, _Writer(recording).written())
 
 
 def require_rerun() -> Any:
-    """The package rerun; raises ``ViewError`` if it is not installed."""
+    """The rerun package; raises ``ViewError`` if it is not installed."""
     try:
         import rerun
-        from rerun.blueprint import StateTimelineView  # noqa: F401  which tells it from others of that name
+        from rerun.blueprint import StateTimelineView  # noqa: F401  other packages of this name do not have it
     except ImportError:
         raise ViewError(
-            "a recording of rerun needs the package rerun-sdk, which is not installed: pip install 'epicycle[rerun]'"
+            "a recording for rerun needs the package rerun-sdk, which is not installed: pip install 'epicycle[rerun]'"
         ) from None
     return rerun
 
 
 class _Writer:
-    """Puts the parts of a run into one stream."""
+    """Writes the parts of a run to one stream."""
 
     def __init__(self, recording: Recording) -> None:
         self._rerun = require_rerun()
@@ -57,12 +57,12 @@ class _Writer:
             self._fired.setdefault(actor, []).append(tag)
         told = (*(signal.tags for signal in self._signals), *self._fired.values(), [act.tag for act in self._acts])
         self._tags = sorted(set(chain.from_iterable(told)))
-        # Neither the clock of the wall nor a random name: equal runs are equal recordings.
+        # No wall clock and no random name, so equal runs give equal recordings.
         digest = results_of(recording).digest
         self._stream = self._rerun.RecordingStream("epicycle", recording_id=digest, send_properties=False)
 
     def written(self) -> bytes:
-        """The file."""
+        """The content of the file."""
         file = self._stream.binary_stream()
         self._stream.send_blueprint(self._blueprint())
         self._stream.log("space", self._rerun.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
@@ -87,7 +87,7 @@ class _Writer:
         self._stream.send_columns(rerun.new_entity_path(path), indices, columns, strict=True)
 
     def _blueprint(self) -> Any:
-        """What a viewer shows at first: the space beside signals as the model's figures have them, states and acts."""
+        """The initial view: the space beside the signals of the model's figures, states and acts."""
         import rerun.blueprint as views
 
         results, figures = results_of(self._recording), self._recording.figures.items()
@@ -123,7 +123,7 @@ class _Writer:
         self._stream.log("about", self._rerun.TextDocument(text, media_type="text/markdown"), static=True)
 
     def _signal(self, signal: Signal) -> None:
-        """Each number in the tokens over time, and each state, as far as there are such."""
+        """Log each number in the tokens over time, and each state."""
         import pyarrow
 
         numbers: dict[str, tuple[list[Tag], list[float]]] = {}
@@ -155,7 +155,7 @@ class _Writer:
         thin, paint = rerun.Radius.ui_points(THICKNESS), [thing.colour]
         look: dict[str, Any] = {"line_radii": thin, "colors": paint, "fill_mode": "transparentfillmajorwireframe"}
         named = {"labels": [thing.label], "show_labels": True} if thing.label else {}
-        # Each kind of shape: how it looks, and for each scene those that it has, as columns.
+        # Each kind of shape: its style, and the shapes of each scene as columns.
         shapes: list[tuple[Any, list[list[Any]], Callable[[Any], Any]]] = [
             (
                 rerun.Points3D.from_fields(radii=rerun.Radius.ui_points(PIXELS), colors=paint, **named),

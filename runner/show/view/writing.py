@@ -1,4 +1,4 @@
-"""Files that show a run: written whole or not at all."""
+"""Writes files that show a run, completely or not at all."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from epicycle.actors import EpicycleError
 
 
 class ViewError(EpicycleError):
-    """A page or another file that shows a run, and cannot be made."""
+    """A page or another file that shows a run cannot be made."""
 
 
 def replace_file(path: Path, data: bytes) -> None:
-    """Write a file; one that is there already stays as it is until then.  Raises ``ViewError``."""
+    """Write a file; an existing one is replaced only once the new one is complete.  Raises ``ViewError``."""
     aside = path.with_name(f".{path.name}")
     try:
         aside.write_bytes(data)

@@ -1,1 +1,1 @@
-"""What the runs of a study say: its table, estimates of every condition, verdicts on claims, and what to choose."""
+"""What the runs of a study show: its table, estimates for every condition, verdicts on claims, and what to choose."""

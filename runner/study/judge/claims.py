@@ -1,8 +1,8 @@
-"""Judging claims: every one is taken apart into comparisons, each with its interval and a corrected test.
+"""Judging claims: each is split into comparisons, each with its interval and a corrected test.
 
-A comparison is a contrast of conditions, weighed sum by weighed sum over common replications: the difference of two
-conditions, or the difference of two slopes.  Its mean has Student's interval and test, and the bootstrap's interval
-beside them; the p-values of one claim are corrected together (Holm).
+A comparison is a contrast, a weighted sum of conditions over common replications: the difference of two conditions, or
+of two slopes.  Its mean has Student's interval and test, and a bootstrap interval beside them; the p-values of a claim
+are corrected together (Holm).
 
 Sources: A. M. Law, *Simulation Modeling and Analysis*, 10.2 (paired comparisons under common random numbers);
 S. Holm, *A simple sequentially rejective multiple test procedure* (1979); E. B. Wilson, *Probable inference* (1927).
@@ -26,7 +26,7 @@ from .samples import Levels, Place, Samples, has_enough
 
 REPRODUCED, NOT_REPRODUCED, UNDECIDED = "reproduced", "not reproduced", "undecided"
 CONFIRMED, REVERSED = "confirmed", "reversed"
-ALMOST_ALL = 0.9  # what Wilson's lower bound has to reach for "in every run", if none is against it
+ALMOST_ALL = 0.9  # the lower Wilson bound required for "in every run", if no run contradicts it
 RESAMPLES = 1_999
 
 Choices = Sequence[Sequence[int]]  # levels, by dimension
@@ -34,10 +34,10 @@ Choices = Sequence[Sequence[int]]  # levels, by dimension
 
 @dataclass(frozen=True)
 class Finding:
-    """What one comparison has found: how much more ``metric`` is at ``level`` than ``against`` another, ``where``.
+    """The result of one comparison: how much greater ``metric`` is at ``level`` than ``against`` another, ``where``.
 
-    For a condition that is to hold always, ``metric`` is the condition, and ``value`` the share of the runs in which it
-    does.  ``count`` runs or pairs have a number, ``missing`` have none.  ``outcome`` is ``confirmed``, ``reversed`` or
+    For a condition that should always hold, ``metric`` is the condition, and ``value`` the share of runs in which it
+    holds.  ``count`` runs or pairs have a number, ``missing`` have none.  ``outcome`` is ``confirmed``, ``reversed`` or
     ``undecided``.
     """
 
@@ -59,13 +59,13 @@ class Finding:
 
     @property
     def has_enough(self) -> bool:
-        """Whether so few numbers are missing that the mean says something."""
+        """Whether few enough numbers are missing for the mean to be meaningful."""
         return has_enough(self.count, self.missing)
 
 
 @dataclass(frozen=True)
 class Judgement:
-    """What came of a claim, for one level each of the factors that are judged apart (``where``)."""
+    """The outcome of a claim, at one level of each factor that is judged separately (``where``)."""
 
     claim: Claim
     where: Levels
@@ -78,19 +78,19 @@ class Judgement:
         return self.claim.name
 
     def counts(self, outcome: str) -> int:
-        """How many comparisons have come out like this."""
+        """How many comparisons have this outcome."""
         return sum(finding.outcome == outcome for finding in self.findings)
 
     @property
     def agreeing(self) -> int:
-        """How many means point where the claim says, by chance or not; of conditions, how many hold in all runs."""
+        """How many means point the claimed way, by chance or not; for conditions, how many hold in all runs."""
         if self.claim.form == ALWAYS:
             return sum(finding.count > 0 and finding.value == 1 for finding in self.findings)
         return sum(_support(self.claim, finding) > 0 for finding in self.findings)
 
     @property
     def holds_in_means(self) -> bool:
-        """Whether so many means agree as the claim asks for, by chance or not."""
+        """Whether as many means agree as the claim requires, by chance or not."""
         return bool(self.findings) and self.agreeing >= self.claim.share * len(self.findings) - 1e-9
 
     @property
@@ -100,7 +100,7 @@ class Judgement:
 
     @property
     def weakest(self) -> Finding | None:
-        """The weakest comparison, counted in standard errors for the claim; None if there is none."""
+        """The weakest comparison, in standard errors in favour of the claim; None without comparisons."""
         return min(self.findings, key=lambda each: _support(self.claim, each), default=None)
 
     def as_dict(self) -> dict[str, Any]:
@@ -123,7 +123,7 @@ class Judgement:
 
 @dataclass(frozen=True)
 class Standing:
-    """How much speaks for one level each of the factors that claims are judged apart for: what came of all of them."""
+    """The evidence for one level of each factor that claims are judged separately for: the outcomes of all claims."""
 
     where: Levels
     judgements: tuple[Judgement, ...]
@@ -139,7 +139,7 @@ class Standing:
 
     @property
     def agreeing(self) -> float:
-        """Of the comparisons of a claim, the share that agrees, in the mean over the claims."""
+        """The share of a claim's comparisons that agree, averaged over the claims."""
         shares = [each.agreeing / len(each.findings) if each.findings else 0.0 for each in self.judgements]
         return math.fsum(shares) / len(shares)
 
@@ -156,9 +156,10 @@ class Standing:
 
 
 def ranked(judgements: Sequence[Judgement]) -> list[Standing]:
-    """The levels that claims are judged apart for, the one that most speaks for first.
+    """The levels that claims are judged separately for, best supported first.
 
-    First counts how few claims are refuted, then how many hold in the means, how many are reproduced, and what agrees.
+    They are ordered by the number of claims refuted, then of claims that hold in the means, of claims reproduced, and
+    by the share that agrees.
     """
     apart: dict[tuple[Factor, ...], list[Judgement]] = {}
     for each in judgements:
@@ -172,7 +173,7 @@ def ranked(judgements: Sequence[Judgement]) -> list[Standing]:
 
 
 def judge(samples: Samples) -> list[Judgement]:
-    """Judge all claims of a study, one after the other; those of another study at each level of what that has not."""
+    """Judge all claims of a study in turn; those of another study at each level of the factors that it lacks."""
     questions = samples.study.questions
     return [_judged(claim, apart, samples) for apart in samples.levels(questions.apart) for claim in questions.claims]
 
@@ -205,7 +206,7 @@ def verdict(claim: Claim, findings: Sequence[Finding]) -> str:
 
 
 def _comparisons(claim: Claim, where: Selection, samples: Samples) -> Iterator[Finding]:
-    """A comparison counts if so much is hardly chance, and few numbers are missing."""
+    """A comparison counts if it is significant and few numbers are missing."""
     contrasts = list(_contrasts(claim, where, samples))
     findings = [_finding(metric.text, *each, samples) for metric in claim.metrics for each in contrasts]
     for each, p in zip(findings, holm([finding.p for finding in findings]), strict=True):
@@ -218,9 +219,9 @@ def _comparisons(claim: Claim, where: Selection, samples: Samples) -> Iterator[F
 def _contrasts(
     claim: Claim, where: Selection, samples: Samples
 ) -> Iterator[tuple[dict[int, float], tuple[Levels, Levels, Levels]]]:
-    """What a claim compares, at every combination of the dimensions that it says nothing of.
+    """What a claim compares, at every combination of the dimensions that it does not mention.
 
-    Each is a weighed sum of conditions, with the levels that these share, those of one side, and those of the other.
+    Each contrast is a weighted sum of conditions, with their common levels, those of one side, and those of the other.
     """
     choices = samples.choices(where)
     ordered = claim.form in (RISES, FALLS)
@@ -242,7 +243,7 @@ def _contrasts(
 
 
 def _pairs(claim: Claim, choices: Choices, homes: Sequence[int], samples: Samples) -> Iterator[tuple[Place, Place]]:
-    """Every one of the levels of ``at`` with every one of ``than``."""
+    """Each level of ``at`` with each level of ``than``."""
 
     def levels(selection: Selection) -> list[Place]:
         within = samples.choices(selection)
@@ -265,7 +266,7 @@ def _steps(claim: Claim, choices: Choices, samples: Samples) -> Iterator[tuple[P
 
 
 def _slope(claim: Claim, choices: Choices, samples: Samples) -> dict[Place, float]:
-    """What the values at the levels of a factor are weighed with, so that their sum is the slope over it."""
+    """The weights of the values at the levels of a factor whose sum is the slope over the factor."""
     (home,) = samples.homes([claim.per])
     at = {index: _number(samples.level(home, index, claim.per)) for index in choices[home]}
     center = math.fsum(at.values()) / len(at)
@@ -305,7 +306,7 @@ def _occurrences(claim: Claim, where: Selection, samples: Samples) -> Iterator[F
             return None
         try:
             return bool(formula(row))
-        except EpicycleError:  # it cannot be calculated for this run
+        except EpicycleError:  # it cannot be evaluated for this run
             return None
 
     for place in samples.places(samples.choices(where)):
@@ -317,7 +318,7 @@ def _occurrences(claim: Claim, where: Selection, samples: Samples) -> Iterator[F
 
 
 def _outcome_of_rate(claim: Claim, finding: Finding, holds: int) -> str:
-    """One run against it refutes ``always``, whatever is missing; none against it needs runs enough to say so."""
+    """One contrary run refutes ``always``, whatever is missing; without any, enough runs are needed to confirm it."""
     if claim.share == 1:
         if holds < finding.count:
             return REVERSED
@@ -334,7 +335,7 @@ def _sign(claim: Claim) -> int:
 
 
 def _support(claim: Claim, finding: Finding) -> float:
-    """How much a finding speaks for its claim, in standard errors."""
+    """The support of a finding for its claim, in standard errors."""
     if claim.form == ALWAYS:
         return finding.value if finding.count else -math.inf
     if finding.count < 2:

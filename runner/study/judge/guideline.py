@@ -1,7 +1,7 @@
-"""The guideline: which level to choose at every combination of the other factors, and how sure that is.
+"""The guideline: which level to choose at every combination of the other factors, and with what certainty.
 
-The levels that are *not worse* hold the true best with the stated confidence: a level is left out if it is worse than
-any of the others by a one-sided paired test at (1 - confidence) / (levels - 1).  This is Bonferroni's form of multiple
+The levels that are *not worse* contain the true best with the stated confidence: a level is left out if it is worse
+than any other in a one-sided paired test at (1 - confidence) / (levels - 1).  This is Bonferroni's form of multiple
 comparisons with the best under common random numbers.
 
 Sources: J. C. Hsu, *Multiple Comparisons: Theory and Methods* (1996), chapter 4; B. L. Nelson and F. J. Matejcik,
@@ -31,14 +31,14 @@ class Option:
     estimate: Estimate
     behind: Estimate  # how much worse than the best, over common replications
     missing: int  # runs without a number
-    is_fit: bool  # so few are missing that its mean says something
-    is_not_worse: bool  # than any other, as far as can be told
-    confidence: float  # the share of resamples in which it is the best
+    is_fit: bool  # few enough are missing for its mean to be meaningful
+    is_not_worse: bool  # than any other, as far as the runs show
+    confidence: float  # share of resamples in which it is best
 
 
 @dataclass(frozen=True)
 class Recommendation:
-    """What to choose ``where`` the other factors are as given; None if no level has numbers enough.
+    """What to choose ``where`` the other factors are as given; None if no level has enough numbers.
 
     ``best`` has the best mean, ``sufficient`` is the first level in the order of the study that is not worse, or within
     the tolerance.
@@ -54,7 +54,7 @@ class Recommendation:
 
     @property
     def not_worse(self) -> list[Factor]:
-        """The levels among which the true best is, with the stated confidence."""
+        """The levels that contain the true best with the stated confidence."""
         return [option.level for option in self.options if option.is_not_worse]
 
     def as_dict(self) -> dict[str, Any]:
@@ -112,13 +112,13 @@ def _recommended(guideline: Guideline, home: int, rest: Place, samples: Samples)
 
 
 def _is_not_worse(index: int, fit: list[int], costs: list[dict[int, float]]) -> bool:
-    """Whether no other level is better by a one-sided test, at a level that is shared by all of them."""
+    """Whether no other level is better in a one-sided test, with the error probability shared by all tests."""
     found = [paired_difference(costs[other], costs[index]) for other in fit if other != index]
     return not any(each.estimate.value > 0 and each.p / 2 * (len(fit) - 1) < 1 - LEVEL for each in found)
 
 
 def _confidence(costs: list[dict[int, float]]) -> list[float]:
-    """How often each is the best if the replications that all of them have are drawn again; ties are shared."""
+    """How often each is best when the replications that all have in common are resampled; ties are shared."""
     common = sorted(set.intersection(*(set(each) for each in costs))) if costs else []
     if not common:
         return [0.0] * len(costs)

@@ -1,4 +1,4 @@
-"""The numbers of a study by condition and replication, and its conditions by the levels that they have."""
+"""The numbers of a study by condition and replication, and its conditions by their levels."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ if TYPE_CHECKING:
 
 Levels: TypeAlias = dict[str, Factor]  # by factor
 Place: TypeAlias = tuple[int, ...]  # a level of each dimension
-MISSING = 0.05  # of the replications may be without a number, or else a mean says nothing
+MISSING = 0.05  # share of replications that may lack a number; beyond it, a mean is meaningless
 
 
 class Samples:
-    """What a table holds, run by run; those that failed or have no number are known as such."""
+    """The contents of a table, run by run, with failed runs and missing numbers marked."""
 
     def __init__(self, study: Study, table: pa.Table) -> None:
         self.study = study
@@ -52,17 +52,17 @@ class Samples:
         return [home for home, each in enumerate(self.dimensions) if wanted & each.columns.keys()]
 
     def places(self, choices: Sequence[Sequence[int]], fixed: Iterable[int] = ()) -> list[Place]:
-        """All combinations of levels, with the first one of ``fixed`` dimensions."""
+        """All combinations of levels, with the first level of ``fixed`` dimensions."""
         held = set(fixed)
         return list(product(*((0,) if home in held else levels for home, levels in enumerate(choices))))
 
     def values(self, place: Place, homes: Iterable[int] | None = None) -> Levels:
-        """What a combination of levels is, or as much of it as these dimensions say."""
+        """The values of a combination of levels, or those that these dimensions set."""
         wanted = range(len(place)) if homes is None else homes
         return {name: value for home in wanted for name, value in self._levels[home][place[home]].items()}
 
     def levels(self, factors: Iterable[str]) -> list[Levels]:
-        """All combinations of the values of some factors that there are; one without any, if there are no factors."""
+        """All existing combinations of the values of some factors; an empty one, if there are no factors."""
         wanted = list(factors)
         lists = []
         for home in self.homes(wanted):
@@ -82,7 +82,7 @@ class Samples:
         return index_of(place, self.dimensions)
 
     def over(self, condition: int) -> dict[int, int | None]:
-        """The rows of the runs of a condition that are over, by replication; None for those that failed."""
+        """The rows of a condition's finished runs, by replication; None for failed ones."""
         return self.runs.get(condition, {})
 
     def numbers(self, condition: int, metric: str) -> dict[int, float]:
@@ -92,7 +92,7 @@ class Samples:
         return {one: value for one, value in values.items() if value is not None and math.isfinite(value)}
 
     def rows(self, condition: int, metrics: Iterable[str]) -> list[dict[str, float | None] | None]:
-        """The metrics of each run that is over, None for what is no number; None for a run that failed."""
+        """The metrics of each finished run, None where there is no number; None for a failed run."""
         columns = {name: self._column(name) for name in metrics}
 
         def number(value: float | None) -> float | None:
@@ -105,5 +105,5 @@ class Samples:
 
 
 def has_enough(count: int, missing: int) -> bool:
-    """Whether so few numbers are missing that their mean says something."""
+    """Whether few enough numbers are missing for their mean to be meaningful."""
     return count > 1 and missing <= MISSING * (count + missing)

@@ -1,4 +1,4 @@
-"""What a study has found: its table, as Arrow, pandas or xarray."""
+"""The results of a study: its table, as Arrow, pandas or xarray."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     import pyarrow as pa
     import xarray
 
-TIMES = ("wall_time",)  # what is not the same each time
+TIMES = ("wall_time",)  # differs from run to run
 
 
 class StudyResults(Tabled):
@@ -40,47 +40,47 @@ class StudyResults(Tabled):
     >>> results.to_pandas().groupby("load")["mean_wait"].mean()
     """
 
-    def __init__(self, folder: Path) -> None:
-        self.folder = folder
-        self._store = Store(folder)
+    def __init__(self, folder: str | Path) -> None:
+        self.folder = Path(folder)
+        self._store = Store(self.folder)
         self.manifest = self._store.manifest
         self.plan = Plan.of_manifest(self.manifest)
         self._frozen: tuple[pa.Table, int] | None = None
 
     def freeze(self) -> StudyResults:
-        """Keep to the rows that are there now, however many may come; reading is quicker then.  Returns itself."""
+        """Use only the rows that exist now, even if more are added; this makes reading faster.  Returns itself."""
         self._frozen = self._read()
         return self
 
     @property
     def factors(self) -> list[str]:
-        """The columns that say what was varied."""
+        """The columns of varied factors."""
         return list(self.manifest["factors"])
 
     @property
     def metrics(self) -> list[str]:
-        """The columns that say what came out."""
+        """The columns of metrics."""
         return list(self.manifest["metrics"])
 
     def table(self, *, times: bool = False) -> pa.Table:
-        """A row for each run that is over, by condition and replication; ``times``: with the wall time of each.
+        """A row for each finished run, by condition and replication; with ``times``, including its wall-clock time.
 
-        Without times the table of a study is the same bit for bit, whatever happened while it was made.  Replications
-        beyond those that the study asks for now are in it, too.  Runs of another seed, model or study than the folder
-        is of now are left out; ``left_out`` counts them.
+        Without times, the table of a study is the same to the bit, whatever happened while it was made.  It includes
+        replications beyond those that the study now asks for.  Runs of another seed, model or study than the folder now
+        has are left out; ``left_out`` counts them.
         """
         table, _ = self._read()
         return table if times else table.drop_columns(list(TIMES))
 
     def _read(self) -> tuple[pa.Table, int]:
-        """The table, and how many runs are left out of it."""
+        """The table, and the number of runs left out of it."""
         import pyarrow as pa
         import pyarrow.compute as pc
 
         if self._frozen is not None:
             return self._frozen
         table = pa.Table.from_batches(list(self._store.rows()), self._store.schema)
-        # The numbers of the plan's conditions by their keys; a plan may be too large to be gone through.
+        # The numbers of the plan's conditions by their keys; a plan may be too large to enumerate.
         known = table.group_by(["condition", *self.factors], use_threads=False).aggregate([]).to_pylist()
         order = {row["condition"]: self.plan.find(row["condition"], row) for row in known}
         at = pc.index_in(table["condition"], value_set=pa.array(order, pa.string()))
@@ -91,7 +91,7 @@ class StudyResults(Tabled):
         table = self._replicated(table.filter(pc.is_valid(places))).sort_by(
             [(name, "ascending") for name in ("condition", "replication", "_rank", "run")]
         )
-        if table.num_rows:  # of a run that was written more than once, the best row is the first
+        if table.num_rows:  # if a run was written more than once, its best row comes first
             changes = (
                 pc.not_equal(table[name].slice(1), table[name].slice(0, table.num_rows - 1))
                 for name in ("condition", "replication")
@@ -107,7 +107,7 @@ class StudyResults(Tabled):
         return table.drop_columns(["_rank"]).combine_chunks().cast(pa.schema(fields)), left
 
     def _replicated(self, table: pa.Table) -> pa.Table:
-        """The rows whose seeds are the plan's, by the replications that these seeds have there."""
+        """The rows with seeds of the plan, by the replications of these seeds in it."""
         import pyarrow as pa
         import pyarrow.compute as pc
 
@@ -117,13 +117,13 @@ class StudyResults(Tabled):
             conditions = {index: self.plan.condition(index) for index in set(table["condition"].to_pylist())}
             seeds = [self.plan.seed(conditions[index], replication) for index, replication in found]
             return table.filter(pc.equal(table["seed"], pa.array(seeds, pa.int64())))
-        # Another seed in the study's file moves the replications; those beyond what is asked for are of this seed.
+        # Another seed in the study's file shifts the replications; surplus ones are of this seed.
         now = pc.subtract(table["seed"], study.seed)
         is_meant = pc.or_(pc.less(now, self.plan.replications), pc.equal(now, before))
         return _with(table, "replication", now).filter(pc.and_(pc.greater_equal(now, 0), is_meant))
 
     def digest(self) -> str:
-        """SHA-256 of all rows, by which tables are told apart: the same wherever and however often they are made."""
+        """SHA-256 of all rows, which identifies a table: the same wherever and however often it is made."""
         digest = hashlib.sha256()
         for batch in self.table().to_batches():
             for row in batch.to_pylist():
@@ -132,16 +132,16 @@ class StudyResults(Tabled):
 
     @property
     def left_out(self) -> int:
-        """How many runs of the folder are not of the study as it is now, and so not in the table."""
+        """How many runs of the folder do not belong to the present study, and so are not in the table."""
         _, left = self._read()
         return left
 
     def beyond(self) -> int:
-        """How many runs of the table are replications beyond those that the study asks for now."""
+        """How many runs of the table are replications beyond those that the study now asks for."""
         return sum(each >= self.plan.replications for each in self.table()["replication"].to_pylist())
 
     def counts(self) -> Counter[str]:
-        """How many runs are over, by status."""
+        """How many runs are finished, by status."""
         return Counter(self.table()["status"].to_pylist())
 
     def failures(self) -> list[dict[str, Any]]:
@@ -153,15 +153,15 @@ class StudyResults(Tabled):
         ]
 
     def values(self, metric: str) -> dict[int, dict[int, float]]:
-        """The numbers of a metric by condition and replication; runs that are not ``ok`` or have none are left out."""
+        """The numbers of a metric by condition and replication, without runs that are not ``ok`` or lack the metric."""
         self._check("metric", metric, self.metrics)
         samples = self._samples()
         return {condition: samples.numbers(condition, metric) for condition in samples.runs}
 
     def means(self, metric: str, level: float = LEVEL) -> list[dict[str, Any]]:
-        """A row for each condition: what was varied, the mean with its standard error and interval, how many runs.
+        """A row for each condition: the varied values, the mean with its standard error and interval, run counts.
 
-        ``runs`` are those that are over, ``count`` those of them that have a number.
+        ``runs`` counts the finished runs, ``count`` those among them that have a number.
         """
         self._check("metric", metric, self.metrics)
         samples = self._samples()
@@ -175,10 +175,10 @@ class StudyResults(Tabled):
         ]
 
     def differences(self, metric: str, over: str, level: float = LEVEL) -> list[dict[str, Any]]:
-        """How the levels of one factor differ, two by two, at every combination of the others.
+        """How the levels of one factor differ, pair by pair, at every combination of the others.
 
         Each row has the other factors, the two levels as ``first`` and ``second``, the mean of second less first over
-        common replications with its interval, ``p`` of a paired test, and ``p_holm`` corrected for all rows.
+        common replications with its interval, the ``p`` of a paired test, and ``p_holm``, corrected for all rows.
         """
         self._check("factor", over, self.factors)
         groups: dict[tuple[Factor, ...], list[tuple[Factor, dict[int, float]]]] = {}
@@ -204,15 +204,15 @@ class StudyResults(Tabled):
             raise StoreError(f"{told}; it has {', '.join(known) or 'none'}")
 
     def claims(self) -> list[Judgement]:
-        """What came of the claims of the study's file; those of another study, at each level of what that has not."""
+        """The verdicts on the claims of the study's file; those of another study at each level of what it lacks."""
         return judge(self._samples())
 
     def standings(self) -> list[Standing]:
-        """How much speaks for each level that claims are judged apart for, the best first."""
+        """The evidence for each level that claims are judged separately for, the best first."""
         return ranked(self.claims())
 
     def guideline(self) -> list[Recommendation]:
-        """What the study's guideline recommends, at every combination of the factors that are not to be chosen."""
+        """What the study's guideline recommends, at every combination of the factors that are not chosen."""
         return recommend(self._samples())
 
     def find(self, run: str) -> dict[str, Any]:
@@ -222,10 +222,10 @@ class StudyResults(Tabled):
             row: dict[str, Any] = found[0]
             return row
         if found:
-            raise StoreError(f"{counted(len(found), 'run')} of {self.folder} begin with {run!r}: give more of it")
+            raise StoreError(f"{counted(len(found), 'run')} of {self.folder} begin with {run!r}: give more characters")
         raise StoreError(
             f"{self.folder} has no run {run!r}\n"
-            f"   help: the column 'run' of {self.folder}/table.parquet has their names"
+            f"   help: the column 'run' of {self.folder}/table.parquet lists their names"
         )
 
     def to_pandas(self) -> pandas.DataFrame:
@@ -265,7 +265,7 @@ class StudyResults(Tabled):
 
     @property
     def path(self) -> Path:
-        """Where the table is."""
+        """The path of the table."""
         return self.folder / "table.parquet"
 
     def write_table(self) -> Path:
@@ -286,12 +286,12 @@ class StudyResults(Tabled):
             file = pq.ParquetFile(pa.BufferReader(data))
             is_of_another = file.metadata.created_by != pq.read_metadata(pa.BufferReader(ours)).created_by
             return is_of_another and bool(file.read().equals(table))
-        except (OSError, ValueError, pa.ArrowException):  # ValueError: a text in it that is no UTF-8
+        except (OSError, ValueError, pa.ArrowException):  # ValueError: a text in it is not UTF-8
             return False
 
 
 def _with(table: pa.Table, name: str, values: Any) -> pa.Table:
-    """A table with other values in one of its columns."""
+    """A table with different values in one of its columns."""
     return table.set_column(table.schema.get_field_index(name), name, values)
 
 

@@ -1,4 +1,4 @@
-"""The columns of a study's table: whether its models have what they ask for, their values in a run, units and docs."""
+"""The columns of a study's table: whether its models provide them, their values in a run, units and docs."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from ...text import Problems, inside, select
 
 @dataclass(frozen=True)
 class Column:
-    """A column of the table: what it counts in (empty if that is not known), what it is, and what it is called."""
+    """A column of the table: its unit (empty if unknown), doc and label."""
 
     unit: str = ""
     doc: str = ""
@@ -29,7 +29,7 @@ class Column:
 
 
 def check_metric(metric: StudyMetric, models: Sequence[Model], problems: Problems) -> None:
-    """Note names that none of the models knows."""
+    """Note names that none of the models has."""
 
     def complain(message: str, part: str, known: Iterable[str], caption: str) -> None:
         position = None
@@ -59,7 +59,7 @@ def check_metric(metric: StudyMetric, models: Sequence[Model], problems: Problem
     own = units.get(metric.source.strip(), "")
     if own and metric.unit and metric.unit != own:
         problems.add(
-            f"metric {metric.name}: {metric.source.strip()} counts in {own}, not in {metric.unit}",
+            f"metric {metric.name}: {metric.source.strip()} has the unit {own}, not {metric.unit}",
             metric.places.get("unit"),
             "leave 'unit' out; 'to: ...' converts",
         )
@@ -68,9 +68,9 @@ def check_metric(metric: StudyMetric, models: Sequence[Model], problems: Problem
 
 
 def value_of(metric: StudyMetric, results: Results) -> float | None:
-    """The number for the table; None if there is none, as what it asks for is missing in this run.
+    """The number for the table; None if something that it needs is missing in this run.
 
-    Raises ``EpicycleError`` if it cannot be evaluated, or is no number.
+    Raises ``EpicycleError`` if it cannot be evaluated, or is not a number.
     """
     names: dict[str, Any] = {name: operand(value) for name, value in results.metrics.items()}
     names |= {name: getattr(results, name) for name in NUMBERS}
@@ -92,23 +92,23 @@ def value_of(metric: StudyMetric, results: Results) -> float | None:
     if value is None:
         return None
     if not isinstance(value, (bool, int, float)):
-        raise EpicycleError(f"metric {metric.name} is no number: {value!r}")
+        raise EpicycleError(f"metric {metric.name} is not a number: {value!r}")
     unit = results.units.get(metric.source.strip()) or metric.unit
     return Quantity(float(value), unit).to(metric.to) if metric.to else float(value)
 
 
-# -- what is said of columns ------------------------------------------------------------------------------------------
+# -- descriptions of columns ------------------------------------------------------------------------------------------
 
 
 def columns_of(dimensions: Iterable[Dimension], metrics: Iterable[StudyMetric], model: Model) -> dict[str, Column]:
-    """The columns that say what was varied and what came out, by name."""
+    """The columns of factors and metrics, by name."""
     found: dict[str, Column] = {}
     for dimension in dimensions:
         for setting in dimension.level(0).settings:
             if setting.path in dimension.columns:
                 declared = _declared(setting.path, model)
                 written = split_number(setting.node)
-                # A number with a unit is in the table in SI units, one without in the parameter's own.
+                # In the table, a number with a unit is in SI units, one without in the parameter's unit.
                 unit = si_unit(written[1]) if written is not None and written[1] else declared.unit
                 found[setting.path] = Column(unit, declared.doc)
     own = {metric.name: Column(metric.unit, metric.measure.doc, metric.measure.label) for metric in model.metrics}
@@ -120,7 +120,7 @@ def columns_of(dimensions: Iterable[Dimension], metrics: Iterable[StudyMetric], 
 
 
 def _declared(path: str, model: Model) -> Column:
-    """Unit and doc of a parameter of the model, or of those actors' that a pattern selects."""
+    """Unit and doc of a parameter of the model, or of the actors that a pattern selects."""
     if (declared := model.declared.get(path)) is not None:
         return Column(declared.unit, declared.doc)
     owner, _, name = path.rpartition(".")
@@ -131,7 +131,7 @@ def _declared(path: str, model: Model) -> Column:
 
 
 def si_unit(text: str) -> str:
-    """The SI unit of what another unit measures; the same one, if that is of SI.  Raises ``UnitError``."""
+    """The SI unit of the same quantity as another unit; the unit itself if it is one of SI. Raises ``UnitError``."""
     unit = parse_unit(text)
     if unit.factor == 1.0:
         return text

@@ -1,4 +1,4 @@
-"""Plan: the conditions of a study and the identity of every run, worked out one at a time."""
+"""Plan: the conditions of a study and the identity of every run, computed one at a time."""
 
 from __future__ import annotations
 
@@ -23,45 +23,45 @@ from .columns import Column, check_metric, columns_of
 
 _LOGGER = logging.getLogger("epicycle")
 
-MAX_TRIED = 20  # levels of a dimension with which the model is loaded before anything runs
+MAX_TRIED = 20  # levels of a dimension that the model is loaded with before anything runs
 
 Sources = dict[str, str]  # SHA-256 by the name of a file, and versions by 'package NAME'
 
 
 def epicycle_version() -> str:
-    """The version of which results are: another one may give other ones."""
+    """The version that made results: another one may give different ones."""
     return version_of("epicycle") or "unknown"
 
 
 @dataclass(frozen=True)
 class Condition:
-    """One combination of levels; ``key`` tells it from all others, whatever study it is in."""
+    """One combination of levels; ``key`` identifies it in any study."""
 
     index: int
-    level: Level  # of all dimensions together
+    level: Level  # over all dimensions
     key: str
 
     @property
     def values(self) -> dict[str, Factor]:
-        """What the columns of the table say of it."""
+        """Its values in the columns of the table."""
         return self.level.values
 
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """A study that has been tried: every level of every dimension loads.
+    """A checked study: every level of every dimension loads.
 
-    ``made`` does so; ``of_manifest`` takes over from a results folder what was found then.
+    ``made`` checks it; ``of_manifest`` takes the outcome of that check from a results folder.
     """
 
     study: Study
     metrics: list[StudyMetric]
     sources: Sources
-    extra: list[dict[int, Sources]]  # by dimension, the files that single levels read beside the others
-    texts: dict[str, str]  # the YAML of the model and of all that belongs to it
+    extra: list[dict[int, Sources]]  # by dimension, the further files that single levels read
+    texts: dict[str, str]  # the YAML of the model and of everything that belongs to it
     columns: dict[str, Column]
     made_with: str  # the version of Epicycle
-    files: Iterable[str] = ()  # all that were read, by the names by which they were
+    files: Iterable[str] = ()  # all files read, by the names used to read them
 
     # -- making one -----------------------------------------------------------------------------------------------
 
@@ -69,7 +69,7 @@ class Plan:
     def made(cls, study: Study) -> Plan:
         """Load the model with the first levels of all dimensions, and with each other level in the place of its first.
 
-        Raises ``ModelError`` with all that is wrong in any of them.
+        Raises ``ModelError`` with all problems in any of them.
         """
         problems = Problems()
         read = _Read()
@@ -77,7 +77,7 @@ class Plan:
         sources = _tried(study, firsts, read, problems)
         extra: list[dict[int, Sources]] = [{} for _ in study.dimensions]
         for number, dimension in enumerate(study.dimensions):
-            few = min(dimension.size, MAX_TRIED)  # from end to end
+            few = min(dimension.size, MAX_TRIED)  # evenly spread
             for index in sorted({step * (dimension.size - 1) // (few - 1) for step in range(1, few)}):
                 indices = [*firsts[:number], index, *firsts[number + 1 :]]
                 found = _tried(study, indices, read, problems)
@@ -91,7 +91,7 @@ class Plan:
             check_metric(metric, read.models, problems)
             if study.metrics is None and (metric.name in RESERVED or metric.name in study.factors):
                 problems.add(
-                    f"metric {metric.name!r} of the model has the name of another column of the table",
+                    f"the model's metric {metric.name!r} has the same name as another column of the table",
                     None,
                     f"rename it in the study: metrics: {{my_name: {metric.name}}}",
                 )
@@ -107,7 +107,8 @@ class Plan:
         columns = columns_of(study.dimensions, metrics, read.models[0])
         if endless := read.models[0].endless:
             _LOGGER.warning(
-                "warning: %s\n   help: set 'stop' in its section 'run'; --run-timeout gives up runs", endless
+                "warning: %s\n   help: set 'stop' in its section 'run'; --run-timeout ends runs that take too long",
+                endless,
             )
         return cls(study, metrics, sources, extra, read.texts, columns, epicycle_version(), read.files)
 
@@ -115,7 +116,7 @@ class Plan:
     def of_manifest(cls, manifest: Mapping[str, Any]) -> Plan:
         """The plan of a results folder; no file but the manifest is needed.
 
-        Raises ``ModelError``, and ``EpicycleError`` if what the manifest says does not fit together.
+        Raises ``ModelError``, and ``EpicycleError`` if the manifest contradicts itself.
         """
         study = study_of_text(
             manifest["text"],
@@ -144,7 +145,7 @@ class Plan:
         }
         if wrong := [name for name, is_wrong in unlike.items() if is_wrong]:
             found = ", ".join(map(repr, wrong))
-            raise EpicycleError(f"the manifest of {study.name} is damaged: {found} is not as its study's text says")
+            raise EpicycleError(f"the manifest of {study.name} is damaged: {found} does not match the study's text")
         problems = Problems()
         study.questions.check(names, problems)
         problems.raise_if_any()
@@ -152,7 +153,7 @@ class Plan:
         return cls(study, metrics, manifest["sources"], extra, manifest["model"], columns, manifest["epicycle"])
 
     def manifest(self) -> dict[str, Any]:
-        """What ``of_manifest`` needs."""
+        """The entries that ``of_manifest`` needs."""
         study = self.study
         return {
             "epicycle": self.made_with,
@@ -181,17 +182,17 @@ class Plan:
 
     @property
     def replications(self) -> int:
-        """How many runs a condition has, at most."""
+        """The greatest number of runs of a condition."""
         return self.study.replications if self.study.until is None else self.study.until.at_most
 
     @property
     def size(self) -> int:
-        """How many runs there are, at most."""
+        """The greatest number of runs."""
         return self.conditions * self.replications
 
     @property
     def decides(self) -> str | None:
-        """The metric that decides how many replications a condition gets, if one does."""
+        """The metric that decides how many replications a condition gets, if any."""
         return None if self.study.until is None else self.study.until.metric
 
     def __iter__(self) -> Iterator[Condition]:
@@ -220,7 +221,7 @@ class Plan:
         return Condition(index, level, _hash(identity))
 
     def find(self, key: str, values: Mapping[str, Factor]) -> int | None:
-        """The number of the condition with this key, which has these values; None if the plan has none."""
+        """The number of the condition with this key and these values; None if the plan has none."""
         place = [at for each in self.study.dimensions if (at := each.find(values)) is not None]
         if len(place) < len(self.study.dimensions):
             return None
@@ -238,7 +239,7 @@ class Plan:
         return _hash([condition.key, self.seed(condition, replication)])
 
     def unlike(self, noted: Noted) -> list[str]:
-        """What of this was not read when the plan was tried, or was not the same then."""
+        """The files that were not read when the plan was checked, or have changed since."""
         known = [self.sources, *(found for each in self.extra for found in each.values())]
         digests = {digest for found in known for digest in found.values()}
         files = [name for name, digest in noted.files.items() if digest not in digests]
@@ -264,7 +265,7 @@ def index_of(place: Iterable[int], dimensions: Sequence[Dimension]) -> int:
 
 
 def _together(study: Study, place: Iterable[int]) -> Level:
-    """What the study sets in all runs, and the levels of a condition."""
+    """The settings of the study for all runs, and the levels of a condition."""
     levels = [dimension.level(at) for dimension, at in zip(study.dimensions, place, strict=True)]
     return Level(
         (*study.fixed, *(setting for level in levels for setting in level.settings)),
@@ -280,7 +281,7 @@ def _load(study: Study, level: Level) -> Model:
 
 @dataclass
 class _Read:
-    """What trying a study has read."""
+    """What checking a study has read."""
 
     models: list[Model] = field(default_factory=list)
     texts: dict[str, str] = field(default_factory=dict)
@@ -288,7 +289,7 @@ class _Read:
 
 
 def _tried(study: Study, place: list[int], read: _Read, problems: Problems) -> Sources:
-    """Load the model with these levels; the files that this reads."""
+    """Load the model with these levels; returns the files that this reads."""
     with noting() as noted:
         try:
             read.models.append(_load(study, _together(study, place)))
@@ -303,7 +304,7 @@ def _tried(study: Study, place: list[int], read: _Read, problems: Problems) -> S
     ]:
         read.files[name] = None
         path = Path(name).resolve()
-        # By names that stay when a study and its model are moved, or Epicycle is.
+        # By names that stay the same when the study with its model, or Epicycle, is moved.
         shown = path.relative_to(home).as_posix() if path.is_relative_to(home) else path.name
         found[shown] = digest
         if path.suffix in (".yaml", ".yml"):

@@ -1,1 +1,1 @@
-"""Making runs: which come next, in which processes, and the folder that keeps what came of each."""
+"""Making runs: which come next, in which processes, and the folder that keeps their results."""

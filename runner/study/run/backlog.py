@@ -1,4 +1,4 @@
-"""The backlog of a study: which run comes next, and when a condition has had enough."""
+"""The backlog of a study: which run comes next, and when a condition has enough runs."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from ..inference import half_width
 from ..plan.plan import Condition, Plan
 
 OK, FAILED, TIMEOUT, KILLED = "ok", "failed", "timeout", "killed"
-RETRIED = (TIMEOUT, KILLED)  # what hangs on the machine, not on the model alone
+RETRIED = (TIMEOUT, KILLED)  # these depend on the machine, not only on the model
 
 
 @dataclass(frozen=True)
 class Done:
-    """What is known of a run that is over: its status, and the value of the metric that decides, if one does."""
+    """What is known of a finished run: its status, and the value of the deciding metric, if there is one."""
 
     status: str
     value: float | None = None
@@ -36,54 +36,54 @@ class Task:
 
 
 class Backlog:
-    """Hands out the runs of a plan that are not there yet, condition by condition.
+    """Hands out the missing runs of a plan, condition by condition.
 
-    With ``until``, a condition gets its replications in batches, and is looked at only between batches: what is run
-    depends on neither the number of workers nor their speed.
+    With ``until``, a condition gets its replications in batches and is evaluated only between batches: the runs depend
+    on neither the number of workers nor their speed.
     """
 
     def __init__(self, plan: Plan, known: Mapping[str, Done]) -> None:
         self.plan = plan
         self.known = known
-        self.there: Counter[str] = Counter()  # the runs that were there already, by status
-        self.made: Counter[str] = Counter()  # and those that were made
+        self.there: Counter[str] = Counter()  # runs that already existed, by status
+        self.made: Counter[str] = Counter()  # new runs, by status
         self.stopped_early = 0  # runs that were not needed
-        self._conditions = iter(plan)  # that are still to come
-        self._open: dict[int, Iterator[Task | None]] = {}  # the runs of conditions that are begun
-        self._running: Counter[int] = Counter()  # how many, by condition
-        self._values: dict[int, list[float]] = {}  # of the metric that decides, by condition
+        self._conditions = iter(plan)  # still to come
+        self._open: dict[int, Iterator[Task | None]] = {}  # runs of started conditions
+        self._running: Counter[int] = Counter()  # number of runs, by condition
+        self._values: dict[int, list[float]] = {}  # values of the deciding metric, by condition
         self._again: deque[Task] = deque()
 
     @property
     def total(self) -> int:
-        """All runs, those that were there and those that may come."""
+        """The number of all runs, existing and possible."""
         return self.plan.size - self.stopped_early
 
     @property
     def over(self) -> int:
-        """The runs that are over."""
+        """The number of finished runs."""
         return self.there.total() + self.made.total()
 
     @property
     def failed(self) -> int:
-        """How many of those are not ok."""
+        """How many of these are not ok."""
         return self.over - self.made[OK] - self.there[OK]
 
     @property
     def left(self) -> int:
-        """The runs that are still to be made: of those that were there, some may not have come up yet."""
+        """The number of runs still to be made: some of the existing ones may not have come up yet."""
         return max(0, self.total - self.over - (self._asked_for - self.there.total()))
 
     @cached_property
     def _asked_for(self) -> int:
-        """How many of the runs that are known the plan asks for; in a folder there may be others, too."""
+        """How many of the known runs the plan asks for; a folder may hold others, too."""
         if not self.known:
             return 0
         replications = range(self.plan.replications)
         return sum(self.plan.key(each, one) in self.known for each in self.plan for one in replications)
 
     def next(self) -> Task | None:
-        """The next run; None if there is none now, or ever."""
+        """The next run; None if there is none at present, or none left."""
         if self._again:
             return self._again.popleft()
         for runs in chain(list(self._open.values()), map(self._begin, self._conditions)):
@@ -92,12 +92,12 @@ class Backlog:
         return None
 
     def again(self, task: Task) -> None:
-        """A run is to be made once more, as its worker has died."""
+        """Make a run again, because its worker has died."""
         task.attempt += 1
         self._again.append(task)
 
     def finished(self, task: Task, done: Done) -> None:
-        """A run is over."""
+        """A run has finished."""
         self._running[task.condition] -= 1
         self._note(task.condition, done, self.made)
 
@@ -106,7 +106,7 @@ class Backlog:
         return runs
 
     def _runs(self, condition: Condition) -> Iterator[Task | None]:
-        """The runs of a condition that are not there; None while the end of a batch is waited for."""
+        """The missing runs of a condition; None while waiting for the end of a batch."""
         index, most, until = condition.index, self.plan.replications, self.plan.study.until
         values = self._values[index] = []
         batch = most if until is None else until.batch

@@ -1,4 +1,4 @@
-"""Runs on the machines of a Dask cluster, whose rows come back and are written here."""
+"""Runs on the machines of a Dask cluster; their rows come back and are written here."""
 
 from __future__ import annotations
 
@@ -22,11 +22,11 @@ from .making import Keeper
 from .parcel import SENT, fitness, make_on_worker, pack, parcel_key, unfit
 from .processes import DONE, Outcome, WorkerError
 
-CONNECT = 10.0  # s in which a scheduler has to answer
+CONNECT = 10.0  # s for a scheduler to answer
 PATIENCE = 60.0  # s without any worker
-_ANSWER = 30.0  # s in which one that is busy has to answer
-_LOOK = 0.5  # s between two looks around
-_BATCH = 0.5  # s that a batch of runs is to take: time enough to bring the next
+_ANSWER = 30.0  # s for a busy scheduler to answer
+_LOOK = 0.5  # s between two checks
+_BATCH = 0.5  # s that a batch of runs should take: enough time to bring the next
 _LARGEST = 100  # runs of a batch
 
 
@@ -35,7 +35,7 @@ def distributed_module() -> Any:
     try:
         import dask
 
-        # Its log is set up when it is imported.  What a user has to know comes as an exception.
+        # Its log is set up on import. What a user needs to know comes as an exception.
         with dask.config.set({"logging": {"distributed": "critical", "distributed.client": "critical"}}):
             import distributed
     except ImportError as error:
@@ -44,9 +44,9 @@ def distributed_module() -> Any:
 
 
 class Cluster:
-    """The workers of a scheduler.
+    """The workers of a Dask scheduler.
 
-    Without the address of one there is a scheduler of its own, with ``jobs`` processes at a time on this machine.
+    Without an address, it starts a scheduler on this machine, with ``jobs`` processes at a time.
     """
 
     def __init__(self, keeper: Keeper, jobs: int, scheduler: str | None) -> None:
@@ -60,10 +60,10 @@ class Cluster:
         self._sent: dict[str, Any] = {}  # parcels, by worker
         self._batches = 0
         self._running: dict[asyncio.Future[list[Outcome]], list[Task]] = {}
-        self._wanted = 1  # batches at a time
-        self._seconds = _BATCH  # that a run takes, as far as known
+        self._wanted = 1  # batches submitted at a time
+        self._seconds = _BATCH  # estimated s of a run
         self._looked = 0.0
-        self._seen = time.monotonic()  # when there were workers
+        self._seen = time.monotonic()  # when there were last workers
 
     def run(self, tell: Callable[[], None]) -> None:
         """Make all runs; ``tell`` is called now and then.  Raises ``WriteError`` and ``WorkerError``."""
@@ -94,7 +94,7 @@ class Cluster:
     async def _client(self) -> AsyncIterator[Any]:
         module = self._distributed
         if self._scheduler is None:
-            # In this process: each run has a process of its own, whatever Dask's worker is.
+            # In this process: runs have their own processes, wherever Dask's worker is.
             cluster = module.LocalCluster(
                 processes=False,
                 n_workers=1,
@@ -115,14 +115,14 @@ class Cluster:
             except (OSError, ValueError) as error:
                 raise WorkerError(
                     f"no scheduler answers at {self._scheduler}\n"
-                    "   help: 'dask scheduler' starts one, and says its address"
+                    "   help: 'dask scheduler' starts one and prints its address"
                 ) from error
             yield client
         finally:
             await client.close()
 
     async def _look(self, client: Any) -> None:
-        """Look at the workers, now and then; raises ``WorkerError`` if one cannot work, or none is there for long."""
+        """Check the workers now and then; raises ``WorkerError`` if one cannot work, or there are none for long."""
         now = time.monotonic()
         if now - self._looked < _LOOK:
             return
@@ -132,18 +132,18 @@ class Cluster:
             del self._sent[address]
         if new := sorted(threads.keys() - self._sent.keys()):
             await self._welcome(client, new)
-        # More than the workers take: what is left waits at the scheduler for whoever is free first.
+        # More than the workers take: the rest waits at the scheduler for the first free worker.
         self._wanted = 2 * sum(threads.values()) + 4
         if threads:
             self._seen = time.monotonic()
         elif now - self._seen > PATIENCE:
             raise WorkerError(
                 f"the scheduler {self._scheduler} has had no workers for {PATIENCE:g} s\n"
-                f"   help: 'dask worker {self._scheduler}' starts some"
+                f"   help: 'dask worker {self._scheduler}' starts one"
             )
 
     async def _welcome(self, client: Any, workers: list[str]) -> None:
-        """Send new workers the parcel; raises ``WorkerError`` if one is not like this machine."""
+        """Send new workers the parcel; raises ``WorkerError`` if one differs from this machine."""
         options = {"workers": workers, "on_error": "return"}
         for address, there in (await self._asked(client.run(resolve_name, _name(fitness), **options))).items():
             if isinstance(there, ImportError | AttributeError):
@@ -151,28 +151,28 @@ class Cluster:
         for address, there in (await self._asked(client.run(fitness, **options))).items():
             if isinstance(there, dict) and (unlike := unfit(there, fitness())):
                 raise WorkerError(f"the Dask worker {address} {unlike}")
-        # To each its own, that they have before they have any work: nobody is preferred as he has it, or waited for.
+        # Each worker gets the parcel before any work, so that none is preferred for having it, or waited for.
         for address in workers:
             parcel = {parcel_key(self._study, address): self._parcel}
             self._sent[address] = await self._asked(client.scatter(parcel, workers=[address]))
 
     async def _asked(self, question: Any) -> Any:
-        """What the scheduler answers; raises ``WorkerError`` if it does not."""
+        """The scheduler's answer; raises ``WorkerError`` if there is none."""
         try:
             return await asyncio.wait_for(question, _ANSWER)
-        except Exception as error:  # of many kinds, whose only reason can be this
+        except Exception as error:  # many kinds, all for the same reason
             raise self._lost() from error
 
     def _lost(self) -> WorkerError:
         return WorkerError(
-            f"the scheduler{'' if self._scheduler is None else f' {self._scheduler}'} is gone\n"
-            f"   help: what was finished is kept; 'epicycle resume {self._keeper.store.folder}' goes on"
+            f"the scheduler{'' if self._scheduler is None else f' {self._scheduler}'} no longer answers\n"
+            f"   help: finished runs are kept; 'epicycle resume {self._keeper.store.folder}' continues"
         )
 
     # -- runs -----------------------------------------------------------------------------------------------------
 
     def _batch(self) -> list[Task] | None:
-        """The next runs; one that may have ended its process comes alone."""
+        """The next runs; one that may have killed its process comes alone."""
         share = (self._backlog.total - self._backlog.over) // (2 * self._wanted)
         most = max(1, min(_LARGEST, int(_BATCH / self._seconds), share))
         batch: list[Task] = []
@@ -183,12 +183,12 @@ class Cluster:
         return batch or None
 
     def _fill(self, client: Any) -> None:
-        """Give as much as is wanted."""
+        """Submit as many batches as wanted."""
         while len(self._running) < self._wanted and (batch := self._batch()):
             self._begin(client, batch)
 
     def _begin(self, client: Any, batch: list[Task]) -> None:
-        """Send a batch.  All that the scheduler sees of it is Python's own: it need not know Epicycle."""
+        """Send a batch.  The scheduler sees only types of Python itself, so it need not have Epicycle."""
         self._batches += 1
         key = f"{self._study}-{self._batches}"
         make = (resolve_name, _name(make_on_worker))
@@ -198,21 +198,21 @@ class Cluster:
         self._running[asyncio.ensure_future(future.result())] = batch
 
     def _end(self, over: asyncio.Future[list[Outcome]], batch: list[Task]) -> None:
-        """A batch is over, or has ended its workers."""
+        """A batch has finished, or has killed its workers."""
         try:
             outcomes = over.result()
         except self._distributed.KilledWorker:
             for task in batch:
-                if len(batch) > 1:  # it may have been another one of them
+                if len(batch) > 1:  # another run of the batch may be to blame
                     self._backlog.again(task)
                 else:
-                    self._keeper.again(task, "the Dask workers that made it ended, one after the other")
+                    self._keeper.again(task, "the Dask workers that made it ended one after another")
             return
         except (CancelledError, asyncio.CancelledError, self._distributed.core.CommClosedError) as error:
             raise self._lost() from error
         except WorkerError:
             raise
-        except (ImportError, AttributeError) as error:  # of a worker that has just come
+        except (ImportError, AttributeError) as error:  # from a worker that has just joined
             raise WorkerError(f"a Dask worker {_without(error)}") from error
         except Exception as error:
             raise WorkerError(f"the Dask workers cannot make runs: {type(error).__name__}: {error}") from error
@@ -220,12 +220,14 @@ class Cluster:
             if what == DONE:
                 told, why_not = told
                 if why_not is not None and self._is_right_here(task):
-                    raise WorkerError(f"a Dask worker cannot load the model, which is right here:\n{why_not}\n{SENT}")
+                    raise WorkerError(
+                        f"a Dask worker cannot load the model, although this machine can:\n{why_not}\n{SENT}"
+                    )
                 self._seconds += 0.2 * (told["wall_time"] - self._seconds)
             self._keeper.settle(task, (what, told))
 
     def _is_right_here(self, task: Task) -> bool:
-        """Whether the model of a run can be loaded on this machine."""
+        """Whether this machine can load the model of a run."""
         plan = self._backlog.plan
         try:
             plan.load(plan.condition(task.condition))
@@ -235,9 +237,9 @@ class Cluster:
 
 
 def _name(function: Callable[..., object]) -> str:
-    """What ``resolve_name`` finds a function by."""
+    """The name by which ``resolve_name`` finds a function."""
     return f"{function.__module__}:{function.__name__}"
 
 
 def _without(error: Exception) -> str:
-    return f"has no Epicycle like this one: {error}\n   help: install it there, in the version that is here"
+    return f"does not have this version of Epicycle: {error}\n   help: install it there"

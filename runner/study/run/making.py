@@ -1,4 +1,4 @@
-"""Making the runs of a backlog in processes of this machine, and keeping what comes of each, wherever it was made."""
+"""Making the runs of a backlog in processes on this machine, and keeping the results of runs made anywhere."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from .processes import DEAD, DONE, Outcome, Processes
 from .runner import Runner, empty_row
 from .store import Row, Store, Writer, writing
 
-_LOOK = 0.5  # s between two looks at the clock
-ATTEMPTS = 3  # of a run whose process dies; memory runs out for what others take, too
+_LOOK = 0.5  # s between two checks of the clock
+ATTEMPTS = 3  # for a run whose process dies; others may have used up the memory
 
 
 @dataclass
 class Keeper:
-    """Keeps the rows of runs that are over, whoever has made them, and sees to it that the others are made again."""
+    """Keeps the rows of finished runs, whoever made them, and has the others made again."""
 
     store: Store
     backlog: Backlog
@@ -27,7 +27,7 @@ class Keeper:
     _writer: Writer
 
     def settle(self, task: Task, outcome: Outcome) -> None:
-        """See what has become of a run."""
+        """Handle the outcome of a run."""
         what, told = outcome
         if what == DONE:
             self._keep(task, told)
@@ -37,7 +37,7 @@ class Keeper:
             self._give_up(task, TIMEOUT, f"it took longer than {self.timeout:g} s")
 
     def again(self, task: Task, error: str) -> None:
-        """A run whose process has died is made again, or given up with this ``error``."""
+        """Make a run whose process died again, or give it up with this ``error``."""
         if task.attempt < ATTEMPTS:
             self.backlog.again(task)
         else:
@@ -56,7 +56,7 @@ class Keeper:
 
 @contextmanager
 def keeping(store: Store, backlog: Backlog, timeout: float | None) -> Iterator[Keeper]:
-    """What was interrupted leaves its journal, which the next to open the folder makes a part of."""
+    """An interrupted session leaves its journal, which the next one to open the folder turns into a part."""
     writer = Writer(store)
     try:
         yield Keeper(store, backlog, timeout, writer)
@@ -67,12 +67,12 @@ def keeping(store: Store, backlog: Backlog, timeout: float | None) -> Iterator[K
 
 
 def make_here(keeper: Keeper, jobs: int, tell: Callable[[], None]) -> None:
-    """Make the runs in processes of this machine."""
+    """Make the runs in processes on this machine."""
     backlog, tasks = keeper.backlog, dict[Future[Outcome], Task]()
     over: queue.SimpleQueue[Future[Outcome]] = queue.SimpleQueue()
     with ThreadPoolExecutor(jobs) as threads, Processes(Runner.of_manifest, keeper.store.manifest) as processes:
         while True:
-            # More than there are processes: who has made one begins with the next before this one is written.
+            # More than there are processes: each starts its next run before the last one is written.
             while len(tasks) < 2 * jobs and (task := backlog.next()) is not None:
                 future = threads.submit(_make, processes, task, keeper.timeout)
                 tasks[future] = task
@@ -88,7 +88,7 @@ def make_here(keeper: Keeper, jobs: int, tell: Callable[[], None]) -> None:
 
 
 def _make(processes: Processes, task: Task, timeout: float | None) -> Outcome:
-    """Make a run, and at once again if its process dies: who kills processes when rows come would hit it each time."""
+    """Make a run, and again at once if its process dies."""
     while (outcome := processes.make(task, timeout))[0] == DEAD and task.attempt < ATTEMPTS:
         task.attempt += 1
     return outcome

@@ -1,4 +1,4 @@
-"""The manifest of a study's results folder: what it holds, and how we know that it is what was written."""
+"""The manifest of a study's results folder: its contents, and how we know that they are intact."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ class StoreError(EpicycleError):
 
 
 class DamagedError(StoreError):
-    """A file of a results folder that does not hold any more what was written."""
+    """A file of a results folder that no longer holds what was written."""
 
 
-# What a plan is made of again, and how it looks: a type, some of the values, a list or mapping of these (of two of the
-# same, if there are two), a record, or (in a tuple) one of several.
+# The entries from which a plan is restored, and their shapes: a type, some of the values, a list or mapping of these
+# (of two of the same, if there are two), a record, or (in a tuple) one of several.
 _KINDS = frozenset({"bool", "int", "float", "text"})
 _SHAPE: dict[str, Any] = {
     "epicycle": str,
@@ -63,14 +63,14 @@ def _fits(value: Any, shape: Any) -> bool:
             has_keys = isinstance(value, dict) and (str in shape or value.keys() == shape.keys())
             return has_keys and all(_fits(each, shape.get(str) or shape[name]) for name, each in value.items())
         case range():
-            return type(value) is int and value in shape  # of anything else it would ask every number
+            return type(value) is int and value in shape  # for any other type it would compare every number
         case frozenset():
             return type(value) is str and value in shape
     return value is None if shape is None else type(value) is shape
 
 
 def columns_of_rows(factors: Mapping[str, str], metrics: Iterable[str]) -> dict[str, str]:
-    """The columns of a row, and what they hold."""
+    """The columns of a row, and their types."""
     return {
         **{"run": "text", "condition": "text", "replication": "int"},
         **factors,
@@ -90,7 +90,7 @@ def schema_of(manifest: Mapping[str, Any]) -> pa.Schema:
 
 
 def checksum(data: bytes) -> str:
-    """By which bytes are known again; of 2^64 kinds of damage one stays unseen."""
+    """Identifies bytes; it misses one in 2^64 kinds of damage."""
     return hashlib.sha256(data).hexdigest()[:16]
 
 
@@ -104,11 +104,11 @@ def _checksum_of(manifest: Mapping[str, Any]) -> str:
 
 
 def read_manifest(folder: Path) -> dict[str, Any]:
-    """What a results folder says of itself; raises ``StoreError``, and ``DamagedError`` for what we did not write."""
+    """The manifest of a results folder; raises ``StoreError``, and ``DamagedError`` for what we did not write."""
     path = folder / "manifest.json"
 
     def damaged(what: object) -> DamagedError:
-        told = f"'epicycle study STUDY --out {folder}' writes it anew, and keeps the runs that are there"
+        told = f"'epicycle study STUDY --out {folder}' rewrites it and keeps the existing runs"
         return DamagedError(f"{path} {what}\n   help: {told}")
 
     if not folder.is_dir():
@@ -126,14 +126,14 @@ def read_manifest(folder: Path) -> dict[str, Any]:
     if not isinstance(manifest, dict) or not manifest.keys() & {"level_sources", "checksum"}:
         raise StoreError(f"{folder} holds other results, not those of a study")
     if "checksum" in manifest and manifest["checksum"] != _checksum_of(manifest):
-        raise damaged("is damaged: it is not what was written")
+        raise damaged("is damaged: it does not match its checksum")
     if (found := manifest.get("format")) != FORMAT:
         raise StoreError(
-            f"{folder} has format {found}, this Epicycle reads format {FORMAT}\n"
-            f"   help: its table.parquet can be read with pandas; make its runs anew in another folder"
+            f"{folder} has format {found}, but this Epicycle reads format {FORMAT}\n"
+            f"   help: pandas can read its table.parquet; to continue, repeat its runs in another folder"
         )
     if missing := [repr(name) for name in (*_SHAPE, "checksum") if name not in manifest]:
         raise damaged(f"is damaged: it has no {', '.join(missing)}")
     if unlike := [repr(name) for name, shape in _SHAPE.items() if not _fits(manifest[name], shape)]:
-        raise damaged(f"is damaged: {', '.join(unlike)} cannot be what was written")
+        raise damaged(f"is damaged: {', '.join(unlike)} cannot have been written like this")
     return manifest

@@ -1,6 +1,6 @@
-"""A parcel: a plan with all files that it reads, for machines that share no file system with this one.
+"""A parcel: a plan with all files that it reads, for machines without access to this file system.
 
-There a Dask worker hands the runs to processes of its own, and ends those that hang.
+There, a Dask worker passes the runs to its own processes, and ends those that hang.
 """
 
 from __future__ import annotations
@@ -31,21 +31,20 @@ from .runner import Runner
 from .store import Row
 
 SENT = (
-    "   help: files are sent along if they are named by a path from the study or the model; packages have to be "
-    "installed there"
+    "   help: files named by a path relative to the study or the model are sent along; packages must be installed there"
 )
 _CODE = ("epicycle.actors", "epicycle.aspects", "epicycle.runner")
-_SOURCES = (".py", ".pyx", ".pxd")  # of what is compiled, too
+_SOURCES = (".py", ".pyx", ".pxd")  # including those of compiled modules
 _NO_MATTER = ("pyarrow",)  # workers write no files
-_OPTIONAL = ("casadi",)  # which takes part in runs, where it is installed
+_OPTIONAL = ("casadi",)  # takes part in runs, where installed
 _SOON = 0.05  # s
-_IDLE = 20.0  # s after which processes without work are ended: their study is over
+_IDLE = 20.0  # s after which processes without work are ended: their study has finished
 
 
 def pack(plan: Plan) -> bytes:
-    """A plan that has been tried, with its files.
+    """A checked plan with its files.
 
-    Each file goes under the names by which it may be asked for: as it was read, and with links resolved.
+    Each file is listed under the names by which it may be requested: as it was read, and with links resolved.
     """
     files: dict[str, bytes] = {}
     for name in (*plan.files, *_modules(plan.study.types)):
@@ -59,10 +58,10 @@ def pack(plan: Plan) -> bytes:
 
 
 def unpack(parcel: bytes, root: Path) -> Plan:
-    """Lay the files of a parcel below a folder as they were below the root of their machine; the plan that is there.
+    """Unpack the files of a parcel below a folder, as they were below the root of their machine; returns the plan.
 
-    The working directory becomes what the study's was, so that names of files in ``--set`` mean the same.  Raises
-    ``WorkerError`` on a machine where a seed may give another run.
+    The working directory becomes that of the study, so that names of files in ``--set`` mean the same.  Raises
+    ``WorkerError`` on a machine where a seed may give a different run.
     """
     found: dict[str, Any] = pickle.loads(zlib.decompress(parcel))
     if unlike := unfit(fitness(), found["fitness"]):
@@ -73,7 +72,7 @@ def unpack(parcel: bytes, root: Path) -> Plan:
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_bytes(content)
     study, folder = below(root, manifest["file"]), below(root, found["folder"])
-    for each in (study.parent, folder):  # a name may lead through them
+    for each in (study.parent, folder):  # a name may pass through them
         each.mkdir(parents=True, exist_ok=True)
     os.chdir(folder)
     types = [str(below(root, name)) for name in manifest["types"]]
@@ -81,13 +80,13 @@ def unpack(parcel: bytes, root: Path) -> Plan:
 
 
 def below(root: Path, name: str) -> Path:
-    """Where a file lies whose place was below the root of a file system, or of a drive."""
+    """The new place of a file that was below the root of a file system, or of a drive."""
     path = Path(name)
     return root.joinpath(path.drive.rstrip(":"), *path.parts[1:]) if path.anchor else root / path
 
 
 def _modules(types: Iterable[Path]) -> Iterator[str]:
-    """The Python files that own types import from beside their file."""
+    """The Python files that types of the user's own import from beside their file."""
     for file in types:
         folder = file.resolve().parent
         finder = ModuleFinder(path=[str(folder)])
@@ -102,7 +101,7 @@ def _modules(types: Iterable[Path]) -> Iterator[str]:
 
 @lru_cache(maxsize=1)
 def fitness() -> dict[str, str | None]:
-    """What has to be the same wherever a seed is to give the same run."""
+    """What must be the same wherever a seed should give the same run."""
     found = {name: each for name, each in versions().items() if name not in _NO_MATTER}
     found |= {name: version_of(name) for name in _OPTIONAL}
     found["python"] = ".".join(platform.python_version_tuple()[:2])
@@ -111,24 +110,24 @@ def fitness() -> dict[str, str | None]:
 
 
 def unfit(worker: Mapping[str, str | None], client: Mapping[str, str | None]) -> str:
-    """What is said of a worker, after its name, that is not like the machine that wants it to work; empty if it is."""
+    """What is wrong with a worker that differs from the machine that employs it, to follow its name; or empty."""
     told = [
         f"{name} {worker.get(name) or 'is missing'} there, {wanted or 'none'} here"
         for name, wanted in client.items()
         if name != "code" and wanted != worker.get(name)
     ]
     if not told and worker.get("code") != client["code"]:
-        told = ["the code of Epicycle is not the same"]
+        told = ["the code of Epicycle differs"]
     if not told:
         return ""
     return (
-        f"is not like this machine: {'; '.join(told)}\n"
-        "   help: the same seed is to give the same run, so install the same there"
+        f"differs from this machine: {'; '.join(told)}\n"
+        "   help: the same seed must give the same run, so install the same versions there"
     )
 
 
 def _code() -> str:
-    """A hash of Epicycle's code: while it is worked on, the version says little."""
+    """A hash of Epicycle's code: during development, the version says little."""
     digest = hashlib.sha256()
     for package in _CODE:
         for folder in map(Path, import_module(package).__path__):
@@ -143,7 +142,7 @@ def _code() -> str:
 
 
 class Guest:
-    """Makes runs of a plan among files that lie elsewhere than in the study's place."""
+    """Makes runs of a plan whose files are elsewhere than in the study's place."""
 
     def __init__(self, parcel: bytes, folder: str) -> None:
         self._root = str(Path(folder).resolve())
@@ -151,19 +150,19 @@ class Guest:
             plan = unpack(parcel, Path(self._root))
         except ModelError as error:
             raise WorkerError(
-                f"cannot read the study, which is right here:\n{self._named(str(error))}\n{SENT}"
+                f"cannot read the study, although this machine can:\n{self._named(str(error))}\n{SENT}"
             ) from error
         self._runner = Runner(plan)
 
     def prepare(self, task: Task) -> None:
-        """Load the model; raises ``WorkerError`` if this reads anything else than it does at the study's place."""
+        """Load the model; raises ``WorkerError`` if this reads other contents than in the study's place."""
         with noting() as noted:
             self._runner.prepare(task)
         if noted.files and (unlike := self._runner.plan.unlike(noted)):
-            raise WorkerError(f"has another {self._named(unlike[0])} than this machine\n{SENT}")
+            raise WorkerError(f"has another version of {self._named(unlike[0])} than this machine\n{SENT}")
 
     def make(self, task: Task) -> tuple[Row, str | None]:
-        """The row of a run; and why its model could not be loaded, if that was so."""
+        """The row of a run; and why its model could not be loaded, if it could not."""
         why_not = self._runner.why_not(task)
         row = self._runner.make(task)
         if row["error"] is not None:
@@ -171,13 +170,13 @@ class Guest:
         return row, None if why_not is None else self._named(why_not)
 
     def _named(self, text: str) -> str:
-        """The names of files as they are at the study's place."""
+        """A text with the names of files as they are in the study's place."""
         return text.replace(self._root, "")
 
 
 @dataclass
 class _House:
-    """The processes of one study on this worker, how many batches they are at, and what ends them."""
+    """The processes of one study on this worker, the number of batches they work on, and what ends them."""
 
     processes: Processes
     batches: int = 0
@@ -189,14 +188,14 @@ _guard = threading.Lock()
 
 
 def parcel_key(study: str, address: str) -> str:
-    """The name under which the worker at an address has the parcel of a study."""
+    """The name under which the worker at an address stores the parcel of a study."""
     return f"{study}-parcel-{address}"
 
 
 def make_on_worker(batch: str) -> list[Outcome]:
-    """Make runs, on a Dask worker; raises ``WorkerError`` if it cannot.
+    """Make runs on a Dask worker; raises ``WorkerError`` if it cannot.
 
-    What it gives are plain values, which a scheduler that knows nothing of Epicycle passes on.
+    It returns plain values, which a scheduler without Epicycle can pass on.
     """
     from distributed import get_worker
 
@@ -212,18 +211,18 @@ def make_on_worker(batch: str) -> list[Outcome]:
         while (parcel := worker.data.get(parcel_key(given["study"], worker.address))) is None:
             if not is_wanted():
                 raise UnwantedError
-            time.sleep(_SOON)  # the parcel comes soon after a worker that has just come
+            time.sleep(_SOON)  # the parcel arrives soon after a new worker
         with _at_work(given["study"], parcel, worker.local_directory) as processes:
             return [processes.make(Task(*each), given["timeout"], is_wanted) for each in given["tasks"]]
     except UnwantedError:
-        return []  # nobody will look at it
+        return []  # nobody will read it
     except WorkerError as error:
         raise WorkerError(f"the Dask worker {worker.address} {error}") from None
 
 
 @contextmanager
 def _at_work(study: str, parcel: bytes, place: str) -> Iterator[Processes]:
-    """The processes of a study; they are ended when there has been no work for a while."""
+    """The processes of a study, which are ended when there has been no work for a while."""
     with _guard:
         if (house := _houses.get(study)) is None:
             house = _houses[study] = _House(Processes(Guest, parcel, place=place))
@@ -244,6 +243,6 @@ def _at_work(study: str, parcel: bytes, place: str) -> Iterator[Processes]:
 def _close(study: str) -> None:
     with _guard:
         if (house := _houses.get(study)) is None or house.batches:
-            return  # work has just come
+            return  # work has just arrived
         del _houses[study]
     house.processes.end()

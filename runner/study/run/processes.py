@@ -1,8 +1,8 @@
-"""Processes that make runs for this one, some of which may hang, run out of memory or be killed.
+"""Processes that make runs for this one; some may hang, run out of memory or be killed.
 
-Whoever wants the runs outlives those that hang or kill their process, and can end them.  Each process takes what makes
-a bench, and then one request after the other from standard input; it answers on what was standard output, and ends with
-its input.
+This process survives runs that hang or kill their process, and can end them.  Each process reads from standard input
+what it needs to make a bench, and then one request after another; it answers on its original standard output, and ends
+when its input does.
 """
 
 from __future__ import annotations
@@ -24,14 +24,14 @@ from epicycle.actors import EpicycleError
 
 from ...collection import keep_for_good, seldom_collecting
 
-MAX_STILLBORN = 5  # processes in a row that end before they can do anything
-_LOOK = 0.5  # s between two looks whether a run is still wanted
+MAX_STILLBORN = 5  # processes in a row that end before they start work
+_LOOK = 0.5  # s between two checks whether a run is still wanted
 # One thread a process: N processes of N threads each would only be in each other's way.
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS", "NUMBA_NUM_THREADS")
 
-# What a process tells, with an exception for ``RAISED`` and what it has made for ``DONE``.
+# The answers of a process, with an exception for ``RAISED`` and the result for ``DONE``.
 READY, BEGUN, DONE, RAISED = "ready", "begun", "done", "raised"
-# What else may become of a request: it took too long, or the process has ended with that exit code.
+# Other outcomes of a request: it took too long, or the process ended with that exit code.
 LATE, DEAD = "late", "dead"
 Outcome = tuple[str, Any]
 
@@ -41,31 +41,31 @@ class WorkerError(EpicycleError):
 
 
 class UnwantedError(EpicycleError):
-    """Whoever wanted something made has gone."""
+    """Nobody waits for the result any longer."""
 
 
 class Bench(Protocol):
-    """What makes things in a process, one after the other."""
+    """Makes things in a process, one after another."""
 
     def prepare(self, request: Any) -> None:
-        """Load what is needed; has as much time as ``make``."""
+        """Load what is needed; has the same time limit as ``make``."""
 
     def make(self, request: Any) -> Any:
-        """What is wanted, as plain data."""
+        """The result, as plain data."""
 
 
 class _Process:
     def __init__(self, begin: Callable[..., Bench], arguments: tuple[object, ...], folder: str) -> None:
         self._folder = folder
         environment = {**os.environ, **dict.fromkeys(_THREADS, "1"), "PYTHONPATH": os.pathsep.join(sys.path)}
-        # No multiprocessing: the processes of Dask are daemons, which may have no children by it.  With -P they import
-        # what this process would, and no module of that name that happens to lie in the working directory.
+        # No multiprocessing: the processes of Dask are daemons, which it allows no children. With -P they import what
+        # this process would, and no module of the same name that happens to be in the working directory.
         self._process = subprocess.Popen(
             [sys.executable, "-P", "-c", f"from {__name__} import serve; serve()"],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             env=environment,
-            process_group=0,  # an interrupt from the terminal is not meant for it; it ends with its input
+            process_group=0,  # an interrupt from the terminal is not meant for it; it ends when its input does
         )
         self._told: queue.SimpleQueue[Outcome] = queue.SimpleQueue()
         threading.Thread(target=self._listen, daemon=True).start()
@@ -73,7 +73,7 @@ class _Process:
         self.is_ready = False
 
     def make(self, request: object, timeout: float | None, is_wanted: Callable[[], bool]) -> Outcome:
-        """What becomes of a request; raises what the bench has raised, and ``UnwantedError``."""
+        """The outcome of a request; raises what the bench has raised, and ``UnwantedError``."""
         if self._first is not None:
             self._give(self._first)
             self._first = None
@@ -97,7 +97,7 @@ class _Process:
                 return what, told
 
     def end(self) -> None:
-        """Kill it, if it is still there, and leave nothing behind."""
+        """Kill it if it still runs, and leave nothing behind."""
         self._process.kill()
         self._process.wait()
         if self._folder:
@@ -108,7 +108,7 @@ class _Process:
         try:
             pickle.dump(what, self._process.stdin)
             self._process.stdin.flush()
-        except OSError:  # it has died, which the listener tells
+        except OSError:  # it has died, which the listener reports
             return
 
     def _listen(self) -> None:
@@ -121,10 +121,10 @@ class _Process:
 
 
 class Processes:
-    """As many processes as are wanted at once, each of which makes one thing after the other.
+    """Several processes at once, each of which makes one thing after another.
 
-    In each, ``begin(*arguments)`` makes the bench.  ``place``: where each is to have a folder of its own, until it
-    ends; it is the last argument then.
+    In each, ``begin(*arguments)`` makes the bench.  ``place``, if given, is where each gets a temporary folder, which
+    becomes the last argument.
     """
 
     def __init__(self, begin: Callable[..., Bench], *arguments: object, place: str = "") -> None:
@@ -139,9 +139,9 @@ class Processes:
     def make(
         self, request: object, timeout: float | None = None, is_wanted: Callable[[], bool] = lambda: True
     ) -> Outcome:
-        """What becomes of a request in one of the processes, in at most ``timeout`` seconds once it has begun.
+        """The outcome of a request in one of the processes, in at most ``timeout`` seconds from its start.
 
-        Raises ``WorkerError``, what the bench has raised, and ``UnwantedError`` if it is not wanted any more.
+        Raises ``WorkerError``, what the bench has raised, and ``UnwantedError`` if it is no longer wanted.
         """
         code = None
         for _ in range(MAX_STILLBORN):
@@ -155,10 +155,10 @@ class Processes:
             if process.is_ready:
                 return what, told
             code = told
-        raise WorkerError(f"{MAX_STILLBORN} processes in a row ended before they could begin (exit code {code})")
+        raise WorkerError(f"{MAX_STILLBORN} processes in a row ended before they could start (exit code {code})")
 
     def end(self) -> None:
-        """End all, in the middle of what they are at."""
+        """End all, even in the middle of their work."""
         with self._guard:
             self._is_over = True
             there = [*self._idle, *self._busy]
@@ -192,15 +192,15 @@ class Processes:
         process.end()
 
 
-# -- in such a process ------------------------------------------------------------------------------------------------
+# -- inside such a process --------------------------------------------------------------------------------------------
 
 
 def serve() -> None:
-    """Serve whoever has started this process."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # who waits for it decides what an interrupt means
+    """Serve the process that started this one."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the waiting process decides what an interrupt means
     requests, replies = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
     nothing = os.open(os.devnull, os.O_RDWR)
-    for each in (0, 1):  # an actor that prints would break into the answers
+    for each in (0, 1):  # an actor that prints would corrupt the answers
         os.dup2(nothing, each)
     given: queue.SimpleQueue[Any] = queue.SimpleQueue()
     threading.Thread(target=_listen, args=(requests, given), daemon=True).start()
@@ -220,7 +220,7 @@ def serve() -> None:
                 bench.prepare(request)
                 tell(BEGUN)
                 tell(DONE, bench.make(request))
-                if not is_settled:  # what a first run has loaded, none of the next needs to be looked through for
+                if not is_settled:  # what the first run has loaded need not be scanned in later ones
                     keep_for_good()
                     is_settled = True
     except BrokenPipeError:
@@ -232,7 +232,7 @@ def serve() -> None:
 
 
 def _listen(requests: BinaryIO, given: queue.SimpleQueue[Any]) -> None:
-    """Take what comes; when who wants the runs has ended, however that was, end in the middle of a run."""
+    """Read the requests; if the process that sends them ends in any way, end even in the middle of a run."""
     try:
         while True:
             given.put(pickle.load(requests))

@@ -1,4 +1,4 @@
-"""How far a study is: a bar where there is somebody to see it, a line a minute elsewhere."""
+"""The progress of a study: a bar where somebody can see it, a line per minute elsewhere."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ EVERY = 60.0  # s between two lines where there is no bar
 
 
 class Pulse:
-    """The rate of a session, and what is left to do."""
+    """The rate of a session, and the work left."""
 
     def __init__(self) -> None:
         self.started = time.monotonic()
@@ -32,7 +32,7 @@ class Pulse:
 
 @contextmanager
 def progress(name: str) -> Iterator[Callable[[Backlog], None]]:
-    """What a session calls now and then."""
+    """A function for a session to call now and then."""
     pulse = Pulse()
     with bar(name) as show:
         last = pulse.started
@@ -51,7 +51,7 @@ def progress(name: str) -> Iterator[Callable[[Backlog], None]]:
 
 
 def duration(seconds: float) -> str:
-    """A time as people say it."""
+    """A duration in words."""
     for limit, size, unit in ((100, 1, "s"), (6_000, 60, "min"), (172_800, 3600, "h"), (63_072_000, 86_400, "days")):
         if seconds < limit:
             return f"{seconds / size:.0f} {unit}"

@@ -1,4 +1,4 @@
-"""Runs of a study: from a task to its row; and once more, for signals, which a study does not keep as runs repeat."""
+"""Runs of a study: from a task to its row; and repeated for their signals, which a study need not keep."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ _MODELS_KEPT = 4
 
 
 class Runner:
-    """Makes runs of a plan, and keeps the models of the last conditions."""
+    """Makes runs of a plan, and keeps the models of the latest conditions."""
 
     def __init__(self, plan: Plan) -> None:
         self.plan = plan
@@ -36,7 +36,7 @@ class Runner:
         return cls(Plan.of_manifest(manifest))
 
     def prepare(self, task: Task) -> None:
-        """Load the model of the task's condition, unless it is there."""
+        """Load the model of the task's condition, unless it is loaded."""
         self._loaded(task.condition)
 
     def why_not(self, task: Task) -> str | None:
@@ -45,7 +45,7 @@ class Runner:
         return model if isinstance(model, str) else None
 
     def make(self, task: Task) -> Row:
-        """The row of a run; whatever it raises is reported there."""
+        """The row of a run, which also reports what it raises."""
         condition, model = self._loaded(task.condition)
         row = empty_row(self.plan, condition, task)
         started = time.perf_counter()
@@ -74,17 +74,17 @@ class Runner:
 
 
 def empty_row(plan: Plan, condition: Condition, task: Task) -> Row:
-    """What a row holds before the run."""
+    """The row before the run."""
     known = {"run": task.key, "condition": condition.key, "replication": task.replication, "seed": task.seed}
     columns = columns_of_rows(plan.study.factors, (metric.name for metric in plan.metrics))
     return dict.fromkeys(columns) | known | condition.values
 
 
-# -- once more --------------------------------------------------------------------------------------------------------
+# -- repeated runs ----------------------------------------------------------------------------------------------------
 
 
 def again(plan: Plan, condition: Condition, seed: int) -> tuple[Model, Results, EpicycleError | None]:
-    """A run once more, alone, with all that the model records and the whole event log; and what made it fail."""
+    """Repeat a run alone, with everything that the model records and the whole event log; and what made it fail."""
     model = plan.load(condition)
     simulation = Simulation(model, seed=seed, keep_log=LogFilter({}))
     try:
@@ -100,22 +100,22 @@ def again(plan: Plan, condition: Condition, seed: int) -> tuple[Model, Results, 
 
 
 class ReplayError(EpicycleError):
-    """A run that cannot be repeated, or does not give what it gave before."""
+    """A run that cannot be repeated, or gives a different result."""
 
 
 class Reader(Protocol):
-    """What is wanted of a repeated run; has to be picklable."""
+    """What to extract from a repeated run; must be picklable."""
 
     def ports(self, model: Model) -> tuple[str, ...]:
         """The output ports to be recorded, as patterns."""
 
     def extract(self, model: Model, results: Results) -> Any:
-        """What is kept, as plain data."""
+        """The extract, as plain data."""
 
 
 @dataclass(frozen=True)
 class Replay:
-    """A run that is to be repeated, and who reads it, by name."""
+    """A run to repeat, and its readers by name."""
 
     condition: int
     replication: int
@@ -127,18 +127,18 @@ class Replay:
 def repeat(
     plan: Plan, replays: Sequence[Replay], jobs: int, tell: Callable[[int], None] = lambda done: None
 ) -> Iterator[tuple[Replay, dict[str, Any]]]:
-    """Repeat runs in ``jobs`` processes, in any order: each with what its readers took of it.
+    """Repeat runs in ``jobs`` processes, in any order; yields each with what its readers extracted.
 
-    What a reader raises stands in the place of what it took, as an ``EpicycleError``.  Raises ``ReplayError``.
+    What a reader raises replaces its extract, as an ``EpicycleError``.  Raises ``ReplayError``.
     """
-    # Runs of one condition follow each other, so that a process loads few models.
+    # Runs of a condition follow each other, so that a process loads few models.
     ordered = sorted(replays, key=lambda each: (each.condition, each.replication))
     with ThreadPoolExecutor(jobs) as threads, Processes(_Repeater, plan.manifest()) as processes:
         futures = {threads.submit(processes.make, each): each for each in ordered}
         for done, future in enumerate(as_completed(futures), start=1):
             what, found = future.result()
             if what != DONE:
-                raise ReplayError("a process that repeated runs has died; is there enough memory?")
+                raise ReplayError("a process that was repeating runs died; is there enough memory?")
             yield futures[future], found
             tell(done)
 
@@ -155,7 +155,7 @@ class _Repeater:
         self._model(replay.condition)
 
     def make(self, replay: Replay) -> dict[str, Any]:
-        """What the readers take of the run."""
+        """The extracts of the readers from the run."""
         model = self._model(replay.condition)
         model.recorded = []
         for _, reader in replay.readers:
@@ -163,8 +163,9 @@ class _Repeater:
         results = Simulation(model, seed=replay.seed).run()
         if results.digest != replay.digest:
             raise ReplayError(
-                f"run {replay.replication} of condition {replay.condition} (seed {replay.seed}) does not repeat: "
-                f"its digest is {results.digest[:16]}..., but was {replay.digest[:16]}...; something has changed since"
+                f"run {replay.replication} of condition {replay.condition} (seed {replay.seed}) gave a different "
+                f"result: its digest is {results.digest[:16]}..., but was {replay.digest[:16]}...; something has "
+                "changed since"
             )
         found: dict[str, Any] = {}
         for name, reader in replay.readers:

@@ -1,4 +1,4 @@
-"""The results folder of a study: parts that are only ever added, each whole; journals of what is not in one yet.
+"""The results folder of a study: parts, which are only added, each complete; journals of rows not yet in a part.
 
 ::
 
@@ -6,17 +6,17 @@
     parts/<name>-<checksum>.parquet
                            rows of runs; a part appears all at once, and is never changed
     journals/<name>.jsonl  the rows of a session since its last part, a line each: checksum, row
-    table.parquet          all rows in the order of the plan, made at the end
+    table.parquet          all rows in the order of the plan, written at the end
     lock                   held by the process that writes
-    damaged/               files that were not any more what was written
+    damaged/               files that did not match their checksums
 
-A run counts as finished when its line is in a journal, that is before anybody hears of it: the line is handed to the
-operating system at once, where no ``kill`` can reach it, and brought to the disk at most once a second.  The next to
-open the folder makes a part of every journal that was left behind.  A row that is in two places is one row.
+A run counts as finished once its line is in a journal, before anybody is notified: the line is handed to the operating
+system at once, where no ``kill`` can reach it, and brought to the disk at most once a second.  The next session to open
+the folder turns every journal left behind into a part.  A row in two places counts once.
 
-The manifest has a checksum in it, a part in its name, a row of a journal before it, and no byte is believed before its
-checksum is seen to be right.  Who only reads is told of damage; who continues with the study puts the damaged file
-aside, and makes the runs that are not there any more.
+The manifest contains its checksum, a part has it in its name, a row of a journal before it, and nothing is used before
+its checksum is verified.  Readers get an error about damage; a session that continues the study sets the damaged file
+aside, and repeats the lost runs.
 """
 
 from __future__ import annotations
@@ -42,24 +42,24 @@ if TYPE_CHECKING:
 
 try:
     import fcntl
-except ImportError:  # Windows: nothing tells two processes that they write to one folder
+except ImportError:  # Windows: nothing keeps two processes from writing to one folder
     fcntl = None  # type: ignore[assignment]
 
 _LOGGER = logging.getLogger("epicycle")
 
 ROWS_OF_A_PART = 1_000
 SECONDS_TO_THE_DISK = 1.0
-BEST_FIRST = (OK, FAILED, TIMEOUT, KILLED)  # of two rows of one run, the better one counts
+BEST_FIRST = (OK, FAILED, TIMEOUT, KILLED)  # of two rows of a run, the better one counts
 
 Row = dict[str, Any]
 
 
 class WriteError(StoreError):
-    """A results folder that takes nothing more."""
+    """A results folder that cannot be written to."""
 
 
 class Store:
-    """A results folder that is open for reading; raises ``StoreError`` if it is none, or a broken one."""
+    """A results folder open for reading; raises ``StoreError`` if it is not one, or is broken."""
 
     def __init__(self, folder: Path) -> None:
         self.folder = folder
@@ -67,7 +67,7 @@ class Store:
         self.schema = schema_of(self.manifest)
 
     def rows(self, columns: list[str] | None = None) -> Iterator[pa.RecordBatch]:
-        """All rows, part by part; those of a run that was written twice come twice."""
+        """All rows, part by part; a run that was written twice comes twice."""
         import pyarrow as pa
         import pyarrow.parquet as pq
 
@@ -76,18 +76,18 @@ class Store:
             self._check(path, damage)
             with pq.ParquetFile(pa.BufferReader(data)) as file:
                 if not file.schema_arrow.equals(self.schema):
-                    told = f"{path} has not the columns of {self.folder}/manifest.json: it is of another study"
+                    told = f"{path} lacks the columns of {self.folder}/manifest.json: it belongs to another study"
                     raise StoreError(told)
                 yield from file.iter_batches(columns=columns)
         for path in sorted(self.folder.glob("journals/*.jsonl")):
-            with suppress(FileNotFoundError):  # its writer has just made a part of it
+            with suppress(FileNotFoundError):  # its writer has just turned it into a part
                 rows, damage = read_journal(path)
                 self._check(path, damage)
                 if rows:
                     yield pa.RecordBatch.from_pylist(rows, self.schema).select(columns or self.schema.names)
 
     def known(self, value: str | None = None) -> dict[str, Done]:
-        """The runs that are there, by key; ``value`` names the metric that is wanted of each."""
+        """The existing runs by key; ``value`` names the metric to return of each."""
         found: dict[str, Done] = {}
         for batch in self.rows(["run", "status", *([value] if value else [])]):
             for key, status, *number in zip(*(column.to_pylist() for column in batch.columns), strict=True):
@@ -98,17 +98,17 @@ class Store:
 
     def _check(self, path: Path, damage: str) -> None:
         if damage:
-            told = f"'epicycle resume {self.folder}' puts it aside and makes the runs anew that are lost with it"
+            told = f"'epicycle resume {self.folder}' sets it aside and repeats its lost runs"
             raise DamagedError(f"{path} {damage}\n   help: {told}")
 
 
-# -- opening it to write ----------------------------------------------------------------------------------------------
+# -- opening it for writing -------------------------------------------------------------------------------------------
 
 
 def prepare(folder: Path, manifest: Mapping[str, Any]) -> Store:
-    """Make a results folder, or see that one that is there holds results of the same study; journals become parts.
+    """Make a results folder, or check that an existing one holds results of the same study; journals become parts.
 
-    Raises ``StoreError``.  The caller holds the lock, so that whoever has left a journal behind is gone.
+    Raises ``StoreError``.  The caller holds the lock, so whoever left a journal behind no longer runs.
     """
     path = folder / "manifest.json"
     another = "\n   help: choose another folder with --out"
@@ -117,9 +117,9 @@ def prepare(folder: Path, manifest: Mapping[str, Any]) -> Store:
         try:
             before = read_manifest(folder)
         except DamagedError:
-            if not (folder / "parts").is_dir():  # it may never have been ours
+            if not (folder / "parts").is_dir():  # it may never have been one of ours
                 raise
-            _LOGGER.warning("%s is damaged: it is written anew", path)
+            _LOGGER.warning("%s is damaged and is being rewritten", path)
     elif folder.is_dir() and any(
         each.name not in ("lock", "parts", "journals", "damaged") and not each.name.startswith(".manifest.json")
         for each in folder.iterdir()
@@ -132,18 +132,18 @@ def prepare(folder: Path, manifest: Mapping[str, Any]) -> Store:
         for what in ("factors", "metrics"):
             if list(before[what].items()) != list(manifest[what].items()):
                 had, has = _shown(before[what]), _shown(manifest[what])
-                raise StoreError(f"{folder} was made when {name} had other {what}: {had}, not {has}{another}")
+                raise StoreError(f"{folder} was made when {name} had different {what}: {had}, not {has}{another}")
     with writing(folder):
         for name in ("parts", "journals"):
             (folder / name).mkdir(exist_ok=True)
         _replace(path, manifest_text(manifest).encode())
         for pattern in ("parts/.*.parquet.*", ".manifest.json.*", ".table.parquet.*"):
             for aside in folder.glob(pattern):
-                aside.unlink()  # what somebody was writing when killed
+                aside.unlink()  # left by a process that was killed while writing
         store = Store(folder)
         for part in sorted(folder.glob("parts/*.parquet")):
             if damage := read_part(part)[1]:
-                _put_aside(part, f"{damage}; its runs are made anew")
+                _put_aside(part, f"{damage}; its runs are repeated")
         for journal in sorted(folder.glob("journals/*.jsonl")):
             if kind := irregular(journal):
                 _put_aside(journal, f"is {kind}")
@@ -152,7 +152,7 @@ def prepare(folder: Path, manifest: Mapping[str, Any]) -> Store:
             if rows:
                 write_part(store, journal.stem, rows)
             if damage:
-                _put_aside(journal, f"{damage}; their runs are made anew")
+                _put_aside(journal, f"{damage}; their runs are repeated")
             else:
                 journal.unlink()
     return store
@@ -163,11 +163,11 @@ def _shown(columns: Mapping[str, str]) -> str:
 
 
 def _put_aside(path: Path, damage: str) -> None:
-    """Keep a damaged file where it does no harm, and say so."""
+    """Move a damaged file to where it does no harm, and report it."""
     aside = path.parent.parent / "damaged"
     aside.mkdir(exist_ok=True)
     os.replace(path, aside / path.name)
-    _LOGGER.warning("%s %s\n   what is damaged is kept in %s", path, damage, aside)
+    _LOGGER.warning("%s %s\n   the damaged file is kept in %s", path, damage, aside)
 
 
 @contextmanager
@@ -181,7 +181,7 @@ def lock(folder: Path) -> Iterator[None]:
     with file:
         if not _is_locked(file):
             file.seek(0)
-            raise StoreError(f"{folder} is being written by another process ({file.read().strip()})")
+            raise StoreError(f"{folder} is in use: another process is writing to it ({file.read().strip()})")
         file.truncate(0)
         file.write(f"pid {os.getpid()}\n")
         file.flush()
@@ -197,7 +197,7 @@ def is_running(folder: Path) -> bool:
 
 
 def _is_locked(file: IO[str]) -> bool:
-    """Lock a file, if nobody else has."""
+    """Lock a file unless somebody else holds the lock."""
     try:
         if fcntl is not None:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -211,18 +211,18 @@ def _is_locked(file: IO[str]) -> bool:
 
 @contextmanager
 def writing(folder: Path) -> Iterator[None]:
-    """Tell of a full disk, missing rights and the like in one sentence: raise ``WriteError``."""
+    """Report a full disk, missing permissions and similar in one sentence: raise ``WriteError``."""
     try:
         yield
     except OSError as error:
         message = f"cannot write to {folder}: {error.strerror or error}"
-        if (folder / "manifest.json").is_file():  # something has begun
-            message += f"\n   help: what was finished is kept; 'epicycle resume {folder}' goes on"
+        if (folder / "manifest.json").is_file():  # there is something to resume
+            message += f"\n   help: finished runs are kept; 'epicycle resume {folder}' continues"
         raise WriteError(message) from error
 
 
 class Writer:
-    """Writes rows; raises ``OSError`` if it cannot, and then nothing half is left."""
+    """Writes rows; raises ``OSError`` if it cannot, and then leaves nothing incomplete."""
 
     def __init__(self, store: Store) -> None:
         self._store = store
@@ -241,9 +241,9 @@ class Writer:
         line = b"%s %s\n" % (checksum(text).encode(), text)
         size = os.fstat(self._journal).st_size
         try:
-            if os.write(self._journal, line) < len(line):  # the disk is full: the next try says so
+            if os.write(self._journal, line) < len(line):  # the disk is full: the next attempt reports it
                 os.write(self._journal, line)
-                raise OSError("only a part of a row could be written")
+                raise OSError("a row could be written only in part")
         except OSError:
             with suppress(OSError):
                 os.ftruncate(self._journal, size)
@@ -256,16 +256,16 @@ class Writer:
             self.flush()
 
     def flush(self) -> None:
-        """Make a part of the rows."""
+        """Turn the rows into a part."""
         if self._rows:
             write_part(self._store, self._path.stem, self._rows)
-        # Only now, as the part has them all.
+        # Only now that the part has them all.
         if self._journal is not None:
             self._path.unlink()
         self.close()
 
     def close(self) -> None:
-        """Leave the journal as it is, if there is one."""
+        """Leave the journal as it is, if any."""
         if self._journal is not None:
             os.close(self._journal)
             self._journal = None
@@ -281,7 +281,7 @@ def write_part(store: Store, name: str, rows: list[Row]) -> None:
 
 
 def parquet_of(table: pa.Table) -> bytes:
-    """What a Parquet file holds."""
+    """The bytes of a Parquet file."""
     import pyarrow.parquet as pq
 
     buffer = io.BytesIO()
@@ -296,7 +296,7 @@ def replace_file(path: Path, data: bytes) -> None:
 
 
 def _replace(path: Path, data: bytes) -> None:
-    """Write a file aside, bring it to the disk, and move it into its place."""
+    """Write a temporary file, bring it to the disk, and move it into its place."""
     aside = path.with_name(f".{path.name}.{os.getpid()}")
     try:
         with aside.open("wb") as file:
@@ -325,16 +325,16 @@ def _sync_folder(folder: Path) -> None:
 
 
 def read_part(path: Path) -> tuple[bytes, str]:
-    """The contents of a part, and what is wrong with them."""
+    """The contents of a part, and what is wrong with it."""
     try:
         data = read_regular(path)
     except OSError as error:
         return b"", f"cannot be read: {error.strerror}"
-    return data, "" if path.stem.endswith(f"-{checksum(data)}") else "is damaged: it is not what was written"
+    return data, "" if path.stem.endswith(f"-{checksum(data)}") else "is damaged: it does not match its checksum"
 
 
 def read_journal(path: Path) -> tuple[list[Row], str]:
-    """The rows of a journal, and what is wrong with others; a last line that is not whole was not finished."""
+    """The intact rows of a journal, and what is wrong with others; an incomplete last line was never finished."""
     try:
         lines = read_regular(path).split(b"\n")[:-1]
     except FileNotFoundError:
@@ -344,4 +344,4 @@ def read_journal(path: Path) -> tuple[list[Row], str]:
     halves = [line.partition(b" ") for line in lines]
     whole = [json.loads(text) for digest, _, text in halves if digest == checksum(text).encode()]
     lost = len(lines) - len(whole)
-    return whole, f"is damaged: {counted(lost, 'line')} of {len(lines):,} are not what was written" if lost else ""
+    return whole, f"is damaged: {counted(lost, 'line')} of {len(lines):,} with a wrong checksum" if lost else ""

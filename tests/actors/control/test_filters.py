@@ -98,20 +98,20 @@ def test_a_reset_begins_anew_and_tokens_of_one_tag_are_taken_in_turn() -> None:
 
 def test_what_is_unstable_grows_until_it_cannot() -> None:
     assert filtered([1.0] * 11, denominator=[1, -(2.0**100)])[-1] == pytest.approx(2.0**1000)
-    with pytest.raises(EpicycleError, match=r"^what comes out has grown beyond all numbers: the filter is unstable$"):
+    with pytest.raises(EpicycleError, match=r"^the output has grown too large for a float: the filter is unstable$"):
         filtered([1.0] * 12, denominator=[1, -(2.0**100)])
 
 
 @pytest.mark.parametrize(
     ("parameters", "message"),
     [
-        ({}, "give either 'numerator' and 'denominator' or a 'design'"),
+        ({}, "give either a 'numerator' (and 'denominator') or a 'design'"),
         ({"numerator": [1], "design": {"type": "FirstOrder", "time_constant": 1, "period": 1}},
-         "give either 'numerator' and 'denominator' or a 'design'"),
+         "give either a 'numerator' (and 'denominator') or a 'design'"),
         ({"numerator": [1], "denominator": [0, 1]},
-         "denominator: its first coefficient, that of the highest power, may not be 0 or missing"),
+         "denominator: the first coefficient, that of the highest power, must not be 0 or missing"),
         ({"denominator": [1, -1], "start": "settled"},
-         "start: a filter that adds up without end never settles (its denominator's sum is 0)"),
+         "start: a filter that integrates never settles (the coefficients of its denominator add up to 0)"),
         ({"design": {"type": "Butterworth", "cutoff": 50, "period": 0.01}},
          "it: DiscreteFilter.design: cutoff: 50 Hz is not below 50 Hz, half the rate of the samples"),
     ],

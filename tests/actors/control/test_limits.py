@@ -68,9 +68,9 @@ def test_a_relay_stays_between_its_borders_as_it_is() -> None:
 @pytest.mark.parametrize(
     ("kind", "parameters", "message"),
     [
-        (Limiter, {"low": 2, "high": 1}, "low is 2 and high is 1: low may not be above high"),
+        (Limiter, {"low": 2, "high": 1}, "low is 2 and high is 1: low must not be above high"),
         (Limiter, {"high": 1, "initial": 2}, "initial: 2 is not within -inf and 1"),
-        (DeadZone, {"low": 2, "high": 1}, "low is 2 and high is 1: low may not be above high"),
+        (DeadZone, {"low": 2, "high": 1}, "low is 2 and high is 1: low must not be above high"),
         (Hysteresis, {"lower": 1, "upper": 1}, "lower is 1 and upper is 1: lower must be below upper"),
         (Quantizer, {"step": 0}, "it: Quantizer.step: 0 is out of bounds, expected a number > 0"),
     ],
@@ -85,4 +85,4 @@ def test_what_has_too_many_steps() -> None:
     harness = Harness(Quantizer("it", step=1e-300))
     with pytest.raises(EpicycleError) as caught:
         harness.fire(0.0, input=1e300)
-    assert str(caught.value) == "1e+300 cannot be counted in steps of 1e-300"
+    assert str(caught.value) == "1e+300 is too large or not a number, and cannot be rounded to steps of 1e-300"

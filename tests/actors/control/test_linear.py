@@ -225,7 +225,7 @@ def test_what_is_unstable_grows_until_it_cannot() -> None:
     harness.fire(700.0, trigger=0)
     assert harness.last("output") == pytest.approx(math.exp(700), rel=1e-12)
     with pytest.raises(
-        EpicycleError, match=r"^the state has grown beyond all numbers: the system is unstable, end the"
+        EpicycleError, match=r"^the state has grown too large for a float: the system is unstable; end the"
     ):
         harness.fire(720.0, trigger=0)
 
@@ -270,9 +270,9 @@ def test_a_step_takes_the_input_of_its_own_time() -> None:
 @pytest.mark.parametrize(
     ("kind", "parameters", "message"),
     [
-        (StateSpace, {"a": [[1, 2]], "b": [[1]]}, "a: 1 x 2, expected 1 x 1: it is square"),
+        (StateSpace, {"a": [[1, 2]], "b": [[1]]}, "a: 1 x 2, expected 1 x 1: it must be square"),
         (StateSpace, {"a": [[1, 2], [3]], "b": [[1]]},
-         "it: StateSpace.a: [[1, 2], [3]] is no matrix: its rows are not equally long"),
+         "it: StateSpace.a: [[1, 2], [3]] is not a matrix: its rows differ in length"),
         (StateSpace, {"a": [[0]], "b": [[1], [1]]}, "b: 2 x 1, expected 1 x 1: a row for each of 1 state"),
         (StateSpace, {"a": [[0]], "b": [[1]], "c": [[1, 2]]},
          "c: 1 x 2, expected 1 x 1: a column for each of 1 state"),
@@ -280,18 +280,19 @@ def test_a_step_takes_the_input_of_its_own_time() -> None:
          "d: 2 x 1, expected 1 x 1: a row for each output and a column for each input"),
         (StateSpace, {"a": [[0]], "b": [[1]], "initial": [1, 2]}, "initial: 2 numbers for 1 state"),
         (StateSpace, {"a": [[0]], "b": [[1]], "held": [1, 2]}, "held: 2 numbers for 1 input"),
-        (StateSpace, {"a": [[math.inf]], "b": [[1]]}, "a: [inf] are not all finite"),
+        (StateSpace, {"a": [[math.inf]], "b": [[1]]}, "a: the numbers [inf] are not all finite"),
         (TransferFunction, {"numerator": [1, 0], "denominator": [1]},
-         ("numerator: its degree is 1, that of the denominator 0: a system that differentiates its input cannot follow "
-          "one that jumps")),
+         ("numerator: its degree 1 is above that of the denominator, 0: the system would differentiate its input, "
+          "which jumps")),
         (TransferFunction, {"denominator": [0, 1]},
-         "denominator: its first coefficient, that of the highest power, may not be 0 or missing"),
+         "denominator: the first coefficient, that of the highest power, must not be 0 or missing"),
         (TransferFunction, {"denominator": []},
-         "denominator: its first coefficient, that of the highest power, may not be 0 or missing"),
+         "denominator: the first coefficient, that of the highest power, must not be 0 or missing"),
         (TransferFunction, {"denominator": [1.0] * 101},
-         ("100 states and 1 input are more than 100 together: their exponentials would take long; "
-          "give several systems, or 'sampled' ones")),
-        (TransferFunction, {"denominator": [1, 1], "initial": [1, 2]}, "initial: 2 values for a system of order 1"),
+         ("100 states and 1 input are more than 100 in total, and the matrix exponential would take long; use "
+          "several systems, or 'sampled' ones")),
+        (TransferFunction, {"denominator": [1, 1], "initial": [1, 2]}, ("initial: 2 values, expected at most 1, the "
+                                                                       "order of the system")),
     ],
 )  # fmt: skip
 def test_systems_that_are_none(kind: Any, parameters: dict[str, Any], message: str) -> None:
@@ -303,10 +304,10 @@ def test_systems_that_are_none(kind: Any, parameters: dict[str, Any], message: s
 @pytest.mark.parametrize(
     ("actor", "token", "message"),
     [
-        (LAG, "fast", "it.input is 'fast', which is not a finite number"),
-        (LAG, True, "it.input is true, which is not a finite number"),
+        (LAG, "fast", "it.input got 'fast', expected a finite number"),
+        (LAG, True, "it.input got true, expected a finite number"),
         ({"type": "StateSpace", "a": [[0]], "b": [[1, 2]]}, [1.0],
-         "it.input is [1.0], which is not a list of 2 numbers"),
+         "it.input got [1.0], expected a list of 2 numbers"),
     ],
 )  # fmt: skip
 def test_inputs_that_are_none(actor: dict[str, Any], token: Any, message: str) -> None:

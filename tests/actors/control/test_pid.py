@@ -248,8 +248,8 @@ run: {stop: 5 s, record: [plant.output]}
 @pytest.mark.parametrize(
     ("parameters", "message"),
     [
-        ({"low": 2, "high": 1}, "low is 2 and high is 1: low may not be above high"),
-        ({"tracking_time": 1}, "tracking_time: it goes with anti_windup: back_calculation, not clamping"),
+        ({"low": 2, "high": 1}, "low is 2 and high is 1: low must not be above high"),
+        ({"tracking_time": 1}, "tracking_time: it is for 'anti_windup: back_calculation', but anti_windup is clamping"),
         ({"anti_windup": "clampin"},
          "it: PID.anti_windup: 'clampin' is not one of clamping, back_calculation, none, did you mean 'clamping'?"),
         ({"filter_time": "-1 s"}, "it: PID.filter_time: -1 is out of bounds, expected a number in s >= 0"),

@@ -104,8 +104,8 @@ def test_the_log_has_the_same_bits_whoever_looks() -> None:
 @pytest.mark.parametrize(
     ("token", "message"),
     [
-        (math.nan, "pid.measurement is nan, which is not a finite number"),
-        ("cold", "pid.measurement is 'cold', which is not a finite number"),
+        (math.nan, "pid.measurement got nan, expected a finite number"),
+        ("cold", "pid.measurement got 'cold', expected a finite number"),
     ],
 )
 def test_what_is_no_number_ends_the_run(token: object, message: str) -> None:

@@ -110,8 +110,8 @@ def test_a_wake_up_is_called_off() -> None:
 @pytest.mark.parametrize(
     ("names", "message"),
     [
-        (("1a",), "'1a' cannot be the name of a port: use letters, digits and _, no digit first"),
-        (("ä",), "'ä' cannot be the name of a port: use letters, digits and _, no digit first"),
+        (("1a",), "'1a' cannot be the name of a port: use letters, digits and _, and no digit first"),
+        (("ä",), "'ä' cannot be the name of a port: use letters, digits and _, and no digit first"),
     ],
 )
 def test_names_of_own_ports(monkeypatch: pytest.MonkeyPatch, names: tuple[str, ...], message: str) -> None:
@@ -136,7 +136,7 @@ def test_own_ports_beside_those_of_the_class(monkeypatch: pytest.MonkeyPatch) ->
 
     with pytest.raises(PortError) as caught:
         Twice("a")
-    assert str(caught.value) == "there would be two ports called 'put'"
+    assert str(caught.value) == "there would be two ports named 'put'"
 
 
 class Band(Actor):
@@ -149,7 +149,7 @@ class Band(Actor):
 
     def check(self) -> None:
         if self.low > self.high:
-            raise ParameterError(f"low is {self.low:g} and high is {self.high:g}: low may not be above high")
+            raise ParameterError(f"low is {self.low:g} and high is {self.high:g}: low must not be above high")
         self.output.type = bool
 
 
@@ -159,7 +159,7 @@ def test_check_sees_parameters_and_ports_of_an_instance() -> None:
     assert declared_ports(Band)["output"].type is Any  # of the class, as it was
     with pytest.raises(ParameterError) as caught:
         Band("band", low=2.0)
-    assert str(caught.value) == "low is 2 and high is 1: low may not be above high"
+    assert str(caught.value) == "low is 2 and high is 1: low must not be above high"
 
 
 def test_what_has_no_input_beside_parameters_is_a_source() -> None:

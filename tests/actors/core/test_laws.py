@@ -138,11 +138,11 @@ def test_the_logarithm_of_a_binomial_probability(n: int, p: float) -> None:
 @pytest.mark.parametrize(
     ("name", "parameters", "message"),
     [
-        ("geometric", (1.5,), "p = 1.5 is not above 0 and at most 1"),
-        ("geometric", (0.0,), "p = 0 is not above 0 and at most 1"),
+        ("geometric", (1.5,), "p = 1.5 is not > 0 and <= 1"),
+        ("geometric", (0.0,), "p = 0 is not > 0 and <= 1"),
         ("poisson", (-0.1,), "lam = -0.1 is not between 0 and 1e18"),
         ("poisson", (2e18,), "lam = 2e+18 is not between 0 and 1e18"),
-        ("triangular", (0.0, 2.0, 1.0), "left = 0, mode = 2 and right = 1 are not in order"),
+        ("triangular", (0.0, 2.0, 1.0), "left = 0, mode = 2 and right = 1 are not in ascending order"),
         ("binomial", (-1, 0.5), "n = -1 is not between 0 and 2^63 - 1"),
     ],
 )

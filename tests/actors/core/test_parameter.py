@@ -69,7 +69,7 @@ def test_values(parameter: Parameter[Any], given: object, value: object) -> None
         (
             Parameter(float, above=0, unit="s"),
             9e-10,
-            "9e-10 s is shorter than a nanosecond, which is the shortest time",
+            "9e-10 s is shorter than a nanosecond, the shortest time",
         ),
         (array_parameter((None,), above=0), [1.0, 0.0], "0 is out of bounds, expected a list of n numbers > 0"),
         (Parameter(int), 2.5, "2.5 is not an integer"),
@@ -78,7 +78,7 @@ def test_values(parameter: Parameter[Any], given: object, value: object) -> None
         (Parameter(bool), 1, "1 is not true or false"),
         (Parameter(str), 1, "1 is not a text"),
         (Parameter(str, choices=("slow", "fast")), "fats", "'fats' is not one of slow, fast, did you mean 'fast'?"),
-        (Parameter(str, choices=("fast",), renamed={"quick": "fast"}), "quick", "'quick' is called 'fast' now"),
+        (Parameter(str, choices=("fast",), renamed={"quick": "fast"}), "quick", "'quick' is now called 'fast'"),
         (Parameter(Path), "", "'' is not a file"),
         (Parameter(Path), "a\0b", "'a\\x00b' is not a file"),
         (MappingParameter(Parameter(float)), None, "None is not a mapping of names to number"),
@@ -157,10 +157,10 @@ def test_a_part_is_made_from_a_mapping_and_counts_in_the_unit_around_it() -> Non
     [
         ({}, "Whole needs a value for 'from'", ()),
         ({"fro": 1}, "Whole has no parameter 'fro', did you mean 'from'? valid parameters: from, part, list", ("fro",)),
-        ({"zzz": 1}, "Whole has no parameter 'zzz', valid parameters: from, part, list", ("zzz",)),
+        ({"zzz": 1}, "Whole has no parameter 'zzz'; valid parameters: from, part, list", ("zzz",)),
         ({"from": "x"}, "Whole.from: 'x' is not a number", ("from",)),
-        ({"from": 1, "part": 3}, "Whole.part: 3 is not a mapping like {type: ...}, with one of Wheel", ("part",)),
-        ({"from": 1, "part": {}}, "Whole.part: {} has no 'type', which is one of Wheel", ("part",)),
+        ({"from": 1, "part": 3}, "Whole.part: 3 is not a mapping {type: ...} with one of the types Wheel", ("part",)),
+        ({"from": 1, "part": {}}, "Whole.part: {} has no 'type'; expected one of Wheel", ("part",)),
         (
             {"from": 1, "part": {"type": "Whel"}},
             "Whole.part: 'Whel' is not one of Wheel, did you mean 'Wheel'?",
@@ -189,14 +189,14 @@ def test_reserved_names() -> None:
     for name in ("type", "count", "priority", "tags"):
         with pytest.raises(TypeError) as caught:
             type("Bad", (Configurable,), {name: Parameter(float)})
-        assert str(caught.value) == f"Bad: a parameter may not be called {name!r}"
+        assert str(caught.value) == f"Bad: a parameter must not be named {name!r}"
 
 
 def test_a_parameter_is_read_when_it_is_set() -> None:
     whole = Whole.__new__(Whole)
     with pytest.raises(AttributeError) as caught:
         _ = whole.from_
-    assert str(caught.value) == "Whole.from is read before it was set"
+    assert str(caught.value) == "Whole.from was read before it was set"
 
 
 @pytest.mark.parametrize(

@@ -57,7 +57,7 @@ def test_a_wrong_token_is_the_error_of_the_actor_that_reads_it() -> None:
 
 def test_it_is_set_by_tokens_alone() -> None:
     level = load(MODEL.format(factor=1), types=[Level]).graph.actors["level"]
-    with pytest.raises(AttributeError, match=r"^level\.level changes by a token at its port alone$"):
+    with pytest.raises(AttributeError, match=r"^level\.level can only be changed by a token at its port$"):
         level.level = 3.0  # type: ignore[attr-defined]
 
 

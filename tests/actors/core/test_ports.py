@@ -48,7 +48,7 @@ def test_nothing_is_sent_outside_of_a_run() -> None:
     for _ in range(2):
         with pytest.raises(PortError) as caught:
             port.send(1.0)
-        assert str(caught.value) == "hub.out cannot send now: tokens are sent in fire() or run() of a running model"
+        assert str(caught.value) == "hub.out cannot send now: send tokens only in fire() or run() of a running model"
         port.connect(lambda token, channel=None: sent.append((token, channel)))
         port.send(2.0)
         port.send(3.0, 1)

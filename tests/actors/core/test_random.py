@@ -283,21 +283,21 @@ def test_copies_go_on_alike() -> None:
 @pytest.mark.parametrize(
     ("draw", "message"),
     [
-        (lambda s: s.normal(0.0, -1.0), "scale = -1 is not 0 or more"),
-        (lambda s: s.exponential(float("nan")), "scale = nan is not 0 or more"),
-        (lambda s: s.gamma(-1.0), "shape = -1 is not 0 or more"),
-        (lambda s: s.weibull(0.0), "a = 0 is not above 0"),
+        (lambda s: s.normal(0.0, -1.0), "scale = -1 is not >= 0"),
+        (lambda s: s.exponential(float("nan")), "scale = nan is not >= 0"),
+        (lambda s: s.gamma(-1.0), "shape = -1 is not >= 0"),
+        (lambda s: s.weibull(0.0), "a = 0 is not > 0"),
         (lambda s: s.poisson(-1.0), "lam = -1 is not between 0 and 1e18"),
         (lambda s: s.binomial(3, 1.5), "p = 1.5 is not between 0 and 1"),
         (lambda s: s.binomial(-1, 0.5), "n = -1 is not between 0 and 2^63 - 1"),
-        (lambda s: s.geometric(0.0), "p = 0 is not above 0 and at most 1"),
-        (lambda s: s.triangular(1.0, 0.0, 2.0), "left = 1, mode = 0 and right = 2 are not in order"),
-        (lambda s: s.integers(3, 3), "there is no integer from 3 to 3, which is left out"),
-        (lambda s: s.choice([]), "there is nothing to choose from"),
-        (lambda s: s.choice(3, p=[0.5, 0.5]), "2 weights are given for 3 elements"),
-        (lambda s: s.choice(2, p=[0.0, 0.0]), "weights [0.0, 0.0] are not all 0 or more with a finite sum above 0"),
-        (lambda s: s.choice(2, 3, False), "3 different elements are asked for, and there are 2"),
-        (lambda s: s.multinomial(5, [2.0, 1.0]), "pvals [2.0, 1.0] are no probabilities, or add up to more than 1"),
+        (lambda s: s.geometric(0.0), "p = 0 is not > 0 and <= 1"),
+        (lambda s: s.triangular(1.0, 0.0, 2.0), "left = 1, mode = 0 and right = 2 are not in ascending order"),
+        (lambda s: s.integers(3, 3), "there is no integer from 3 to 3 (excluded)"),
+        (lambda s: s.choice([]), "the choice is empty: give at least one element"),
+        (lambda s: s.choice(3, p=[0.5, 0.5]), "2 weights for 3 elements; give one for each"),
+        (lambda s: s.choice(2, p=[0.0, 0.0]), "weights [0.0, 0.0]: expected numbers >= 0 with a finite sum > 0"),
+        (lambda s: s.choice(2, 3, False), "cannot choose 3 different elements of 2"),
+        (lambda s: s.multinomial(5, [2.0, 1.0]), "pvals [2.0, 1.0]: expected probabilities that add up to at most 1"),
         (lambda s: s.multivariate_normal([0, 0], [[1, 2], [2, 1]]), "cov is not positive semidefinite"),
         (lambda s: s.multivariate_normal([0, 0], [[1, 2], [0, 1]]), "cov is not symmetric"),
         (lambda s: s.multivariate_normal([0, 0], [[1, 2]]), "cov is not square"),
@@ -312,8 +312,7 @@ def test_laws_that_are_missing_are_told() -> None:
     with pytest.raises(AttributeError) as caught:
         stream().zipf(2.0)
     assert str(caught.value).startswith(
-        "a random stream has no 'zipf', as what NumPy makes of it depends on its version and the machine; "
-        "there are below, beta, "
+        "a random stream has no 'zipf': NumPy's results depend on its version and the machine; available: below, beta, "
     )
     with pytest.raises(AttributeError, match=r"^a random stream has no 'gauss'$"):
         stream().gauss()

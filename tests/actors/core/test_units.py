@@ -65,13 +65,13 @@ def test_convert(value: str | int | float, unit: str, expected: float) -> None:
         ("8 m//s", "m/s", "'8 m//s' has an unreadable unit 'm//s': a unit is missing before '/'"),
         ("8 m/", "m/s", "'8 m/' has an unreadable unit 'm/': a unit is missing at the end"),
         ("8 (m", "m", "'8 (m' has an unreadable unit '(m': a '(' is not closed"),
-        ("8 m)", "m", "'8 m)' has an unreadable unit 'm)': ')' cannot stand there"),
+        ("8 m)", "m", "'8 m)' has an unreadable unit 'm)': ')' is not allowed there"),
         (
             "8 m s",
             "m*s",
-            "'8 m s' has an unreadable unit 'm s': 's' cannot stand there, write * between units",
+            "'8 m s' has an unreadable unit 'm s': 's' is not allowed there, write * between units",
         ),
-        ("8,5 m", "m", "'8,5 m' has an unreadable unit ',5 m': ',' has no meaning there"),
+        ("8,5 m", "m", "'8,5 m' has an unreadable unit ',5 m': ',' is not allowed in a unit"),
         ("8 m^99", "m", "'8 m^99' has an unreadable unit 'm^99': the exponent 99 is too large"),
         ("8 (m^9)^9", "m", "'8 (m^9)^9' has an unreadable unit '(m^9)^9': its powers are too large"),
         (

@@ -190,7 +190,7 @@ run: {stop: 12 s, record: [robot.pose]}
 @pytest.mark.parametrize(
     ("waypoints", "message"),
     [
-        ([], "waypoints: there is none to go to"),
+        ([], "waypoints: the list is empty; give at least one"),
         ([[1, 1], [1, 1], [2, 2]], "waypoints: 0 and 1 are the same, [1.0, 1.0]"),
         ([[1, 1], [2, 2], [1, 1]], "waypoints: 2 and 0 are the same, [1.0, 1.0]"),
         ([[1, 1]], "closed: a path of one waypoint cannot be closed; give two or more"),
@@ -206,4 +206,4 @@ def test_paths_that_are_none(waypoints: Any, message: str) -> None:
 def test_a_speed_without_end_leads_nowhere() -> None:
     with pytest.raises(EpicycleError) as caught:
         Harness(Unicycle("it", speed=math.inf))
-    assert str(caught.value) == "a speed of inf m/s and a turn rate of 0 rad/s lead nowhere"
+    assert str(caught.value) == "a speed of inf m/s and a turn rate of 0 rad/s are not finite numbers"

@@ -89,7 +89,7 @@ connections:
 """
     with pytest.raises(ActorError) as caught:
         Simulation(load(text)).run()
-    assert caught.value.reason == "it needs a target: connect 'target', or give a 'landmark', and not both"
+    assert caught.value.reason == "it needs one target: either connect 'target' or give a 'landmark'"
 
 
 # -- scanning ---------------------------------------------------------------------------------------------------------
@@ -151,8 +151,8 @@ def test_beams_have_independent_noise_and_nothing_beyond_the_range() -> None:
 @pytest.mark.parametrize(
     ("parameters", "message"),
     [
-        ({"max_range": math.inf}, "max_range: it is infinite, and a beam that ends nowhere would be, too"),
-        ({"discs": [[0, 0, -1]]}, "discs: a radius is negative"),
+        ({"max_range": math.inf}, "max_range: it must be finite, because beams that hit nothing end there"),
+        ({"discs": [[0, 0, -1]]}, "discs: a radius is negative; expected >= 0"),
         ({"walls": [[0, 0, 1]]}, "it: RangeScanner.walls: [[0, 0, 1]] is not a list of n x 4 numbers in m"),
     ],
 )

@@ -208,7 +208,7 @@ def test_an_answer_may_come_twice_but_a_firing_happens_once() -> None:
     ports = engine_parts.load(text.replace("{ASPECTS}", "{net: {type: Line, at: a.input}}"), types=[Twice])
     assert [value for *_, value in sends(run(ports), "a.output")] == [0, 0, 2, 2, 4, 4]
     firings = engine_parts.load(text.replace("{ASPECTS}", "{net: {type: Line, at: {at: a, time: 0}}}"), types=[Twice])
-    with pytest.raises(ActorError, match="which is no request to net that waits for an answer"):
+    with pytest.raises(ActorError, match="but no such request to net waits for an answer"):
         run(firings)
 
 
@@ -217,6 +217,6 @@ def test_what_comes_out_must_have_gone_in() -> None:
     with pytest.raises(ActorError) as caught:
         run(load(text))
     assert str(caught.value).partition("\n")[0] == (
-        "aspect net failed in delivering at (0 s, 1): net.response sends 0, which is no request: what leaves an aspect "
-        "that is a model must be what came in, with another token in it if need be"
+        "aspect net failed in delivering at (0 s, 1): net.response sends 0, which is not a request: an aspect that "
+        "is a model must send back the requests that it receives, with another token in them if needed"
     )

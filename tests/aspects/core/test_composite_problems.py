@@ -59,7 +59,7 @@ WIRE = "inputs: [request]\n    outputs: [response]\n    connections: [request ->
             """m.yaml:33:38: error: aspect net: Desk attaches to actors, but a.input is a port
    help: write 'a', without the port
 m.yaml:33:53: error: aspect net: time: -1 is out of bounds, expected a time in s >= 0, a distribution, \
-or these by input port""",
+or a mapping of input ports to these""",
         ),
         (
             "net: {type: Desk, at: {at: a, time: {inptu: 1, input: 1 m}}}",
@@ -105,7 +105,7 @@ or these by input port""",
         ),
         (
             "net: {type: Desk, tiem: 2, at: a.input, until: 2 s, from: 3 s}",
-            """m.yaml:33:11: error: aspect net: it is never active: until 2 s is not after from 3 s
+            """m.yaml:33:11: error: aspect net: it is never active: 'until' (2 s) must be after 'from' (3 s)
 m.yaml:33:29: error: net: Desk has no parameter 'tiem', did you mean 'time'?
    help: valid parameters: time""",
         ),

@@ -163,11 +163,14 @@ def test_the_command_line_shows_them(tmp_path: Path, capsys: pytest.CaptureFixtu
     ("decorate", "message"),
     [
         (lambda: Noise(deviation=1).at("output")(object()), "is neither an actor nor a class of actors"),
-        (lambda: Noise(deviation=1).at(), "Noise stands at ports: say at which"),
-        (lambda: ExecutionTime(time=1).at("input"), "ExecutionTime stands at actors: write at() without ports"),
+        (lambda: Noise(deviation=1).at(), "Noise attaches to ports: give their names in at()"),
+        (
+            lambda: ExecutionTime(time=1).at("input"),
+            "ExecutionTime attaches to actors, not to ports: write at() without ports",
+        ),
         (
             lambda: Noise(deviation=1).at("output", name="2nd"),
-            "'2nd' is not a name: use letters, digits and _, no digit first",
+            "'2nd' is not a name: use letters, digits and _, and no digit first",
         ),
         (
             lambda: Noise(deviation=1).at("outptu")(Fresh),
@@ -175,19 +178,19 @@ def test_the_command_line_shows_them(tmp_path: Path, capsys: pytest.CaptureFixtu
         ),
         (
             lambda: Noise(deviation=1).at("input")(Fresh),
-            "Noise stands at output ports, but input is an input port of Fresh",
+            "Noise attaches to output ports, but input is an input port of Fresh",
         ),
         (
             lambda: Noise(deviation=1).at("output")(Sensor),
-            "Sensor has an aspect 'noise' already: give this one another name with name=...",
+            "Sensor already has an aspect 'noise': give this one another name with name=...",
         ),
         (
             lambda: Noise(deviation=1).at("output")(Sensor("s")),
-            "s has an aspect 'noise' already: give this one another name with name=...",
+            "s already has an aspect 'noise': give this one another name with name=...",
         ),
         (
             lambda: Noise(deviation=1).at("output")(plain(Scale, "s")["s"]),
-            "s is part of a model: weave it there, with model.weave('noise', ..., at=...)",
+            "s is part of a model: weave the aspect there, with model.weave('noise', ..., at=...)",
         ),
     ],
 )

@@ -57,15 +57,14 @@ def test_where_aspects_stand() -> None:
 def test_an_aspect_is_of_a_kind() -> None:
     with pytest.raises(TypeError) as caught:
         type("Odd", (Aspect,), {"pass_token": lambda self, token, point: None})
-    assert str(caught.value) == "Odd has a pass_token(): derive it from PortAspect, not from Aspect"
+    assert str(caught.value) == "Odd has a pass_token(); derive it from PortAspect, not from Aspect"
 
 
 def test_a_clock_has_no_window() -> None:
     with pytest.raises(EpicycleError) as caught:
         ClockOffset(until=3)
     assert str(caught.value) == (
-        "a clock is wrong from the beginning of a run to its end: leave out 'until', "
-        "valid parameters: offset, deviation"
+        "a clock is wrong for the whole run; leave out 'until'; valid parameters: offset, deviation"
     )
 
 
@@ -75,10 +74,13 @@ def test_a_clock_has_no_window() -> None:
         ({"from": 2.0, "until": 5.0, "every": 3.0}, ""),
         ({"from": 2.0, "until": 2.5, "every": 0.5}, ""),
         ({"until": 3.0, "every": 4.0}, ""),
-        ({"from": 2.0, "until": 5.0, "every": 2.9}, "every 2.9 s needs at least the time from 'from' to 'until'"),
-        ({"from": 2.0, "every": 2.9}, "every 2.9 s needs a time 'until' as well"),
-        ({"from": 2.0, "until": 2.0}, "it is never active: until 2 s is not after from 2 s"),
-        ({"from": 2.0, "until": 1.5}, "it is never active: until 1.5 s is not after from 2 s"),
+        (
+            {"from": 2.0, "until": 5.0, "every": 2.9},
+            "'every' (2.9 s) needs to be at least the time from 'from' to 'until'",
+        ),
+        ({"from": 2.0, "every": 2.9}, "'every' (2.9 s) needs 'until' as well"),
+        ({"from": 2.0, "until": 2.0}, "it is never active: 'until' (2 s) must be after 'from' (2 s)"),
+        ({"from": 2.0, "until": 1.5}, "it is never active: 'until' (1.5 s) must be after 'from' (2 s)"),
     ],
 )
 def test_windows(window: dict[str, float], message: str) -> None:

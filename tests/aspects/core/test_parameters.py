@@ -147,12 +147,12 @@ def test_values_that_the_parameter_does_not_take() -> None:
         run(loaded)
     assert str(caught.value).partition("\n")[0] == (
         "aspect low failed in pass_token() at g[0].gain at (0 s, 1): gain of g[0]: -1 is out of bounds, expected a "
-        "number from 0 to 10; a Saturate behind keeps it within bounds"
+        "number from 0 to 10; an aspect Saturate after the others keeps it within bounds"
     )
     assert loaded["g[0]"].gain == 2.0
     kept = model("low: {type: Bias, by: -3, at: 'g[0].gain'}, keep: {type: Saturate, low: 0, at: 'g[0].gain'}")
     assert sent(run(kept), "g[0]")[0][0] == 0.0
-    with pytest.raises(ActorError, match=r"'value > 1' gives True, which is no number"):
+    with pytest.raises(ActorError, match="'value > 1' gives True, which is not a number"):
         run(model("odd: {type: Transform, to: value > 1, at: 'g[0].gain'}"))
 
 

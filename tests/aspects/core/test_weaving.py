@@ -223,15 +223,15 @@ def test_windows_can_be_set_from_outside() -> None:
         ),
         (
             "type: PacketLoss, probability: 1, at: a.input, from: 3 s, until: 2 s",
-            "m.yaml:16:3: error: aspect loss: it is never active: until 2 s is not after from 3 s",
+            "m.yaml:16:3: error: aspect loss: it is never active: 'until' (2 s) must be after 'from' (3 s)",
         ),
         (
             "type: PacketLoss, probability: 1, at: a.input, every: 2 s",
-            "m.yaml:16:3: error: aspect loss: every 2 s needs a time 'until' as well",
+            "m.yaml:16:3: error: aspect loss: 'every' (2 s) needs 'until' as well",
         ),
         (
             "type: PacketLoss, probability: 1, at: a.input, until: 3 s, every: 2 s",
-            "m.yaml:16:3: error: aspect loss: every 2 s needs at least the time from 'from' to 'until'",
+            "m.yaml:16:3: error: aspect loss: 'every' (2 s) needs to be at least the time from 'from' to 'until'",
         ),
     ],
 )
@@ -305,8 +305,8 @@ def test_a_failing_aspect_is_named_and_not_the_sender() -> None:
     with pytest.raises(ActorError) as caught:
         dropped("type: Bias, by: 1, fields: x, at: t.output")
     assert str(caught.value).partition("\n")[0] == (
-        "aspect loss failed in pass_token() at t.output at (0 s, 1): "
-        "a token of type int has no fields; leave out 'fields' to alter all of it"
+        "aspect loss failed in pass_token() at t.output at (0 s, 1): a token of type int has no fields; leave out "
+        "'fields' to alter all its numbers"
     )
 
 

@@ -149,10 +149,10 @@ def test_times_for_all_actors_over_and_over(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("rows", "reason"),
     [
-        (["signal,value", "slow@b,1"], "it has no times of a; it has those of b"),
-        (["signal,value", "robot.state,1"], "it has no times of a; it has those of no actor"),
-        (["signal,values", "slow@a,1"], "there is no column 'value'; columns: signal, values"),
-        (["signal,value", "slow@a,-1"], "row 1: -1 is not a time in s from 0 on"),
+        (["signal,value", "slow@b,1"], "it has no times of a; it has times of b"),
+        (["signal,value", "robot.state,1"], "it has no times of a; it has times of no actor"),
+        (["signal,values", "slow@a,1"], "it has no column 'value'; columns: signal, values"),
+        (["signal,value", "slow@a,-1"], "row 1: -1 is not a time in s >= 0"),
         (["value"], "it has no rows"),
     ],
 )
@@ -170,7 +170,7 @@ def test_files_that_tell_no_times(rows: list[str], reason: str, tmp_path: Path) 
 def test_parameters_that_do_not_fit() -> None:
     with pytest.raises(EpicycleError) as caught:
         ExecutionTime(measure=True, time=1)
-    assert str(caught.value) == ("it cannot measure execution times where they are given: leave one or the other out")
+    assert str(caught.value) == ("it cannot measure execution times that are given; leave out 'measure', or the times")
     with pytest.raises(EpicycleError) as caught:
         ExecutionTime(times="times.txt")
-    assert str(caught.value) == "times: 'times.txt' ends neither in .csv nor in .parquet"
+    assert str(caught.value) == "times: 'times.txt' must end in .csv or .parquet"

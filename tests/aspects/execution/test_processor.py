@@ -275,13 +275,13 @@ run: {{stop: 1 s}}
         ),
         (
             "more: {type: Processor, at: a, times: {a: soon}}",
-            "7:45: error: aspect more.times: a: 'soon' is not a time in s, nor a distribution {type: ..., ...}",
+            "7:45: error: aspect more.times: a: 'soon' is neither a time in s nor a distribution {type: ..., ...}",
         ),
         (
             "more: {type: Processor, at: a, times: {a: -1}}",
             (
                 "7:45: error: aspect more.times: a: -1 is out of bounds, expected a time in s >= 0, a distribution, "
-                "or these by input port"
+                "or a mapping of input ports to these"
             ),
         ),
         (

@@ -129,13 +129,13 @@ def test_length_of_a_message() -> None:
         (
             image,
             {"length_field": "name"},
-            "Image.name is 'x', but the length of a message is a finite number",
+            "Image.name is 'x', but the length of a message must be a finite number",
         ),
-        (Image("x", np.zeros(1), -1), {"length_field": "bits"}, "Image.bits is -1, but a length is >= 0"),
+        (Image("x", np.zeros(1), -1), {"length_field": "bits"}, "Image.bits is -1, but a length must be >= 0"),
         (
             Image("x", np.zeros(1), math.nan),
             {"priority_field": "bits"},
-            "Image.bits is nan, but the priority of a message is a finite number",
+            "Image.bits is nan, but the priority of a message must be a finite number",
         ),
         (object(), {"number_length": 1}, "a token of type object holds no numbers to count"),
     ):
@@ -322,7 +322,10 @@ def test_a_station_sends_one_message_at_a_time() -> None:
         (lambda: Bus(factor=1, capacity=-1), "Bus.capacity: -1 is out of bounds, expected an integer >= 0"),
         (lambda: radio(rate=0), "RadioMedium.rate: 0 is out of bounds, expected a number in bit/s > 0"),
         (lambda: radio(loss=1.5), "RadioMedium.loss: 1.5 is out of bounds, expected a number from 0 to 1"),
-        (lambda: radio(window=64, max_window=32), "max_window 32 is below window 64"),
+        (
+            lambda: radio(window=64, max_window=32),
+            "max_window is 32 and window is 64: max_window must not be below window",
+        ),
     ],
 )
 def test_wrong_parameters(make: Callable[[], Medium], message: str) -> None:

@@ -276,11 +276,11 @@ def test_what_is_not_silent_is_found() -> None:
 
 def test_what_does_not_only_observe_is_found() -> None:
     assert told(assert_observes_only, Meddler(), grid(2, 8), "t.output").startswith(
-        "Meddler() at t.output does more than to observe: event 2 differs\n"
+        "Meddler() at t.output does more than observe: event 2 differs\n"
     )
     stops = Assert(that="token < 3", on_violation="stop")
     assert told(assert_observes_only, stops, grid(2, 8), "t.output") == (
-        f"{stops!r} at t.output does more than to observe: event 21 differs\n"
+        f"{stops!r} at t.output does more than observe: event 21 differs\n"
         "  without it: (0.004 s, 1) t.output send 4\n"
         "  with it, its own events left out: nothing more"
     )
@@ -296,34 +296,34 @@ run: {stop: 20 ms}
     )
     message = told(assert_removal_moves_nothing, Thief(model.graph.actors["clock"]), Trial(model))
     assert message.startswith(
-        "Thief() at ** moves what is not its own, though none of its decisions was carried out: event 3 differs\n"
+        "Thief() at ** changes more than its own events, although none of its decisions was carried out: event 3 "
+        "differs\n"
     )
 
 
 def test_who_changes_tokens_in_place_is_found() -> None:
     text = "actors: {t: {type: Ticker}, a: {type: Wrap}}\nconnections: [t.output -> a.input]"
     model = load(text, types=[Wrap])
-    assert "Vandal() at a.output moves what is not its own" in told(
+    assert "Vandal() at a.output changes more than its own events" in told(
         assert_removal_moves_nothing, Vandal(), Trial(model, until=3), at="a.output"
     )
 
 
 def test_streams_that_are_not_ones_own_are_found() -> None:
     assert told(assert_streams_are_its_own, Lottery(), grid(3, 4)) == (
-        "Lottery() draws from a generator that is shared by all: it has point.random"
+        "Lottery() draws from a global generator; use point.random"
     )
     assert told(assert_streams_are_its_own, Gossip(), grid(3, 4), "first[*].input") == (
-        "Gossip() at first[*].input acts in another way in a second run: event 2 differs\n"
-        "  the first: (0 s, 1) first[0].input tested: seen [0, 16]\n"
-        "  the second: (0 s, 1) first[0].input tested: seen [0, 31]"
+        "Gossip() at first[*].input acts differently in a second run: event 2 differs\n  the first: (0 s, 1) "
+        "first[0].input tested: seen [0, 16]\n  the second: (0 s, 1) first[0].input tested: seen [0, 31]"
     )
     assert told(assert_streams_are_its_own, Newcomer(), grid(3, 4), "first[*].input") == (
-        "Newcomer(): what it decides at a port depends on where else it stands: event 3 differs\n"
-        "  at first[*].input: (0.001 s, 1) first[0].input tested: changed [1, first[2].input]\n"
-        "  at half of that: (0.001 s, 1) first[0].input tested: changed [1, first[0].input]"
+        "Newcomer(): what it decides at a port depends on where else it is attached: event 3 differs\n  at "
+        "first[*].input: (0.001 s, 1) first[0].input tested: changed [1, first[2].input]\n  at half of that: (0.001 "
+        "s, 1) first[0].input tested: changed [1, first[0].input]"
     )
     assert told(assert_streams_are_its_own, Probe(), Careless(one_stream=True)) == (
-        "Probe() has one random stream for a.input and b.input"
+        "Probe() has the same random stream for a.input and b.input"
     )
 
 
@@ -337,12 +337,14 @@ def test_who_depends_on_the_order_is_found() -> None:
     )
     at_one = Woven("a", Noise(deviation=1), "first[*].output"), Woven("b", Noise(deviation=1), "first[1].*")
     assert told(assert_order_of_unrelated_aspects_is_free, *at_one, grid(2, 4)) == (
-        "a and b both stand at first[1].output, so their order matters"
+        "a and b are both attached to first[1].output, so their order matters"
     )
 
 
 def test_what_nothing_passes_shows_nothing() -> None:
     late = Noise(deviation=0, **{"from": 10})
-    message = "nothing has passed Noise(deviation=0.0, from=10.0) at **, so nothing is shown: let it run longer"
+    message = (
+        "nothing has passed Noise(deviation=0.0, from=10.0) at **, so the test shows nothing: let the model run longer"
+    )
     for test in (assert_silent_at_zero, assert_removal_moves_nothing, assert_streams_are_its_own):
         assert told(test, late, grid(2, 8)) == message

@@ -255,6 +255,16 @@ def test_packaged_models_are_written_in_every_format(name: str, tmp_path: Path) 
         assert (tmp_path / f"graph{ending}").stat().st_size > 100
 
 
+def test_mermaid_shows_what_places_share() -> None:
+    lines = mermaid(outline(load_model("collision_avoidance", disturb="shared_radio"), depth=0)).splitlines()
+    hexagon = next(number for number, line in enumerate(lines) if "{{" in line)
+    assert lines[hexagon : hexagon + 2] == [
+        '    shared_radio{{"«radio»<br/>RadioMedium"}}',
+        "    shared_radio -.- main & observer_0",
+    ]
+    assert "{{" not in mermaid(outline(load_model("collision_avoidance", disturb="wifi_burst"), depth=0))
+
+
 def test_without_a_file_mermaid_is_printed_and_what_is_left_out_is_said(tmp_path: Path) -> None:
     model = small(tmp_path, *MANY)
     done = epicycle("small.yaml", "--without", "loss", cwd=tmp_path)
@@ -269,7 +279,7 @@ def test_without_a_file_mermaid_is_printed_and_what_is_left_out_is_said(tmp_path
     [
         (
             ("-o", "graph.txt"),
-            "error: graph.txt is no picture: its name must end in .svg, .png, .pdf, .mmd, .md\n",
+            "error: graph.txt is not a picture: its name must end in one of .svg, .png, .pdf, .mmd, .md\n",
         ),
         (("-o", "none/graph.svg"), "error: none/graph.svg cannot be written: there is no folder none\n"),
         (("-o", "folder.svg"), "error: folder.svg cannot be written: it is a folder\n"),
@@ -293,5 +303,5 @@ def test_depth_is_a_whole_number(depth: str, tmp_path: Path) -> None:
     done = epicycle("small.yaml", "--depth", depth, cwd=tmp_path)
     assert (done.returncode, done.stdout) == (BAD_INPUT, "")
     assert done.stderr.splitlines()[-1] == (
-        f"epicycle graph: error: argument --depth: {depth!r} is not a whole number from 0 on"
+        f"epicycle graph: error: argument --depth: {depth!r} is not a whole number of at least 0"
     )

@@ -216,7 +216,7 @@ def test_unfinished_and_failed_runs_and_hostile_names(tmp_path: Path, capsys: py
     assert all(value.startswith("data:") for tag, name, value in found.attributes if (tag, name) == ("img", "src"))
     assert hostile in found.text
     assert found.tables["Runs"] == [["status", "runs"], ["ok", "4"], ["failed", "2"], ["missing", "4"]]
-    assert "The study is not finished: 4 runs are missing." in found.text
+    assert "The study is not finished: 4 runs missing." in found.text
     failures = open_study(out).failures()
     shown = found.tables["Runs without a result"][1:]
     assert shown == [
@@ -237,9 +237,9 @@ def test_nothing_there_yet(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -
     assert main(["study", str(tmp_path / "walks.yaml"), "--types", str(THIS), "--out", str(out)]) == 1
     capsys.readouterr()
     assert main(["report", str(out)]) == 1
-    problem = "figure place_mean: none of the runs that it shows is there"
+    problem = "figure place_mean: none of the runs that it shows has been made"
     assert f"error: {problem}\n" in capsys.readouterr().err
-    assert "This figure could not be drawn: none of the runs that it shows is there" in page(out).text
+    assert "This figure could not be drawn: none of the runs that it shows has been made" in page(out).text
     assert main(["report", str(tmp_path)]) == 2
     assert capsys.readouterr().err == f"error: {tmp_path} holds no results of a study: it has no manifest.json\n"
 
@@ -288,7 +288,7 @@ def test_repeated_runs_give_the_signals_of_single_ones(wheels: Path) -> None:
     with pytest.raises(ReplayError) as caught:
         list(repeat(data.plan, [Replay(1, 0, row["seed"], "0" * 64, ())], 1))
     assert str(caught.value) == (
-        f"run 0 of condition 1 (seed 0) does not repeat: its digest is {row['digest'][:16]}..., "
+        f"run 0 of condition 1 (seed 0) gave a different result: its digest is {row['digest'][:16]}..., "
         "but was 0000000000000000...; something has changed since"
     )
 

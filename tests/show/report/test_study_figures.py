@@ -96,16 +96,16 @@ def test_metrics_of_one_unit_may_be_lines_of_one_panel(data: Data, sheets: list[
         (
             Means(metric=["mean_wait", "share"], together=True),
             "together",
-            "metrics in one panel need one unit",
+            "metrics in one panel need the same unit",
             "mean_wait in s, share in 1",
         ),
         (
             Means(metric=["mean_wait", "longest"], together=True, lines="load"),
             "lines",
-            "the metrics are its lines already",
-            "leave 'lines' or 'together' out",
+            "the metrics are already its lines",
+            "leave out 'lines' or 'together'",
         ),
-        (Means(metric=[]), "metric", "there is no metric in it", "name one at least"),
+        (Means(metric=[]), "metric", "it names no metric", "name at least one"),
     ],
 )
 def test_metrics_that_do_not_go_together(figure: Means, parameter: str, message: str, advice: str, data: Data) -> None:
@@ -139,7 +139,7 @@ def test_levels_that_are_no_numbers_have_no_logarithm(data: Data, tmp_path: Path
     assert main(["study", str(tmp_path / "s.yaml"), "--out", str(tmp_path / "out"), "--jobs", "1"]) == 0
     with pytest.raises(EpicycleError) as caught:
         drawn(Data(open_study(tmp_path / "out")), Means(metric="mean_wait", log_x=True))
-    assert str(caught.value) == "the levels along the axis are not numbers, so that it cannot be logarithmic"
+    assert str(caught.value) == "the levels along the axis are not numbers, so it cannot be logarithmic"
 
 
 def test_tips_say_what_is_there_in_words(data: Data, sheets: list[Sheet]) -> None:

@@ -334,7 +334,7 @@ def test_a_run_that_was_not_made_has_no_file(tmp_path: Path) -> None:
             pytest.importorskip("rerun")
         with pytest.raises(ViewError) as caught:
             write(Recording(model, {}), tmp_path / "none")
-        assert str(caught.value) == "a file shows a run that has been made: call Recording.run first"
+        assert str(caught.value) == "a file needs a run that has been made: call Recording.run first"
 
 
 # -- rerun ------------------------------------------------------------------------------------------------------------

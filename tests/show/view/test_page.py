@@ -73,7 +73,7 @@ def test_a_dropped_plan_tells_why_the_robot_did_as_it_did(wifi: Path, opened: Op
     page.tab.mouse.click(box["x"] + spot[0], box["y"] + spot[1])
     words = page.words()
     assert words.startswith(f"dropped by wifi_loss\nat main.peer_plan, {spot[2]}")
-    assert "had to do without it\nmain.controller fired at" in words
+    assert "fired without it\nmain.controller fired at" in words
     assert "led to it" in words
     assert "came of it" in words
     # The controller's next firing says what it did not get, and what came of it: a control for the vehicle.
@@ -209,7 +209,22 @@ def test_noise_loses_nothing_and_who_gets_nothing_never_fires(tmp_path: Path, op
     page.do("state.goTo({run: 0, firing: -1, record: state.run.losses[2].record})")
     words = page.words()
     assert words.startswith("dropped by lost\nat deaf.input, 2 s\n")
-    assert "had to do without it" not in words  # it has never fired
+    assert "fired without it" not in words  # it has never fired
+
+
+def test_monitors_say_when_they_broke_and_lead_there(tmp_path: Path, opened: Open) -> None:
+    model = tmp_path / "m.yaml"
+    model.write_text(
+        "model: m\nactors: {clock: {type: Clock, period: 1 s}}\nrun: {stop: 10 s}\n"
+        "monitors: {low: always clock.output < 4, high: eventually clock.output > 8}\n",
+        encoding="utf-8",
+    )
+    page = opened(written(tmp_path / "m.html", (str(model), {})))
+    words = page.words()
+    assert "Monitor low\nalways clock.output < 4\tbroken at 4 s, where clock.output = 4, robustness -6" in words
+    assert "Monitor high\neventually clock.output > 8\tholds, robustness 2" in words
+    page.tab.get_by_role("button", name="go to the break").click()
+    assert page.do("return state.time") == 4e9
 
 
 def test_two_runs_are_shown_side_by_side_with_their_first_difference(pair: Path, opened: Open) -> None:

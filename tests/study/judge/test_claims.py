@@ -1,4 +1,4 @@
-"""Claims and guidelines against tables of which the truth is known, SciPy, and queueing theory."""
+"""Claims and guidelines against tables with known truth, SciPy, and queueing theory."""
 
 from __future__ import annotations
 
@@ -275,13 +275,13 @@ def test_missing_numbers_are_counted_and_never_averaged_in() -> None:
     assert one(claim, grows, runs=40, failed=(3,)).findings[0].missing == 1
     assert one(claim.replace("less", "greater"), grows, runs=40, failed=(3, 4)).verdict == "reproduced"
     assert one(claim.replace("less", "greater"), grows, runs=40, failed=(3, 4, 5)).verdict == "undecided"
-    # What holds in every run holds not in one of which nothing is known; but one against it is enough.
+    # A property of every run does not hold with a run of unknown outcome; but one contrary run refutes it.
     assert one("always: wait > -99", grows, runs=60, failed=(3,)).verdict == "undecided"
     assert one("always: wait > 30", grows, runs=60, failed=(3,)).verdict == "not reproduced"
     assert one("always: wait != None, where: {servers: 4}", sometimes(0.5), runs=60).verdict == "not reproduced"
     assert one("always: wait != None, where: {servers: 3}", sometimes(0.5), runs=60).verdict == "reproduced"
     assert one("always: wait < 1, where: {servers: 4}", lambda *_: math.nan, runs=60).missing == 180
-    assert one("always: 1 / (way - way) > 0", grows, runs=60).verdict == "undecided"  # which nobody can calculate
+    assert one("always: 1 / (way - way) > 0", grows, runs=60).verdict == "undecided"  # cannot be calculated
     assert one("less: wait, at: {servers: 4}", flat, runs=0).verdict == "undecided"
 
 
@@ -322,9 +322,9 @@ def test_true_best_is_among_those_that_are_not_worse() -> None:
     found = [each for seed in range(40) for each in advice("least: wait", close, runs=20, seed=seed)]
     kept = sum(2 in each.not_worse for each in found)
     assert kept >= stats.binom.ppf(0.001, len(found), 0.95)
-    # It is no use to keep everything.
+    # Keeping everything would be useless.
     assert sum(len(each.not_worse) for each in found) < 4 * len(found)
-    # A level is the best with the confidence that is said, about: the bootstrap takes the means for the truth.
+    # A level is best with about the stated confidence: the bootstrap treats the means as the truth.
     right = sum(each.best == 2 for each in found)
     said = sum(option.confidence for each in found for option in each.options if option.level == 2)
     assert right == pytest.approx(said, rel=0.25)

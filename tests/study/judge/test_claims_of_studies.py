@@ -63,7 +63,7 @@ def test_queueing_theory(queue: Path) -> None:
     assert open_study(queue / "out").claims() == []
     assert open_study(queue / "out").guideline() == []
     (queue / "queue.yaml").write_text(QUEUE + ASKED, encoding="utf-8")
-    # To ask something of results makes no run again.
+    # Queries of results repeat no run.
     outcome = run_study(Plan.made(read_study(queue / "queue.yaml")), queue / "out", jobs=1)
     assert (outcome.made, outcome.there) == (0, 30)
     results = open_study(queue / "out")
@@ -85,7 +85,7 @@ def test_claims_of_another_study_are_judged_at_each_level_of_what_it_has_not(que
     )
     text = QUEUE.replace("vary: {load: [0.3, 0.5, 0.7]}\n", variants).replace("study: queue", "study: variants")
     run_study(Plan.made(read_study(write(tmp_path, text, "variants"))), tmp_path / "out", jobs=1)
-    lender.unlink()  # the folder knows what it was
+    lender.unlink()  # the folder has kept it
     found = open_study(tmp_path / "out").claims()
     assert [(each.name, each.where, each.verdict) for each in found] == [
         ("true_by_theory", {"variant": "usual"}, "reproduced"),

@@ -1,4 +1,4 @@
-"""What a study has found: its table, means, differences, and how far it is."""
+"""The results of a study: its table, means, differences, and progress."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from tests.study.study_parts import STUDY, plan_of, write
 def test_status_tells_how_far_it_is(done: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["status", str(done / "out"), "--conditions"]) == 0
     assert capsys.readouterr().out.splitlines() == [
-        "walks: 10 of 10 runs are over (10 ok)",
+        "walks: 10 of 10 runs are finished (10 ok)",
         "0 (drift=0.0): 5 ok of 5",
         "1 (drift=1.0): 5 ok of 5",
     ]
@@ -79,18 +79,18 @@ def test_fewer_replications_take_no_row_from_the_table(
     copied: Path, done: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     before = (done / "out" / "table.parquet").read_bytes()
-    kept = "out has 6 runs beyond the 2 replications asked for: the table keeps them\n"
+    kept = "out has 6 runs beyond the 2 replications requested: they stay in the table\n"
     assert study(copied, "--replications", 2) == 0
     assert capsys.readouterr() == (
-        f"walks: 2 conditions, 0 new runs, 4 there before\nwrote {copied / 'out' / 'table.parquet'}\n",
+        f"walks: 2 conditions, 0 new runs, 4 already there\nwrote {copied / 'out' / 'table.parquet'}\n",
         kept.replace("out has", f"{copied / 'out'} has"),
     )
     assert (copied / "out" / "table.parquet").read_bytes() == before
     assert main(["status", str(copied / "out")]) == 0
-    assert message(capsys, copied, out=True) == f"walks: 4 of 4 runs are over, and 6 more (10 ok)\n{kept}"
+    assert message(capsys, copied, out=True) == f"walks: 4 of 4 runs are finished, and 6 more (10 ok)\n{kept}"
     assert main(["report", str(copied / "out")]) == 0
     page = (copied / "out" / "report.html").read_text(encoding="utf-8")
-    assert "4 of 4 runs are over, and 6 more of replications beyond those asked for." in page
+    assert "4 of 4 runs are finished, and 6 more from replications beyond those requested." in page
     assert "Seeds 20 to 24:" in page
 
 
@@ -106,10 +106,10 @@ def test_runs_of_another_seed_are_told_and_not_mixed_in(
     assert study(tmp_path, "--replications", 2) == 0
     made, lost = ("2 new runs, 2", 2) if paired == "true" else ("4 new runs, 0", 4)
     assert capsys.readouterr() == (
-        f"walks: 2 conditions, {made} there before\nwrote {tmp_path / 'out' / 'table.parquet'}\n",
+        f"walks: 2 conditions, {made} already there\nwrote {tmp_path / 'out' / 'table.parquet'}\n",
         (
-            f"{tmp_path / 'out'} has {lost} runs of another version of the study, its model or Epicycle, "
-            "which the table leaves out\n"
+            f"{tmp_path / 'out'} has {lost} runs of another version of the study, its model or Epicycle: "
+            "they are not in the table\n"
         ),
     )
     tables = [(tmp_path / out / "table.parquet").read_bytes() for out in ("out", "fresh")]

@@ -1,4 +1,4 @@
-"""What a study varies: every form of a dimension gives the conditions that it says."""
+"""What a study varies: every form of a dimension gives the conditions that it declares."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ HEAD = "study: s\nmodel: ./walk.yaml\n"
 
 
 def values(tmp_path: Path, text: str) -> list[dict[str, Any]]:
-    """What the columns hold in every condition, by which it can be found again."""
+    """The values of the columns in every condition, which identify it."""
     plan = plan_of(write(tmp_path, HEAD + text))
     conditions = list(plan)
     assert [plan.find(each.key, each.values) for each in conditions] == [each.index for each in conditions]

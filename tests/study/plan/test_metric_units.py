@@ -1,4 +1,4 @@
-"""Metrics of studies have units: declared or the model's, converted on demand, and told wherever they are shown."""
+"""Metrics of studies have units: declared or the model's, converted on demand, and shown with their values."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def test_table_holds_numbers_in_the_units_that_are_asked_for(folder: Path) -> No
         assert row["pure"] == pytest.approx(row["place"] / row["highest"] * 100, rel=1e-15)
     assert plan.columns["place"].unit == "m"
     assert plan.columns["in_km"].doc == "where it ends"
-    # What is read from the folder alone goes on in the same units.
+    # Read from the folder alone, it continues in the same units.
     again = Plan.of_manifest(read_manifest(folder / "out"))
     assert [(each.unit, each.to) for each in again.metrics] == [(each.unit, each.to) for each in plan.metrics]
     assert [again.condition(index).key for index in range(2)] == [plan.condition(index).key for index in range(2)]
@@ -84,7 +84,7 @@ def test_another_unit_makes_other_runs(folder: Path) -> None:
 
 
 def problems_of(path: Path, study: str) -> str:
-    """What is said about a study."""
+    """The errors of a study."""
     path.write_text(study)
     with pytest.raises(ModelError) as caught:
         plan_of(path)
@@ -120,7 +120,7 @@ metrics:
         "3 errors in walks.yaml"
     )
     assert problems_of(path, "\n".join(line for line in study.splitlines() if line[:4] not in ("  e:", "  f:"))) == (
-        "walks.yaml:9:27: error: metric a: place counts in m, not in s\n"
+        "walks.yaml:9:27: error: metric a: place has the unit m, not s\n"
         "    9 |   a: {value: place, unit: s}\n"
         "      |                           ^\n"
         "   help: leave 'unit' out; 'to: ...' converts\n"

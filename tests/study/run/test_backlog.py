@@ -1,4 +1,4 @@
-"""The backlog: every run once, what is left of them, and how that is told."""
+"""The backlog: every run once, the runs left, and the display of progress."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def test_progress_is_a_line_a_minute_without_a_terminal(
 
 
 def test_what_is_left_is_only_what_has_to_be_made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A study goes on with more replications: half of its runs are there, and not only in the beginning."""
+    """A study continues with more replications: half of its runs exist, and not only at the beginning."""
     plan = plan_of(write(tmp_path))
     keys = [plan.key(plan.condition(each), one) for each in range(2) for one in range(5)]
     there = {key: Done(OK) for key in (*keys[:2], *keys[5:8], "a run of another model")}

@@ -1,4 +1,4 @@
-"""Damage to the files of a results folder: it is told, and what is lost is made anew; no row is ever another one."""
+"""Damage to the files of a results folder is reported, and lost runs are repeated; no row ever changes."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ from epicycle.runner.study.run.store import Store, lock, prepare
 from epicycle.runner.study.session import manifest_of
 from tests.study.study_parts import plan_of, write
 
-HELP = "   help: 'epicycle resume out' puts it aside and makes the runs anew that are lost with it"
-ANEW = "   help: 'epicycle study STUDY --out out' writes it anew, and keeps the runs that are there"
+HELP = "   help: 'epicycle resume out' sets it aside and repeats its lost runs"
+ANEW = "   help: 'epicycle study STUDY --out out' rewrites it and keeps the existing runs"
 
 
 def lines_of(rows: list[dict[str, Any]]) -> bytes:
@@ -66,7 +66,7 @@ def are_among(found: Iterable[dict[str, Any]], whole: dict[str, dict[str, Any]])
 
 
 def test_flipped_bits_are_told_or_repaired(done: Path, tmp_path: Path) -> None:
-    """300 bits, each in a folder of its own; some of the folders are resumed."""
+    """300 bits, each in its own folder; some of the folders are resumed."""
     plan = plan_of(done / "walks.yaml")
     whole = {row["run"]: row for row in open_study(done / "out").table(times=True).to_pylist()}
     kept = {row["run"]: row for batch in Store(done / "out").rows() for row in batch.to_pylist()}
@@ -111,18 +111,18 @@ def test_damaged_journal(copied: Path, capsys: pytest.CaptureFixture[str], caplo
     for command in ("status", "report"):
         assert main([command, "out"]) == 2
         assert capsys.readouterr().err == (
-            f"error: out/journals/behind.jsonl is damaged: 2 lines of 6 are not what was written\n{HELP}\n"
+            f"error: out/journals/behind.jsonl is damaged: 2 lines of 6 with a wrong checksum\n{HELP}\n"
         )
     table = (copied / "out" / "table.parquet").read_bytes()
     assert (
         main(["study", "walks.yaml", "--types", str(plan_of(copied / "walks.yaml").study.types[0]), "--out", "out"])
         == 0
     )
-    assert capsys.readouterr().out.startswith("walks: 2 conditions, 2 new runs, 8 there before\n")
+    assert capsys.readouterr().out.startswith("walks: 2 conditions, 2 new runs, 8 already there\n")
     assert [record.getMessage() for record in caplog.records] == [
         (
-            "out/journals/behind.jsonl is damaged: 2 lines of 6 are not what was written; their runs are made anew\n"
-            "   what is damaged is kept in out/damaged"
+            "out/journals/behind.jsonl is damaged: 2 lines of 6 with a wrong checksum; their runs are repeated\n"
+            "   the damaged file is kept in out/damaged"
         )
     ]
     assert (copied / "out" / "table.parquet").read_bytes() == table
@@ -134,11 +134,13 @@ def test_damaged_manifest(copied: Path, capsys: pytest.CaptureFixture[str], capl
     path.write_bytes(path.read_bytes().replace(b'"replications": 5', b'"replications": 4'))
     for command in ("status", "report", "resume"):
         assert main([command, "out"]) == 2
-        assert capsys.readouterr().err == f"error: out/manifest.json is damaged: it is not what was written\n{ANEW}\n"
+        assert (
+            capsys.readouterr().err == f"error: out/manifest.json is damaged: it does not match its checksum\n{ANEW}\n"
+        )
     table = (copied / "out" / "table.parquet").read_bytes()
     outcome = run_study(plan_of(copied / "walks.yaml"), Path("out"), jobs=1)
     assert (outcome.made, outcome.there) == (0, 10)
-    assert [record.getMessage() for record in caplog.records] == ["out/manifest.json is damaged: it is written anew"]
+    assert [record.getMessage() for record in caplog.records] == ["out/manifest.json is damaged and is being rewritten"]
     assert (copied / "out" / "table.parquet").read_bytes() == table
 
 
@@ -156,9 +158,9 @@ def test_damaged_table(copied: Path, capsys: pytest.CaptureFixture[str]) -> None
     path.write_bytes(data[:50] + bytes([data[50] ^ 1]) + data[51:])
     assert main(["status", "out"]) == 0
     assert capsys.readouterr().out == (
-        "walks: 10 of 10 runs are over (10 ok)\n"
-        "out/table.parquet is not the table of these runs, but damaged or older than they are\n"
-        "   help: 'epicycle resume out' writes it anew\n"
+        "walks: 10 of 10 runs are finished (10 ok)\n"
+        "out/table.parquet does not match the runs: it is damaged or out of date\n"
+        "   help: 'epicycle resume out' rewrites it\n"
     )
     run_study(plan_of(copied / "walks.yaml"), Path("out"), jobs=1)
     assert path.read_bytes() == data
@@ -196,7 +198,7 @@ VALUES: tuple[Any, ...] = (
 
 
 def edits(value: Any) -> Iterator[Any]:
-    """A manifest with one thing changed, at any depth."""
+    """A manifest with one change, at any depth."""
     yield from VALUES
     if isinstance(value, dict):
         for name in value:
@@ -212,7 +214,7 @@ def edits(value: Any) -> Iterator[Any]:
 
 
 def test_every_edit_of_a_manifest_gives_a_message(copied: Path) -> None:
-    """Of any field to any type: by hand, and by somebody who makes the checksum right."""
+    """Of any field to any type: by hand, and by somebody who corrects the checksum."""
     out = Path("out")
     path = out / "manifest.json"
     manifest = read_manifest(out)
@@ -225,7 +227,7 @@ def test_every_edit_of_a_manifest_gives_a_message(copied: Path) -> None:
         with pytest.raises(StoreError) as caught:
             read_manifest(out)
         if isinstance(edited, dict) and edited.keys() == manifest.keys():
-            assert str(caught.value) == f"out/manifest.json is damaged: it is not what was written\n{ANEW}"
+            assert str(caught.value) == f"out/manifest.json is damaged: it does not match its checksum\n{ANEW}"
         if not isinstance(edited, dict):
             assert str(caught.value) == "out holds other results, not those of a study"
             continue

@@ -1,4 +1,4 @@
-"""Studies on Dask: a real scheduler and real workers on loopback, which start in folders of their own."""
+"""Studies on Dask: a real scheduler and real workers on loopback, which start in separate folders."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def table_of(folder: Path) -> bytes:
 
 
 def without_progress(text: str) -> str:
-    """What was said, without the line a minute that a slow machine may add."""
+    """The messages, without the line per minute that a slow machine may add."""
     return re.sub(r"^\d\d:\d\d:\d\d walks: .*\n", "", text, flags=re.M)
 
 
@@ -62,9 +62,9 @@ def test_table_is_that_of_local_processes(cluster: Cluster, tmp_path: Path, caps
     assert table_of(tmp_path / "dask") == table_of(tmp_path / "local")
     statuses = Counter(pq.read_table(tmp_path / "dask" / "table.parquet")["status"].to_pylist())
     assert statuses.keys() == {"ok", "failed", "timeout", "killed"}
-    # Where there is nothing to do, no scheduler is asked.
+    # If there is nothing to do, no scheduler is contacted.
     assert main(["resume", str(tmp_path / "dask"), "--executor", "dask", "--scheduler", "127.0.0.1:9"]) == 1
-    assert f"0 new runs, {statuses.total()} there before" in capsys.readouterr().out
+    assert f"0 new runs, {statuses.total()} already there" in capsys.readouterr().out
 
 
 def test_workers_and_the_scheduler_are_lost(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -91,14 +91,14 @@ def test_workers_and_the_scheduler_are_lost(tmp_path: Path, capsys: pytest.Captu
         cluster.scheduler.kill()
         _, said = process.communicate(timeout=60)
     assert without_progress(said) == (
-        f"error: the scheduler {cluster.address} is gone\n"
-        f"   help: what was finished is kept; 'epicycle resume {tmp_path / 'dask'}' goes on\n"
+        f"error: the scheduler {cluster.address} no longer answers\n"
+        f"   help: finished runs are kept; 'epicycle resume {tmp_path / 'dask'}' continues\n"
     )
     assert process.returncode == 1
     kept = len(open_study(tmp_path / "dask").table())
     assert 8 <= kept < 40
     assert main(["resume", str(tmp_path / "dask"), "--jobs", "2"]) == 0
-    assert capsys.readouterr().out.startswith(f"walks: 2 conditions, {40 - kept} new runs, {kept} there before\n")
+    assert capsys.readouterr().out.startswith(f"walks: 2 conditions, {40 - kept} new runs, {kept} already there\n")
     assert table_of(tmp_path / "dask") == table_of(tmp_path / "local")
 
 
@@ -115,7 +115,7 @@ def test_a_cluster_of_its_own(tmp_path: Path) -> None:
         time.sleep(0.02)
     os.killpg(process.pid, signal.SIGINT)  # as a terminal does
     _, said = process.communicate(timeout=60)
-    assert without_progress(said) == f"interrupted; what was finished is kept: 'epicycle resume {out}' goes on\n"
+    assert without_progress(said) == f"interrupted; finished runs are kept: 'epicycle resume {out}' continues\n"
     assert process.returncode == 130
     assert 0 < len(open_study(out).table()) < 10
 
@@ -230,7 +230,7 @@ def test_all_files_travel(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> No
 
 
 def error_of(folder: Path, capsys: pytest.CaptureFixture[str], *arguments: object) -> str:
-    """What a study that cannot be run says, whole, without the folder."""
+    """The whole error of a study that cannot be run, without the folder."""
     try:
         code = study(folder, "--executor", "dask", *arguments)
     except SystemExit as error:
@@ -246,30 +246,31 @@ def test_what_cannot_be(
     assert study(tmp_path, "--scheduler", "localhost:8786") == 2
     assert capsys.readouterr().err == "error: --scheduler tcp://localhost:8786 is for --executor dask\n"
     assert error_of(tmp_path, capsys, "--scheduler", "localhost:8786", "--jobs", 2) == (
-        "2: error: --jobs counts processes of this machine; a scheduler has the workers that were started for it\n"
+        "2: error: --jobs counts processes on this machine and does not go with --scheduler, which has its own "
+        "workers\n"
     )
     for bad in ("localhost", "tcp://localhost:99999", "tcp://:8786", "inproc://localhost:8786"):
         expected = f"2: error: argument --scheduler: {bad!r} is not an address such as tcp://localhost:8786\n"
         assert error_of(tmp_path, capsys, "--scheduler", bad) == expected
     monkeypatch.setattr(cluster_module, "CONNECT", 1.0)
-    with socket.create_server(("127.0.0.1", 0)) as nobody:  # who takes calls and says nothing
+    with socket.create_server(("127.0.0.1", 0)) as nobody:  # accepts connections and never answers
         for port in (9, nobody.getsockname()[1]):
             assert error_of(tmp_path, capsys, "--scheduler", f"127.0.0.1:{port}") == (
                 f"1: error: no scheduler answers at tcp://127.0.0.1:{port}\n"
-                "   help: 'dask scheduler' starts one, and says its address\n"
+                "   help: 'dask scheduler' starts one and prints its address\n"
             )
     monkeypatch.setattr(cluster_module, "CONNECT", 10.0)
     for name, unlike in (
         ("numpy", f"numpy {fitness()['numpy']} there, 1.0 here"),
         ("casadi", f"casadi {fitness()['casadi'] or 'is missing'} there, 1.0 here"),
-        ("code", "the code of Epicycle is not the same"),
+        ("code", "the code of Epicycle differs"),
     ):
         with monkeypatch.context() as context:
             context.setitem(fitness(), name, "1.0")
             said = error_of(tmp_path, capsys, "--scheduler", cluster.address)
         assert re.sub(r"127.0.0.1:[0-9]+", "WORKER", said) == (
-            f"1: error: the Dask worker tcp://WORKER is not like this machine: {unlike}\n"
-            "   help: the same seed is to give the same run, so install the same there\n"
+            f"1: error: the Dask worker tcp://WORKER differs from this machine: {unlike}\n"
+            "   help: the same seed must give the same run, so install the same versions there\n"
         )
     with monkeypatch.context() as context:
         context.setitem(sys.modules, "distributed", None)
@@ -277,7 +278,7 @@ def test_what_cannot_be(
 
 
 def test_the_code_that_has_to_be_the_same_is_all_that_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Also what is compiled; not what is made of it, which differs between machines."""
+    """Including the sources of compiled modules; not the compiled files, which differ between machines."""
     monkeypatch.setattr(parcel, "import_module", lambda name: SimpleNamespace(__path__=[str(tmp_path)]))
     (tmp_path / "core").mkdir()
     seen = [parcel._code()]
@@ -303,15 +304,15 @@ def test_workers_that_are_missing_or_have_no_epicycle(
         address = ("--scheduler", cluster.address)
         assert error_of(tmp_path, capsys, *address) == (
             f"1: error: the scheduler {cluster.address} has had no workers for 1 s\n"
-            f"   help: 'dask worker {cluster.address}' starts some\n"
+            f"   help: 'dask worker {cluster.address}' starts one\n"
         )
         monkeypatch.setattr(cluster_module, "PATIENCE", 60.0)
         cluster.add_worker(**without_epicycle(tmp_path / "without"))
         expected = (
-            " has no Epicycle like this one: No module named 'epicycle.runner'; 'epicycle' is not a package\n"
-            "   help: install it there, in the version that is here\n"
+            " does not have this version of Epicycle: No module named 'epicycle.runner'; 'epicycle' is not a package\n"
+            "   help: install it there\n"
         )
-        # While it is just coming, its name is not always known.
+        # While it is joining, its name is not always known.
         first, then = (error_of(tmp_path, capsys, *address) for _ in range(2))
         assert re.sub(r"(a|the) Dask worker( tcp://[0-9.:]+)?", "WORKER", first) == f"1: error: WORKER{expected}"
         assert re.sub(r"tcp://[0-9.:]+", "ADDRESS", then) == f"1: error: the Dask worker ADDRESS{expected}"

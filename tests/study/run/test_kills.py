@@ -1,4 +1,4 @@
-"""`kill -9` of a study and of its workers, at any moment: nothing is lost, the table is as if nothing had been."""
+"""`kill -9` of a study and of its workers, at any moment: nothing is lost, the table is as without the kill."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def rows(folder: Path) -> set[str]:
 
 
 def written(folder: Path) -> int:
-    """How many bytes of rows there are; it changes when something happens."""
+    """The number of bytes of all rows, which changes with progress."""
     total = 0
     for path in (*folder.glob("journals/*"), *folder.glob("parts/*")):
         with suppress(FileNotFoundError):
@@ -116,7 +116,7 @@ def test_an_interrupt_ends_it_with_a_word(tmp_path: Path) -> None:
     os.killpg(process.pid, signal.SIGINT)  # as a terminal does
     _, said = process.communicate(timeout=30)
     assert process.returncode == 130
-    assert said == f"interrupted; what was finished is kept: 'epicycle resume {out}' goes on\n"
+    assert said == f"interrupted; finished runs are kept: 'epicycle resume {out}' continues\n"
     assert 0 < len(rows(out)) < 10
     deadline = time.monotonic() + 30
     while members(process.pid) and time.monotonic() < deadline:

@@ -73,7 +73,7 @@ def test_sequential_stopping_is_decided_between_batches(tmp_path: Path, capsys: 
         assert len(places) == needed
     assert outcome.stopped_early == 80 - len(table)
     assert main(["status", str(tmp_path / "out")]) == 0
-    assert capsys.readouterr().out == f"walks: {len(table)} of at most 80 runs are over ({len(table)} ok)\n"
+    assert capsys.readouterr().out == f"walks: {len(table)} of at most 80 runs are finished ({len(table)} ok)\n"
     assert run_study(plan, tmp_path / "out", jobs=1).made == 0
 
 
@@ -104,9 +104,9 @@ def test_runs_that_fail_hang_or_die_are_rows(tmp_path: Path, capsys: pytest.Capt
     assert f"epicycle replay {tmp_path / 'out'} {rows['failed']['run'][:12]}\n" in said
     # What has failed is not run again; what hangs on the machine is, if that is asked for.
     assert study(tmp_path, "--run-timeout", 0.5) == 1
-    assert capsys.readouterr().out.startswith("walks: 1 condition, 0 new runs, 10 there before\n")
+    assert capsys.readouterr().out.startswith("walks: 1 condition, 0 new runs, 10 already there\n")
     assert study(tmp_path, "--run-timeout", 0.5, "--retry", "--jobs", 2) == 1
-    assert capsys.readouterr().out.startswith("walks: 1 condition, 2 new runs, 8 there before\n")
+    assert capsys.readouterr().out.startswith("walks: 1 condition, 2 new runs, 8 already there\n")
     assert main(["replay", str(tmp_path / "out"), rows["failed"]["run"][:12]]) == 1
     assert "ValueError: seed 23 is unlucky" in capsys.readouterr().err
 

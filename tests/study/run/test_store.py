@@ -20,8 +20,8 @@ from epicycle.runner.study.session import manifest_of
 from tests.study.study_commands import message, study
 from tests.study.study_parts import STUDY, plan_of, write
 
-OTHER_FORMAT = "\n   help: its table.parquet can be read with pandas; make its runs anew in another folder"
-MADE_ANEW = "\n   help: 'epicycle study STUDY --out mine' writes it anew, and keeps the runs that are there"
+OTHER_FORMAT = "\n   help: pandas can read its table.parquet; to continue, repeat its runs in another folder"
+MADE_ANEW = "\n   help: 'epicycle study STUDY --out mine' rewrites it and keeps the existing runs"
 
 
 def test_folder_of_another_study(copied: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -33,7 +33,7 @@ def test_folder_of_another_study(copied: Path, capsys: pytest.CaptureFixture[str
     write(copied, STUDY.replace("  place: place\n", "  highest: highest\n"))
     assert study(copied) == 2
     assert message(capsys, copied) == (
-        "error: out was made when walks had other metrics: place, lost (aspects['loss']['dropped']), mean_place "
+        "error: out was made when walks had different metrics: place, lost (aspects['loss']['dropped']), mean_place "
         "(sum(signals['walk.output']['value']) / len(signals['walk.output']['value'])), not highest, lost "
         "(aspects['loss']['dropped']), mean_place (sum(signals['walk.output']['value']) / "
         "len(signals['walk.output']['value']))\n   help: choose another folder with --out\n"
@@ -50,7 +50,7 @@ def test_folder_of_another_study(copied: Path, capsys: pytest.CaptureFixture[str
     assert message(capsys, copied) == "error: mine holds other results, not those of a study\n"
     manifest = json.loads((copied / "out" / "manifest.json").read_text())
     for spoiled, said in (
-        (manifest | {"format": 2}, f"mine has format 2, this Epicycle reads format 4{OTHER_FORMAT}"),
+        (manifest | {"format": 2}, f"mine has format 2, but this Epicycle reads format 4{OTHER_FORMAT}"),
         (
             {key: manifest[key] for key in manifest if key != "text"},
             f"mine/manifest.json is damaged: it has no 'text'{MADE_ANEW}",
@@ -62,13 +62,13 @@ def test_folder_of_another_study(copied: Path, capsys: pytest.CaptureFixture[str
     with lock(copied / "out"):
         assert study(copied) == 2
     said = message(capsys, copied)
-    assert said == f"error: out is being written by another process (pid {os.getpid()})\n"
+    assert said == f"error: out is in use: another process is writing to it (pid {os.getpid()})\n"
     for command in ("resume", "status"):
         assert main([command, str(copied / "nothing")]) == 2
         assert message(capsys, copied) == "error: there is no folder nothing\n"
     assert main(["replay", str(copied / "out"), "abc"]) == 2
     assert message(capsys, copied) == (
-        "error: out has no run 'abc'\n   help: the column 'run' of out/table.parquet has their names\n"
+        "error: out has no run 'abc'\n   help: the column 'run' of out/table.parquet lists their names\n"
     )
 
 
@@ -78,13 +78,13 @@ def test_truncated_part(copied: Path, capsys: pytest.CaptureFixture[str]) -> Non
     part.write_bytes(part.read_bytes()[:-20])
     assert main(["status", str(copied / "out")]) == 2
     assert message(capsys, copied) == (
-        f"error: out/parts/{part.name} is damaged: it is not what was written\n"
-        "   help: 'epicycle resume out' puts it aside and makes the runs anew that are lost with it\n"
+        f"error: out/parts/{part.name} is damaged: it does not match its checksum\n"
+        "   help: 'epicycle resume out' sets it aside and repeats its lost runs\n"
     )
     assert study(copied) == 0
     assert [path.name for path in (copied / "out" / "damaged").iterdir()] == [part.name]
     new = f"{lost} new run{'s' if lost > 1 else ''}"
-    assert capsys.readouterr().out.startswith(f"walks: 2 conditions, {new}, {10 - lost} there before\n")
+    assert capsys.readouterr().out.startswith(f"walks: 2 conditions, {new}, {10 - lost} already there\n")
 
 
 def test_a_line_that_is_not_whole_was_not_finished(copied: Path, done: Path) -> None:
@@ -134,13 +134,13 @@ def test_full_disk_leaves_nothing_half(
     assert study(copied, "--replications", 6) == 1
     assert message(capsys, copied) == (
         "error: cannot write to out: No space left on device\n"
-        "   help: what was finished is kept; 'epicycle resume out' goes on\n"
+        "   help: finished runs are kept; 'epicycle resume out' continues\n"
     )
     monkeypatch.undo()
     writer.flush()
     assert [row["run"] for batch in store.rows() for row in batch.to_pylist()] == [rows[0]["run"], rows[2]["run"]]
     assert study(copied, "--replications", 6) == 0
-    assert capsys.readouterr().out.startswith("walks: 2 conditions, 0 new runs, 12 there before\n")
+    assert capsys.readouterr().out.startswith("walks: 2 conditions, 0 new runs, 12 already there\n")
 
 
 def test_folder_that_takes_nothing_from_the_start(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -1,13 +1,13 @@
-// What led to an event, and what came of it.
+// The causes and effects of an event.
 //
-// A firing is caused by the tokens that it takes, by the firing that asked for its wake-up, by the one before if SimPy
-// resumed its process, and, if it sends something, by the tokens that its actor has taken silently since it last sent.  An
-// act that lost a token causes the next firing of the actor that did not get it.  A wake-up is followed one step, for a
-// clock would lead to its beginning.
+// A firing is caused by the tokens that it takes, by the firing that requested its wake-up, by the previous one if
+// SimPy resumed its process, and, if it sends something, by the tokens that its actor has taken without sending since
+// it last sent.  An act that lost a token causes the next firing of the actor that did not get it.  Wake-ups are
+// followed one step only, because a clock would lead back to its start.
 
 const NEAREST = 300; // firings of a cone, nearest in time first
 
-// Each as {firing, kind, record}: the send that brought it, or the act that lost it, if there is one.
+// Each as {firing, kind, record}: the send of its token, or the act that lost it, if there is one.
 function causesOf(run, firing) {
   const found = [], actor = run.firing_actor[firing];
   for (const arrival of run.arrivalsOf.of(firing)) {
@@ -21,7 +21,7 @@ function causesOf(run, firing) {
   return found;
 }
 
-// The firings of the actor just before this one that sent nothing; for a resumed process, the one before in any case.
+// The firings of the actor just before this one that sent nothing; for a resumed process, always the previous one.
 function absorbed(run, firing, actor) {
   const rows = run.firingsOf.of(actor), found = [];
   let place = search(rows.length, (i) => rows[i] >= firing) - 1;
@@ -50,7 +50,7 @@ function effectsOf(run, firing) {
   return found;
 }
 
-// The acts because of which an actor did not get a token between its firing before and this one.
+// The acts that kept a token from an actor between its previous firing and this one.
 function lossesBefore(run, firing) {
   const actor = run.firing_actor[firing], losses = run.lossesOf.get(actor) ?? [], rows = run.firingsOf.of(actor);
   const place = search(rows.length, (i) => rows[i] >= firing), tag = run.firing_tag[firing];
@@ -60,11 +60,11 @@ function lossesBefore(run, firing) {
   return losses.slice(first, end);
 }
 
-// All that led to a selection or came of it: firings by direction, and the edges between them.
+// All causes and effects of a selection: firings by direction, and the edges between them.
 class Cone {
   constructor(run, selection, directions) {
     this.run = run;
-    this.back = new Map(); // firing -> how it got in
+    this.back = new Map(); // firing -> how it was reached
     this.ahead = new Map();
     this.edges = [];
     this.isCut = false;
@@ -93,7 +93,7 @@ class Cone {
         this.isCut = true;
         break;
       }
-      waiting.sort((one, other) => order(other.firing, one.firing)); // the nearest is the last
+      waiting.sort((one, other) => order(other.firing, one.firing)); // the nearest comes last
       const { firing, wakes } = waiting.pop();
       for (const each of next(this.run, firing)) {
         if (each.kind === "wake" && !wakes) continue;
@@ -117,14 +117,14 @@ class Cone {
   }
 }
 
-// The firing that sent what a record is about.
+// The firing whose send a record concerns.
 function senderOf(run, record) {
   if (run.record_firing[record] >= 0) return run.record_firing[record];
   const about = run.record_about[record];
   return about >= 0 ? run.record_firing[about] : NOTHING;
 }
 
-// The next firings of the actors that a loss concerns.
+// The next firings of the actors that a loss affects.
 function deprived(run, record) {
   const port = run.ports[run.record_port[record]];
   return port.leads.map((actor) => run.nextFiring(actor, run.record_tag[record])).filter((firing) => firing >= 0);

@@ -1,4 +1,4 @@
-// Sequence chart: a lane for each actor, firings as dots, tokens as arrows from who sent them to who took them.
+// Sequence chart: a lane for each actor, firings as dots, tokens as arrows from sender to receiver.
 
 const ROW = 19, ARROWS = 2500;
 
@@ -10,7 +10,7 @@ class Chart extends Timeline {
     state.listeners.push(() => this.follow());
   }
 
-  // Scrolls to the actor that is selected.
+  // Scrolls to the selected actor.
   follow() {
     const { selection, run } = this.state;
     if (!selection || !this.height) return;
@@ -21,7 +21,7 @@ class Chart extends Timeline {
     if (y < RULER + ROW || y > this.height - ROW) this.scrollBy(y - this.height / 2);
   }
 
-  // The actors that have a lane, by where it is.
+  // The actors with a lane, by its position.
   rows() {
     const { run, cone, selection } = this.state;
     const wanted = this.isConeOnly && cone && selection.run === this.state.active ? cone.actors : null;
@@ -105,7 +105,7 @@ class Chart extends Timeline {
     paper.fill();
   }
 
-  // Of firings that would lie on each other, one is drawn.
+  // Of firings that would overlap, only one is drawn.
   dots(from, to, first, last) {
     const { state } = this, { run, cone, selection, active } = state, isCone = cone && selection.run === active, { shown } = this.rows();
     for (let row = first; row < last; row++) {
@@ -157,7 +157,7 @@ class Chart extends Timeline {
   }
 }
 
-// The end of a path, which tells more than its beginning.
+// The end of a path, which says more than its start.
 function fromEnd(path, letters) {
   return path.length <= letters ? path : `…${path.slice(path.length - letters + 1)}`;
 }

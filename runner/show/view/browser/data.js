@@ -1,4 +1,4 @@
-// The data of the page: runs in columns, as packing.py writes them, and the indices to look things up in them.
+// The data of the page: runs in columns, as packing.py writes them, and indices for looking things up.
 
 const MISSING = -2, NOTHING = -1;
 
@@ -14,7 +14,7 @@ async function readData(text) {
   return head;
 }
 
-// Whole numbers are differences to the one before; the bytes of one place in all numbers stand together.
+// Whole numbers are stored as differences from the previous one; bytes of equal significance are stored together.
 function readColumn(body, [kind, start, count]) {
   if (kind === "b") return body.subarray(start, start + count);
   const width = kind === "d" ? 8 : 4, whole = new Uint8Array(width * count);
@@ -29,7 +29,7 @@ function readColumn(body, [kind, start, count]) {
   return numbers;
 }
 
-// Which rows have each number from 0 to count in a column; rows with a negative one are left out.
+// For each number from 0 to count, the rows that have it in a column; rows with a negative number are left out.
 class Index {
   constructor(column, count) {
     this.starts = new Int32Array(count + 1);
@@ -45,7 +45,7 @@ class Index {
   }
 }
 
-// The first of some places in a row for which something is so, if it is so for all after that, too.
+// The first index for which a condition holds, given that it also holds for all later ones.
 function search(count, isSo) {
   let low = 0, high = count;
   while (low < high) {
@@ -97,12 +97,12 @@ class Run {
     return new TextDecoder().decode(this.textBytes.subarray(start, this.textEnds[text]));
   }
 
-  // The last tag at a time (ns) or before; -1 before the first.
+  // The last tag at or before a time (ns); -1 before the first.
   tagAt(time) {
     return search(this.times.length, (tag) => this.times[tag] > time) - 1;
   }
 
-  // The last firing of an actor at a tag or before, and the first one at it or after; -1 if there is none.
+  // The last firing of an actor at or before a tag, and the first one at or after it; -1 if there is none.
   lastFiring(actor, tag) {
     const rows = this.firingsOf.of(actor), place = search(rows.length, (i) => this.firing_tag[rows[i]] > tag);
     return place ? rows[place - 1] : -1;
@@ -113,7 +113,7 @@ class Run {
     return place < rows.length ? rows[place] : -1;
   }
 
-  // Which firing asked for each wake-up.
+  // The firing that requested each wake-up.
   askers() {
     return this.wake_tag.map((tag, wake) => {
       if (tag < 0) return tag;
@@ -122,10 +122,10 @@ class Run {
     });
   }
 
-  // A token is lost to an actor by the last act on its way there, if it never arrived.
+  // The last act on its way to an actor loses a token, if it never arrived.
   findLosses() {
-    const last = new Map(); // what acts are about, and the actor -> the last of them
-    const unsent = new Map(); // of acts at an output about nothing that was sent: aspects that one token has met
+    const last = new Map(); // what acts concern, and the actor -> the last of them
+    const unsent = new Map(); // for acts at an output that concern nothing sent: aspects that one token has met
     for (const record of this.acts) {
       const about = this.record_about[record];
       if (about === MISSING) continue;
@@ -156,7 +156,7 @@ class Run {
     }
   }
 
-  // Tokens that take time, in the order in which they are sent, and the longest of these times (ns).
+  // Tokens with a travel time, in order of sending, and the longest of these times (ns).
   findFlights() {
     const flights = [];
     this.arrival_record.forEach((record, arrival) => {
@@ -177,7 +177,7 @@ class Run {
     return this.places[this.firing_actor[firing]];
   }
 
-  // How a port is called with its channel.
+  // The name of a port with its channel.
   portText(port, channel) {
     return this.portPath(port) + (channel >= 0 && this.ports[port].multi ? `[${channel}]` : "");
   }

@@ -1,4 +1,4 @@
-// Details of what is selected, in words: what it took, what it sent, what it did not get, and where to go on from there.
+// Details of the selection, in words: what it took, what it sent, what it did not get, and links to follow.
 
 class Details {
   constructor(state, lanes) {
@@ -25,13 +25,17 @@ class Details {
     ];
     if (run.settings.length) facts.push(["settings", run.settings.join(", ")]);
     parts.push(table(run.metrics.map(([name, value, unit, doc]) => [name, `${value}${unit ? ` ${unit}` : ""}`, doc]), "metrics"));
+    for (const { name, property, text, time } of run.monitors) {
+      parts.push(element("h2", { text: `Monitor ${name}` }), table([[property, text]], "monitor"));
+      if (time !== null) parts.push(button("go to the break", () => this.state.setTime(time)));
+    }
     parts.push(table(facts, "run"));
     const shown = run.firing_tag.length;
     if (shown < run.firings)
-      parts.push(element("p", { className: "note", text: `The run is too long to hold all of it here: ${shown.toLocaleString("en")} of its firings are shown, in ${run.gaps.length + 1} stretches that are whole in themselves. Signals and metrics are of the whole run.` }));
+      parts.push(element("p", { className: "note", text: `The run is too long to show completely: ${shown.toLocaleString("en")} of its firings are shown, in ${run.gaps.length + 1} stretches without gaps. Signals and metrics cover the whole run.` }));
     const thinned = run.lanes.filter((lane) => lane.left_out);
     if (thinned.length)
-      parts.push(element("p", { className: "note", text: `${thinned.length} of ${run.lanes.length} signals are thinned: where there are more samples than pixels, the lowest and the highest ones are shown.` }));
+      parts.push(element("p", { className: "note", text: `${thinned.length} of ${run.lanes.length} signals are thinned: where there are more samples than pixels, the lowest and the highest are shown.` }));
     parts.push(element("p", { className: "note", text: "Select an actor, a body, a dot or a cross to see what led to it and what came of it." }));
     return parts;
   }
@@ -58,7 +62,7 @@ class Details {
   }
 
   fired(run, firing) {
-    const actor = run.actorName(firing), outside = ["", "SimPy resumed the process", "an aspect let go of what it had kept"];
+    const actor = run.actorName(firing), outside = ["", "SimPy resumed the process", "an aspect released what it had held"];
     const parts = [
       element("h2", { text: actor }),
       element("p", { text: `fired at ${run.tagText(run.firing_tag[firing])}${run.firing_outside[firing] ? `: ${outside[run.firing_outside[firing]]}` : ""}` }),
@@ -68,7 +72,7 @@ class Details {
     const took = [...run.arrivalsOf.of(firing)].map((arrival) => this.arrival(run, firing, arrival));
     for (const wake of run.wakesOf.of(firing)) {
       const asker = run.wake_asker[wake], tag = run.wake_tag[wake];
-      took.push(this.item("wake-up", tag < 0 ? "asked for in initialize" : `asked for at ${run.tagText(tag)}`, asker, NOTHING));
+      took.push(this.item("wake-up", tag < 0 ? "requested in initialize" : `requested at ${run.tagText(tag)}`, asker, NOTHING));
     }
     parts.push(...list("took", took));
     const missed = lossesBefore(run, firing).map((record) => this.loss(run, record));
@@ -83,7 +87,7 @@ class Details {
 
   arrival(run, firing, arrival) {
     const port = run.portText(run.arrival_port[arrival], run.arrival_channel[arrival]).split(".").at(-1), record = run.arrival_record[arrival];
-    if (record < 0) return this.item(port, "sent in a part that is not shown", NOTHING, NOTHING);
+    if (record < 0) return this.item(port, "sent in a part of the run that is not shown", NOTHING, NOTHING);
     const late = run.record_tag[record] === run.firing_tag[firing] ? "" : `, sent at ${run.tagText(run.record_tag[record])}`;
     const acts = [...run.actsAbout.of(record)].filter((act) => run.ports[run.record_port[act]].leads.includes(run.firing_actor[firing]));
     const marks = [...new Set(acts.map((act) => `${run.aspects[run.record_aspect[act]]}: ${run.events[run.record_event[act]]}`))];
@@ -116,7 +120,7 @@ class Details {
     ];
     if (about >= 0) parts.push(...list("sent by", [this.item(run.portPath(run.record_port[about]).split(".").at(-1), `at ${run.tagText(run.record_tag[about])}`, sender, NOTHING)]));
     if (run.isLoss.has(record))
-      parts.push(...list("had to do without it", deprived(run, record).map((firing) => this.item(run.actorName(firing), `fired at ${run.tagText(run.firing_tag[firing])}`, firing, NOTHING))));
+      parts.push(...list("fired without it", deprived(run, record).map((firing) => this.item(run.actorName(firing), `fired at ${run.tagText(run.firing_tag[firing])}`, firing, NOTHING))));
     return parts;
   }
 

@@ -1,6 +1,6 @@
-// Graph: the drawn model, its actors alight when they fire, tokens on their wires, acts of aspects where they stand.
+// Graph: the drawn model, with actors lit when they fire, tokens on their wires, and acts of aspects at their badges.
 
-const LEGIBLE = 5; // px of a letter; below, composites close and words are left out
+const LEGIBLE = 5; // px of a letter; below this, composites close and words are left out
 
 class Graph extends View {
   constructor(state, number) {
@@ -61,7 +61,7 @@ class Graph extends View {
     return this.shut.get(box.path) ?? this.camera.scale * 9 < LEGIBLE * 0.62;
   }
 
-  // The outermost closed composite around something in one, if there is any; what is in it is not seen.
+  // The outermost closed composite around something, if there is one; its content is not visible.
   cover(path) {
     for (let at = path.indexOf("."); at >= 0; at = path.indexOf(".", at + 1)) {
       const box = this.boxes.get(path.slice(0, at));
@@ -70,7 +70,7 @@ class Graph extends View {
     return null;
   }
 
-  // The box that is seen for a path; arrays that are one box have that of their first instance.
+  // The visible box for a path; arrays that are one box use that of their first instance.
   boxOf(path) {
     const box = this.boxes.get(path) ?? this.boxes.get(path.replace(/\[\d+\]/g, "[0]"));
     return box ? this.cover(box.path) ?? box : null;
@@ -98,7 +98,7 @@ class Graph extends View {
     return x < right && y < bottom && x + width > left && y + height > top;
   }
 
-  // How strongly each actor is lit, by the path of the box that is seen for it.
+  // How strongly each actor is lit, by the path of its visible box.
   firing() {
     const { run, state } = this, lit = new Map(), last = state.tags[this.number];
     const end = search(run.firing_tag.length, (firing) => run.firing_tag[firing] > last);
@@ -133,7 +133,7 @@ class Graph extends View {
     }
   }
 
-  // The colour of the cone in which a box has a part.
+  // The colour of the cone that a box belongs to.
   coneColour(box) {
     const { cone, selection } = this.state;
     if (!cone || selection.run !== this.number) return null;
@@ -216,7 +216,7 @@ class Graph extends View {
       }
   }
 
-  // A wire lies in the composite that its ends stand in, or whose ports they are.
+  // A wire belongs to the composite that contains its ends, or whose ports they are.
   isHidden(wire) {
     if (wire.scope === undefined) {
       const owners = [wire.source, ...wire.targets].map((path) => path.replace(/\.[^.]*$/, ""));
@@ -263,7 +263,7 @@ class Graph extends View {
     return false;
   }
 
-  // -- tokens on their way --
+  // -- travelling tokens --
 
   tokens() {
     const { run, state } = this, { time, afterglow } = state, last = state.tags[this.number];
@@ -308,7 +308,7 @@ class Graph extends View {
     this.paper.globalAlpha = 1;
   }
 
-  // The places of the composites that are seen closed.
+  // The places of the composites that appear closed.
   get shutBoxes() {
     const { camera: { scale }, drawing } = this;
     if (this.shutNow?.scale !== scale) {
@@ -334,7 +334,7 @@ class Graph extends View {
     paper.restore();
   }
 
-  // The way along wires from an output port to an input port, through ports of composites.
+  // The route along wires from an output port to an input port, through ports of composites.
   route(from, to) {
     const key = from * 65536 + to;
     if (!this.routes.has(key)) this.routes.set(key, this.findRoute(this.portOf(from), this.portOf(to)));
@@ -393,7 +393,7 @@ class Graph extends View {
     return state.select(found < 0 ? null : { run: this.number, firing: found, record: NOTHING });
   }
 
-  // The last act of an aspect at a place until now, or else its first.
+  // The last act of an aspect at a place until now, otherwise its first.
   pickAct(aspect, place) {
     const { run, state } = this, last = state.tags[this.number];
     const acts = run.acts.filter((record) =>
@@ -407,7 +407,7 @@ function shortName(aspect) {
   return aspect.replace(/^.*\./, "");
 }
 
-// The part of a wire's tree that leads from its source to one of its ends.
+// The part of a wire's tree from its source to one of its ends.
 function branch(wire, source, head) {
   const key = (x, y) => `${x},${y}`;
   if (!wire.tree) {
@@ -439,7 +439,7 @@ function branch(wire, source, head) {
   return lines.flat();
 }
 
-// The point of a route after a share of its length.
+// The point of a route at a fraction of its length.
 function along({ points, lengths }, share) {
   const wanted = share * lengths.at(-1), i = Math.max(1, search(lengths.length, (at) => lengths[at] >= wanted));
   if (i >= lengths.length) return points.slice(-2);

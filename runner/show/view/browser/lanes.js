@@ -1,4 +1,4 @@
-// Lanes: acts of each aspect, then signals, numbers as lines and states as strips; of two runs, one over the other.
+// Lanes: acts of each aspect, then signals, numbers as lines and states as strips; two runs are drawn over each other.
 
 const LANE = 46, ACTS = 17, RULER = 18, MODES = 8;
 
@@ -12,7 +12,7 @@ class Lanes extends Timeline {
     this.addModes(state.runs[0]);
   }
 
-  // Ports that send words, as the modes of machines are, have lanes whether they are recorded or not.
+  // Ports that send words, such as modes of machines, have lanes even if they are not recorded.
   addModes(run) {
     const modes = [...run.ports.keys()].filter((port) => {
       const rows = run.recordsAt.of(port).slice(0, 40).filter((row) => run.isSend[row]);
@@ -21,7 +21,7 @@ class Lanes extends Timeline {
     for (const port of modes.slice(0, MODES)) this.toggle(run.portPath(port), true);
   }
 
-  // Shows or hides a signal, or what a port sent though it was not recorded: numbers, or words.
+  // Shows or hides a signal, or the numbers or words that an unrecorded port sent.
   toggle(path, isShown = !this.shown.has(path)) {
     if (!isShown) this.shown.delete(path);
     else {
@@ -105,7 +105,7 @@ class Lanes extends Timeline {
     this.text(now, 4, y + 28, { size: 11, colour: theme.now, width: this.margin - 8 });
   }
 
-  // Where a sample stands on the axis.
+  // The position of a sample on the axis.
   sampleX(run, seconds) {
     if (!this.state.axis.byTag) return this.x(seconds * 1e9);
     return this.x(search(run.times.length, (tag) => run.times[tag] >= seconds * 1e9 - 0.5));
@@ -170,7 +170,7 @@ class Lanes extends Timeline {
   }
 }
 
-// What a port sent, of the firings that were kept.
+// What a port sent in the kept firings.
 function laneOf(run, path) {
   const rows = run.recordsAt.of(run.portOf.get(path)).filter((row) => run.isSend[row]);
   const times = Float64Array.from(rows, (row) => run.times[run.record_tag[row]] / 1e9);

@@ -1,4 +1,4 @@
-// The page: views in their places, buttons, keys, and the loop that draws.
+// The page: arranges the views, buttons and keys, and runs the drawing loop.
 
 async function main() {
   const holder = document.getElementById("data"), page = document.getElementById("page");
@@ -7,11 +7,11 @@ async function main() {
   try {
     data = await readData(holder.textContent);
   } catch (error) {
-    page.replaceChildren(element("p", { className: "note", text: `This browser cannot read the page's data (${error.message}); it needs DecompressionStream, which browsers have since 2023.` }));
+    page.replaceChildren(element("p", { className: "note", text: `This browser cannot read the page's data (${error.message}); it needs DecompressionStream, which browsers have had since 2023.` }));
     return;
   }
   holder.remove();
-  PALETTE.push(...data.palette.map((colour) => (colour === "#000000" ? "#8c6bb1" : colour))); // black is no colour in the dark
+  PALETTE.push(...data.palette.map((colour) => (colour === "#000000" ? "#8c6bb1" : colour))); // black is invisible in the dark theme
   data.runs.forEach((run, i) => {
     const record = data.difference?.records[i] ?? NOTHING;
     run.tagOfDifference = record >= 0 ? run.record_tag[record] : undefined;
@@ -57,11 +57,11 @@ async function main() {
 function bar(state, data) {
   const [first] = data.runs, play = button("▶", () => state.play(!state.isPlaying), "play");
   play.id = "play";
-  const speed = element("select", { label: "model seconds in a second", id: "speed" });
+  const speed = element("select", { label: "model seconds per second", id: "speed" });
   for (const each of [...new Set([...SPEEDS, state.speed])].sort((a, b) => a - b)) speed.append(element("option", { value: each, text: `×${each}` }));
   speed.value = state.speed;
   speed.addEventListener("change", () => { state.speed = Number(speed.value); });
-  const axis = element("select", { label: "axis of time", id: "axis" }, element("option", { value: "time", text: "by time" }), element("option", { value: "tag", text: "by tag" }));
+  const axis = element("select", { label: "time axis", id: "axis" }, element("option", { value: "time", text: "by time" }), element("option", { value: "tag", text: "by tag" }));
   axis.addEventListener("change", () => state.setByTag(axis.value === "tag"));
   const toggle = (name, words) => {
     const made = button(words, () => {
@@ -122,7 +122,7 @@ function picker(state, lanes) {
   return select;
 }
 
-// On a narrow screen one pane is seen at a time.
+// A narrow screen shows one pane at a time.
 function tabs(panes, hasSpace, state) {
   const names = [...(hasSpace ? ["space"] : []), "graph", "chart", "lanes", "about"], made = element("nav", {});
   for (const name of names) {

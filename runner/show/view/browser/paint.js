@@ -1,6 +1,6 @@
-// Canvases that fit their boxes, colours of the theme, and the gestures that all views share.
+// Canvases that fit their boxes, colours of the theme, and gestures shared by all views.
 
-const PALETTE = []; // of figures, too: filled by main
+const PALETTE = []; // also of figures; filled by main
 
 function element(name, options = {}, ...children) {
   const { text, label, ...rest } = options, made = document.createElement(name);
@@ -11,7 +11,7 @@ function element(name, options = {}, ...children) {
   return made;
 }
 
-// The colours of the page's style, read anew when the theme changes.
+// The colours of the page's style, read again when the theme changes.
 const theme = {};
 function readTheme() {
   const style = getComputedStyle(document.documentElement);
@@ -19,13 +19,13 @@ function readTheme() {
     theme[name] = style.getPropertyValue(`--${name}`).trim();
 }
 
-// CSS pixels in what views take for one: on a very wide screen letters and lines are larger.
+// CSS pixels per unit of the views: letters and lines are larger on a very wide screen.
 function unit() {
   return window.innerWidth >= 2400 ? 1.5 : 1;
 }
 
 class View {
-  // A canvas in a box; `draw` paints it in CSS pixels, or larger units on a screen that is far away.
+  // A canvas in a box; `draw` paints it in CSS pixels, or in larger units on a very wide screen.
   constructor(state, label) {
     this.state = state;
     this.canvas = element("canvas", { label, tabIndex: 0, className: "view" });
@@ -101,8 +101,8 @@ class View {
   }
 }
 
-// Drags, wheel and pinches of a canvas: `move(dx, dy, x, y)`, `zoom(factor, x, y)`, `click(x, y)`; a drag begins with
-// `grab(x, y)`, which may return another way to go on with it.
+// Drags, wheel and pinches of a canvas: `move(dx, dy, x, y)`, `zoom(factor, x, y)`, `click(x, y)`; a drag starts with
+// `grab(x, y)`, which may return another function to continue it.
 function gestures(canvas, { move, zoom, click, grab, hover }) {
   const held = new Map();
   let start = null, way = null, spread = 0;
@@ -150,7 +150,7 @@ function gestures(canvas, { move, zoom, click, grab, hover }) {
   }, { passive: false });
 }
 
-// Marks at round numbers.
+// Ticks at round numbers.
 function ticks(low, high, count) {
   const raw = (high - low) / Math.max(1, count), power = 10 ** Math.floor(Math.log10(raw));
   const step = power * ([1, 2, 5, 10].find((each) => each * power >= raw) ?? 10), found = [];

@@ -1,11 +1,11 @@
-// Space: what figures of the model say stands where.
+// Space: the positions of things, as figures of the model place them.
 
 class Space extends View {
   constructor(state, number, camera) {
     super(state, "Space: bodies, estimates, plans and goals");
     this.number = number;
     this.marks = state.runs[number].marks;
-    this.camera = camera; // of all runs: they are seen from one place
+    this.camera = camera; // shared by all runs, which are seen from one place
     this.canvas.dataset.view = "space";
     gestures(this.canvas, {
       move: (dx, dy) => this.pan(dx, dy),
@@ -69,12 +69,12 @@ class Space extends View {
     return mark.colour === null ? theme.limit : PALETTE[mark.colour % PALETTE.length];
   }
 
-  // The row of a mark that counts at a time (s); -1 before the first.
+  // The row of a mark that is valid at a time (s); -1 before the first.
   row(mark, time) {
     return search(mark.times.length, (row) => mark.times[row] > time + 1e-12) - 1;
   }
 
-  // Whether a row is older than what usually comes after one.
+  // Whether a row is older than the usual interval between rows.
   isStale(mark, row, time) {
     return time - mark.times[row] > 1.6 * mark.interval;
   }
@@ -83,7 +83,7 @@ class Space extends View {
     const row = this.row(mark, time), { rows, width, times } = mark;
     if (row < 0) return null;
     const now = [rows[row * width], rows[row * width + 1]], gap = times[row + 1] - times[row];
-    // A body moves on its way to where it is said to be next.
+    // A body moves towards its next known position.
     if (!(gap > 0) || gap > 2 * mark.interval) return now;
     const share = (time - times[row]) / gap;
     return [0, 1].map((i) => now[i] + share * (rows[(row + 1) * width + i] - now[i]));
@@ -97,7 +97,7 @@ class Space extends View {
     for (const mark of this.marks) if (mark.shape === "body") this.trail(mark, time);
     for (const [shape, painter] of Object.entries(painters))
       for (const mark of this.marks) if (mark.shape === shape) this[painter](paper, mark, time);
-    if (!this.marks.length) this.text("No figure of this model shows a space.", 12, 24, { colour: theme.soft });
+    if (!this.marks.length) this.text("No figure of this model shows positions in space.", 12, 24, { colour: theme.soft });
   }
 
   grid() {
@@ -165,7 +165,7 @@ class Space extends View {
     this.cross(this.x(x), this.y(y), 3, faded(colour, share));
   }
 
-  // The circles of a plan, as one shape, and the way through their middles.
+  // The circles of a plan as one shape, and the path through their centres.
   tube(paper, mark, time) {
     const row = this.row(mark, time), { rows, width } = mark, colour = this.colour(mark), way = [];
     if (row < 0) return;
@@ -198,7 +198,7 @@ class Space extends View {
     return port !== undefined && selection.firing >= 0 && run.firing_actor[selection.firing] === run.ports[port].place;
   }
 
-  // A click on a body selects what said last where it is.
+  // A click on a body selects the firing that last gave its position.
   pick(x, y) {
     const run = this.state.runs[this.number], time = this.state.time / 1e9;
     let best = null, least = 24;

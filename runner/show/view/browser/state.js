@@ -1,7 +1,7 @@
-// What the page shows just now: the moment, the selection, the axis; views redraw when something changes.
+// The state of the page: time, selection and axis; views redraw when it changes.
 
 const SPEEDS = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100, 200, 500, 1e3, 2e3, 5e3, 1e4, 1e5, 1e6];
-const GLOW = 0.35; // s of the wall clock for which a firing is seen
+const GLOW = 0.35; // s of real time for which a firing is visible
 
 class State {
   constructor(data) {
@@ -10,7 +10,7 @@ class State {
     this.active = 0;
     this.end = Math.max(1, ...data.runs.map((run) => run.end)); // ns
     this.time = 0; // ns
-    this.tags = data.runs.map(() => NOTHING); // the last tag that is over, of each run
+    this.tags = data.runs.map(() => NOTHING); // the last completed tag of each run
     this.isPlaying = false;
     this.speed = speedFor(this.end / 1e9);
     this.axis = { byTag: false, low: 0, high: this.end };
@@ -40,7 +40,7 @@ class State {
     this.changed();
   }
 
-  // To one tag of the active run, after which later microsteps of its time may still be to come.
+  // Moves to one tag of the active run; later microsteps of its time may still follow.
   setTag(tag) {
     const run = this.run;
     if (!run.times.length) return;
@@ -68,7 +68,7 @@ class State {
     if (this.time >= this.end) this.isPlaying = false;
   }
 
-  // How strongly to show what happened at a tag of a run: 1 now, less as it is over, 0 if it is to come.
+  // How strongly to show what happened at a tag of a run: 1 now, fading afterwards, 0 before.
   glow(run, tag) {
     const now = this.tags[this.runs.indexOf(run)];
     if (tag > now) return 0;
@@ -81,7 +81,7 @@ class State {
     return GLOW * this.speed * 1e9; // ns
   }
 
-  // -- the axis of time: seconds, or one step for each tag --
+  // -- the time axis: seconds, or one step for each tag --
 
   place(run, tag) {
     return this.axis.byTag ? tag : run.times[tag];

@@ -1,4 +1,4 @@
-// What all views over time share: the axis, the cursor, dragging and zooming; and the strip of the whole run.
+// The common part of all views over time: axis, cursor, dragging and zooming; and the strip of the whole run.
 
 const MARGIN = 168; // px at the left, for names
 
@@ -36,7 +36,7 @@ class Timeline extends View {
     return low + ((x - this.margin) / this.span) * (high - low);
   }
 
-  // The tags of a run that are in sight.
+  // The visible tags of a run.
   tagsInSight(run) {
     const { low, high, byTag } = this.state.axis;
     if (byTag) return [Math.max(0, Math.floor(low)), Math.min(run.times.length - 1, Math.ceil(high))];
@@ -59,7 +59,7 @@ class Timeline extends View {
       const words = axis.byTag ? (Number.isInteger(at) && run.times[at] !== undefined ? run.tagText(at) : "") : `${numberText(at)} s`;
       this.text(words, x + 3, 11, { size: 10, colour: theme.soft });
     }
-    // What a thinned run does not show.
+    // The firings that a thinned run does not show.
     for (const [kept, count] of run.gaps) {
       const before = run.firing_tag[kept - 1] ?? 0, after = run.firing_tag[kept] ?? run.times.length - 1;
       const from = this.x(this.state.place(run, before)), to = this.x(this.state.place(run, after));
@@ -75,6 +75,10 @@ class Timeline extends View {
     const x = this.x(this.state.cursor);
     if (x >= this.margin - 1) this.line([x, 0, x, this.height], theme.now, 1.5);
     const { data, runs, active } = this.state;
+    for (const { time } of runs[active].monitors) {
+      const at = time === null || this.state.axis.byTag ? -1 : this.x(time);
+      if (at >= this.margin) this.line([at, 0, at, this.height], theme.loss, 1.5, [1, 3]);
+    }
     if (data.difference) {
       const tag = runs[active].tagOfDifference, at = tag === undefined ? -1 : this.x(this.state.place(runs[active], tag));
       if (at >= this.margin) this.line([at, 0, at, this.height], theme.loss, 1.5, [4, 3]);
@@ -89,7 +93,7 @@ class Timeline extends View {
   }
 }
 
-// The whole run in one strip: how much happens when, what is in sight, and where the cursor is.
+// The whole run in one strip: how much happens when, the visible part, and the cursor.
 class Scrubber extends View {
   constructor(state) {
     super(state, "The whole run: drag to move through time");
