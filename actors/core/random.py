@@ -64,10 +64,6 @@ class RandomStream(Words):
         inner = bits.advance(-len(self._ahead)).state["state"]
         return int(inner["state"]), int(inner["inc"])
 
-    def become(self, other: RandomStream) -> None:
-        """Engine: go on as another stream does, which nobody may use any more."""
-        self._bits, self._block, self._ahead = other._bits, other._block, other._ahead
-
     # -- bits ------------------------------------------------------------------------------------------------------
 
     def below(self, bound: int) -> int:
@@ -261,7 +257,6 @@ if TYPE_CHECKING:
 
         def word(self) -> int: ...
         def below(self, bound: int) -> int: ...
-        def become(self, other: Stream) -> None: ...
 
 else:
     Stream = RandomStream
@@ -279,16 +274,17 @@ class Streams:
 
     def __init__(self, seed: int) -> None:
         self._seed = seed
-        self._made: list[tuple[Stream, str, str]] = []
+        self._made: list[tuple[RandomStream, str, str]] = []
 
     def of(self, path: str, purpose: str = "") -> Stream:
         """A new stream for one purpose of one actor or aspect."""
         stream = random_stream(self._seed, path, purpose)
-        self._made.append((stream, path, purpose))
+        self._made.append((cast(RandomStream, stream), path, purpose))
         return stream
 
     def reseed(self, seed: int) -> None:
         """From now on all streams, those that are still to be made too, are those of a run with another seed."""
         self._seed = seed
         for stream, path, purpose in self._made:
-            stream.become(random_stream(seed, path, purpose))
+            other = cast(RandomStream, random_stream(seed, path, purpose))
+            stream._bits, stream._block, stream._ahead = other._bits, other._block, other._ahead
