@@ -20,8 +20,8 @@ if TYPE_CHECKING:
     imports=("build",),
 )
 def show(options: argparse.Namespace) -> int:
-    """Show the parameters of a model with their types, units, values and docs, the files that it reads, its metrics,
-    recorded ports, figures and aspects, and the packaged disturbances that fit it."""
+    """Show the parameters of a model with their types, units, values and docs, the files that it reads, its metrics
+    and monitors, recorded ports, figures and aspects, and the packaged disturbances that fit it."""
     from ..text import noting
 
     with noting() as noted:
@@ -29,6 +29,7 @@ def show(options: argparse.Namespace) -> int:
     found = {
         "parameters": list(_parameters(model)),
         "metrics": list(_metrics(model)),
+        "monitors": list(_monitors(model)),
         "figures": [{"figure": name, "type": kind} for name, (kind, *_) in model.figures.items()],
         "aspects": [{"aspect": each.name, "type": each.kind, "at": ", ".join(each.places)} for each in model.aspects],
         "disturbances": [{"disturbance": name, "what it is": doc} for name, doc in _disturbances(options)],
@@ -68,8 +69,16 @@ def _parameters(model: Model) -> Iterator[dict[str, str]]:
 
 def _metrics(model: Model) -> Iterator[dict[str, str]]:
     for each in model.metrics:
+        if each.monitor:
+            continue
         takes, unit = f"{each.measure.take} of {', '.join(each.ports)}", "" if each.unit == "1" else each.unit
         yield {"metric": each.name, "takes": takes, "unit": unit, "what it is": each.measure.doc}
+
+
+def _monitors(model: Model) -> Iterator[dict[str, str]]:
+    for each in model.monitors:
+        said = each.requirement
+        yield {"monitor": each.name, "property": said.property, "unit": said.unit, "what it is": said.doc}
 
 
 def _disturbances(options: argparse.Namespace) -> Iterator[tuple[str, str]]:

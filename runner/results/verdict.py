@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -36,7 +37,11 @@ class Verdict:
         """The same as of a metric: whether the property holds, or by how much."""
         if self.missing:
             return Outcome(missing=self.missing)
-        return Outcome(self.holds, note=self.remark) if whether else Outcome(self.robustness)
+        if whether:
+            return Outcome(self.holds, note=self.remark)
+        if self.robustness is not None and math.isinf(self.robustness):  # of which nobody can take a mean
+            return Outcome(missing="it is infinite: no comparison of numbers decides the property")
+        return Outcome(self.robustness)
 
     def plain(self) -> dict[str, Any]:
         """The same for programs."""

@@ -87,6 +87,13 @@ def _deciding(start: int, end: int, value: Value, positive: bool) -> Found:
     return [each if (at(value, each.start) > 0.0) == positive else each._replace(value=None) for each in pieces]
 
 
+def _append(pieces: list[Piece] | deque[Piece], piece: Piece) -> None:
+    """Let a signal grow; what stays as it is becomes one piece."""
+    if pieces and not isinstance(piece.value, Line) and pieces[-1].value == piece.value:
+        piece = Piece(pieces.pop().start, piece.end, piece.value)
+    pieces.append(piece)
+
+
 class Window:
     """``always``, or ``eventually`` if ``any``, from ``start`` to ``end`` ns later.
 
@@ -137,10 +144,7 @@ class Window:
 
     def _put(self, piece: Piece) -> None:
         for pieces in (self._back, self._front):
-            if pieces and not isinstance(piece.value, Line) and pieces[-1].value == piece.value:
-                pieces.append(Piece(pieces.pop().start, piece.end, piece.value))
-            else:
-                pieces.append(piece)
+            _append(pieces, piece)
 
     def _slide(self, now: int) -> None:
         """Let the window be that of a time."""
@@ -198,7 +202,8 @@ class Rest:
 
     def take(self, over: bool) -> Found:
         """See the module."""
-        self._pieces += self._of.take(over)
+        for piece in self._of.take(over):
+            _append(self._pieces, piece)
         if not over or not self._pieces:
             return []
         pieces, self._pieces = self._pieces, []

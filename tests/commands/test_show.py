@@ -39,6 +39,8 @@ def printed(capsys: pytest.CaptureFixture[str], *arguments: str, code: int = 0) 
 
 
 def test_a_model_shows_what_it_offers(capsys: pytest.CaptureFixture[str]) -> None:
+    monitors = "monitors: {alive: {property: eventually sends clock.output, doc: it ticks}}\n"
+    Path("m.yaml").write_text(MODEL + monitors)
     assert (
         printed(capsys, "show", "m.yaml", "--set", "share=0.25")
         == """\
@@ -53,6 +55,9 @@ share      number <= 1                   0.25
 
 metric  takes                  unit  what it is
 ticks   count of clock.output        how many
+
+monitor  property                       unit  what it is
+alive    eventually sends clock.output        it ticks
 
 figure  type
 ticks   TimeSeries

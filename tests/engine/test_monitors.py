@@ -115,6 +115,14 @@ def test_a_verdict_is_two_metrics() -> None:
     assert results.outcomes["low"].remarks == ["broken at 4 s, where a.output = 7"]
 
 
+def test_an_infinite_robustness_is_no_metric() -> None:
+    results = run(RISING, "heard: eventually sends b.output")
+    assert results.monitors["heard"] == Verdict(True, float("inf"))
+    assert results.metrics == {"heard": True, "heard_robustness": None}
+    missing = "it is infinite: no comparison of numbers decides the property"
+    assert results.outcomes["heard_robustness"].missing == missing
+
+
 def test_a_monitor_ends_a_run_when_it_is_broken() -> None:
     found = run(RISING, "low: {property: always a.output < 6, stop: true}")
     assert (found.stopped, found.end) == ("monitor low", 4.0)
