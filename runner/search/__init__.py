@@ -2,7 +2,7 @@
 
 from .explaining import Effect, Explanation, Step, explain
 from .minimal import minimal
-from .rare import RareEvent, rare
+from .splitting import RareEvent, rare
 from .tried import Tried
 
 __all__ = ["Effect", "Explanation", "RareEvent", "Step", "Tried", "explain", "minimal", "rare"]
