@@ -11,6 +11,7 @@ if TYPE_CHECKING:
     from .media import Medium
     from .observation import InvariantError
     from .situation import SituationError
+    from .trace import Trace, TraceError, TraceFile
 else:
     from .clock import ClockAspect, ClockDrift, ClockOffset
     from .communication import Corrupt, Duplicate, GilbertElliott, Latency, PacketLoss, Reorder, Throttle
@@ -31,6 +32,7 @@ else:
     from .media import Bus, Medium, RadioMedium
     from .observation import Assert, Count, InvariantError, Probe
     from .situation import Occlusion, Outage, OutOfRange, RangeLoss, SituationError
+    from .trace import Trace, TraceError, TraceFile, TraceReplay
 
 __all__ = [
     "STAMP", "ActorPoint", "Alteration", "Aspect", "AspectContext", "Assert", "Bias", "Bus", "ByActorParameter",
@@ -41,6 +43,6 @@ __all__ = [
     "LossAspect", "MeasurementAspect", "MeasurementFailure", "Medium", "Noise", "ObservationAspect", "Occlusion",
     "OutOfRange", "Outage", "Outlier", "PacketLoss", "PortAspect", "PortsParameter", "Probe", "Processor", "Quantise",
     "RadioMedium", "RandomLoss", "RangeLoss", "Reading", "Reorder", "Replace", "Request", "Saturate", "Selection",
-    "SelectionParameter", "SituationError", "SkipFiring", "StuckAt", "Throttle", "Transform", "Unit", "aspect_stream",
-    "class_decorations", "decorations", "time_needed",
+    "SelectionParameter", "SituationError", "SkipFiring", "StuckAt", "Throttle", "Trace", "TraceError", "TraceFile",
+    "TraceReplay", "Transform", "Unit", "aspect_stream", "class_decorations", "decorations", "time_needed",
 ]  # fmt: skip

@@ -16,6 +16,7 @@ from .measurement import Bias as _Bias, Drift as _Drift, MeasurementFailure as _
 from .media import Bus as _Bus, RadioMedium as _RadioMedium
 from .observation import Assert as _Assert, Count as _Count, Probe as _Probe
 from .situation import Occlusion as _Occlusion, OutOfRange as _OutOfRange, Outage as _Outage, RangeLoss as _RangeLoss
+from .trace import TraceReplay as _TraceReplay
 from epicycle.actors import Distribution
 from epicycle.actors.expression import PortFormula
 
@@ -148,6 +149,10 @@ class StuckAt(_StuckAt):
 class Throttle(_Throttle):
     """Lets through at most `rate` messages per second in the long run, and `burst` at once (token bucket)."""
     def __init__(self, *, rate: _Number, burst: _Whole = ..., excess: Literal['drop', 'delay'] = ..., from_: _Number = ..., until: _Number | None = ..., every: _Number | None = ..., when: str | PortFormula | None = ...) -> None: ...
+
+class TraceReplay(_TraceReplay):
+    """Loses and delays messages exactly as a measured trace says."""
+    def __init__(self, *, by: Literal['token', 'time'] = ..., start: Literal['first', 'random'] = ..., at_end: Literal['repeat', 'pass', 'stop'] = ..., file: str | Path, time: str = ..., lost: str = ..., received: str = ..., delay: str = ..., delay_unit: Literal['s', 'ms', 'us', 'ns'] = ..., sequence: str | None = ..., wraps: _Whole | None = ..., from_: _Number = ..., until: _Number | None = ..., every: _Number | None = ..., when: str | PortFormula | None = ...) -> None: ...
 
 class Transform(_Transform):
     """Replaces each number by an expression over it, the time and the latest tokens of ports."""

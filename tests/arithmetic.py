@@ -38,6 +38,7 @@ _COUNTS = ("len", "bool")
 DRAWN = "what is drawn or told to people; no digest, token, metric or table comes from it"
 FOREIGN = "a foreign library computes; docs/semantics.md says that the promise ends there"
 PAPER = "what kernels are tested against, and a foreign library's program; no token is computed by it"
+FITTED = "estimates from measured data; a run gets them as parameters, written out in a file"
 FRACTIONS = "powers of fractions and whole numbers, which are exact"
 WHOLE = "sums of whole numbers"
 EXCEPTIONS = {  # file or folder: what it may use, and why
@@ -54,11 +55,15 @@ EXCEPTIONS = {  # file or folder: what it may use, and why
     "actors/statistics.py": (("**",), FRACTIONS),
     "aspects/core/fields.py": (("sum",), WHOLE),
     "aspects/execution.py": (("sum",), WHOLE),
+    "aspects/trace.py": (("numpy.cumsum",), WHOLE),
     "runner/engine/statistic.py": (("sum",), WHOLE),
     "runner/results/encoding.py": (("sum",), "only asks whether a sum is NaN"),
     "runner/build/checks.py": (("sum",), WHOLE),
+    "runner/calls/disturbing.py": (("sum",), WHOLE),
     "runner/text/problems.py": (("sum",), WHOLE),
     "runner/results/arrow.py": (("numpy.cumsum",), WHOLE),
+    "runner/recorded/delays.py": ((), FITTED),
+    "runner/recorded/losses.py": ((), FITTED),
     "runner/show": ((), DRAWN),
     "runner/shown.py": (("**", "math.log10"), DRAWN),
     "runner/study/judge/claims.py": (("sum",), WHOLE),

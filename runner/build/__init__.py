@@ -1,6 +1,7 @@
 """From declarations, or a program, to a checked and frozen model."""
 
 from .composite_class import CompositeClass, load_composite
+from .disturbance import disturb_ports
 from .figures import Complaint, figures_of, made_figure, place_in_figure, tell_of_figure
 from .load import load_model
 from .model import Model
@@ -13,6 +14,7 @@ __all__ = [
     "CompositeClass",
     "CompositePort",
     "Model",
+    "disturb_ports",
     "figures_of",
     "load_composite",
     "load_model",

@@ -4,22 +4,32 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from collections.abc import Mapping as AnyMapping
+from dataclasses import replace
 
-from ..catalogue import installed
+from epicycle.aspects import ObservationAspect, PortAspect
+
+from ..catalogue import Catalogue, installed
 from ..graph import ActName, WovenAspect
 from ..language import (
+    COMPOSITE_THERE,
     PARAMETER_THERE,
     CompositeText,
+    Disturbance,
     ParameterText,
+    PartText,
+    PointcutText,
+    Setting,
     Settings,
     inherit,
     joined,
     load_disturbance,
     settings_in,
+    settings_of,
 )
-from ..text import Mapping, Position, Problems, node_of
+from ..text import Mapping, PathIndex, PatternError, Position, Problems, Text, call_site, node_of
 from .acts import acts_of
 from .draft import Draft
+from .paths import Paths
 from .scope import Building
 from .settle import Settler
 from .unfold import Known, Unfolding
@@ -31,25 +41,113 @@ def disturb(
 ) -> tuple[Draft, list[WovenAspect], frozenset[ActName] | None]:
     """The model's draft with the aspects of a disturbance, these aspects, and the only acts; raises ``ModelError``."""
     problems = Problems()
-    disturbance = load_disturbance(name, problems)
-    problems.raise_if_any()
-    assert disturbance is not None, "what cannot be read is a problem"
-    own = {key: ParameterText(key, position, node_of(value, position)) for key, value in model.parameters.items()}
-    parameters = joined(own, disturbance.text.parameters, PARAMETER_THERE, problems)
-    root = CompositeText(model.name, position, parameters=parameters, aspects=disturbance.text.aspects)
+    disturbance = _loaded(name, problems)
     for setting in disturbance.settings:
         hint = f"load the model together with the disturbance: load_model(..., disturb={name!r})"
         problems.add(f"{setting.path!r} can no longer be set: the model has been built", setting.position, hint)
+    node = node_of(values, position)
+    settings = settings_in(node, problems) if isinstance(node, Mapping) else []
     for key in sorted(values.keys() & model.parameters.keys() - disturbance.text.parameters.keys()):
         problems.add(f"{key!r} is a parameter of the model, not of the disturbance {disturbance.text.name}", position)
+    return _woven(model, disturbance, settings, installed().with_types(types), position, problems)
+
+
+def disturb_ports(
+    model: Building,
+    names: Iterable[str],
+    at: AnyMapping[str, list[str]] | None,
+    values: Iterable[str | Setting] | AnyMapping[str, object],
+    types: Iterable[type],
+) -> tuple[list[str], frozenset[ActName] | None]:
+    """Weave the aspects of disturbances that alter, delay or lose tokens; what is left out (in words), the only acts.
+
+    ``at`` are ports, by direction, in place of those that the disturbances name.  Of aspects with the same name, the
+    last one counts.  Raises ``ModelError``.
+    """
+    problems, position, catalogue = Problems(), call_site(), installed().with_types(types)
+    whole = Disturbance(CompositeText("disturbances", position))
+    left_out: list[str] = []
+    for name in names:
+        one = _loaded(name, problems)
+        aspects, unused = _of_ports(one, catalogue, at, Paths(model.draft).ports)
+        left_out += unused
+        if not aspects:
+            message = f"{one.text.name} has no aspect that alters, delays or loses tokens"
+            problems.add(message, one.text.position)
+        parameters = joined(whole.text.parameters, one.text.parameters, PARAMETER_THERE, problems)
+        whole = replace(
+            whole,
+            text=replace(whole.text, parameters=parameters, aspects=whole.text.aspects | aspects),
+            composites=joined(whole.composites, one.composites, COMPOSITE_THERE, problems),
+            exactly=whole.exactly if one.exactly is None else (*(whole.exactly or ()), *one.exactly),
+        )
+    settings = settings_of(values, problems)
+    draft, found, acts = _woven(model, whole, settings, catalogue, position, problems)
+    model.adopt(draft, found)
+    return left_out, acts
+
+
+def _of_ports(
+    disturbance: Disturbance, catalogue: Catalogue, at: AnyMapping[str, list[str]] | None, ports: PathIndex
+) -> tuple[dict[str, PartText], list[str]]:
+    """The aspects of a disturbance that alter, delay or lose tokens, and what else there is, in words."""
+    of = f"({disturbance.text.name})"
+    aspects, left_out = {}, [f"set {setting.path} {of}" for setting in disturbance.settings]
+    for key, part in disturbance.text.aspects.items():
+        cls = catalogue.aspects.get(part.type.text)
+        if cls is not None and (not issubclass(cls, PortAspect) or issubclass(cls, ObservationAspect)):
+            left_out.append(f"{key}: {part.type.text} {of}")
+            continue
+        if at is None:
+            part, unmatched = _matched(part, ports)
+            left_out += [f"{key} at {text} {of}" for text in unmatched]
+        elif cls is not None:
+            side = "input" if "input" in cls.stands_at else "output"
+            part = replace(part, at=tuple(PointcutText.of(Text(port, part.position)) for port in at[side]))
+        aspects[key] = part
+    return aspects, left_out
+
+
+def _matched(part: PartText, ports: PathIndex) -> tuple[PartText, list[str]]:
+    """An aspect without the patterns that match no port, if others do; and these patterns."""
+    aimed = [each for each in part.at if not each.exclude]
+    unmatched = [each for each in aimed if each.text and not _matches(each.text, ports)]
+    if len(unmatched) == len(aimed):
+        return part, []
+    return replace(part, at=tuple(each for each in part.at if each not in unmatched)), [each.text for each in unmatched]
+
+
+def _matches(pattern: str, ports: PathIndex) -> bool:
+    try:
+        return bool(ports.select(pattern))
+    except PatternError:
+        return True  # which is reported when the aspect is woven
+
+
+def _loaded(name: str, problems: Problems) -> Disturbance:
+    disturbance = load_disturbance(name, problems)
+    problems.raise_if_any()
+    assert disturbance is not None, "what cannot be read is a problem"
+    return disturbance
+
+
+def _woven(
+    model: Building,
+    disturbance: Disturbance,
+    settings: list[Setting],
+    catalogue: Catalogue,
+    position: Position,
+    problems: Problems,
+) -> tuple[Draft, list[WovenAspect], frozenset[ActName] | None]:
+    own = {key: ParameterText(key, position, node_of(value, position)) for key, value in model.parameters.items()}
+    parameters = joined(own, disturbance.text.parameters, PARAMETER_THERE, problems)
+    root = CompositeText(model.name, position, parameters=parameters, aspects=disturbance.text.aspects)
     taken = {woven.name for woven in model.aspects}
     for part in disturbance.text.aspects.values():
         if part.name in taken:
             problems.add(f"there is already an aspect {part.name!r}", part.position, "unweave it first")
     problems.raise_if_any()
-    node = node_of(values, position)
-    settler = Settler(Settings(settings_in(node, problems) if isinstance(node, Mapping) else []), problems)
-    catalogue = installed().with_types(types)
+    settler = Settler(Settings(settings), problems)
     composites, broken = inherit(disturbance.composites, catalogue.actors, problems)
     made = Unfolding(Known(composites, catalogue, broken), settler, model.draft.copy())
     made.body("", root, settler.parameters("", root, {}, {}, None))

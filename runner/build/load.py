@@ -22,13 +22,12 @@ from ..language import (
     inherit,
     joined,
     load_disturbances,
-    parse_setting,
     read_model,
     read_overrides,
-    settings_in,
+    settings_of,
     without,
 )
-from ..text import NORMAL, Limits, Problems, call_site, node_of
+from ..text import NORMAL, Limits, Problems
 from ..text import Mapping as MappingNode
 from .acts import acts_of
 from .checks import check
@@ -65,7 +64,7 @@ def load_model(
     """
     problems, limits = Problems(), Limits(max_actors)
     settings = [each for file in _several(overrides) for each in read_overrides(Path(file), problems)]
-    settings += _settings(set, problems)
+    settings += settings_of(set, problems)
     with without_collection():
         # What the files declare.
         text, declared = read_model(str(name), problems)
@@ -142,12 +141,3 @@ def _figures(text: ModelText, values: Values, names: dict[str, object]) -> dict[
 
 def _several(given: str | Path | Iterable[str | Path]) -> list[str | Path]:
     return [given] if isinstance(given, (str, Path)) else list(given)
-
-
-def _settings(given: Iterable[str | Setting] | Mapping[str, object], problems: Problems) -> list[Setting]:
-    if not isinstance(given, Mapping):
-        read = (parse_setting(each, problems) if isinstance(each, str) else each for each in given)
-        return [setting for setting in read if setting is not None]
-    node = node_of(given, call_site())
-    assert isinstance(node, MappingNode)
-    return settings_in(node, problems)

@@ -10,8 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from .comparing import Comparison, Difference, compare
+    from .disturbing import Disturbed, disturb
     from .estimating import RareEvent, rare
     from .explaining import Explained, explain, explained
+    from .fitting import Fit, fit
     from .picturing import Picture, Pictures, draw, plot, save
     from .running import Changes, Done, as_command, load, perform, run, seconds, watched
     from .studying import study
@@ -21,17 +23,21 @@ __all__ = [
     "Changes",
     "Comparison",
     "Difference",
+    "Disturbed",
     "Done",
     "Explained",
+    "Fit",
     "Page",
     "Picture",
     "Pictures",
     "RareEvent",
     "as_command",
     "compare",
+    "disturb",
     "draw",
     "explain",
     "explained",
+    "fit",
     "load",
     "perform",
     "plot",
@@ -47,8 +53,10 @@ __all__ = [
 
 _HOMES = {
     "comparing": ("Comparison", "Difference", "compare"),
+    "disturbing": ("Disturbed", "disturb"),
     "estimating": ("RareEvent", "rare"),
     "explaining": ("Explained", "explain", "explained"),
+    "fitting": ("Fit", "fit"),
     "picturing": ("Picture", "Pictures", "draw", "plot", "save"),
     "running": ("Changes", "Done", "as_command", "load", "perform", "run", "seconds", "watched"),
     "studying": ("study",),

@@ -222,7 +222,7 @@ TOPICS: Final[dict[str, tuple[str, tuple[str, ...]]]] = {
     "vehicles": ("Ground vehicles, their sensors and guidance", ("vehicles",)),
     "robotics": ("Robots that observe and avoid a moving obstacle, as in the paper", ("robotics",)),
     "sinks": ("Where tokens end", ("sinks",)),
-    "communication": ("At input ports: whether, when and how a message arrives", ("communication", "media")),
+    "communication": ("At input ports: whether, when and how a message arrives", ("communication", "trace", "media")),
     "measurement": ("At output ports: what a sensor seems to have measured", ("measurement",)),
     "situation": ("What depends on where bodies are: distance, range, line of sight, partition", ("situation",)),
     "execution": ("At actors: firings that take time or do not happen, crashes, clocks", ("clock", "execution")),

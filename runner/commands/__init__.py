@@ -1,6 +1,6 @@
 """The commands of the command line, in the order in which ``epicycle --help`` names them."""
 
-from . import compare, completion, describe, explain, imports, new, rare, run, show, studies, trace, view
+from . import compare, completion, describe, disturb, explain, fit, imports, new, rare, run, show, studies, trace, view
 
 COMMANDS = (
     run.run,
@@ -8,6 +8,8 @@ COMMANDS = (
     compare.compare,
     explain.explain,
     rare.rare,
+    fit.fit,
+    disturb.disturb,
     studies.study,
     studies.resume,
     studies.status,

@@ -17,6 +17,7 @@ from .dimensions import Dimension, Factor, Level, in_si, split_number
 from .disturbance import (
     COMPOSITE_THERE,
     PARAMETER_THERE,
+    Disturbance,
     add_disturbances,
     joined,
     load_disturbance,
@@ -26,7 +27,7 @@ from .files import read_library, read_model
 from .inheritance import inherit
 from .places import connection
 from .schema import CONSTRUCTS, json_schema, schema_text
-from .settings import Setting, Settings, change_aspect, parse_setting, read_overrides, settings_in, without
+from .settings import Setting, Settings, change_aspect, parse_setting, read_overrides, settings_in, settings_of, without
 from .study import MAX_REPLICATIONS, MAX_STUDY_SEED, RESERVED, Study, is_study, read_study, study_of_text
 from .study_metric import ASPECTS, NUMBERS, SIGNALS, StudyMetric, asks_for_none
 from .usage import check_usage
@@ -51,6 +52,7 @@ __all__ = [
     "CompositeText",
     "ConnectionText",
     "Dimension",
+    "Disturbance",
     "Factor",
     "Guideline",
     "Level",
@@ -86,6 +88,7 @@ __all__ = [
     "read_study",
     "schema_text",
     "settings_in",
+    "settings_of",
     "split_number",
     "study_of_text",
     "without",

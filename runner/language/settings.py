@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from collections.abc import Mapping as AnyMapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -22,12 +23,14 @@ from ..text import (
     Problems,
     Scalar,
     Text,
+    call_site,
     check_pattern,
     did_you_mean,
     is_empty,
     matches,
     names_asked,
     names_of,
+    node_of,
     parse,
     read,
     split,
@@ -118,6 +121,16 @@ def settings_in(node: Mapping, problems: Problems) -> list[Setting]:
         for key, entry in node.entries.items()
         if is_pattern(key, entry.key.position, problems)
     ]
+
+
+def settings_of(given: Iterable[str | Setting] | AnyMapping[str, object], problems: Problems) -> list[Setting]:
+    """Settings as a call or a command gives them."""
+    if not isinstance(given, AnyMapping):
+        read = (parse_setting(each, problems) if isinstance(each, str) else each for each in given)
+        return [setting for setting in read if setting is not None]
+    node = node_of(given, call_site())
+    assert isinstance(node, Mapping)
+    return settings_in(node, problems)
 
 
 def is_pattern(path: str, position: Position, problems: Problems) -> bool:

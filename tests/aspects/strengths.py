@@ -39,6 +39,7 @@ from epicycle.aspects import (
     SkipFiring,
     StuckAt,
     Throttle,
+    TraceReplay,
     Transform,
 )
 
@@ -55,6 +56,7 @@ AT_ZERO: list[Aspect] = [
     Corrupt(probability=0),
     Corrupt(probability=0, kind="bit_flip"),
     Throttle(rate=1, burst=1e9),
+    TraceReplay(file="tests/aspects/traces/perfect.csv"),
     Bus(factor=0),
     RadioMedium(message_length=1, rate=1e12),
     RangeLoss(positions=["a.at", "b.at"], range=math.inf),
@@ -89,6 +91,7 @@ AT_WORK: list[Aspect] = [
     Reorder(probability=0.5),
     Corrupt(probability=0.5),
     Throttle(rate=300),
+    TraceReplay(file="tests/aspects/traces/link.csv", delay_unit="ms", start="random"),
     Bus(factor="0.2 ms"),
     RadioMedium(message_length=3, rate=1000),
     RangeLoss(positions=["a.at", "b.at"], range=5),
