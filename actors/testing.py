@@ -15,7 +15,7 @@ from typing import Any
 
 import simpy
 
-from .core import Actor, Tag, Wake, to_nanoseconds
+from .core import Actor, Streams, Tag, Wake, to_nanoseconds
 
 
 class Harness:
@@ -32,6 +32,7 @@ class Harness:
         self.actor = actor
         self.tag = Tag(0, 0)
         self.seed = seed
+        self.streams = Streams(seed)
         self.environment = simpy.Environment()
         self.wakes: list[Wake] = []
         self.stopped: str | None = None

@@ -41,7 +41,7 @@ from .posts import Place, Posts
 from .primitives import is_alone
 from .process import Process
 from .quantity import MAX_DEPTH, Quantity, counted_in_si, is_too_deep, plain
-from .random import Stream, random_stream
+from .random import Stream, Streams, random_stream
 from .tag import NANOSECONDS_PER_SECOND, Tag, new_tag, to_nanoseconds, to_seconds
 from .units import UnitError, convert, parse_unit
 
@@ -49,7 +49,7 @@ __all__ = [
     "ABSENT", "MAX_DEPTH", "NANOSECONDS_PER_SECOND", "NEVER", "REQUIRED", "SAME", "Actor", "Configurable", "Context",
     "Emitter", "EpicycleError", "InputPort", "Latest", "Line", "MappingParameter", "Moment", "OutputPort", "Parameter",
     "ParameterError", "Pending", "Place", "PortError", "PortParameter", "Posts", "Process", "Quantity", "Ranks",
-    "Stream", "Tag", "Times", "UnitError", "Wake", "Way", "When", "abridged", "accepts", "array_parameter",
+    "Stream", "Streams", "Tag", "Times", "UnitError", "Wake", "Way", "When", "abridged", "accepts", "array_parameter",
     "bounds_text", "brief", "convert", "counted", "counted_in_si", "cut", "declared_parameters", "declared_ports",
     "did_you_mean", "digits", "elementary", "has_own_ports", "irregular", "is_alone", "is_too_deep", "nearest",
     "new_tag", "new_wake", "normal_quantile", "normal_share", "open_regular", "parse_unit", "paths", "plain", "present",

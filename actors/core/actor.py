@@ -39,7 +39,7 @@ from .moment import Wake
 from .parameter import Configurable, ParameterError
 from .port_parameter import ParameterPort, PortParameter
 from .ports import InputPort, OutputPort, PortError
-from .random import Stream, random_stream
+from .random import Stream, Streams
 from .tag import Tag, to_nanoseconds, to_seconds
 
 
@@ -57,6 +57,10 @@ class Context(Protocol):
     @property
     def seed(self) -> int:
         """The seed of the run."""
+
+    @property
+    def streams(self) -> Streams:
+        """Its random streams."""
 
     @property
     def environment(self) -> Any:
@@ -230,7 +234,7 @@ class Actor(Configurable):
     def random_stream(self, purpose: str) -> Stream:
         """A random stream of the actor for one purpose, independent of all others."""
         if purpose not in self._streams:
-            self._streams[purpose] = random_stream(self.context.seed, self.path, purpose)
+            self._streams[purpose] = self.context.streams.of(self.path, purpose)
         return self._streams[purpose]
 
     def wake_in(self, delay: float) -> Wake:

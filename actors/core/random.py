@@ -267,3 +267,24 @@ def random_stream(seed: int, path: str, purpose: str = "") -> Stream:
     digest = hashlib.sha256(f"{path}\0{purpose}".encode()).digest()
     key = tuple(int.from_bytes(digest[i : i + 4], "little") for i in range(0, 16, 4))
     return cast(Stream, RandomStream(np.random.PCG64(np.random.SeedSequence(seed, spawn_key=key))))
+
+
+class Streams:
+    """The random streams of a run."""
+
+    def __init__(self, seed: int) -> None:
+        self._seed = seed
+        self._made: list[tuple[RandomStream, str, str]] = []
+
+    def of(self, path: str, purpose: str = "") -> Stream:
+        """A new stream for one purpose of one actor or aspect."""
+        stream = random_stream(self._seed, path, purpose)
+        self._made.append((cast(RandomStream, stream), path, purpose))
+        return stream
+
+    def reseed(self, seed: int) -> None:
+        """From now on all streams, those that are still to be made too, are those of a run with another seed."""
+        self._seed = seed
+        for stream, path, purpose in self._made:
+            other = cast(RandomStream, random_stream(seed, path, purpose))
+            stream._bits, stream._block, stream._ahead = other._bits, other._block, other._ahead

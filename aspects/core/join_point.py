@@ -25,7 +25,7 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from typing import Any, ClassVar, Generic, Protocol, TypeVar
 
-from epicycle.actors import EpicycleError, Parameter, Stream, Tag, random_stream, to_nanoseconds, to_seconds
+from epicycle.actors import EpicycleError, Parameter, Stream, Streams, Tag, to_nanoseconds, to_seconds
 from epicycle.actors.expression import PortFormula, PortFormulaParameter, operand, value_at
 
 from .aspect import Aspect
@@ -43,8 +43,8 @@ class AspectContext(Protocol):
         """The present tag."""
 
     @property
-    def seed(self) -> int:
-        """The seed of the run."""
+    def streams(self) -> Streams:
+        """The random streams of the run."""
 
     def later(self, delay: int, deliver: Callable[[Any], None], token: Any) -> None:
         """Call ``deliver(token)`` after ``delay`` ns; 0 is the next microstep."""
@@ -114,7 +114,7 @@ class JoinPoint:
         """The random stream of the aspect at this port, made on first use."""
         if self._first is not self:
             return self._first.random
-        return aspect_stream(self._context.seed, self._place, self.aspect)
+        return aspect_stream(self._context.streams, self._place, self.aspect)
 
     def is_at(self, other: JoinPoint) -> bool:
         """Whether it is the same place of the same aspect: a single token may have a join point of its own."""
@@ -191,9 +191,9 @@ class JoinPoint:
         self._context.stop(f"aspect {self.aspect}")
 
 
-def aspect_stream(seed: int, place: str, aspect: str) -> Stream:
+def aspect_stream(streams: Streams, place: str, aspect: str) -> Stream:
     """The random stream of an aspect at a place: a port, a connection, an actor."""
-    return random_stream(seed, place, f"aspect {aspect}")
+    return streams.of(place, f"aspect {aspect}")
 
 
 Passing = TypeVar("Passing")  # a token, or a firing

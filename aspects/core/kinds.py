@@ -182,7 +182,7 @@ class Unit(ActorPoint):
 
     def __init__(self, path: str, first: ActorPoint) -> None:
         super().__init__(first.aspect, path, first._context, lambda job: None, first.shared)
-        self.random = aspect_stream(first._context.seed, path, f"{first.aspect} as a whole")
+        self.random = aspect_stream(first._context.streams, path, f"{first.aspect} as a whole")
         self.points: list[ActorPoint] = []
         self._readings = first._readings
 

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from .calibrating import Calibrated, calibrate, calibrated
     from .comparing import Comparison, Difference, compare
     from .disturbing import Disturbed, disturb
+    from .estimating import RareEvent, rare
     from .explaining import Explained, explain, explained
     from .falsifying import Falsified, falsified, falsify
     from .fitting import Fit, fit
@@ -35,6 +36,7 @@ __all__ = [
     "Page",
     "Picture",
     "Pictures",
+    "RareEvent",
     "as_command",
     "calibrate",
     "calibrated",
@@ -51,6 +53,7 @@ __all__ = [
     "optimised",
     "perform",
     "plot",
+    "rare",
     "recorded",
     "run",
     "save",
@@ -64,6 +67,7 @@ _HOMES = {
     "calibrating": ("Calibrated", "calibrate", "calibrated"),
     "comparing": ("Comparison", "Difference", "compare"),
     "disturbing": ("Disturbed", "disturb"),
+    "estimating": ("RareEvent", "rare"),
     "explaining": ("Explained", "explain", "explained"),
     "falsifying": ("Falsified", "falsified", "falsify"),
     "optimising": ("Optimised", "optimise", "optimised"),

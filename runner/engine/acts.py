@@ -12,7 +12,7 @@ from collections.abc import Callable, Container
 from dataclasses import replace
 from typing import Any
 
-from epicycle.actors import Tag, Way
+from epicycle.actors import Streams, Tag, Way
 from epicycle.aspects import AspectContext
 
 from ..graph import Act, ActName
@@ -111,8 +111,8 @@ class _Context:
         return self._context.tag
 
     @property
-    def seed(self) -> int:
-        return self._context.seed
+    def streams(self) -> Streams:
+        return self._context.streams
 
     def later(self, delay: int, deliver: Callable[[Any], None], token: Any) -> None:
         self._context.later(delay, deliver, token)

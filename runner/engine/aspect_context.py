@@ -28,7 +28,7 @@ class EngineContext:
         signals: dict[str, Signal],
         blame: Callable[[Exception], ActorError],
     ) -> None:
-        self.seed = director.seed
+        self.streams = director.streams
         self.latest = latest.get
         self.stop = director.stop
         self._blame = blame

@@ -6,7 +6,7 @@ from epicycle.runner.engine.agenda cimport Delivery, Form, Instant, Turn, new_in
 
 
 cdef class Director:
-    cdef public object _all_at_once, _environment, seed, crowd, ranks, watch, _stop_after, _reason
+    cdef public object _all_at_once, _environment, seed, streams, crowd, ranks, watch, _stop_after, _reason
     cdef public list _queue, _recent, _turns
     cdef public dict posters
     cdef public Ranks _ready

@@ -30,7 +30,7 @@ import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NoReturn
 
-from epicycle.actors import InputPort, Moment, Posts, Process, Ranks, Tag, Times, Wake, Way, new_wake
+from epicycle.actors import InputPort, Moment, Posts, Process, Ranks, Streams, Tag, Times, Wake, Way, new_wake
 
 from ..text import NORMAL, Limits, describe
 from . import errors
@@ -54,7 +54,7 @@ class Director:
         "_all_at_once", "_environment", "_has_simpy", "_is_interrupted", "_last", "_most_microsteps", "_most_steps",
         "_most_times", "_next", "_on_their_way", "_past", "_queue", "_rank", "_ready", "_reason", "_recent",
         "_stop_after", "_time", "_times", "_turns", "crowd", "firings", "posters", "present", "ranks", "seed", "steps",
-        "watch",
+        "streams", "watch",
     )  # fmt: skip
 
     def __init__(
@@ -65,6 +65,7 @@ class Director:
         self._has_simpy = False  # whether anybody uses the environment
         self._time = 0  # SimPy's time until then
         self.seed = seed
+        self.streams = Streams(seed)
         self.crowd = Crowd(limits.tokens)
         self._on_their_way = 0  # tokens, to future times and microsteps
         self._most_times = limits.times

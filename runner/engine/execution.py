@@ -38,6 +38,7 @@ class Execution:
         self.border: Border | None = None  # of its composite, if the firing is deferred from outside
         self.refinement: Refinement | None = None  # its refinement, if errors in it lead to a transition
         self.seed = director.seed
+        self.streams = director.streams
         self.environment = local.environment
         self.stop = local.stop
         self._director = director

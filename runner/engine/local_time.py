@@ -28,6 +28,7 @@ class LocalDirector:
     def __init__(self, director: Director | Refinement, clock: Clock) -> None:
         self.environment = LocalEnvironment(director.environment, clock)
         self.seed = director.seed
+        self.streams = director.streams
         self._director = director
         self._clock = clock
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections import deque
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
@@ -12,13 +11,13 @@ from epicycle.actors.expression import operand, value_at
 from epicycle.aspects import Reading
 
 from ..graph import Monitor
-from ..results import Verdict
+from ..results import Past, Verdict
 from ..temporal import LINEAR, TINY, Condition, Finding, Judge, Line, Piece, Source, leaves, looks_ahead
 
 if TYPE_CHECKING:
     from .director import Director
 
-_KEPT = 1_000  # instants of which it is known what the ports had sent
+_KEPT = 1_000  # instants, or up to twice as many, of which it is known what the ports had sent
 
 
 class _Margin:
@@ -115,13 +114,18 @@ class Monitoring:
         self._finding = Finding()
         self._missing = ""  # why it cannot be judged
         self._is_late = looks_ahead(monitor.tree) or linear  # a break may be found out later than it happens
-        self._past: deque[tuple[int, dict[str, Any]]] = deque(maxlen=_KEPT)
+        self._past: Past[tuple[int, dict[str, Any]]] = Past()
         self._values: dict[str, Any] = {}  # of its ports where it broke first
 
     @property
     def is_broken(self) -> bool:
         """Whether it is certain that the run does not have the property."""
         return self._finding.holds is False
+
+    @property
+    def most(self) -> float:
+        """What its robustness is at most, by all that is settled; infinity if nothing is certain yet."""
+        return self._judge.most
 
     def add(self, port: str, time: int, token: Any) -> None:
         """Take in what a port sends at a time (ns)."""
@@ -144,6 +148,8 @@ class Monitoring:
             return
         if self._is_late:
             self._past.append((now, dict(self._latest)))
+            if len(self._past) > 2 * _KEPT:
+                del self._past[:_KEPT]
         self._find(over=False)
 
     def _find(self, over: bool) -> None:

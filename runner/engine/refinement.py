@@ -36,6 +36,7 @@ class Refinement:
     def __init__(self, path: str, outer: Context, director: Director, conductor: Conductor) -> None:
         self.path = path
         self.seed = director.seed
+        self.streams = director.streams
         self.director = director
         self.environment = _Environment(self, outer.environment)
         self.conductor = conductor

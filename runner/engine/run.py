@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import nullcontext
 from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from epicycle.actors import Actor, Way, to_seconds
+from epicycle.actors import Actor, EpicycleError, Way, did_you_mean, to_seconds
 
 from ..build import Model
 from ..collection import seldom_collecting, without_collection
 from ..graph import WovenAspect
 from ..interrupt import between_steps
-from ..results import EventLog, Record, Results, Signal
+from ..results import EventLog, Record, Results, Signal, Verdict
 from ..text import describe, raised_at
 from .acts import Acts
 from .copies import Copies
@@ -62,6 +62,8 @@ class Run:
         self._spent = 0.0  # s of the wall clock
         self._initialized: list[Actor] = []
         self._unreported: ActorError | None = None
+        self.reseeds: list[tuple[bool, int, int]] = []  # whether it had begun, after how many steps, and the seed
+        self._awaited: Mapping[str, float] = {}  # robustness of monitors at which it is to pause
         order, limits = model.order(), model.graph.limits
         self.log = EventLog(keeps, log_to) if tracer is None else TracingLog(keeps, tracer)
         self.director = (
@@ -126,6 +128,25 @@ class Run:
                     found = True
         return found
 
+    def _is_awaited(self, upcoming: int) -> bool:
+        """Before the time advances: whether a monitor has come to what is awaited of it, or ends the run."""
+        for name in self._awaited:
+            self._monitorings[name].settle(upcoming)
+        if any(self._monitorings[name].most <= robustness for name, robustness in self._awaited.items()):
+            self._awaited = {}
+            return True
+        return self._stop_if_broken(upcoming)
+
+    def monitoring(self, name: str) -> Monitoring:
+        """That of a monitor; raises ``EpicycleError``."""
+        if name not in self._monitorings:
+            near = did_you_mean(name, self._monitorings)
+            raise EpicycleError(
+                f"{self.model.name} has no monitor {name!r}{near}\n"
+                f"   help: its monitors: {', '.join(self._monitorings) or 'none'}"
+            )
+        return self._monitorings[name]
+
     # -- running --------------------------------------------------------------------------------------------------
 
     def go(
@@ -156,6 +177,24 @@ class Run:
         finally:
             self._spent += time.perf_counter() - started
         return self.stopped
+
+    def reach(self, stop: int | None, robustness: Mapping[str, float]) -> None:
+        """Go on until ``stop`` (ns), or until the robustness of a monitor is known to be at most the one given."""
+        before, self._awaited = self.director.watch, robustness
+        self.director.watch = self._is_awaited
+        try:
+            self.go(stop)
+            if robustness and not self._awaited:
+                self.stopped = ""  # it is not over
+            for name in self._awaited:
+                self._monitorings[name].settle(self._end(self.stopped) + 1)
+        finally:
+            self.director.watch, self._awaited = before, {}
+
+    def reseed(self, seed: int) -> None:
+        """From now on draw the random numbers of a run with another seed."""
+        self.reseeds.append((self.is_begun, self.director.steps, seed))
+        self.director.streams.reseed(seed)
 
     def _begin(self) -> None:
         self.is_begun = True
@@ -198,12 +237,9 @@ class Run:
 
     def results(self, stopped: str) -> Results:
         """The results so far; ``stopped`` says why the run is over."""
-        end = self.director.last.time
-        if stopped == "stop time" and self._stop is not None:
-            end = max(end, self._stop)  # the values at the last event last until then
-        # Of copies, because reading a measurement ends it.
-        verdicts = {name: Copies().of(each).verdict(end) for name, each in self._monitorings.items()}
-        outcomes = {}
+        end = self._end(stopped)
+        verdicts = {name: self.verdict(name, stopped) for name in self._monitorings}
+        outcomes = {}  # of copies, because reading a measurement ends it
         for metric in self.model.metrics:
             if (verdict := verdicts.get(metric.monitor)) is None:
                 outcomes[metric.name] = Copies().of(self._measurements[metric.name]).outcome(end)
@@ -227,6 +263,17 @@ class Run:
             monitors=verdicts,
             acts=[] if self.acts is None else self.acts.noted,
         )
+
+    def verdict(self, name: str, stopped: str) -> Verdict:
+        """What a monitor comes to if the run is over."""
+        # Of a copy, because reading a monitoring ends it.
+        return Copies().of(self.monitoring(name)).verdict(self._end(stopped))
+
+    def _end(self, stopped: str) -> int:
+        end = self.director.last.time
+        if stopped == "stop time" and self._stop is not None:
+            end = max(end, self._stop)  # the values at the last event last until then
+        return end
 
     def _call(self, actor: Actor, method: str) -> None:
         try:

@@ -12,7 +12,7 @@ from epicycle.aspects import Aspect
 from ..build import Model
 from ..collection import without_collection
 from ..graph import WovenAspect
-from ..results import EventLog, Record, Results, Signal
+from ..results import EventLog, Record, Results, Signal, Verdict
 from ..tables import Table, Tabled
 from .acts import Acts
 from .copies import Copies
@@ -44,6 +44,7 @@ class Snapshot:
         self._keeps = run.keeps
         self._named = run.acts is not None
         self._exactly = None if run.acts is None else run.acts.exactly
+        self._reseeds = tuple(run.reseeds)
 
     def again(self) -> Run:
         """A run that continues from here; raises ``SnapshotError``."""
@@ -51,7 +52,11 @@ class Snapshot:
             return _copy(self.run)
         acts = Acts(self._exactly) if self._named else None
         run = Run(self.model, self.seed, self._keeps, acts=acts)
-        run.go(None, most=self._steps)
+        for is_begun, steps, seed in self._reseeds:
+            if is_begun:
+                run.go(None, most=steps - run.director.steps)
+            run.reseed(seed)
+        run.go(None, most=self._steps - run.director.steps)
         if (run.director.last, run.log.digest) != (self.tag, self._digest):
             raise SnapshotError(
                 f"{self.model.name} has processes, so its run was repeated from the start to go back to {self.tag}, "
@@ -141,6 +146,18 @@ class Simulation(Tabled):
         is_last = last is not None and stop >= last
         return self._run.go(last if is_last else stop) == "stop time" and not is_last
 
+    def reach(self, robustness: Mapping[str, float], *, until: float | None = None) -> bool:
+        """Go on until the ``robustness`` of one of these monitors is at most the number given; whether one is.
+
+        The run pauses before the time advances, when everything at the present time is done.  If there is none, or only
+        at the end, it has come to its stop time (``until``, in s, or the model's), or there is nothing more to do.
+        """
+        self._refuse_over()
+        for name in robustness:
+            self._run.monitoring(name)
+        self._run.reach(self.model.stop_time if until is None else to_nanoseconds(until), robustness)
+        return any(self.robustness(name) <= least for name, least in robustness.items())
+
     def step(self) -> bool:
         """Handle the next tag, or SimPy events before it; returns whether there was anything until the stop time."""
         self._refuse_over()
@@ -154,6 +171,19 @@ class Simulation(Tabled):
     def results(self, stopped: str) -> Results:
         """The results so far; ``stopped`` says why the run is over."""
         return self._run.results(stopped)
+
+    def robustness(self, monitor: str) -> float:
+        """What the robustness of a monitor is at most, whatever comes; infinity if nothing is certain yet.
+
+        Of ``always p`` that is the least margin so far.  Of ``eventually p`` nothing is certain before its end.
+        """
+        monitoring = self._run.monitoring(monitor)
+        monitoring.settle(self.tag.time)
+        return monitoring.most
+
+    def verdict(self, monitor: str) -> Verdict:
+        """What a monitor comes to if the run ends where it has come to."""
+        return self._run.verdict(monitor, self._run.stopped)
 
     def _refuse_over(self) -> None:
         if self._run.is_over:
@@ -183,10 +213,16 @@ class Simulation(Tabled):
             raise SnapshotError(f"{snapshot!r} is of another model than this simulation of {self.model.name}")
         self._run = snapshot.again()
 
-    def fork(self) -> Simulation:
-        """Another simulation that continues from here, as this one does unless something in it is changed."""
+    def fork(self, *, reseed: int | None = None) -> Simulation:
+        """Another simulation that continues from here, as this one does unless something in it is changed.
+
+        With ``reseed``, each random stream becomes the one that a run with this seed would have: what was drawn before
+        stays as it is, and what is drawn from here on depends on this seed alone.
+        """
         snapshot, fork = self.snapshot(), copy.copy(self)
         fork._run = snapshot.run or snapshot.again()
+        if reseed is not None:
+            fork._run.reseed(reseed)
         return fork
 
     def _refuse_told(self) -> None:

@@ -139,7 +139,7 @@ class Ways:
         for woven, aspect in self._wrong_clocks:
             if path in woven.actors:
                 try:
-                    ahead, speed = aspect.error(aspect_stream(self.director.seed, woven.actors[path], woven.name))
+                    ahead, speed = aspect.error(aspect_stream(self.director.streams, woven.actors[path], woven.name))
                 except Exception as error:
                     raise self._error(woven, f"error() at {path}", error) from error
                 clock = Clock(clock.start + ahead, clock.rate * speed)

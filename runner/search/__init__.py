@@ -1,5 +1,7 @@
 """Searches over runs: one that breaks a property, and the smallest set of acts that breaks it there."""
 
+"""Searches over runs: the smallest set of acts that breaks a property, and how probable it is that one is broken."""
+
 from .calibrating import Calibration, Fitted, Match, Task, calibrate
 from .explaining import Effect, Explanation, Step, explain
 from .falsifying import AD_HOC, MAX_RUNS, Asked, Findings, Run, falsify
@@ -34,3 +36,6 @@ __all__ = [
     "minimal",
     "optimise",
 ]
+from .splitting import RareEvent, rare
+
+__all__ = ["Effect", "Explanation", "RareEvent", "Step", "Tried", "explain", "minimal", "rare"]

@@ -32,11 +32,16 @@ class Judge:
         """What is certain by now; with ``over``, nothing comes after this."""
         return self._root.finding(over)
 
+    @property
+    def most(self) -> float:
+        """What the robustness is at most, by what is certain since the last ``finding``; infinity if nothing is."""
+        return self._root.most
+
 
 class _Throughout:
     """``always``, or ``eventually`` if ``any``, at the beginning."""
 
-    __slots__ = ("_any", "_end", "_extreme", "_known", "_of", "_start", "_time")
+    __slots__ = ("_any", "_end", "_extreme", "_is_whole", "_known", "_of", "_start", "_time")
 
     def __init__(self, tree: Quantified, of: Operator) -> None:
         self._any = tree.any
@@ -46,6 +51,12 @@ class _Throughout:
         self._extreme = -math.inf if tree.any else math.inf
         self._known = -1
         self._time: int | None = None  # when it was decided
+        self._is_whole = False
+
+    @property
+    def most(self) -> float:
+        """See ``Judge``; a later time may still be the one that is awaited."""
+        return math.inf if self._any and not self._is_whole else self._extreme
 
     def finding(self, over: bool) -> Finding:
         for piece in self._of.take(over):
@@ -55,8 +66,8 @@ class _Throughout:
             if piece.value is not None and start <= end:
                 self._add(start, end, piece.value)
         is_decided = self._time is not None
-        is_whole = over if self._end is None else self._known >= self._end
-        if not (is_decided or is_whole):
+        self._is_whole = over if self._end is None else self._known >= self._end
+        if not (is_decided or self._is_whole):
             return Finding()
         holds = self._any == is_decided
         when = self._time if not self._any else self._known if self._end is None else self._end
@@ -80,6 +91,12 @@ class _Both:
         self._left = left
         self._right = right
 
+    @property
+    def most(self) -> float:
+        """See ``Judge``."""
+        both = self._left.most, self._right.most
+        return max(both) if self._any else min(both)
+
     def finding(self, over: bool) -> Finding:
         both = self._left.finding(over), self._right.finding(over)
         deciding = [each for each in both if each.holds == self._any]
@@ -100,6 +117,12 @@ class _Once:
     def __init__(self, of: Operator) -> None:
         self._of = of
         self._first: Piece | None = None
+
+    @property
+    def most(self) -> float:
+        """See ``Judge``."""
+        value = None if self._first is None else self._first.value
+        return math.inf if value is None else at(value, 0)
 
     def finding(self, over: bool) -> Finding:
         found = self._of.take(over)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import random  # noqa: TID251 (what to try, and not what a model draws)
 from typing import Any
 
@@ -14,13 +15,17 @@ from tests.temporal.definition import random_property, random_signal, robustness
 
 def judged(tree: Property, signals: list[list[Piece]], draw: random.Random) -> Finding:
     """What is found when the pieces come in in any order; what is said early must be said in the end."""
-    judge, left, said = Judge(tree), [list(pieces) for pieces in signals], set()
+    judge, left, said, most = Judge(tree), [list(pieces) for pieces in signals], set(), math.inf
     while any(left):
         number = draw.choice([number for number, pieces in enumerate(left) if pieces])
         judge.sources[number].pieces.append(left[number].pop(0))
-        said.add(judge.finding(False).holds)
+        said.add(early := judge.finding(False).holds)
+        assert judge.most <= most
+        most = judge.most
+        assert (most < 0.0) == (early is False)
     found = judge.finding(True)
     assert said <= {None, found.holds}
+    assert found.robustness is None or found.robustness <= most + 1e-9
     return found
 
 
