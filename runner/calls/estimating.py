@@ -8,9 +8,8 @@ from pathlib import Path
 from typing import Unpack
 
 from ..build import Model
-from ..search import RareEvent
+from ..search import AD_HOC, RareEvent
 from ..search import rare as search
-from .explaining import AD_HOC
 from .running import Changes, loaded, seconds
 
 __all__ = ["RareEvent", "rare"]

@@ -1,6 +1,4 @@
-"""Searches over runs: one that breaks a property, and the smallest set of acts that breaks it there."""
-
-"""Searches over runs: the smallest set of acts that breaks a property, and how probable it is that one is broken."""
+"""Searches over runs: one that breaks a property, what breaks it there, how probable that is, and what is best."""
 
 from .calibrating import Calibration, Fitted, Match, Task, calibrate
 from .explaining import Effect, Explanation, Step, explain
@@ -8,6 +6,7 @@ from .falsifying import AD_HOC, MAX_RUNS, Asked, Findings, Run, falsify
 from .minimal import minimal
 from .optimising import MAX_POINTS, Goal, Optimum, Outcome, Tested, optimise
 from .space import Interval
+from .splitting import RareEvent, rare
 from .tried import Tried
 
 __all__ = [
@@ -25,6 +24,7 @@ __all__ = [
     "Match",
     "Optimum",
     "Outcome",
+    "RareEvent",
     "Run",
     "Step",
     "Task",
@@ -35,7 +35,5 @@ __all__ = [
     "falsify",
     "minimal",
     "optimise",
+    "rare",
 ]
-from .splitting import RareEvent, rare
-
-__all__ = ["Effect", "Explanation", "RareEvent", "Step", "Tried", "explain", "minimal", "rare"]
