@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable
 from functools import partial
 from typing import Any
 
-from epicycle.actors import Tag, declared_parameters
+from epicycle.actors import Streams, Tag, declared_parameters
 from epicycle.aspects import JoinPoint, Medium, PortAspect, SelectionParameter
 
 SECOND = 1_000_000_000
@@ -27,6 +27,7 @@ class Bench:
     ) -> None:
         self.world = world
         self.seed = seed
+        self.streams = Streams(seed)
         self.tag = Tag(0, 1)
         self.source = "b.port" if aspect is not None else ""
         self.aspects: dict[str, PortAspect] = {"port": aspect} if aspect is not None else dict(ports)

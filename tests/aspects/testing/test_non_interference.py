@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from epicycle.actors import Actor, InputPort, OutputPort, Tag, declared_parameters
+from epicycle.actors import Actor, InputPort, OutputPort, Streams, Tag, declared_parameters
 from epicycle.aspects import (
     Aspect,
     Assert,
@@ -226,6 +226,7 @@ class Careless:
     """A trial with an engine that makes mistakes: it runs two ports, to each of which one token comes."""
 
     seed = 0
+    streams = Streams(0)
     tag = Tag(0, 1)
 
     def __init__(self, *, one_stream: bool = False, minds_order: bool = False) -> None:
