@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Unpack
 
 from ..build import Model
-from ..search import AD_HOC, RareEvent
+from ..search import RareEvent, monitor_named
 from ..search import rare as search
 from .running import Changes, loaded, seconds
 
@@ -41,11 +41,11 @@ def rare(
     """
     made = loaded(model, changes)
     made = copy.copy(made) if isinstance(model, Model) else made
-    monitor = _named(made, monitor, AD_HOC)
+    monitor = monitor_named(made, monitor)
     return search(
         made,
         monitor,
-        guide=None if guide is None else _named(made, guide, _GUIDE),
+        guide=None if guide is None else monitor_named(made, guide, _GUIDE),
         runs=runs,
         repetitions=repetitions,
         seed=seed,
@@ -53,11 +53,3 @@ def rare(
         folder=None if folder is None else Path(folder),
         tell=progress,
     )
-
-
-def _named(model: Model, text: str, name: str) -> str:
-    """The name of a monitor, which is added if the text is a property."""
-    if " " not in text.strip():
-        return text
-    model.monitor(name, text)
-    return name

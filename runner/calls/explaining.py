@@ -17,7 +17,7 @@ from epicycle.actors import counted, to_seconds
 from ..build import Model
 from ..provenance import version_of
 from ..results import Verdict
-from ..search import AD_HOC, Effect, Explanation
+from ..search import Effect, Explanation, monitor_named
 from ..search import explain as search
 from ..shown import finite, short
 from ..tables import Table, Tabled
@@ -139,7 +139,7 @@ def explain(
         made, command = copy.copy(made), ["epicycle", "run", made.name, "--seed", str(seed)]
     else:
         command = as_command(model, seed, until, changes)
-    return explained(made, monitor, seed, seconds("until", until), command, folder, progress)
+    return explained(made, monitor, seed, seconds("until", until), command, folder, progress, flag="")
 
 
 def explained(
@@ -150,11 +150,11 @@ def explained(
     command: Sequence[str],
     folder: str | Path | None,
     progress: Callable[[int, int], None] | None,
+    *,
+    flag: str = "--monitor",
 ) -> Explained:
     """The same for a model that may be changed, and was made by a command."""
-    if " " in monitor.strip():
-        made.monitor(AD_HOC, monitor)
-        monitor = AD_HOC
+    monitor = monitor_named(made, monitor, flag=flag)
     found = search(
         made, monitor, seed=seed, until=until, folder=None if folder is None else Path(folder), tell=progress
     )

@@ -2,8 +2,9 @@
 
 from .calibrating import Calibration, Fitted, Match, Task, calibrate
 from .explaining import Effect, Explanation, Step, explain
-from .falsifying import AD_HOC, MAX_RUNS, Asked, Findings, Run, falsify
+from .falsifying import MAX_RUNS, Asked, Findings, Run, falsify
 from .minimal import minimal
+from .monitored import AD_HOC, monitor_named
 from .optimising import MAX_POINTS, Goal, Optimum, Outcome, Tested, optimise
 from .space import Interval
 from .splitting import RareEvent, rare
@@ -34,6 +35,7 @@ __all__ = [
     "explain",
     "falsify",
     "minimal",
+    "monitor_named",
     "optimise",
     "rare",
 ]

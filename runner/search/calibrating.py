@@ -186,7 +186,7 @@ class _Runs:
         self._types = [each for file in task.types for each in types_of_file(file)]
         model = self._load(())
         problems = Problems()
-        space = read_space(task.vary, model, (), problems)
+        space = read_space(task.vary, model, (), task.set, problems)
         problems.raise_if_any()
         self.axes = [axis for axis in space.axes if isinstance(axis, Interval) and not axis.is_whole]
         if wrong := [axis.path for axis in space.axes if axis not in self.axes]:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from epicycle.actors import EpicycleError, did_you_mean, to_seconds
+from epicycle.actors import EpicycleError, to_seconds
 
 from ..build import Model
 from ..engine import Acts, Simulation
@@ -15,6 +15,7 @@ from ..graph import Act, ActName, ModelGraph
 from ..provenance import version_of
 from ..results import Results, Verdict, canonical, plain
 from .minimal import minimal
+from .monitored import property_of
 from .tried import Tried
 
 
@@ -165,17 +166,6 @@ def explain(
         steps,
         runs.number,
     )
-
-
-def property_of(model: Model, monitor: str) -> str:
-    """The property that a monitor of a model states; raises ``EpicycleError`` if there is no such monitor."""
-    known = {each.name: each.requirement.property for each in model.monitors}
-    if monitor not in known:
-        near = did_you_mean(monitor, known)
-        raise EpicycleError(
-            f"{model.name} has no monitor {monitor!r}{near}\n   help: its monitors: {', '.join(known) or 'none'}"
-        )
-    return known[monitor]
 
 
 def _steps(graph: ModelGraph, ports: Collection[str], ours: Results, theirs: Results) -> list[Step]:

@@ -4,28 +4,25 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-import yaml
-
 from epicycle.actors import EpicycleError, counted
 
-from ..build import Model, load_model
+from ..build import load_model
 from ..catalogue import types_of_file
-from ..language import Dimension, Level, parse_setting, study_of_text
-from ..study import OK, Plan, Search, Trials, available_cores, open_trials
-from ..text import COMMAND_LINE, ModelError, Position, Problems
-from .explaining import property_of
+from ..language import Level, study_of_text
+from ..study import OK, Search, Trials, available_cores, open_trials
+from ..text import Problems
+from .growing import Growing, place_of, text_of
+from .monitored import AD_HOC, monitor_named, property_of
 from .proposals import BATCH, SPREAD, Point, is_guided, proposals
-from .space import Interval, Space, read_space, said
+from .space import Interval, Space, read_space
 
-AD_HOC = "property"  # the name of a monitor that is made of a text
 FILE = Path("falsify")  # what the study of a search has for a file, so that paths are relative to the working directory
 MAX_RUNS = 1_000_000
 MAX_POINTS = 150_000  # numbers in the text of a study, which is read with limits
-_GROWTH = 1.1  # of the number of runs, after which the folder is told of them
 
 
 @dataclass(frozen=True)
@@ -112,19 +109,16 @@ def falsify(
     called with how many there are, and the one of least robustness.  Raises ``EpicycleError``.
     """
     searching = _Searching(asked)
-    found = searching.findings
+    found, growing = searching.findings, searching.growing
     points = searching.next()
-    with open_trials(searching.plan(points), folder, jobs or available_cores(), timeout) as made:
-        told = 0
+    growing.add(points)
+    with open_trials(growing.whole(), folder, jobs or available_cores(), timeout) as made:
         try:
             while points:
-                if len(found.runs) + len(points) >= _GROWTH * told:
-                    told = len(found.runs) + len(points)
-                    made.describe(searching.whole(points))
                 searching.make(points, made, lambda: tell(len(found.runs), found.least))
                 points = [] if found.broken else searching.next()
         finally:
-            made.describe(searching.whole(points))
+            growing.tell(made, over=True)
     return found
 
 
@@ -137,17 +131,11 @@ class _Searching:
             raise EpicycleError(f"runs {asked.runs:,}: expected a whole number from 1 to {MAX_RUNS:,}")
         types = [each for file in asked.types for each in types_of_file(file)]
         model = load_model(asked.model, set=asked.set, disturb=asked.disturb, types=types)
-        self._monitor = asked.monitor
-        if " " in asked.monitor.strip():
-            self._watch(model)
-            self._monitor = AD_HOC
+        self._monitor = monitor_named(model, asked.monitor, flag="--monitor" if asked.command else "")
         source = property_of(model, self._monitor)
         metrics = self._monitor, f"{self._monitor}_robustness"
         problems = Problems()
-        space = read_space(asked.vary, model, metrics, problems)
-        for each in [parse_setting(text, problems) for text in asked.set]:
-            if each is not None and each.path in space.columns:
-                problems.add(f"{each.path!r} is set and varied", each.position, "leave out --set or --vary")
+        space = read_space(asked.vary, model, metrics, asked.set, problems)
         problems.raise_if_any()
         if asked.runs * len(space.axes) > MAX_POINTS:
             most = MAX_POINTS // len(space.axes)
@@ -155,28 +143,13 @@ class _Searching:
                 f"{asked.runs:,} runs are too many for one folder, where {counted(len(space.axes), 'parameter')} "
                 f"may take {most:,} values each\n   help: search with --runs {most} and several seeds, in a folder each"
             )
-        study = study_of_text(self._text(model.name, []), FILE, asked.set, asked.types)
-        self._others: tuple[Dimension, ...] = study.dimensions  # the disturbances
-        base = Plan.made(replace(study, dimensions=(*space.ends(), *self._others)))
-        extra = {name: digest for each in base.extra for more in each.values() for name, digest in more.items()}
-        command = Search(runs=asked.runs, command=list(asked.command))
-        self._base = replace(base, sources=base.sources | extra, search=command)
-        self._levels: dict[tuple[Any, ...], Level] = {}  # of all runs, each once
+        keys = self._keys(model.name)
+        study = study_of_text(text_of(keys, []), FILE, asked.set, asked.types)
+        self.growing = Growing(study, keys, space, Search(runs=asked.runs, command=list(asked.command)))
         guided = is_guided() and any(isinstance(axis, Interval) for axis in space.axes)
         self.findings = Findings(model.name, self._monitor, source, space, guided)
         self._proposals = proposals(len(space.axes), asked.seed, guided)
         self._latest: list[float | None] | None = None
-
-    def _watch(self, model: Model) -> None:
-        """Add the property that is given as a text."""
-        try:
-            model.monitor(AD_HOC, self._asked.monitor)
-        except ModelError as error:
-            if not self._asked.command:
-                raise
-            option = f"--monitor {self._asked.monitor}"
-            at = Position(COMMAND_LINE, 1, 11, max(1, len(option) - 10), option)
-            raise ModelError(replace(each, position=at) for each in error.problems) from None
 
     def next(self) -> list[Point]:
         """The points of the next batch; none if there are as many runs as were asked for."""
@@ -188,57 +161,29 @@ class _Searching:
 
     def make(self, points: Sequence[Point], made: Trials, tell: Callable[[], None]) -> None:
         """Make the runs of a batch."""
-        found, levels = self.findings, [self.findings.space.level(point) for point in points]
-        places = self._distinct(levels)
-        order = list(places)
+        found = self.findings
+        levels, distinct = self.growing.add(points)
+        self.growing.tell(made)
+        order = list(distinct)
         start = len(found.runs)
-        numbers = [(order.index(_place(level)), start + at) for at, level in enumerate(levels)]
-        rows = made.made(self._plan(list(places.values())), numbers, tell)
+        numbers = [(order.index(place_of(level)), start + at) for at, level in enumerate(levels)]
+        rows = made.made(self.growing.plan(list(distinct.values())), numbers, tell)
         for at, (level, row) in enumerate(zip(levels, rows, strict=True), start=1):
             holds = row[found.monitor]
             margin = row[f"{found.monitor}_robustness"]
             known = None if holds is None else bool(holds)
             ended = (row["status"], known, margin, row["error"], row["digest"], row["run"])
             found.add(Run(start + at, level, row["seed"], *ended))
-        self._levels |= places
         self._latest = [each.robustness for each in found.runs[start:]]
 
-    def plan(self, points: Sequence[Point]) -> Plan:
-        """What a folder is to know of a batch before there is any other."""
-        return self._told(self._distinct([self.findings.space.level(each) for each in points]))
-
-    def whole(self, points: Sequence[Point]) -> Plan:
-        """What it is to know of all batches, and of one that is made now."""
-        return self._told(self._levels | self._distinct([self.findings.space.level(each) for each in points]))
-
-    def _told(self, levels: dict[tuple[Any, ...], Level]) -> Plan:
-        plan = self._plan(list(levels.values()))
-        text = self._text(self.findings.model, list(levels.values()))
-        return replace(plan, study=replace(plan.study, text=text))
-
-    def _plan(self, levels: list[Level]) -> Plan:
-        dimensions = (*self.findings.space.dimensions(levels), *self._others)
-        study = replace(self._base.study, dimensions=dimensions)
-        return replace(self._base, study=study, extra=[{} for _ in dimensions])
-
-    def _distinct(self, levels: Sequence[Level]) -> dict[tuple[Any, ...], Level]:
-        return {_place(level): level for level in levels}
-
-    def _text(self, model: str, levels: list[Level]) -> str:
-        """The study of these points, as its file would say it."""
+    def _keys(self, model: str) -> dict[str, Any]:
+        """What the file of the study says beside the points."""
         asked = self._asked
-        said_of: dict[str, Any] = {"study": f"falsify_{model}", "model": asked.model}
-        if vary := said(levels):
-            said_of["vary"] = vary
+        keys: dict[str, Any] = {"study": f"falsify_{model}", "model": asked.model}
         if asked.disturb:
-            said_of["disturb"] = {"given": list(asked.disturb)}
-        said_of["seed"] = asked.seed
+            keys["disturb"] = {"given": list(asked.disturb)}
+        keys["seed"] = asked.seed
         if self._monitor == AD_HOC:
-            said_of["monitors"] = {AD_HOC: asked.monitor}
-        said_of["metrics"] = [self._monitor, f"{self._monitor}_robustness"]
-        text: str = yaml.safe_dump(said_of, sort_keys=False, allow_unicode=True, width=1_000)
-        return text
-
-
-def _place(level: Level) -> tuple[Any, ...]:
-    return tuple(level.values.values())
+            keys["monitors"] = {AD_HOC: asked.monitor}
+        keys["metrics"] = [self._monitor, f"{self._monitor}_robustness"]
+        return keys

@@ -4,21 +4,20 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
-
-import yaml
 
 from epicycle.actors import EpicycleError, did_you_mean
 from epicycle.actors.expression import ExpressionError, Formula
 
 from ..catalogue import is_path, packaged_files
-from ..language import Level, asks_for_none, is_study, parse_setting, read_study, study_of_text
+from ..language import Level, asks_for_none, is_study, read_study, study_of_text
 from ..study import OK, Estimate, Plan, Search, Trials, available_cores, mean, open_trials
 from ..text import COMMAND_LINE, Position, Problems, parse, plain
+from .growing import Growing, place_of, text_of
 from .proposals import Point, is_guided, proposals
-from .space import Interval, Space, read_space, said
+from .space import Interval, Space, read_space
 
 MAX_POINTS = 100_000
 FILE = Path("optimise")  # the file of the study of a search over a model: paths are relative to the working directory
@@ -115,31 +114,32 @@ def optimise(
     found = work.found
     chosen = proposals(len(found.space.axes), work.seed, found.guided, _TOGETHER)
     points = next(chosen)[: goal.points]
-    work.add(points)
-    with open_trials(work.told(), folder, jobs or available_cores(), timeout) as made:
-        while True:
-            tested = work.test(points, made)
-            tell(found)
-            if len(found.tested) >= goal.points:
-                break
-            points = chosen.send([found.cost(each.outcome) for each in tested])[: goal.points - len(found.tested)]
-        if found.best is not None:
-            found.check = work.check(found.best, made)
+    work.growing.add(points)
+    with open_trials(work.growing.whole(), folder, jobs or available_cores(), timeout) as made:
+        try:
+            while True:
+                tested = work.test(points, made)
+                tell(found)
+                if len(found.tested) >= goal.points:
+                    break
+                points = chosen.send([found.cost(each.outcome) for each in tested])[: goal.points - len(found.tested)]
+            if found.best is not None:
+                found.check = work.check(found.best, made)
+        finally:
+            work.growing.tell(made, over=True)
     return found
 
 
 class _Optimising:
     def __init__(self, goal: Goal) -> None:
         self._goal = goal
-        self._said, self._path = _said_of(goal)
-        study = study_of_text(self._text([]), self._path, goal.set, goal.types, goal.replications, goal.seed)
+        keys, path = _keys_of(goal)
+        study = study_of_text(text_of(keys, []), path, goal.set, goal.types, goal.replications, goal.seed)
         base = Plan.made(study)
         problems = Problems()
         metrics = [metric.name for metric in base.metrics]
-        space = read_space(goal.vary, base.load(base.condition(0)), (*metrics, *study.factors), problems)
-        for each in [parse_setting(text, problems) for text in goal.set]:
-            if each is not None and each.path in space.columns:
-                problems.add(f"{each.path!r} is set and varied", each.position, "leave out --set or --vary")
+        taken = (*metrics, *study.factors)
+        space = read_space(goal.vary, base.load(base.condition(0)), taken, goal.set, problems)
         problems.raise_if_any()
         if not space.axes:
             raise EpicycleError("there is nothing to vary\n   help: add --vary load=0.5..0.9")
@@ -151,49 +151,37 @@ class _Optimising:
         }
         problems.raise_if_any()
         self._conditions = {text: each for text, each in conditions.items() if each is not None}
-        tried = Plan.made(replace(study, dimensions=(*space.ends(), *study.dimensions)))
-        extra = {name: digest for each in tried.extra for more in each.values() for name, digest in more.items()}
         self._others = base.conditions
         runs = (goal.points + 1) * self._others * study.replications
-        search = Search(runs=runs, command=list(goal.command))
-        self._base = replace(tried, study=study, sources=tried.sources | extra, search=search)
-        self._levels: dict[tuple[Any, ...], Level] = {}  # of all points, each once
+        self.growing = Growing(study, keys, space, Search(runs=runs, command=list(goal.command)))
         self.found = Optimum(goal, space, is_guided() and any(isinstance(each, Interval) for each in space.axes))
 
     @property
     def seed(self) -> int:
         """The seed of the study, which is that of the search."""
-        return self._base.study.seed
-
-    def add(self, points: Sequence[Point]) -> dict[tuple[Any, ...], Level]:
-        """The points with what they set, each once; the study has them from now on."""
-        levels = [self.found.space.level(point) for point in points]
-        found = {tuple(level.values.values()): level for level in levels}
-        self._levels |= found
-        return found
+        return self.growing.study.seed
 
     def test(self, points: Sequence[Point], made: Trials) -> list[Tested]:
         """Make the runs of some points, and judge them."""
-        new = self.add(points)
-        made.describe(self.told())
-        order, replications = list(new), range(self._base.study.replications)
+        levels, distinct = self.growing.add(points)
+        self.growing.tell(made)
+        order, replications = list(distinct), range(self.growing.study.replications)
         numbers = [(index, replication) for index in range(len(order) * self._others) for replication in replications]
-        rows = made.made(self.plan_of(list(new.values())), numbers, lambda: None)
+        rows = made.made(self.growing.plan(list(distinct.values())), numbers, lambda: None)
         share = self._others * len(replications)
         outcomes = [self._outcome(rows[at * share : (at + 1) * share]) for at in range(len(order))]
         tested = []
-        for point in points:
-            level = self.found.space.level(point)
-            outcome = outcomes[order.index(tuple(level.values.values()))]
+        for level in levels:
+            outcome = outcomes[order.index(place_of(level))]
             tested.append(Tested(len(self.found.tested) + 1, level, outcome))
             self.found.tested.append(tested[-1])
         return tested
 
     def check(self, best: Tested, made: Trials) -> Outcome:
         """What comes of a point with as many seeds again, which had no part in its choice."""
-        count = self._base.study.replications
+        count = self.growing.study.replications
         numbers = [(index, count + each) for index in range(self._others) for each in range(count)]
-        return self._outcome(made.made(self.plan_of([best.level]), numbers, lambda: None))
+        return self._outcome(made.made(self.growing.plan([best.level]), numbers, lambda: None))
 
     def _outcome(self, rows: Sequence[Mapping[str, Any]]) -> Outcome:
         """Conditions must hold in each run; the objective is a mean over runs, all conditions of a study alike."""
@@ -211,27 +199,8 @@ class _Optimising:
         }
         return Outcome(mean(means) if means and missing <= _SHARED * len(rows) else None, len(rows), broken)
 
-    # -- as a study -------------------------------------------------------------------------------------------------
 
-    def plan_of(self, levels: list[Level]) -> Plan:
-        """A plan of some points."""
-        dimensions = (*self.found.space.dimensions(levels), *self._base.study.dimensions)
-        study = replace(self._base.study, dimensions=dimensions)
-        return replace(self._base, study=study, extra=[{} for _ in dimensions])
-
-    def told(self) -> Plan:
-        """What the folder is to know: all points until now."""
-        levels = list(self._levels.values())
-        plan = self.plan_of(levels)
-        return replace(plan, study=replace(plan.study, text=self._text(levels)))
-
-    def _text(self, levels: list[Level]) -> str:
-        vary = {**said(levels), **(self._said.get("vary") or {})}
-        text: str = yaml.safe_dump({**self._said, "vary": vary}, sort_keys=False, allow_unicode=True, width=1_000)
-        return text
-
-
-def _said_of(goal: Goal) -> tuple[dict[str, Any], Path]:
+def _keys_of(goal: Goal) -> tuple[dict[str, Any], Path]:
     """The study that a search adds points to, as a mapping, and its file."""
     target = Path(goal.target)
     if not (is_study(target) if is_path(goal.target) else goal.target in packaged_files("study")):

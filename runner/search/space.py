@@ -148,8 +148,10 @@ def said(levels: Many[Level]) -> dict[str, object]:
 # -- reading it -------------------------------------------------------------------------------------------------------
 
 
-def read_space(vary: Iterable[str], model: Model, taken: Iterable[str], problems: Problems) -> Space:
-    """The space of some ``path=values``; names that are ``taken`` by other columns cannot be varied."""
+def read_space(
+    vary: Iterable[str], model: Model, taken: Iterable[str], given: Iterable[str], problems: Problems
+) -> Space:
+    """The space of some ``path=values``, without what is ``given`` a value and names ``taken`` by other columns."""
     axes: dict[str, Axis] = {}
     for text in vary:
         setting = parse_setting(text, problems, "--vary")
@@ -160,6 +162,9 @@ def read_space(vary: Iterable[str], model: Model, taken: Iterable[str], problems
             problems.add(f"{setting.path!r} cannot be varied: {why}", setting.position)
         elif (axis := _axis(setting, model, problems)) is not None:
             axes[setting.path] = axis
+    for each in [parse_setting(text, problems) for text in given]:
+        if each is not None and each.path in axes:
+            problems.add(f"{each.path!r} is set and varied", each.position, "leave out --set or --vary")
     return Space(list(axes.values()))
 
 

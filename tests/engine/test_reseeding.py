@@ -42,12 +42,13 @@ def streams_in(simulation: Simulation) -> list[Stream]:
     found, seen, waiting = [], {id(simulation.model)}, [simulation._run]
     while waiting:
         thing: Any = waiting.pop()
-        if id(thing) in seen or isinstance(thing, passed) or thing is simulation.model.graph:
+        kind = type(thing)  # not by isinstance, which asks what a weak proxy refers to
+        if id(thing) in seen or issubclass(kind, passed) or thing is simulation.model.graph:
             continue
         seen.add(id(thing))
-        if isinstance(thing, Stream):
+        if issubclass(kind, Stream):
             found.append(thing)
-        is_global = isinstance(thing, types.FunctionType)
+        is_global = kind is types.FunctionType
         waiting += [thing.__closure__, thing.__defaults__] if is_global else gc.get_referents(thing)
     return found
 

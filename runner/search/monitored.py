@@ -1,0 +1,41 @@
+"""The monitor that a search is about: one of the model's, or a property that is given as a text."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from epicycle.actors import EpicycleError, did_you_mean
+
+from ..build import Model
+from ..text import COMMAND_LINE, ModelError, Position
+
+AD_HOC = "property"  # the name of a monitor that is made of a text
+
+
+def monitor_named(model: Model, text: str, name: str = AD_HOC, flag: str = "") -> str:
+    """The name of a monitor; a property, which has a space in it, becomes one of the model's with that ``name``.
+
+    ``flag`` is the option of the command line that it comes from, if it does.  Raises ``ModelError``.
+    """
+    if " " not in text.strip():
+        return text
+    try:
+        model.monitor(name, text)
+    except ModelError as error:
+        if not flag:
+            raise
+        option = f"{flag} {text}"
+        at = Position(COMMAND_LINE, 1, len(flag) + 2, len(text), option)
+        raise ModelError(replace(each, position=at) for each in error.problems) from None
+    return name
+
+
+def property_of(model: Model, monitor: str) -> str:
+    """The property that a monitor of a model states; raises ``EpicycleError`` if there is no such monitor."""
+    known = {each.name: each.requirement.property for each in model.monitors}
+    if monitor not in known:
+        near = did_you_mean(monitor, known)
+        raise EpicycleError(
+            f"{model.name} has no monitor {monitor!r}{near}\n   help: its monitors: {', '.join(known) or 'none'}"
+        )
+    return known[monitor]
