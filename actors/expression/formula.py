@@ -22,7 +22,7 @@ from .values import CONSTANTS, FUNCTIONS
 T = TypeVar("T")
 
 # Dotted names with an index only if another name follows: a final index is a subscript of the token.
-_REFERENCE = re.compile(
+DOTTED = re.compile(
     r"""(?P<text>"[^"]*"|'[^']*')"""
     r"""|(?<![\w.])(?P<path>[A-Za-z_]\w*(?:\[\d+\](?=\.))?(?:\.[A-Za-z_]\w*(?:\[\d+\](?=\.[A-Za-z_]))?)+)""",
     re.ASCII,
@@ -118,7 +118,7 @@ class PortFormula:
             path = match["path"]
             return match[0] if path is None else names.setdefault(path, f"port_{len(names)}")
 
-        self._formula = Formula(_REFERENCE.sub(stand_in, source))
+        self._formula = Formula(DOTTED.sub(stand_in, source))
         self._paths = tuple(names)
         for name in self._formula.names:
             if name in given:

@@ -131,7 +131,7 @@ def calibrate(
     vary: Iterable[str] | Mapping[str, object],
     linear: bool = False,
     seed: int | None = None,
-    folder: str | Path | None = None,
+    out: str | Path | None = None,
     set: Iterable[str] | Mapping[str, object] = (),
     disturb: str | Path | Iterable[str | Path] = (),
     types: Iterable[str | Path] = (),
@@ -139,8 +139,8 @@ def calibrate(
     """Fit parameters of a model so that its signals match measured ones, by least squares.
 
     ``match`` gives a file (.csv, .parquet) with the columns ``time`` and ``value`` for each output port, ``vary`` the
-    ranges.  A token lasts until the next one, or with ``linear`` changes linearly to it.  In a ``folder``, each run is
-    noted, so that a search that was killed continues there.
+    ranges.  A token lasts until the next one, or with ``linear`` changes linearly to it.  Each run is noted in the
+    folder ``out``, if there is one, so that a search that was killed continues there.
 
     >>> epicycle.calibrate("pid_loop", match={"plant.output": "step.csv"}, vary={"plant.time_constant": "0.5 s..5 s"})
     """
@@ -155,10 +155,10 @@ def calibrate(
         [str(each) for each in ([disturb] if isinstance(disturb, (str, Path)) else disturb)],
         [Path(each) for each in types],
     )
-    return calibrated(task, None if folder is None else Path(folder))
+    return calibrated(task, out)
 
 
-def calibrated(task: Task, folder: Path | None) -> Calibrated:
+def calibrated(task: Task, out: str | Path | None) -> Calibrated:
     """The same for what a command asks for."""
     with bar("calibrate") as show:
 
@@ -166,7 +166,7 @@ def calibrated(task: Task, folder: Path | None) -> Calibrated:
             if show is not None:
                 show(float(runs), None, f"{runs:,} runs")
 
-        return Calibrated(search(task, folder, tell), task)
+        return Calibrated(search(task, None if out is None else Path(out), tell), task)
 
 
 def _value(each: Fitted) -> str:

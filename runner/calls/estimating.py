@@ -26,7 +26,7 @@ def rare(
     repetitions: int = 10,
     seed: int | None = None,
     until: float | str | None = None,
-    folder: str | Path | None = None,
+    out: str | Path | None = None,
     progress: Callable[[int, int], None] | None = None,
     **changes: Unpack[Changes],
 ) -> RareEvent:
@@ -50,6 +50,6 @@ def rare(
         repetitions=repetitions,
         seed=seed,
         until=seconds("until", until),
-        folder=None if folder is None else Path(folder),
+        folder=None if out is None else Path(out),
         tell=progress,
     )

@@ -121,15 +121,15 @@ def explain(
     *,
     seed: int | None = None,
     until: float | str | None = None,
-    folder: str | Path | None = None,
+    out: str | Path | None = None,
     progress: Callable[[int, int], None] | None = None,
     **changes: Unpack[Changes],
 ) -> Explained:
     """Find a smallest set of acts of aspects that breaks a monitor in a run, or a property that is given as a text.
 
-    ``set``, ``disturb`` and the other options of ``load`` change the model first.  In a ``folder``, each run that was
-    made is noted, so that a search that was killed continues there.  Raises ``EpicycleError`` if the run does not break
-    the property.
+    ``set``, ``disturb`` and the other options of ``load`` change the model first.  Each run that was made is noted in
+    the folder ``out``, if there is one, so that a search that was killed continues there.  Raises ``EpicycleError`` if
+    the run does not break the property.
 
     >>> epicycle.explain("collision_avoidance", "always clearance.distance >= 4 m", seed=3, set={"disturbance": 0.5})
     """
@@ -139,7 +139,7 @@ def explain(
         made, command = copy.copy(made), ["epicycle", "run", made.name, "--seed", str(seed)]
     else:
         command = as_command(model, seed, until, changes)
-    return explained(made, monitor, seed, seconds("until", until), command, folder, progress, flag="")
+    return explained(made, monitor, seed, seconds("until", until), command, out, progress, flag="")
 
 
 def explained(
@@ -148,16 +148,14 @@ def explained(
     seed: int,
     until: float | None,
     command: Sequence[str],
-    folder: str | Path | None,
+    out: str | Path | None,
     progress: Callable[[int, int], None] | None,
     *,
     flag: str = "--monitor",
 ) -> Explained:
     """The same for a model that may be changed, and was made by a command."""
     monitor = monitor_named(made, monitor, flag=flag)
-    found = search(
-        made, monitor, seed=seed, until=until, folder=None if folder is None else Path(folder), tell=progress
-    )
+    found = search(made, monitor, seed=seed, until=until, folder=None if out is None else Path(out), tell=progress)
     return Explained(found, made, until, command)
 
 

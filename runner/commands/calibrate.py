@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from ..printing import complain, tell, tell_json
-from .options import DISTURB, DONE, INTERRUPTED, SEED, TYPES, command, option, several
+from . import searching
+from .options import DISTURB, DONE, SEED, command, option, several
 
 
 @command(
@@ -26,11 +26,10 @@ from .options import DISTURB, DONE, INTERRUPTED, SEED, TYPES, command, option, s
         help="what a signal does between two tokens (default: hold)",
     ),
     SEED,
-    several("--set", metavar="PATH=VALUE", help="set a parameter in all runs; may be repeated"),
+    searching.SET,
     DISTURB,
-    option("--out", metavar="DIR", type=Path, help="folder for what is found (default: results/MODEL/calibration)"),
-    option("--json", action="store_true", help="print one JSON object instead of the text"),
-    TYPES,
+    searching.out("MODEL/calibration"),
+    *searching.ENDING,
     imports=("calls.calibrating",),
 )
 def calibrate(options: argparse.Namespace) -> int:
@@ -40,8 +39,6 @@ def calibrate(options: argparse.Namespace) -> int:
     a file for --overrides, the facts as JSON, and the residuals.  Each run that was made is noted there, so that an
     interrupted search continues.
     """
-    from epicycle.actors import abridged
-
     from ..calls import calibrated
     from ..search import Task
 
@@ -55,17 +52,5 @@ def calibrate(options: argparse.Namespace) -> int:
         options.disturb,
         [Path(each) for each in options.types],
     )
-    folder = options.out or Path("results") / abridged(Path(options.model).stem, 60) / "calibration"
-    try:
-        found = calibrated(task, folder)
-    except KeyboardInterrupt:
-        complain("interrupted; what was finished is kept: the same command goes on")
-        return INTERRUPTED
-    written = found.save(folder)
-    if options.json:
-        tell_json(found.facts())
-        return DONE
-    tell(str(found))
-    for path in written:
-        tell(f"wrote {path}")
-    return DONE
+    folder = searching.folder_of(options, Path(options.model).stem, "calibration")
+    return searching.answer(options, lambda: calibrated(task, folder), lambda found: found.save(folder), lambda _: DONE)

@@ -14,6 +14,7 @@ from .options import (
     DONE,
     FAILED,
     SEED,
+    UNTIL,
     check_path,
     command,
     option,
@@ -40,7 +41,7 @@ if TYPE_CHECKING:
     *(each for each in CHANGES if each is not DISTURB),
     option("--replications", type=COUNT, metavar="N", default=10, help="runs of each variant (default: 10)"),
     SEED,
-    option("--until", metavar="TIME", help="stop time, such as 30 or '500 ms' (default: the model's)"),
+    UNTIL,
     option("--json", action="store_true", help="print one JSON object instead of the table"),
     option(
         "-o",

@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from ..printing import tell, tell_json
-from .options import CHANGES, DONE, SEED, command, load, option
+from . import searching
+from .options import CHANGES, DONE, SEED, UNTIL, command, load, option
 from .past_run import as_before
 
 
@@ -15,16 +15,11 @@ from .past_run import as_before
     option("model", metavar="MODEL or RESULTS", help="a model, or a folder that a run was written to"),
     *CHANGES,
     SEED,
-    option("--until", metavar="TIME", help="stop time, such as 30 or '500 ms' (default: the model's)"),
-    option(
-        "--monitor",
-        metavar="NAME or PROPERTY",
-        required=True,
-        help="a monitor of the model, or a property such as 'always clearance.distance >= 2 m'",
-    ),
-    option("--out", metavar="DIR", type=Path, help="folder for what is found (default: results/MODEL/explanation)"),
+    UNTIL,
+    searching.monitor("always clearance.distance >= 2 m"),
+    searching.out("MODEL/explanation"),
     option("--no-page", action="store_true", help="write no page with both runs"),
-    option("--json", action="store_true", help="print one JSON object instead of the tables"),
+    searching.JSON,
     imports=("calls.explaining",),
 )
 def explain(options: argparse.Namespace) -> int:
@@ -34,32 +29,26 @@ def explain(options: argparse.Namespace) -> int:
     disturbance with just these acts, the facts as JSON, and a page that shows both runs.  Each run that was tried is
     noted there, so that an interrupted search continues.
     """
-    from epicycle.actors import abridged
-
     from ..bars import bar
-    from ..calls import Changes, as_command, explained, seconds
+    from ..calls import Changes, Explained, as_command, explained, seconds
 
     if Path(options.model).is_dir():
         as_before(options)
     made = load(options)
-    folder = options.out or Path("results") / abridged(made.name, 60) / "explanation"
+    folder = searching.folder_of(options, made.name, "explanation")
     seed = made.seed if options.seed is None else options.seed
     changes: Changes = {"set": options.set, "overrides": options.overrides, "disturb": options.disturb}
     changes |= {"aspects": options.aspect, "without_aspects": options.without}
     given = as_command(options.model, seed, options.until, changes)
-    with bar(made.name) as show:
+    until = seconds("--until", options.until)
 
-        def report(runs: int, acts: int) -> None:
-            if show is not None:
-                show(float(runs), None, f"{runs} runs, {acts} acts")
+    def search() -> Explained:
+        with bar(made.name) as show:
 
-        until = seconds("--until", options.until)
-        found = explained(made, options.monitor, seed, until, given, folder, report)
-    written = found.save(folder, page=not options.no_page)
-    if options.json:
-        tell_json(found.facts())
-        return DONE
-    tell(str(found))
-    for path in written:
-        tell(f"wrote {path}")
-    return DONE
+            def report(runs: int, acts: int) -> None:
+                if show is not None:
+                    show(float(runs), None, f"{runs} runs, {acts} acts")
+
+            return explained(made, options.monitor, seed, until, given, folder, report)
+
+    return searching.answer(options, search, lambda found: found.save(folder, page=not options.no_page), lambda _: DONE)

@@ -5,15 +5,8 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from ..printing import complain, tell, tell_json
-from .options import COUNT, DISTURB, DONE, FAILED, INTERRUPTED, TYPES, command, option, several, whole
-from .studies import first_seed, positive_seconds
-
-VARY = several(
-    "--vary",
-    metavar="PATH=VALUES",
-    help="search a parameter: load=0.5..0.9, period='1 s..5 s', 'policy=[fifo, lifo]'; may be repeated",
-)
+from . import searching
+from .options import COUNT, DISTURB, DONE, FAILED, command, option, several, whole
 
 
 def points(text: str) -> int:
@@ -28,7 +21,7 @@ def points(text: str) -> int:
     option("target", metavar="MODEL or STUDY", help="a path to a YAML file, or the name of a packaged model or study"),
     option("--minimise", metavar="METRIC", help="a metric, or an expression over metrics and varied parameters"),
     option("--maximise", metavar="METRIC", help="the same, whose mean is to be large"),
-    VARY,
+    searching.VARY,
     several(
         "--subject-to",
         metavar="CONDITION",
@@ -36,24 +29,12 @@ def points(text: str) -> int:
     ),
     option("--points", type=points, metavar="N", default=200, help="number of points that are tried (default: 200)"),
     option("--replications", type=COUNT, metavar="N", help="runs of each point (default: the study's, or 1)"),
-    option(
-        "--seed",
-        type=first_seed,
-        metavar="N",
-        help="seed of the search and of the first replication (default: the study's, or 0)",
-    ),
-    several("--set", metavar="PATH=VALUE", help="set a parameter in all runs; may be repeated"),
+    searching.seed_of_search("seed of the search and of the first replication (default: the study's, or 0)"),
+    searching.SET,
     DISTURB,
-    option("--out", metavar="DIR", type=Path, help="results folder (default: results/NAME/optimisation)"),
-    option("--jobs", type=COUNT, metavar="N", help="processes at a time (default: one per core)"),
-    option(
-        "--run-timeout",
-        type=positive_seconds,
-        metavar="S",
-        help="real time in seconds after which a run is ended and counts as failed (default: no limit)",
-    ),
-    option("--json", action="store_true", help="print one JSON object instead of the text"),
-    TYPES,
+    searching.out("NAME/optimisation"),
+    *searching.WORKERS,
+    *searching.ENDING,
     imports=("calls.optimising",),
 )
 def optimise(options: argparse.Namespace) -> int:
@@ -68,7 +49,6 @@ def optimise(options: argparse.Namespace) -> int:
 
     from ..calls import optimised
     from ..search import Goal
-    from ..study import WorkerError, WriteError
 
     if (options.minimise is None) == (options.maximise is None):
         raise EpicycleError("give one of --minimise METRIC and --maximise METRIC")
@@ -86,17 +66,9 @@ def optimise(options: argparse.Namespace) -> int:
         tuple(map(Path, options.types)),
         tuple(options.given),
     )
-    try:
-        found = optimised(goal, options.out, jobs=options.jobs, timeout=options.run_timeout)
-    except KeyboardInterrupt:
-        complain("interrupted; what was finished is kept: the same command goes on")
-        return INTERRUPTED
-    except (WorkerError, WriteError) as error:
-        complain(f"error: {error}")
-        return FAILED
-    if options.json:
-        tell_json(found.facts())
-    else:
-        tell(str(found))
-        tell(f"wrote {found.results.path}")
-    return DONE if found.best is not None else FAILED
+    return searching.answer(
+        options,
+        lambda: optimised(goal, options.out, jobs=options.jobs, timeout=options.run_timeout),
+        lambda found: [found.results.path],
+        lambda found: DONE if found.best is not None else FAILED,
+    )

@@ -71,6 +71,13 @@ def seed(text: str) -> int:
     return whole(0, MAX_SEED)(text)
 
 
+def first_seed(text: str) -> int:
+    """A first seed such that the seeds of all replications are valid, too."""
+    from ..language import MAX_STUDY_SEED
+
+    return whole(0, MAX_STUDY_SEED)(text)
+
+
 def number(text: str) -> float:
     """The number that a text represents; NaN if it represents none."""
     try:
@@ -79,10 +86,25 @@ def number(text: str) -> float:
         return math.nan
 
 
+def positive_seconds(text: str) -> float:
+    """A number of seconds of wall-clock time."""
+    if not 0.0 < (found := number(text)) < math.inf:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a number of seconds greater than 0")
+    return found
+
+
 # -- options ----------------------------------------------------------------------------------------------------------
 
 COUNT = whole(1, 10**9, "1e9")
 SEED = option("--seed", type=seed, metavar="N", help="seed of all random streams (default: the model's)")
+UNTIL = option("--until", metavar="TIME", help="stop time, such as 30 or '500 ms' (default: the model's)")
+JOBS = option("--jobs", type=COUNT, metavar="N", help="processes at a time (default: one per core)")
+RUN_TIMEOUT = option(
+    "--run-timeout",
+    type=positive_seconds,
+    metavar="S",
+    help="seconds of wall-clock time after which a run is ended and counts as failed (default: no limit)",
+)
 JSON = option("--json", action="store_true", help="print JSON")
 TYPES = several(
     "--types",

@@ -7,7 +7,7 @@ import math
 from pathlib import Path
 
 from ..printing import console, tell, tell_json
-from .options import BROKEN, MODEL, SEED, command, complain_of, load, number, option, several
+from .options import BROKEN, MODEL, SEED, UNTIL, command, complain_of, load, number, option, several
 
 
 def factor(text: str) -> float:
@@ -26,7 +26,7 @@ def factor(text: str) -> float:
     "run a model",
     *MODEL,
     SEED,
-    option("--until", metavar="TIME", help="stop time, such as 30 or '500 ms' (default: the model's)"),
+    UNTIL,
     option(
         "--realtime",
         metavar="FACTOR",

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import math
 import re
 import shlex
 from collections import Counter
@@ -12,26 +11,25 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..printing import complain, complain_traceback, console, tell, tell_json
-from .options import COUNT, DONE, FAILED, INTERRUPTED, TYPES, command, complain_of, number, option, several, whole
+from .options import (
+    COUNT,
+    DONE,
+    FAILED,
+    INTERRUPTED,
+    JOBS,
+    RUN_TIMEOUT,
+    TYPES,
+    command,
+    complain_of,
+    first_seed,
+    option,
+    several,
+)
 
 if TYPE_CHECKING:
     from ..study import Plan, StudyResults
 
 SHOWN = 5  # failed runs that are reported one by one
-
-
-def first_seed(text: str) -> int:
-    """A first seed such that the seeds of all replications are valid, too."""
-    from ..language import MAX_STUDY_SEED
-
-    return whole(0, MAX_STUDY_SEED)(text)
-
-
-def positive_seconds(text: str) -> float:
-    """A number of seconds of wall-clock time."""
-    if not 0.0 < (found := number(text)) < math.inf:
-        raise argparse.ArgumentTypeError(f"{text!r} is not a number of seconds greater than 0")
-    return found
 
 
 def address(text: str) -> str:
@@ -59,13 +57,8 @@ SESSION = (
         metavar="ADDRESS",
         help="the Dask scheduler whose workers make the runs (default: start one here, with --jobs workers)",
     ),
-    option("--jobs", type=COUNT, metavar="N", help="processes at a time (default: one per core)"),
-    option(
-        "--run-timeout",
-        type=positive_seconds,
-        metavar="S",
-        help="seconds of wall-clock time after which a run is ended and counts as failed (default: no limit)",
-    ),
+    JOBS,
+    RUN_TIMEOUT,
     option("--retry", action="store_true", help="repeat runs that took too long, or whose process was killed"),
 )
 

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..printing import complain, tell
-from .options import CHANGES, DONE, SEED, check_path, command, load, option
+from .options import CHANGES, DONE, SEED, UNTIL, check_path, command, load, option
 from .past_run import as_before
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     option("model", metavar="MODEL or RESULTS", nargs="+", help="one or two models, or results folders of runs"),
     *CHANGES,
     SEED,
-    option("--until", metavar="TIME", help="stop time, such as 30 or '500 ms' (default: the model's)"),
+    UNTIL,
     option(
         "-o",
         "--out",

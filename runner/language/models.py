@@ -4,13 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 from keyword import iskeyword, kwlist
-from typing import Any
 
-from epicycle.actors import Actor, Parameter, UnitError, declared_parameters, parse_unit
+from epicycle.actors import Actor, UnitError, parse_unit
 from epicycle.actors.expression import CONSTANTS, FUNCTIONS
 from epicycle.aspects import Aspect
 
-from ..catalogue import TAKES, Measure, take_problem
 from ..graph import LIKE, PTOLEMY, TIES
 from ..text import (
     MAX_SEED,
@@ -28,7 +26,7 @@ from ..text import (
     is_empty,
     nearest,
 )
-from .declarations import CompositeText, ConnectionText, MetricText, ModelText, ParameterText, PartText, PortText
+from .declarations import CompositeText, ConnectionText, ModelText, ParameterText, PartText, PortText
 from .fields import (
     AT,
     COMPUTED_FLAG,
@@ -40,7 +38,6 @@ from .fields import (
     Key,
     Schema,
     Shape,
-    about,
     computed,
     named,
     names_of,
@@ -51,9 +48,10 @@ from .fields import (
     schema_of,
 )
 from .fields import NAME as NAME_PATTERN
+from .metrics import METRICS
 from .modes import OF_MODES, machine_of
 from .monitors import MONITORS
-from .places import CONNECTIONS, PATTERN_SCHEMA, PATTERNS, POINTCUTS
+from .places import CONNECTIONS, PATTERNS, POINTCUTS
 
 # -- ports and parameters -----------------------------------------------------------------------------------------
 
@@ -361,43 +359,6 @@ RUN = Construct(
 )
 
 
-def _of_metric(key: str, parameter: Parameter[Any]) -> Key:
-    schema = ref("text") if key in ("unit", "to", "doc", "label") else schema_of(parameter)
-    if key == "take":
-        schema = {"enum": list(TAKES), "enumDescriptions": [f"{each.doc} ({each.over})" for each in TAKES.values()]}
-    return Key(node_as(schema), about(parameter))
-
-
-METRIC = Construct(
-    "A number computed from what a port sends.",
-    {
-        "of": Key(
-            node_as(PATTERN_SCHEMA),
-            "The output port (or a pattern for several).",
-            missing=("{what} has no port", "add 'of: actor.port'"),
-        ),
-        **{key: _of_metric(key, each) for key, each in declared_parameters(Measure).items()},
-    },
-    type="object",
-    required=["of"],
-)
-
-
-def _metric(reader: NodeReader, name: str, entry: Entry) -> MetricText | None:
-    """``name: {of: port, take: last, unit: s, doc: ...}``."""
-    entries = METRIC.entries(reader, entry.value, f"metric {name!r}")
-    if entries is None:
-        return None
-    said = METRIC.values(reader, entries, f"metric {name!r}", entry.key.position)
-    port = AT.read(reader, said["of"], "of") if "of" in said else None
-    take = reader.text(said["take"], "take") if "take" in said else "last"
-    if take is not None and (problem := take_problem(name, take)):
-        reader.problems.add(problem[0], entries["take"].value.position, problem[1])
-    if port is None or take not in TAKES:
-        return None
-    return MetricText(name, port, {key: each for key, each in entries.items() if key != "of"}, entry.key.position)
-
-
 def _model_director(reader: NodeReader, node: Node, what: str) -> dict[str, Entry]:
     """What a file declares about the model's director."""
     if isinstance(node, Scalar) and node.value == PTOLEMY:
@@ -412,7 +373,6 @@ def _model_director(reader: NodeReader, node: Node, what: str) -> dict[str, Entr
     return MODEL_DIRECTOR.entries(reader, node, what) or {}
 
 
-METRICS = named(ref("metric"), _metric)
 LIBRARY = Construct("", {"doc": DOC, "include": INCLUDE, "composites": COMPOSITES})
 MODEL = Construct(
     "",

@@ -29,12 +29,12 @@ from .fields import (
     ref,
     schema_of,
 )
+from .metrics import METRIC
 from .models import (
     BESIDE,
     COMPOSITE,
     DIRECTOR,
     LIBRARY,
-    METRIC,
     MODEL,
     MODEL_DIRECTOR,
     PARAMETER,

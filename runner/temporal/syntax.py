@@ -12,7 +12,7 @@ from collections.abc import Callable
 from typing import Final
 
 from epicycle.actors import EpicycleError, Quantity, convert, counted_in_si, to_nanoseconds
-from epicycle.actors.expression import ExpressionError, PortFormula
+from epicycle.actors.expression import DOTTED, ExpressionError, PortFormula
 
 from .property import OPERATORS, Condition, Junction, Not, Property, Quantified, Sends, Until
 
@@ -230,7 +230,8 @@ def condition_of(source: str) -> Condition:
     """A condition over ports; numbers with units count in SI.  Raises ``ExpressionError``."""
     plain = _QUANTITY.sub(_in_si, source)
     whole = PortFormula(plain)  # the errors of an expression
-    tree = ast.parse(_DOTTED.sub(lambda match: "_" * len(match[0]), plain), mode="eval").body
+    names = DOTTED.sub(lambda match: "_" * len(match[0]), plain)  # of which only the length matters here
+    tree = ast.parse(names, mode="eval").body
     if not isinstance(tree, ast.Compare) or any(type(each) not in _SIGNS for each in tree.ops):
         return Condition(source, whole, PortFormula(f"[{plain}]"), ())
     parts = [tree.left, *tree.comparators]
@@ -240,13 +241,6 @@ def condition_of(source: str) -> Condition:
     is_single = len(signs) == 1 and signs[0] in ("<", "<=", ">", ">=")
     difference = PortFormula(" - ".join(sides)) if is_single else None
     return Condition(source, whole, PortFormula(f"[{', '.join(sides)}]"), signs, difference)
-
-
-# What PortFormula takes for a port; here only its length matters.
-_DOTTED: Final = re.compile(
-    r"\"[^\"]*\"|'[^']*'"
-    r"|(?<![\w.])[A-Za-z_]\w*(?:\[\d+\](?=\.))?(?:\.[A-Za-z_]\w*(?:\[\d+\](?=\.[A-Za-z_]))?)+"
-)
 
 
 def _in_si(match: re.Match[str]) -> str:

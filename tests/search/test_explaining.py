@@ -138,7 +138,7 @@ def test_mistakes(model: Path, monitor: str, message: str) -> None:
 
 def test_a_search_that_is_killed_continues_to_the_same_answer(model: Path, tmp_path: Path) -> None:
     seed = broken_seed(model)
-    whole = epicycle.explain(model, "alive", seed=seed, folder=tmp_path / "whole")
+    whole = epicycle.explain(model, "alive", seed=seed, out=tmp_path / "whole")
     lines = next((tmp_path / "whole").glob("tried-*.jsonl")).read_text(encoding="utf-8").splitlines(keepends=True)
     assert len(lines) > 5
     part = tmp_path / "part"
@@ -146,7 +146,7 @@ def test_a_search_that_is_killed_continues_to_the_same_answer(model: Path, tmp_p
     name = next((tmp_path / "whole").glob("tried-*.jsonl")).name
     # Killed in the middle of a line.
     (part / name).write_text("".join(lines[:4]) + lines[4][: len(lines[4]) // 2], encoding="utf-8")
-    again = epicycle.explain(model, "alive", seed=seed, folder=part)
+    again = epicycle.explain(model, "alive", seed=seed, out=part)
     assert again.explanation.names == whole.explanation.names
     assert again.explanation.effects == whole.explanation.effects
     assert again.explanation.runs < whole.explanation.runs

@@ -320,7 +320,7 @@ def test_an_interrupt_keeps_what_is_there() -> None:
     os.killpg(process.pid, signal.SIGINT)
     _, told = process.communicate(timeout=30)
     assert process.returncode == 130
-    assert told == "interrupted; what was finished is kept: the same command goes on\n"
+    assert told == "interrupted; finished runs are kept: the same command continues\n"
     assert 0 < len(epicycle.open_study("out").table()) < 20
 
 

@@ -11,8 +11,8 @@ import pytest
 from epicycle.runner import open_study
 from epicycle.runner.catalogue import packaged_models
 from epicycle.runner.language import Claim, read_study
+from epicycle.runner.show.report.claims import claims
 from epicycle.runner.show.report.data import Data
-from epicycle.runner.show.report.page import claims
 from epicycle.runner.study import Plan, run_study
 from epicycle.runner.study.judge.claims import (
     NOT_REPRODUCED,
