@@ -5,11 +5,12 @@ from .estimator import UnscentedEstimator
 from .filterpy_estimator import FilterError, FilterPyEstimator
 from .messages import BodyState, Estimate, Measurement, Plan
 from .monitors import DistanceMonitor, GoalMonitor, SeparationMonitor
-from .planning import Barrier, Casadi, Inform, Objective, ReachGoal, Solver
-from .world import BroadcastChannel, ChannelError, CircularMotion, Sensor, Vehicle
+from .planning import Barrier, Casadi, Inform, Objective, ReachGoal, Solver, StayNear
+from .world import BroadcastChannel, ChannelError, CircularMotion, Flooding, Sensor, Vehicle
 
 __all__ = [
     "Barrier", "BodyState", "BroadcastChannel", "Casadi", "ChannelError", "CircularMotion", "DistanceMonitor",
-    "Estimate", "FilterError", "FilterPyEstimator", "GoalMonitor", "Inform", "Measurement", "Objective", "Plan",
-    "ReachGoal", "RobustController", "Sensor", "SeparationMonitor", "Solver", "UnscentedEstimator", "Vehicle",
+    "Estimate", "FilterError", "FilterPyEstimator", "Flooding", "GoalMonitor", "Inform", "Measurement", "Objective",
+    "Plan", "ReachGoal", "RobustController", "Sensor", "SeparationMonitor", "Solver", "StayNear", "UnscentedEstimator",
+    "Vehicle",
 ]  # fmt: skip

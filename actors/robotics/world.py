@@ -10,7 +10,7 @@ import numpy as np
 from ..core import Actor, EpicycleError, InputPort, OutputPort, Parameter, array_parameter, counted
 from ..core.elementary import cos, hypot, sin
 from .arrays import Pair, all_finite, pair
-from .messages import RANGE, RELATIVE_POSITION, BodyState, Measurement, enclosing
+from .messages import RANGE, RELATIVE_POSITION, BodyState, Measurement, Plan, enclosing
 
 
 class Vehicle(Actor):
@@ -184,3 +184,24 @@ class BroadcastChannel(Actor):
                 for listener in listeners:
                     if listener != speaker:
                         send(token, listener)
+
+
+class Flooding(Actor):
+    """Says what its robot has to say, and repeats what it hears from others, so that it reaches whom they do not reach.
+
+    A message is repeated once: only if it is later than all others of its robot so far, from which its ``time`` tells
+    it, as a sequence number would.  Messages that are not finite are dropped.
+    """
+
+    own = InputPort(Measurement | Plan, doc="messages of this robot")
+    heard = InputPort(Measurement | Plan, multi=True, required=False, doc="messages of other robots, from any of them")
+    output = OutputPort(Measurement | Plan, doc="what this robot sends")
+
+    def initialize(self) -> None:
+        self._latest: dict[str, float] = {}  # the time of the latest message of each robot
+
+    def fire(self) -> None:
+        for message in (*self.own.tokens, *self.heard.tokens):
+            if message.finite and message.time > self._latest.get(message.robot, -math.inf):
+                self._latest[message.robot] = message.time
+                self.output.send(message)

@@ -48,9 +48,24 @@ def dynamics(position: Any, velocity: Any, controls: Any, period: Any) -> tuple[
 
 
 def f0(positions: Any, goal: Any) -> Any:
-    """Eq. (2), (N,) in m^2: the squared distance to the goal, which the paper puts at the origin."""
+    """Eq. (2), (N,) in m^2: the squared distance to the goal (1, 2), which the paper puts at the origin, or to one that
+    moves (N, 2)."""
     offsets = positions - goal
     return (offsets * offsets).sum(axis=-1)
+
+
+def f0_of_several(positions: Any, places: Any, weights: Any) -> Any:
+    """f0 of several goals that move (k, N, 2), each with its weight (k,): (N,) in m^2.
+
+    It is the f0 of their ``station``, times the sum of the weights, and a term that no plan changes.
+    """
+    offsets = positions - places
+    return (weights[:, np.newaxis] * (offsets * offsets).sum(axis=-1)).sum(axis=0)
+
+
+def station(places: Any, weights: Any) -> Any:
+    """The goal (N, 2) in m that has the optimum of ``f0_of_several``: the weighted mean of the places (k, N, 2)."""
+    return (weights[:, np.newaxis, np.newaxis] * places).sum(axis=0) / weights.sum()
 
 
 def f1(velocities: Any, max_speed: Any) -> Any:

@@ -38,7 +38,7 @@ class HorizonProblem(NamedTuple):
     peer_mean: Array  # (n, N, 2) Ro_{i,t+s}, f5
     peer_distance: Array  # (n, N) Dmin + alpha * sigma_5i
     objective: int = REACH_GOAL  # eq. (2); or INFORM, eq. (5)
-    goal: Array = np.zeros(2)  # (2,)
+    goal: Array = np.zeros((1, 2))  # (n, 2) at steps 1..n of eq. (2); the last one is there for the other steps, too
     sigma_positions: Array = np.empty((0, 2))  # (M, 2) sigma points of the obstacle's position at t + N
     sigma_weights: Array = np.empty(0)  # (M,) w_{t,i}
     others_distance: Array = np.empty((0, 0))  # (M, M) exponent that the others' measurements add, mutual_information
@@ -47,8 +47,8 @@ class HorizonProblem(NamedTuple):
     measurement_range: float = 0.0  # Dmax, f6
 
     def to_reach(self, goal: Array) -> HorizonProblem:
-        """The same problem with the objective of eq. (2)."""
-        return self._replace(objective=REACH_GOAL, goal=np.array(goal))
+        """The same problem with the objective of eq. (2); a ``goal`` (2,) that stands still, or (N, 2) at each step."""
+        return self._replace(objective=REACH_GOAL, goal=np.array(goal).reshape(-1, 2))
 
     def to_inform(
         self, points: Array, weights: Array, others: Array, variance: float, gamma: float, reach: float

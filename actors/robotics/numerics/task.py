@@ -22,7 +22,7 @@ _VELOCITY = 2
 _TRIED = 4  # the controls that position and velocity follow from
 TAKEN = 6  # the best controls so far
 _SHIFT = 8  # of the position, by a whole Newton step
-_TARGET = 10  # position of the obstacle in f6
+_TARGET = 10  # position of the goal in f0, or of the obstacle in f6
 _COLUMNS = 12  # number of columns
 
 
@@ -42,7 +42,6 @@ class Task(NamedTuple):
     max_speed: float
     max_acceleration: float
     seeks: bool  # the objective is eq. (2)
-    goal: Vector
     variance: float
     penalty: float
     reach: float
@@ -74,7 +73,10 @@ def new_task(problem: HorizonProblem, steps: int, free: int, spare: float, room:
     plan, stages = room[:second].reshape((steps, _COLUMNS)), room[second:third].reshape((steps, STAGE))
     constraints = room[third:fourth].reshape((binding, CONSTRAINT))
     points = room[fourth:].reshape((weights.shape[0], PAIRS + 2 * weights.shape[0]))
-    count = 0
+    count, last = 0, problem.goal.shape[0] - 1
+    for s in range(steps if seeks else 0):
+        for c in range(2):
+            plan[s, _TARGET + c] = problem.goal[min(s, last), c]
     if not seeks and problem.obstacle_mean.shape[0] > 0:
         count = new_points(problem.sigma_positions, weights, problem.others_distance, points)
         for s in range(steps):
@@ -87,7 +89,6 @@ def new_task(problem: HorizonProblem, steps: int, free: int, spare: float, room:
         max_speed=problem.max_speed,
         max_acceleration=problem.max_acceleration,
         seeks=seeks,
-        goal=(problem.goal[0], problem.goal[1]),
         variance=problem.measurement_variance,
         penalty=problem.range_penalty,
         reach=problem.measurement_range,
@@ -167,7 +168,7 @@ def objective_of(task: Task) -> float:
     steps, value = plan.shape[0], 0.0
     if task.seeks:
         for s in range(steps):
-            dx, dy = plan[s, _POSITION] - task.goal[0], plan[s, _POSITION + 1] - task.goal[1]
+            dx, dy = plan[s, _POSITION] - plan[s, _TARGET], plan[s, _POSITION + 1] - plan[s, _TARGET + 1]
             value += dx * dx + dy * dy
     elif task.points.shape[0] > 0:
         value = informed(task.points, plan[steps - 1, _POSITION], plan[steps - 1, _POSITION + 1], task.variance)[0]
@@ -191,7 +192,7 @@ def _add_objective(task: Task, mu: float) -> float:
     steps, value, product = plan.shape[0], 0.0, 1.0
     if task.seeks:
         for s in range(steps):
-            dx, dy = plan[s, _POSITION] - task.goal[0], plan[s, _POSITION + 1] - task.goal[1]
+            dx, dy = plan[s, _POSITION] - plan[s, _TARGET], plan[s, _POSITION + 1] - plan[s, _TARGET + 1]
             value += dx * dx + dy * dy
             add(stages, s, 2.0, 2.0, 0.0, (0.0, dx, dy, 1.0, 0.0, 1.0))
     if not task.points.shape[0] > 0:

@@ -76,7 +76,7 @@ def _call_solver() -> None:
     # Plans that solve it need only one Newton step, and compile everything.
     problem = HorizonProblem(
         0.1, zeros(2), zeros(2), 1.0, 1.0, zeros((steps, 2)), np.ones(steps), 1.0, 1.0, zeros((1, steps, 2)) + 100.0,
-        zeros((1, steps, 3)), zeros((1, steps, 2)) + 200.0, zeros((1, steps)), INFORM, zeros(2), zeros((9, 2)),
+        zeros((1, steps, 3)), zeros((1, steps, 2)) + 200.0, zeros((1, steps)), INFORM, zeros((1, 2)), zeros((9, 2)),
         np.ones(9), zeros((9, 9)), 1.0, 1.0, 1.0,
     )  # fmt: skip
     solve(problem, zeros((2, steps, 2)))

@@ -67,7 +67,7 @@ def inform_problem(random: np.random.Generator, steps: int = 10, reach: float = 
         peer_mean=np.empty((0, steps, 2)),
         peer_distance=np.empty((0, steps)),
         objective=horizon.INFORM,
-        goal=np.zeros(2),
+        goal=np.zeros((1, 2)),
         sigma_positions=points,
         sigma_weights=weights,
         others_distance=np.zeros((9, 9)),

@@ -210,11 +210,25 @@ def test_the_reported_objective(random: np.random.Generator, reach: float) -> No
         solution = solve(problem)
         expected = objective_by_definition(problem, solution.controls)
         assert solution.objective == pytest.approx(expected, abs=1e-9)
-        goal = problem._replace(objective=horizon.REACH_GOAL, goal=random.normal(size=2))
-        solution = solve(goal)
-        places = definitions.driven(goal, solution.controls)[0]
-        assert objective_by_definition(goal, solution.controls) == pytest.approx(((places - goal.goal) ** 2).sum())
-        assert solution.objective == pytest.approx(definitions.f0(places, goal.goal).sum(), abs=1e-9)
+        for rows in (1, 10):  # a goal that stands still, and one that moves
+            goal = problem._replace(objective=horizon.REACH_GOAL, goal=random.normal(size=(rows, 2)))
+            solution = solve(goal)
+            places = definitions.driven(goal, solution.controls)[0]
+            assert objective_by_definition(goal, solution.controls) == pytest.approx(((places - goal.goal) ** 2).sum())
+            assert solution.objective == pytest.approx(definitions.f0(places, goal.goal).sum(), abs=1e-9)
+
+
+def test_staying_near_several(random: np.random.Generator) -> None:
+    """It is to be at their weighted mean, which is where the weighted sum of f0 is least, at every step."""
+    for _ in range(20):
+        places, weights = random.normal(scale=9.0, size=(3, 10, 2)), random.uniform(0.1, 3.0, size=3)
+        station = definitions.station(places, weights)
+        least = definitions.f0_of_several(station, places, weights)
+        assert least == pytest.approx(sum(w * definitions.f0(station, each) for w, each in zip(weights, places)))
+        for _ in range(10):
+            positions = random.normal(scale=9.0, size=(10, 2))
+            found = definitions.f0_of_several(positions, places, weights)
+            assert found - least == pytest.approx(weights.sum() * definitions.f0(positions, station))
 
 
 def test_the_table_of_the_equations() -> None:
