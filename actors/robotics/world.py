@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..core import Actor, EpicycleError, InputPort, OutputPort, Parameter, array_parameter, counted
+from ..core import Actor, EpicycleError, InputPort, OutputPort, Parameter, array_parameter, brief, counted
 from ..core.elementary import cos, hypot, sin
 from .arrays import Pair, all_finite, pair
 from .messages import RANGE, RELATIVE_POSITION, BodyState, Measurement, Plan, enclosing
@@ -193,15 +193,17 @@ class Flooding(Actor):
     it, as a sequence number would.  Messages that are not finite are dropped.
     """
 
-    own = InputPort(Measurement | Plan, doc="messages of this robot")
-    heard = InputPort(Measurement | Plan, multi=True, required=False, doc="messages of other robots, from any of them")
-    output = OutputPort(Measurement | Plan, doc="what this robot sends")
+    own = InputPort(Any, doc="plans or measurements of this robot")
+    heard = InputPort(Any, multi=True, required=False, doc="those of other robots, from whoever has sent or repeated them")
+    output = OutputPort(Any, doc="what this robot sends")
 
     def initialize(self) -> None:
         self._latest: dict[str, float] = {}  # the time of the latest message of each robot
 
     def fire(self) -> None:
         for message in (*self.own.tokens, *self.heard.tokens):
+            if not isinstance(message, (Measurement, Plan)):
+                raise EpicycleError(f"{self.path} takes plans and measurements, not {brief(message)}")
             if message.finite and message.time > self._latest.get(message.robot, -math.inf):
                 self._latest[message.robot] = message.time
                 self.output.send(message)
