@@ -36,8 +36,8 @@ from .robotics.controller import RobustController as _RobustController
 from .robotics.estimator import UnscentedEstimator as _UnscentedEstimator
 from .robotics.filterpy_estimator import FilterPyEstimator as _FilterPyEstimator
 from .robotics.monitors import DistanceMonitor as _DistanceMonitor, GoalMonitor as _GoalMonitor, SeparationMonitor as _SeparationMonitor
-from .robotics.planning import Barrier as _Barrier, Casadi as _Casadi, Inform as _Inform, Objective, ReachGoal as _ReachGoal, Solver
-from .robotics.world import BroadcastChannel as _BroadcastChannel, CircularMotion as _CircularMotion, Sensor as _Sensor, Vehicle as _Vehicle
+from .robotics.planning import Barrier as _Barrier, Casadi as _Casadi, Inform as _Inform, Objective, ReachGoal as _ReachGoal, Solver, StayNear as _StayNear
+from .robotics.world import BroadcastChannel as _BroadcastChannel, CircularMotion as _CircularMotion, Flooding as _Flooding, Sensor as _Sensor, Vehicle as _Vehicle
 from .sinks import Display as _Display, Histogram as _Histogram, Recorder as _Recorder, Stop as _Stop, Test as _Test
 from .sources import Clock as _Clock, PoissonClock as _PoissonClock, Random as _Random, SingleEvent as _SingleEvent, VaryingRandom as _VaryingRandom
 from .statistics import MovingAverage as _MovingAverage, MovingStatistics as _MovingStatistics
@@ -235,6 +235,10 @@ class FirstOfInstant(_FirstOfInstant):
 class FirstOrder(_FirstOrder):
     """A first-order lag, `1 / (T s + 1)`, for an input held from sample to sample: exponential smoothing."""
     def __init__(self, *, time_constant: _Number, period: _Number) -> None: ...
+
+class Flooding(_Flooding):
+    """Says what its robot has to say, and repeats what it hears from others, so that it reaches whom they do not reach."""
+    def __init__(self, path: str) -> None: ...
 
 class Function(_Function):
     """Calls a Python function whenever one of its inputs gets a token, and sends what it returns."""
@@ -446,7 +450,7 @@ class ResettableTimer(_ResettableTimer):
 
 class RobustController(_RobustController):
     """Solves the horizon problem at every trigger and sends the acceleration for the *next* period."""
-    def __init__(self, path: str, *, objective: Objective | abc.Mapping[str, object] = ..., solver: Solver | abc.Mapping[str, object] = ..., max_speed: _Number = ..., max_acceleration: _Number = ..., horizon: _Whole = ..., horizon_from: Literal['now', 'decision'] = ..., period: _Number = ..., safe_distance: _Number = ..., margin: _Number = ..., tube_initial: _Number = ..., tube_growth: _Number = ..., tube_time: Literal['steps', 'seconds'] = ..., covariance_noise: bool = ..., peers_at_start: _Rows = ..., robot_name: str = ..., position_noise: _Number = ..., velocity_noise: _Number = ..., kappa: _Number = ...) -> None: ...
+    def __init__(self, path: str, *, objective: Objective | abc.Mapping[str, object] = ..., objectives: abc.Mapping[str, Objective | abc.Mapping[str, object]] = ..., solver: Solver | abc.Mapping[str, object] = ..., max_speed: _Number = ..., max_acceleration: _Number = ..., horizon: _Whole = ..., horizon_from: Literal['now', 'decision'] = ..., period: _Number = ..., safe_distance: _Number = ..., margin: _Number = ..., tube_initial: _Number = ..., tube_growth: _Number = ..., tube_time: Literal['steps', 'seconds'] = ..., covariance_noise: bool = ..., peers_at_start: _Rows = ..., robot_name: str = ..., position_noise: _Number = ..., velocity_noise: _Number = ..., kappa: _Number = ...) -> None: ...
 
 class Router(_Router):
     """Sends each token to one channel of its output: in turn, at random, to the least loaded, or by a property of the token."""
@@ -515,6 +519,10 @@ class StateSpace(_StateSpace):
 class Station(_Station):
     """A station with `places`, each of which serves one token at a time; urgent tokens go first."""
     def __init__(self, path: str, *, places: _Whole = ..., service_time: Distribution | abc.Mapping[str, object]) -> None: ...
+
+class StayNear(_StayNear):
+    """The sum over the horizon of the squared distances to others, each times its weight: eq. (2) with moving goals."""
+    def __init__(self, *, to: abc.Mapping[str, _Number], offset: _Row = ...) -> None: ...
 
 class Stop(_Stop):
     """Ends the run with the tag at which a true token comes; that tag is completed."""

@@ -23,9 +23,7 @@ LN2 = 0.6931471805599453
 class Objective(Configurable):
     """Base of the objectives: fills in the objective's fields of a horizon problem."""
 
-    def pose(
-        self, problem: HorizonProblem, points: Array, weights: Array, peers: Sequence[str] = ()
-    ) -> HorizonProblem:
+    def pose(self, problem: HorizonProblem, points: Array, weights: Array, peers: Sequence[str] = ()) -> HorizonProblem:
         """The problem with this objective.
 
         ``points`` (M, 2) and ``weights`` (M,) are the target's sigma points at the end of the horizon (M = 0
@@ -39,9 +37,7 @@ class ReachGoal(Objective):
 
     goal = array_parameter((2,), (0.0, 0.0), unit="m", doc="where to go")
 
-    def pose(
-        self, problem: HorizonProblem, points: Array, weights: Array, peers: Sequence[str] = ()
-    ) -> HorizonProblem:
+    def pose(self, problem: HorizonProblem, points: Array, weights: Array, peers: Sequence[str] = ()) -> HorizonProblem:
         return problem.to_reach(self.goal)
 
 
@@ -70,9 +66,7 @@ class StayNear(Objective):
     to = _Weights(doc="weights by the names of robots, as in their plans, or 'target'")
     offset = array_parameter((2,), (0.0, 0.0), unit="m", doc="where to be, as seen from that place")
 
-    def pose(
-        self, problem: HorizonProblem, points: Array, weights: Array, peers: Sequence[str] = ()
-    ) -> HorizonProblem:
+    def pose(self, problem: HorizonProblem, points: Array, weights: Array, peers: Sequence[str] = ()) -> HorizonProblem:
         from .numerics.definitions import station
 
         known = dict(zip((*peers, TARGET), (*problem.peer_mean, *problem.obstacle_mean[:1]), strict=False))
@@ -94,9 +88,7 @@ class Inform(Objective):
         bool, True, doc="whether to count what all robots measure together, or only what this one measures"
     )
 
-    def pose(
-        self, problem: HorizonProblem, points: Array, weights: Array, peers: Sequence[str] = ()
-    ) -> HorizonProblem:
+    def pose(self, problem: HorizonProblem, points: Array, weights: Array, peers: Sequence[str] = ()) -> HorizonProblem:
         others = problem.peer_mean if self.joint else problem.peer_mean[:0]
         # In bits, the information is larger by a factor of 1 / log 2; a penalty smaller by that factor has the same
         # optimum.

@@ -194,7 +194,9 @@ class Flooding(Actor):
     """
 
     own = InputPort(Any, doc="plans or measurements of this robot")
-    heard = InputPort(Any, multi=True, required=False, doc="those of other robots, from whoever has sent or repeated them")
+    heard = InputPort(
+        Any, multi=True, required=False, doc="those of other robots, from whoever has sent or repeated them"
+    )
     output = OutputPort(Any, doc="what this robot sends")
 
     def initialize(self) -> None:

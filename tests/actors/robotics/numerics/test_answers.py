@@ -138,7 +138,9 @@ def posed(**changes: Any) -> Any:
         **changes,
     }
     shapes = {"position": (2,), "goal": (1, 2)}
-    shaped = {name: np.array(fields[name], dtype=float).reshape(shape) for name, shape in shapes.items() if name in fields}
+    shaped = {
+        name: np.array(fields[name], dtype=float).reshape(shape) for name, shape in shapes.items() if name in fields
+    }
     return horizon.HorizonProblem(**{**fields, **shaped})
 
 

@@ -224,7 +224,9 @@ def test_staying_near_several(random: np.random.Generator) -> None:
         places, weights = random.normal(scale=9.0, size=(3, 10, 2)), random.uniform(0.1, 3.0, size=3)
         station = definitions.station(places, weights)
         least = definitions.f0_of_several(station, places, weights)
-        assert least == pytest.approx(sum(w * definitions.f0(station, each) for w, each in zip(weights, places)))
+        assert least == pytest.approx(
+            sum(w * definitions.f0(station, each) for w, each in zip(weights, places, strict=True))
+        )
         for _ in range(10):
             positions = random.normal(scale=9.0, size=(10, 2))
             found = definitions.f0_of_several(positions, places, weights)
