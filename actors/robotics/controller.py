@@ -93,8 +93,8 @@ class RobustController(TargetModel, Actor):
     latest estimate is used, too: an old one is predicted to the time of the own state as its filter would predict it,
     with the process noise, so that its covariance grows.
 
-    With ``objectives`` and a ``role``, the objective changes during the run.  All else stays: the standing plan, to which
-    f3 ties the next one, the peers' plans and the estimate.
+    With ``objectives`` and a ``role``, the objective changes during the run.  All else stays: the standing plan, to
+    which f3 ties the next one, the peers' plans and the estimate.
 
     Before the first plan or estimate comes, the robot avoids only the positions in ``peers_at_start``. Plans and
     estimates that are not finite are ignored; the last good ones are kept.  Without a finite own state the control is
