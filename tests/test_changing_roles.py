@@ -108,10 +108,10 @@ def test_who_has_one_duty_keeps_it() -> None:
 
 
 def test_the_whole_tour() -> None:
-    """Home again, heard all the time, and never near the obstacle: with changing roles, and not if all inform."""
+    """The base hears the main robot all the time, with changing roles, and not if all inform."""
     results = Simulation(load_model("changing_roles"), seed=2).run()
     found = results.metrics
-    assert 25.0 < found["arrival_time"] < 35.0
+    assert 20.0 < found["arrival_time"] < 30.0
     assert found["in_contact"]
     assert found["keeps_off"]
     assert found["contact"] > 95.0  # %
