@@ -22,7 +22,7 @@ _VELOCITY = 2
 _TRIED = 4  # the controls that position and velocity follow from
 TAKEN = 6  # the best controls so far
 _SHIFT = 8  # of the position, by a whole Newton step
-_TARGET = 10  # position of the goal in f0, or of the obstacle in f6
+_TARGET = 10  # position of the obstacle in f6
 _COLUMNS = 12  # number of columns
 
 
@@ -42,6 +42,7 @@ class Task(NamedTuple):
     max_speed: float
     max_acceleration: float
     seeks: bool  # the objective is eq. (2)
+    goal: Array  # (n, 2) of the problem
     variance: float
     penalty: float
     reach: float
@@ -73,10 +74,7 @@ def new_task(problem: HorizonProblem, steps: int, free: int, spare: float, room:
     plan, stages = room[:second].reshape((steps, _COLUMNS)), room[second:third].reshape((steps, STAGE))
     constraints = room[third:fourth].reshape((binding, CONSTRAINT))
     points = room[fourth:].reshape((weights.shape[0], PAIRS + 2 * weights.shape[0]))
-    count, last = 0, problem.goal.shape[0] - 1
-    for s in range(steps if seeks else 0):
-        for c in range(2):
-            plan[s, _TARGET + c] = problem.goal[min(s, last), c]
+    count = 0
     if not seeks and problem.obstacle_mean.shape[0] > 0:
         count = new_points(problem.sigma_positions, weights, problem.others_distance, points)
         for s in range(steps):
@@ -89,6 +87,7 @@ def new_task(problem: HorizonProblem, steps: int, free: int, spare: float, room:
         max_speed=problem.max_speed,
         max_acceleration=problem.max_acceleration,
         seeks=seeks,
+        goal=problem.goal,
         variance=problem.measurement_variance,
         penalty=problem.range_penalty,
         reach=problem.measurement_range,
@@ -161,6 +160,14 @@ def _beyond(task: Task, s: int) -> Term:
     return stay_near(x, y, plan[s, _TARGET], plan[s, _TARGET + 1], task.reach)
 
 
+@inlined
+def _away(task: Task, s: int) -> Vector:
+    """The position as seen from the goal at that step."""
+    plan, goal = task.plan, task.goal
+    g = min(s, goal.shape[0] - 1)
+    return plan[s, _POSITION] - goal[g, 0], plan[s, _POSITION + 1] - goal[g, 1]
+
+
 @borrower
 def objective_of(task: Task) -> float:
     """The objective of eq. (2) or (5) with the trial controls."""
@@ -168,7 +175,7 @@ def objective_of(task: Task) -> float:
     steps, value = plan.shape[0], 0.0
     if task.seeks:
         for s in range(steps):
-            dx, dy = plan[s, _POSITION] - plan[s, _TARGET], plan[s, _POSITION + 1] - plan[s, _TARGET + 1]
+            dx, dy = _away(task, s)
             value += dx * dx + dy * dy
     elif task.points.shape[0] > 0:
         value = informed(task.points, plan[steps - 1, _POSITION], plan[steps - 1, _POSITION + 1], task.variance)[0]
@@ -192,7 +199,7 @@ def _add_objective(task: Task, mu: float) -> float:
     steps, value, product = plan.shape[0], 0.0, 1.0
     if task.seeks:
         for s in range(steps):
-            dx, dy = plan[s, _POSITION] - plan[s, _TARGET], plan[s, _POSITION + 1] - plan[s, _TARGET + 1]
+            dx, dy = _away(task, s)
             value += dx * dx + dy * dy
             add(stages, s, 2.0, 2.0, 0.0, (0.0, dx, dy, 1.0, 0.0, 1.0))
     if not task.points.shape[0] > 0:
