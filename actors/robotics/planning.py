@@ -57,10 +57,10 @@ class _Weights(MappingParameter):
 class StayNear(Objective):
     """The sum over the horizon of the squared distances to others, each times its weight: eq. (2) with moving goals.
 
-    That is eq. (2) with one goal, their weighted mean, which moves as they do: between two robots it is a relay between
-    them (equal weights: in the middle), between the target and a robot it guards the robot, near one robot it goes with
-    it.  A robot is where its latest plan says, the target where its estimate is expected.  Whoever is unknown does not
-    count; if all are, the robot stays where it is.
+    This is eq. (2) with one goal that moves: their weighted mean.  Near two robots, the robot is a relay between them,
+    in the middle if the weights are equal; near the target and a robot, it guards that robot; near one robot, it goes
+    along.  The place of a robot is that of its latest plan, the place of the target that of the estimate.  Names of
+    which nothing is known do not count; if nothing is known of any, the robot stays where it is.
     """
 
     to = _Weights(doc="weights by the names of robots, as in their plans, or 'target'")

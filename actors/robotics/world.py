@@ -187,17 +187,17 @@ class BroadcastChannel(Actor):
 
 
 class Flooding(Actor):
-    """Says what its robot has to say, and repeats what it hears from others, so that it reaches whom they do not reach.
+    """Sends the messages of its robot, and repeats those of others for the robots that are out of their reach.
 
-    A message is repeated once: only if it is later than all others of its robot so far, from which its ``time`` tells
-    it, as a sequence number would.  Messages that are not finite are dropped.
+    A message is repeated once: its ``time`` serves as a sequence number, and only a message later than all earlier ones
+    of the same robot passes.  Messages that are not finite are dropped.
     """
 
     own = InputPort(Any, doc="plans or measurements of this robot")
     heard = InputPort(
-        Any, multi=True, required=False, doc="those of other robots, from whoever has sent or repeated them"
+        Any, multi=True, required=False, doc="plans or measurements of other robots, sent or repeated by any of them"
     )
-    output = OutputPort(Any, doc="what this robot sends")
+    output = OutputPort(Any, doc="the messages that this robot sends")
 
     def initialize(self) -> None:
         self._latest: dict[str, float] = {}  # the time of the latest message of each robot
