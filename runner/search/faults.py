@@ -49,7 +49,7 @@ class FaultSpace:
         return [math.comb(len(self.acts), size) for size in range(self.most + 1)]
 
     def proposals(self, seed: int) -> Proposals:
-        """Batches of sets until there are no more: smaller ones first, and of those those of the worst acts.
+        """Batches of sets until all have been: smaller sets first, and of one size those of the worst acts first.
 
         The worst are those with the least robustness alone; single acts come in a random order.
         """
