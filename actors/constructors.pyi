@@ -237,7 +237,7 @@ class FirstOrder(_FirstOrder):
     def __init__(self, *, time_constant: _Number, period: _Number) -> None: ...
 
 class Flooding(_Flooding):
-    """Says what its robot has to say, and repeats what it hears from others, so that it reaches whom they do not reach."""
+    """Sends the messages of its robot, and repeats those of others for the robots that are out of their reach."""
     def __init__(self, path: str) -> None: ...
 
 class Function(_Function):
