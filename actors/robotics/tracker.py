@@ -1,0 +1,279 @@
+"""Tracks of several targets from the scans of all robots, by joint probabilistic data association."""
+
+from __future__ import annotations
+
+from bisect import bisect_left
+from dataclasses import dataclass, replace
+from operator import attrgetter
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..core import Actor, InputPort, OutputPort, Parameter, to_nanoseconds, to_seconds
+from .arrays import Array
+from .estimator import EXPECTED, PREDICTED, TargetModel
+from .messages import RANGE, Detections, Estimate, Tracks
+
+_LIKELY = 0.5  # probability from which a track counts as detected, or a detection as new
+
+
+@dataclass(frozen=True, slots=True)
+class _Record:
+    """What is kept of a track besides its estimate."""
+
+    number: int = 0  # 0: not confirmed
+    hits: int = 1  # scans that detected it
+    scans: int = 1  # scans that could have, up to its confirmation
+    misses: int = 0  # since the last hit
+    sources: tuple[str, ...] = ()  # robots that detected it at this step
+
+
+class _Picture(NamedTuple):
+    """All tracks at one time, never modified; older ones come first."""
+
+    means: Array  # (T, 4)
+    covariances: Array  # (T, 4, 4)
+    records: tuple[_Record, ...]
+    confirmed: int = 0  # tracks so far
+    rough: int = 0  # probabilities so far that are not exact
+
+    def only(self, kept: list[int]) -> _Picture:
+        """The same with some of the tracks."""
+        if len(kept) == len(self.records):
+            return self
+        records = tuple(self.records[place] for place in kept)
+        return self._replace(means=self.means[kept], covariances=self.covariances[kept], records=records)
+
+
+@dataclass(slots=True)
+class _Step:
+    """The scans of one time, and the tracks after them."""
+
+    time: int  # ns
+    scans: list[tuple[Any, Detections]]  # each with what sorts it
+    after: _Picture | None = None
+
+
+_time = attrgetter("time")
+
+
+class JPDATracker(TargetModel, Actor):
+    """Joint probabilistic data association with the unscented filter: tracks of an unknown number of targets.
+
+    At each trigger, all tracks are predicted to the present, and the scans of all robots are fused one after the other,
+    sorted by time, then by robot.  In each scan every track takes at most one detection inside its ``gate`` and every
+    detection belongs to at most one track; a track becomes the mean of all joint events by their probabilities.  These
+    are exact in every cluster of tracks that share detections, as long as 2^tracks (1 + detections) is at most
+    131,072; those of a larger one come from Fitzgerald's formula, and are counted at ``approximated``.
+
+    A relative position that probably belongs to no track begins a tentative one; a range alone cannot begin any.  It
+    is confirmed by ``confirm_hits`` detections in its first ``confirm_scans`` scans, and dropped when they can no
+    longer come.  A confirmed one is dropped after ``delete_misses`` scans in succession without it, or when its
+    position is less certain than ``max_deviation``.  Only scans that probably have it in range count.  Of two tracks
+    that are nearer to each other than ``merge_distance`` the younger is dropped.
+
+    A late scan is inserted at its time, and the tracker runs again from there: later tracks, and their numbers, are
+    those of a tracker that got it in time.  Scans more than ``max_delay`` late are not fused, but counted at
+    ``too_late``.  A scan from the future, from a wrong clock, is treated as made now; a copy has no effect; one that is
+    not finite is ignored.
+    """
+
+    trigger = InputPort(object, doc="predict to the present time, fuse, and send the tracks")
+    detections = InputPort(
+        Detections, multi=True, required=False, triggers=False, doc="scans of all robots, including this one"
+    )
+    tracks = OutputPort(Tracks, doc="all confirmed tracks (x, y, vx, vy) after fusion")
+    confirmed = OutputPort(int, doc="how many these are")
+    too_late = OutputPort(int, doc="number of scans so far that came more than max_delay late; sent with each of them")
+    approximated = OutputPort(
+        int, doc="number of tracks so far that were in too large a cluster in a scan; sent when it has changed"
+    )
+
+    period = Parameter(float, 0.1, unit="s", above=0, doc="the time over which the process noise was measured")
+    gate = Parameter(
+        float, 16.0, unit="1", above=0, max=1e3,
+        doc="squared Mahalanobis distance up to which a track may cause a detection; chi-square, with 2 degrees of "
+        "freedom for a relative position: 16 is exceeded by 0.03 % of them",
+    )  # fmt: skip
+    birth_density = Parameter(
+        float, 1e-4, above=0, max=1e6,
+        doc="expected detections of targets without a track per m^2 (m for ranges) of a scan, besides the clutter",
+    )  # fmt: skip
+    birth_variance = Parameter(float, 4.0, unit="m^2/s^2", min=0, doc="variance of a new track's velocity")
+    confirm_hits = Parameter(int, 3, min=1, doc="M: detections that confirm a track")
+    confirm_scans = Parameter(int, 4, min=1, doc="N: among its first scans, the one that began it included")
+    delete_misses = Parameter(int, 8, min=1, doc="scans in succession without a detection that end a confirmed track")
+    max_deviation = Parameter(
+        float, 10.0, unit="m", above=0, doc="root mean square of the position's two deviations that ends a track"
+    )
+    merge_distance = Parameter(
+        float, 1.0, unit="1", min=0,
+        doc="squared Mahalanobis distance of two tracks, chi-square with 4 degrees of freedom, that makes them one",
+    )  # fmt: skip
+    max_tracks = Parameter(int, 64, min=1, max=1000, doc="number of tracks, tentative ones included, never exceeded")
+    max_delay = Parameter(float, 2.0, unit="s", min=0, max=1e9, doc="largest age of a scan that is still fused")
+    noise_direction = Parameter(
+        str, EXPECTED, choices=(EXPECTED, PREDICTED),
+        doc="the noise ellipse is averaged over the directions that the prediction allows, or turned along its mean",
+    )  # fmt: skip
+
+    def initialize(self) -> None:
+        from .numerics import association, ukf
+        from .numerics.warm_up import compile_tracking
+
+        compile_tracking()
+        self._kinds = {True: float(ukf.RANGE), False: float(ukf.RELATIVE_POSITION)}
+        self._predict, self._fuse = association.predict_tracks, association.fuse_scan
+        self._begin, self._duplicates = association.new_track, association.duplicates
+        self._noise = self.process_noise
+        self._averaged = self.noise_direction == EXPECTED
+        self._waiting: list[Detections] = []  # for the next trigger
+        self._too_late = self._rough = 0
+        self._steps: list[_Step] = []  # of the last ``max_delay``, and the tracks before them, with their time
+        self._before = _Picture(np.empty((0, 4)), np.empty((0, 4, 4)), ())
+        self._before_at: int | None = None
+
+    def fire(self) -> None:
+        now = self.tag.time
+        earliest = now - to_nanoseconds(self.max_delay)
+        self._take(earliest)
+        if not self.trigger.present:
+            return
+        picture = self._catch_up(now)
+        self._forget(earliest)
+        if picture.rough != self._rough:
+            self._rough = picture.rough
+            self.approximated.send(self._rough)
+        told = sorted((each.number, place) for place, each in enumerate(picture.records) if each.number)
+        time = to_seconds(now)
+        estimates = tuple(
+            Estimate(picture.means[place], picture.covariances[place], time, picture.records[place].sources)
+            for _, place in told
+        )
+        self.tracks.send(Tracks(tuple(number for number, _ in told), estimates, time))
+        self.confirmed.send(len(told))
+
+    # --- in the order of time ---------------------------------------------------------------------------
+
+    def _take(self, earliest: int) -> None:
+        """Keep new scans for the next trigger, unless they are older than ``earliest``."""
+        come = [*self._waiting, *(each for each in self.detections.tokens if each.finite)]
+        self._waiting = [each for each in come if to_nanoseconds(each.time) >= earliest]
+        if len(self._waiting) < len(come):
+            self._too_late += len(come) - len(self._waiting)
+            self.too_late.send(self._too_late)
+
+    def _catch_up(self, now: int) -> _Picture:
+        """Insert waiting scans at their times, and bring all tracks to the present."""
+        steps, first = self._steps, self._place_of(now)
+        for scan in self._waiting:
+            place = self._place_of(min(to_nanoseconds(scan.time), now))
+            order = _order(scan)
+            if all(order != known for known, _ in steps[place].scans):
+                steps[place].scans.append((order, scan))
+                first = min(first, place)
+        self._waiting = []
+        before, at = self._before, self._before_at
+        if first:
+            last = steps[first - 1]
+            assert last.after is not None  # only new steps have none, and they follow
+            before, at = last.after, last.time
+        for step in steps[first:]:
+            # Sorted, so that the order of arrival has no influence.
+            step.scans.sort(key=lambda each: each[0])
+            before = self._step(before, 0.0 if at is None else to_seconds(step.time - at), step.scans)
+            step.after, at = before, step.time
+        return before
+
+    def _place_of(self, time: int) -> int:
+        """The index of the step at that time, which may be new."""
+        steps = self._steps
+        place = bisect_left(steps, time, key=_time)
+        if place == len(steps) or steps[place].time != time:
+            steps.insert(place, _Step(time, []))
+        return place
+
+    def _forget(self, earliest: int) -> None:
+        """Forget the steps before a time, which no scan can change any longer."""
+        count = bisect_left(self._steps, earliest, key=_time)
+        if count:
+            last = self._steps[count - 1]
+            assert last.after is not None
+            self._before, self._before_at = last.after, last.time
+            del self._steps[:count]
+
+    # --- tracks -----------------------------------------------------------------------------------------
+
+    def _step(self, picture: _Picture, elapsed: float, scans: list[tuple[Any, Detections]]) -> _Picture:
+        """All tracks ``elapsed`` seconds later, after the scans of that time."""
+        if elapsed > 0.0 and picture.records:
+            noise = self._noise * (elapsed / self.period)
+            means, covariances = self._predict(picture.means, picture.covariances, noise, elapsed)
+            records = tuple(replace(each, sources=()) if each.sources else each for each in picture.records)
+            picture = picture._replace(means=means, covariances=covariances, records=records)
+        for _, scan in scans:
+            picture = self._after_scan(picture, scan)
+        if len(picture.records) > 1 and self.merge_distance > 0.0:
+            extra = self._duplicates(picture.means, picture.covariances, self.merge_distance)
+            picture = picture.only([place for place, same in enumerate(extra.tolist()) if not same])
+        largest = 2.0 * self.max_deviation * self.max_deviation
+        spread = (picture.covariances[:, 0, 0] + picture.covariances[:, 1, 1]).tolist()
+        return picture.only([place for place, each in enumerate(spread) if each <= largest])
+
+    def _after_scan(self, picture: _Picture, scan: Detections) -> _Picture:
+        count = len(scan.values)
+        rows = np.zeros((1 + count, 7))  # the sensor, without a value, and each detection
+        rows[:, 0] = self._kinds[scan.kind == RANGE]
+        rows[:, 1:3] = scan.observer
+        rows[1:, 3 : 3 + scan.values.shape[1]] = scan.values
+        rows[:, 5], rows[:, 6] = scan.along, scan.across
+        density = scan.clutter_density + self.birth_density
+        means, covariances, caused, in_range, rough = self._fuse(
+            picture.means, picture.covariances, self.kappa, rows[0], rows[1:], scan.probability, density,
+            scan.max_range, self.gate, self._averaged,
+        )  # fmt: skip
+        left = [1.0] * count
+        for row in caused.tolist():
+            left = [each - taken for each, taken in zip(left, row[1:], strict=True)]
+        records, kept, confirmed = [], [], picture.confirmed
+        missed = caused[:, 0].tolist()
+        for place, (known, seen) in enumerate(zip(picture.records, in_range.tolist(), strict=True)):
+            record = self._judged(known, 1.0 - missed[place] >= _LIKELY, seen >= _LIKELY, scan.robot)
+            if record is None:
+                continue
+            record, confirmed = self._numbered(record, confirmed)
+            records.append(record)
+            kept.append(place)
+        new = [rows[1 + place] for place, free in enumerate(left) if free >= _LIKELY and scan.kind != RANGE]
+        new = new[: max(self.max_tracks - len(records), 0)]
+        begun = [self._begin(row, self.birth_variance) for row in new]
+        for _ in begun:
+            record, confirmed = self._numbered(_Record(sources=(scan.robot,)), confirmed)
+            records.append(record)
+        if len(kept) < len(means):
+            means, covariances = means[kept], covariances[kept]
+        if begun:
+            means = np.concatenate([means, [mean for mean, _ in begun]])
+            covariances = np.concatenate([covariances, [covariance for _, covariance in begun]])
+        return _Picture(means, covariances, tuple(records), confirmed, picture.rough + rough)
+
+    def _judged(self, known: _Record, is_hit: bool, is_in_range: bool, robot: str) -> _Record | None:
+        """A track's record after a scan; None if it ends."""
+        if not (is_hit or is_in_range):
+            return known
+        sources = tuple(sorted({*known.sources, robot})) if is_hit else known.sources
+        misses = 0 if is_hit else known.misses + 1
+        record = _Record(known.number, known.hits + is_hit, known.scans + 1, misses, sources)
+        if record.number:
+            return record if misses < self.delete_misses else None
+        return record if record.scans - record.hits <= self.confirm_scans - self.confirm_hits else None
+
+    def _numbered(self, record: _Record, confirmed: int) -> tuple[_Record, int]:
+        """A record with a number, if it is confirmed now, and the number of confirmed tracks so far."""
+        if record.number or record.hits < self.confirm_hits:
+            return record, confirmed
+        return replace(record, number=confirmed + 1), confirmed + 1
+
+
+def _order(scan: Detections) -> Any:
+    return scan.robot, scan.time, scan.kind, scan.observer.tolist(), scan.values.tolist()
