@@ -14,7 +14,7 @@ from .arrays import Array
 from .estimator import EXPECTED, PREDICTED, TargetModel
 from .messages import RANGE, Detections, Estimate, Tracks
 
-_LIKELY = 0.5  # probability from which a track counts as detected, or a detection as new
+_LIKELY = 0.5  # probability from which a track counts as in range, or a detection as new; share of expected detections
 
 
 @dataclass(frozen=True, slots=True)
@@ -22,9 +22,10 @@ class _Record:
     """What is kept of a track besides its estimate."""
 
     number: int = 0  # 0: not confirmed
-    hits: int = 1  # scans that detected it
-    scans: int = 1  # scans that could have, up to its confirmation
-    misses: int = 0  # since the last hit
+    hits: int = 0  # steps that detected it
+    steps: int = 0  # steps that could have
+    expected: float = 0.0  # detections at this step
+    detected: float = 0.0  # probably
     sources: tuple[str, ...] = ()  # robots that detected it at this step
 
 
@@ -33,6 +34,7 @@ class _Picture(NamedTuple):
 
     means: Array  # (T, 4)
     covariances: Array  # (T, 4, 4)
+    existence: Array  # (T,) how likely each exists
     records: tuple[_Record, ...]
     confirmed: int = 0  # tracks so far
     rough: int = 0  # probabilities so far that are not exact
@@ -42,7 +44,9 @@ class _Picture(NamedTuple):
         if len(kept) == len(self.records):
             return self
         records = tuple(self.records[place] for place in kept)
-        return self._replace(means=self.means[kept], covariances=self.covariances[kept], records=records)
+        return self._replace(
+            means=self.means[kept], covariances=self.covariances[kept], existence=self.existence[kept], records=records
+        )
 
 
 @dataclass(slots=True)
@@ -66,11 +70,16 @@ class JPDATracker(TargetModel, Actor):
     are exact in every cluster of tracks that share detections, as long as 2^tracks (1 + detections) is at most
     131,072; those of a larger one come from Fitzgerald's formula, and are counted at ``approximated``.
 
-    A relative position that probably belongs to no track begins a tentative one; a range alone cannot begin any.  It
-    is confirmed by ``confirm_hits`` detections in its first ``confirm_scans`` scans, and dropped when they can no
-    longer come.  A confirmed one is dropped after ``delete_misses`` scans in succession without it, or when its
-    position is less certain than ``max_deviation``.  Only scans that probably have it in range count.  Of two tracks
-    that are nearer to each other than ``merge_distance`` the younger is dropped.
+    A relative position that probably belongs to no track begins a tentative one; a range alone cannot begin any.  A
+    step, that is all scans of a time, is a hit if it detected the track at least half as often as it should have, and
+    a miss otherwise; scans that probably have it out of range do not count.  A tentative track is confirmed with
+    ``confirm_hits`` hits, as soon as it exists with ``confirm_probability``, and dropped when it has more misses than
+    ``confirm_steps`` leave.  A confirmed one is dropped when it exists with less than ``delete_probability``, or when
+    its position is less certain than ``max_deviation``.  Of two tracks that are nearer to each other than
+    ``merge_distance`` the younger is dropped.
+
+    A track exists at first with the share of new targets in all detections from elsewhere; how likely it does after
+    further scans is part of the association (JIPDA).  With a probability of 1 this is JPDA.
 
     A late scan is inserted at its time, and the tracker runs again from there: later tracks, and their numbers, are
     those of a tracker that got it in time.  Scans more than ``max_delay`` late are not fused, but counted at
@@ -96,13 +105,19 @@ class JPDATracker(TargetModel, Actor):
         "freedom for a relative position: 16 is exceeded by 0.03 % of them",
     )  # fmt: skip
     birth_density = Parameter(
-        float, 1e-4, above=0, max=1e6,
+        float, 1e-5, above=0, max=1e6,
         doc="expected detections of targets without a track per m^2 (m for ranges) of a scan, besides the clutter",
     )  # fmt: skip
     birth_variance = Parameter(float, 4.0, unit="m^2/s^2", min=0, doc="variance of a new track's velocity")
-    confirm_hits = Parameter(int, 3, min=1, doc="M: detections that confirm a track")
-    confirm_scans = Parameter(int, 4, min=1, doc="N: among its first scans, the one that began it included")
-    delete_misses = Parameter(int, 8, min=1, doc="scans in succession without a detection that end a confirmed track")
+    confirm_hits = Parameter(int, 3, min=1, doc="M: hits that confirm a track")
+    confirm_steps = Parameter(int, 4, min=1, doc="N: among its first steps, the one that began it included")
+    confirm_probability = Parameter(
+        float, 0.99, unit="1", min=0, max=1, doc="how likely a target must exist for a confirmed track"
+    )
+    delete_probability = Parameter(
+        float, 0.05, unit="1", min=0, max=1, doc="a confirmed track ends when it exists with less probability"
+    )
+    lifetime = Parameter(float, 30.0, unit="s", above=0, doc="mean time after which a target is gone")
     max_deviation = Parameter(
         float, 10.0, unit="m", above=0, doc="root mean square of the position's two deviations that ends a track"
     )
@@ -130,7 +145,7 @@ class JPDATracker(TargetModel, Actor):
         self._waiting: list[Detections] = []  # for the next trigger
         self._too_late = self._rough = 0
         self._steps: list[_Step] = []  # of the last ``max_delay``, and the tracks before them, with their time
-        self._before = _Picture(np.empty((0, 4)), np.empty((0, 4, 4)), ())
+        self._before = _Picture(np.empty((0, 4)), np.empty((0, 4, 4)), np.empty(0), ())
         self._before_at: int | None = None
 
     def fire(self) -> None:
@@ -208,11 +223,13 @@ class JPDATracker(TargetModel, Actor):
         """All tracks ``elapsed`` seconds later, after the scans of that time."""
         if elapsed > 0.0 and picture.records:
             noise = self._noise * (elapsed / self.period)
-            means, covariances = self._predict(picture.means, picture.covariances, noise, elapsed)
-            records = tuple(replace(each, sources=()) if each.sources else each for each in picture.records)
-            picture = picture._replace(means=means, covariances=covariances, records=records)
+            means, covariances, existence = self._predict(*picture[:3], noise, elapsed, self.lifetime)
+            picture = picture._replace(means=means, covariances=covariances, existence=existence)
+        before = tuple(replace(each, expected=0.0, detected=0.0, sources=()) for each in picture.records)
+        picture = picture._replace(records=before)
         for _, scan in scans:
             picture = self._after_scan(picture, scan)
+        picture = self._managed(picture)
         if len(picture.records) > 1 and self.merge_distance > 0.0:
             extra = self._duplicates(picture.means, picture.covariances, self.merge_distance)
             picture = picture.only([place for place, same in enumerate(extra.tolist()) if not same])
@@ -228,51 +245,50 @@ class JPDATracker(TargetModel, Actor):
         rows[1:, 3 : 3 + scan.values.shape[1]] = scan.values
         rows[:, 5], rows[:, 6] = scan.along, scan.across
         density = scan.clutter_density + self.birth_density
-        means, covariances, caused, in_range, rough = self._fuse(
-            picture.means, picture.covariances, self.kappa, rows[0], rows[1:], scan.probability, density,
-            scan.max_range, self.gate, self._averaged,
+        means, covariances, existence, caused, in_range, rough = self._fuse(
+            *picture[:3], self.kappa, rows[0], rows[1:], scan.probability, density, scan.max_range, self.gate,
+            self._averaged,
         )  # fmt: skip
         left = [1.0] * count
         for row in caused.tolist():
             left = [each - taken for each, taken in zip(left, row[1:], strict=True)]
-        records, kept, confirmed = [], [], picture.confirmed
-        missed = caused[:, 0].tolist()
-        for place, (known, seen) in enumerate(zip(picture.records, in_range.tolist(), strict=True)):
-            record = self._judged(known, 1.0 - missed[place] >= _LIKELY, seen >= _LIKELY, scan.robot)
-            if record is None:
-                continue
-            record, confirmed = self._numbered(record, confirmed)
-            records.append(record)
-            kept.append(place)
+        records = []
+        for known, missed, share in zip(picture.records, caused[:, 0].tolist(), in_range.tolist(), strict=True):
+            records.append(known if share < _LIKELY else _counted(known, scan, scan.probability * share, 1.0 - missed))
         new = [rows[1 + place] for place, free in enumerate(left) if free >= _LIKELY and scan.kind != RANGE]
-        new = new[: max(self.max_tracks - len(records), 0)]
-        begun = [self._begin(row, self.birth_variance) for row in new]
-        for _ in begun:
-            record, confirmed = self._numbered(_Record(sources=(scan.robot,)), confirmed)
-            records.append(record)
-        if len(kept) < len(means):
-            means, covariances = means[kept], covariances[kept]
+        begun = [self._begin(row, self.birth_variance) for row in new[: max(self.max_tracks - len(records), 0)]]
         if begun:
             means = np.concatenate([means, [mean for mean, _ in begun]])
             covariances = np.concatenate([covariances, [covariance for _, covariance in begun]])
-        return _Picture(means, covariances, tuple(records), confirmed, picture.rough + rough)
+            existence = np.concatenate([existence, [self.birth_density / density] * len(begun)])
+            records.extend(_counted(_Record(), scan, scan.probability, 1.0) for _ in begun)
+        return _Picture(means, covariances, existence, tuple(records), picture.confirmed, picture.rough + rough)
 
-    def _judged(self, known: _Record, is_hit: bool, is_in_range: bool, robot: str) -> _Record | None:
-        """A track's record after a scan; None if it ends."""
-        if not (is_hit or is_in_range):
-            return known
-        sources = tuple(sorted({*known.sources, robot})) if is_hit else known.sources
-        misses = 0 if is_hit else known.misses + 1
-        record = _Record(known.number, known.hits + is_hit, known.scans + 1, misses, sources)
-        if record.number:
-            return record if misses < self.delete_misses else None
-        return record if record.scans - record.hits <= self.confirm_scans - self.confirm_hits else None
+    def _managed(self, picture: _Picture) -> _Picture:
+        """The tracks that are left at the end of a step, newly confirmed ones with a number."""
+        records, kept, confirmed = [], [], picture.confirmed
+        for place, (known, exists) in enumerate(zip(picture.records, picture.existence.tolist(), strict=True)):
+            record = known
+            if known.expected > 0.0 or known.detected > 0.0:  # somebody looked there
+                is_hit = known.detected >= _LIKELY * known.expected
+                record = replace(known, hits=known.hits + is_hit, steps=known.steps + 1)
+            if record.number and exists < self.delete_probability:
+                continue
+            if not record.number:
+                if record.steps - record.hits > max(self.confirm_steps - self.confirm_hits, 0):
+                    continue
+                if record.hits >= self.confirm_hits and exists >= self.confirm_probability:
+                    confirmed += 1
+                    record = replace(record, number=confirmed)
+            records.append(record)
+            kept.append(place)
+        return picture.only(kept)._replace(records=tuple(records), confirmed=confirmed)
 
-    def _numbered(self, record: _Record, confirmed: int) -> tuple[_Record, int]:
-        """A record with a number, if it is confirmed now, and the number of confirmed tracks so far."""
-        if record.number or record.hits < self.confirm_hits:
-            return record, confirmed
-        return replace(record, number=confirmed + 1), confirmed + 1
+
+def _counted(record: _Record, scan: Detections, expected: float, detected: float) -> _Record:
+    """A record after a scan with the probability that it should have detected the track, and that it has."""
+    sources = tuple(sorted({*record.sources, scan.robot})) if detected >= _LIKELY else record.sources
+    return replace(record, expected=record.expected + expected, detected=record.detected + detected, sources=sources)
 
 
 def _order(scan: Detections) -> Any:

@@ -5,6 +5,9 @@ Its probability is proportional to the product of a weight for each track: ``P_D
 detection j, ``1 - P_D P_G`` if it caused none inside its gate (Fortmann, Bar-Shalom & Scheffe, IEEE J. Oceanic Eng. 8,
 1983).  Tracks that share no gated detection are independent, so sums are taken in each cluster alone.
 
+A track may also not exist at all.  P_D is then to be multiplied by the probability that it does, and what the scan
+tells about that follows from the same sum (Musicki & Evans, IEEE Trans. Aerosp. Electron. Syst. 40, 2004).
+
 The sum over all events of a cluster is exact, and does not list them: detections are taken one after the other, and all
 that matters of the ones before is the set of tracks that they used.  Two passes over these sets, forwards and
 backwards, give every probability.  They need 2^tracks (1 + detections) numbers; a cluster that needs more than
@@ -236,17 +239,23 @@ def _share_in_range(points: Array, weights: Array, detection: Array, max_range: 
 
 @kernel
 def detection_weights(
-    means: Array, covariances: Array, kappa: float, sensor: Array, detections: Array, probability: float,
-    density: float, max_range: float, gate: float, averaged: bool,
-) -> tuple[Array, Array, Array]:  # fmt: skip
-    """The weights (T, 1 + m) of m detections (m, 7) of one scan for tracks (T, n), how likely each track is in range of
-    the sensor (T,), and the noise covariances (T, 3) of a detection of it.
+    means: Array, covariances: Array, existence: Array, kappa: float, sensor: Array, detections: Array,
+    probability: float, density: float, max_range: float, gate: float, averaged: bool,
+) -> tuple[Array, Array, Array, Array]:  # fmt: skip
+    """The weights (T, 1 + m) of m detections (m, 7) of one scan for tracks (T, n), which exist with probabilities
+    ``existence`` (T,); how likely each is in range of the sensor (T,), and not detected in its gate if it exists (T,);
+    and the noise covariances (T, 3) of a detection of it.
 
     ``sensor`` (7,) is a detection without a value.  ``density`` is that of detections from elsewhere in the space of
     values, in 1 / m^2, or 1 / m for ranges.
     """
     tracks, count = means.shape[0], detections.shape[0]
-    weights, shares, noises = np.zeros((tracks, 1 + count)), np.empty(tracks), np.empty((tracks, 3))
+    weights, noises, shares, silent = (
+        np.zeros((tracks, 1 + count)),
+        np.empty((tracks, 3)),
+        np.empty(tracks),
+        np.empty(tracks),
+    )
     size = 1 if sensor[KIND] == RANGE else 2
     inside = gate_probability(gate, size)
     for t in range(tracks):
@@ -259,8 +268,9 @@ def detection_weights(
         shares[t] = _share_in_range(points, spread, sensor, max_range)
         expected, root = _expected(points, spread, sensor, noises[t])
         detected = probability * min(shares[t], 1.0)
-        weights[t, 0] = 1.0 - detected * inside
-        height = detected / density
+        silent[t] = 1.0 - detected * inside
+        weights[t, 0] = 1.0 - existence[t] * detected * inside
+        height = existence[t] * detected / density
         for k in range(size):
             height /= root[k, k] * math.sqrt(2.0 * math.pi)
         for j in range(count):
@@ -270,7 +280,27 @@ def detection_weights(
             squared = _squared(difference, root)
             if squared <= gate:
                 weights[t, 1 + j] = height * exp(-0.5 * squared)
-    return weights, shares, noises
+    return weights, shares, silent, noises
+
+
+@inner
+def _exist(caused: Array, before: float, missed: float, silent: float) -> float:
+    """How likely a track exists after a scan, with the probabilities (1 + m,) of what it caused, which become those of
+    an existing one; ``missed`` was its weight of no detection, and ``silent`` that of an existing one."""
+    if not before < 1.0:
+        return before
+    alive = before * silent / missed if missed > 0.0 else before
+    caused[0] *= alive
+    after = 0.0
+    for j in range(caused.shape[0]):
+        after += caused[j]
+    after = min(after, 1.0)
+    for j in range(caused.shape[0]):
+        if after > 0.0:
+            caused[j] /= after
+        else:
+            caused[j] = 1.0 if j == 0 else 0.0
+    return after
 
 
 @inner
@@ -290,26 +320,27 @@ def _mixed(probabilities: Array, means: Array, covariances: Array) -> tuple[Arra
 
 
 @entry(
-    "Tuple((f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8[::1], i8))(f8[:, ::1], f8[:, :, ::1], f8, f8[::1], f8[:, ::1], "
-    "f8, f8, f8, f8, b1)"
+    "Tuple((f8[:, ::1], f8[:, :, ::1], f8[::1], f8[:, ::1], f8[::1], i8))(f8[:, ::1], f8[:, :, ::1], f8[::1], f8, "
+    "f8[::1], f8[:, ::1], f8, f8, f8, f8, b1)"
 )
 def fuse_scan(
-    means: Array, covariances: Array, kappa: float, sensor: Array, detections: Array, probability: float,
-    density: float, max_range: float, gate: float, averaged: bool,
-) -> tuple[Array, Array, Array, Array, int]:  # fmt: skip
-    """Tracks (T, n) after a scan: their means and covariances, the association probabilities (T, 1 + m), how likely
-    each is in range (T,), and how many probabilities are not exact.
+    means: Array, covariances: Array, existence: Array, kappa: float, sensor: Array, detections: Array,
+    probability: float, density: float, max_range: float, gate: float, averaged: bool,
+) -> tuple[Array, Array, Array, Array, Array, int]:  # fmt: skip
+    """Tracks (T, n) after a scan: their means and covariances, how likely each exists (T,), which detection each caused
+    if it exists (T, 1 + m), how likely each is in range (T,), and how many tracks' probabilities are not exact.
 
     A track becomes the mixture of what each of its detections would make of it, and itself, by its first two moments.
     A track whose result would not be finite stays as it is.
     """
-    weights, shares, noises = detection_weights(
-        means, covariances, kappa, sensor, detections, probability, density, max_range, gate, averaged
+    weights, shares, silent, noises = detection_weights(
+        means, covariances, existence, kappa, sensor, detections, probability, density, max_range, gate, averaged
     )
     caused, rough = association_probabilities(weights)
-    then, spread = means.copy(), covariances.copy()
+    then, spread, alive = means.copy(), covariances.copy(), existence.copy()
     size = means.shape[1]
     for t in range(means.shape[0]):
+        alive[t] = _exist(caused[t], existence[t], weights[t, 0], silent[t])
         count = 0
         for j in range(caused.shape[1]):
             count += 1 if caused[t, j] > 0.0 else 0
@@ -327,17 +358,22 @@ def fuse_scan(
         mean, covariance = _mixed(shared, each, around)
         if _finite(mean, covariance):
             then[t], spread[t] = mean, covariance
-    return then, spread, caused, shares, rough
+    return then, spread, alive, caused, shares, rough
 
 
-@entry("Tuple((f8[:, ::1], f8[:, :, ::1]))(f8[:, ::1], f8[:, :, ::1], f8[:, ::1], f8)")
-def predict_tracks(means: Array, covariances: Array, noise: Array, elapsed: float) -> tuple[Array, Array]:
-    """Tracks (T, 4) ``elapsed`` seconds later, with the process ``noise`` of that time."""
-    then, spread = means.copy(), covariances.copy()
+@entry("Tuple((f8[:, ::1], f8[:, :, ::1], f8[::1]))(f8[:, ::1], f8[:, :, ::1], f8[::1], f8[:, ::1], f8, f8)")
+def predict_tracks(
+    means: Array, covariances: Array, existence: Array, noise: Array, elapsed: float, lifetime: float
+) -> tuple[Array, Array, Array]:
+    """Tracks (T, 4) ``elapsed`` seconds later, with the process ``noise`` of that time; targets have a mean
+    ``lifetime``."""
+    then, spread, alive = means.copy(), covariances.copy(), existence.copy()
+    stays = exp(-elapsed / lifetime)
     transition = constant_velocity(elapsed)
     for t in range(means.shape[0]):
         then[t], spread[t] = predict(means[t], covariances[t], transition, noise)
-    return then, spread
+        alive[t] *= stays
+    return then, spread, alive
 
 
 @entry("Tuple((f8[::1], f8[:, ::1]))(f8[::1], f8)")

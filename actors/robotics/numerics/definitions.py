@@ -199,6 +199,28 @@ def association(missed: Array, likelihood: Array, density: float) -> Array:
     return result / result.sum(axis=1, keepdims=True)
 
 
+def integrated_association(missed: Array, likelihood: Array, density: float, existence: Array) -> tuple[Array, Array]:
+    """JIPDA: how likely each track exists after the scan (T,), and what it caused if so, (T, 1 + m).
+
+    Each track exists with the probability ``existence`` (T,); a joint event is one of those that exist, and the others
+    caused nothing.
+    """
+    tracks, detections = likelihood.shape
+    result, total = np.zeros((tracks, 1 + detections)), 0.0
+    for there in product((False, True), repeat=tracks):
+        for event in joint_events(tracks, detections):
+            worth = density ** (detections - sum(each > 0 for each in event))
+            for t, each in enumerate(event):
+                if there[t]:
+                    worth *= existence[t] * (likelihood[t, each - 1] if each else missed[t])
+                else:
+                    worth *= 0.0 if each else 1.0 - existence[t]
+            total += worth
+            result[there, np.array(event)[list(there)]] += worth
+    after = result.sum(axis=1)
+    return after / total, result / after[:, np.newaxis]
+
+
 def mixture(probabilities: Array, means: Array, covariances: Array) -> tuple[Array, Array]:
     """JPDA: the mean (n,) and covariance of a track that is one of several normal distributions."""
     mean = (probabilities[:, np.newaxis] * means).sum(axis=0)

@@ -30,6 +30,7 @@ def scene(random: np.random.Generator, tracks: int, detections: int, kind: int) 
     return {
         "means": random.normal(scale=2.0, size=(tracks, 4)),
         "covariances": np.array([spread(random, 4) for _ in range(tracks)]).reshape(tracks, 4, 4),
+        "existence": np.ones(tracks),
         "kappa": 0.0,
         "sensor": sensor,
         "detections": rows,
@@ -42,7 +43,8 @@ def scene(random: np.random.Generator, tracks: int, detections: int, kind: int) 
 
 
 def written(scene: dict[str, Any]) -> tuple[np.ndarray, np.ndarray]:
-    """Weights of no detection (T,), and of each detection (T, m), from the definitions of their parts."""
+    """Weights of no detection (T,), and of each detection (T, m), of tracks that exist, from the definitions of their
+    parts."""
     sensor, gate, rows = scene["sensor"], scene["gate"], scene["detections"]
     size = 1 if sensor[0] == ukf.RANGE else 2
     missed, likelihood = [], []
@@ -86,6 +88,32 @@ def test_association_probabilities(random: np.random.Generator, kind: int) -> No
     assert shared > 100
 
 
+def test_tracks_that_may_not_exist(random: np.random.Generator) -> None:
+    """Joint events of all subsets of the tracks that may be there."""
+    for number in range(200):
+        given = scene(random, 1 + number % 4, number % 5, (ukf.RELATIVE_POSITION, ukf.RANGE)[number % 2])
+        given["existence"] = random.uniform(0.05, 1.0, size=1 + number % 4)
+        _, _, existence, caused, *_ = association.fuse_scan(*given.values())
+        expected = definitions.integrated_association(*written(given), given["density"], given["existence"])
+        assert existence == pytest.approx(expected[0], abs=1e-11)
+        assert caused == pytest.approx(expected[1], abs=1e-11)
+
+
+def test_one_track_that_may_not_exist() -> None:
+    """A known answer, that of Musicki's IPDA: the odds grow by 1 - P_D P_G + P_D N / density."""
+    sensor = np.array([ukf.RELATIVE_POSITION, 0.0, 0.0, 0.0, 0.0, 1.0, 1.0])
+    detection = np.array([[ukf.RELATIVE_POSITION, 0.0, 0.0, 3.0, 0.0, 1.0, 1.0]])
+    track = np.array([[2.0, 0.0, 0.0, 0.0]]), np.eye(4)[np.newaxis]
+    for rows, factor in (
+        (detection, 1.0 - 0.8 * chi2.cdf(9.0, 2) + 0.8 * np.exp(-0.25) / (4.0 * np.pi) / 0.01),
+        (detection[:0], 1.0 - 0.8 * chi2.cdf(9.0, 2)),
+    ):
+        *_, after, _, _, _ = association.fuse_scan(
+            *track, np.array([0.3]), 0.0, sensor, rows, 0.8, 0.01, 99.0, 9.0, True
+        )
+        assert after[0] / (1.0 - after[0]) == pytest.approx(0.3 / 0.7 * factor)
+
+
 def test_clusters_are_independent(random: np.random.Generator) -> None:
     """Sparse weights, in which tracks fall into clusters of all kinds, one without any detection among them."""
     sizes = set()
@@ -103,7 +131,7 @@ def test_clusters_are_independent(random: np.random.Generator) -> None:
 def test_a_track_is_the_mixture_of_its_events(random: np.random.Generator) -> None:
     for number in range(100):
         given = scene(random, 3, 4, (ukf.RELATIVE_POSITION, ukf.RANGE)[number % 2])
-        means, covariances, caused, *_ = association.fuse_scan(*given.values())
+        means, covariances, _, caused, *_ = association.fuse_scan(*given.values())
         for t in range(3):
             mean, covariance = given["means"][t], given["covariances"][t]
             points, weights = ukf.sigma_points(mean, covariance, 0.0)
@@ -228,7 +256,7 @@ def test_stone_soup_s_joint_association(random: np.random.Generator) -> None:
                 probabilities[place] = float(hypothesis.probability)
                 each.append(updater.update(hypothesis) if hypothesis else hypothesis.prediction)
                 shares.append(float(hypothesis.probability))
-            assert found[2][t] == pytest.approx(probabilities, abs=1e-9)
+            assert found[3][t] == pytest.approx(probabilities, abs=1e-9)
             means = np.hstack([np.asarray(state.state_vector) for state in each]).T
             mean, covariance = definitions.mixture(
                 np.array(shares), means.astype(float), np.array([np.asarray(state.covar) for state in each], float)
