@@ -233,7 +233,7 @@ class RobustController(TargetModel, Actor):
         )
         return self.objective.pose(posed, points, weights), starts
 
-    def _expected(self, now: float) -> tuple[Array, Array, Array, Array]:
+    def _expected(self, now: float) -> tuple[Array, ...]:
         """Means (K, N, 2) and covariances (K, N, 3) of all targets, sigma points of each (K M, 2) and their weights."""
         targets = [self._target] if self._target is not None else []
         if self._tracks is not None:

@@ -196,7 +196,8 @@ def association(missed: Array, likelihood: Array, density: float) -> Array:
         for t, each in enumerate(event):
             worth *= likelihood[t, each - 1] if each else missed[t]
         result[np.arange(tracks), event] += worth
-    return result / result.sum(axis=1, keepdims=True)
+    normalised: Array = result / result.sum(axis=1, keepdims=True)
+    return normalised
 
 
 def integrated_association(missed: Array, likelihood: Array, density: float, existence: Array) -> tuple[Array, Array]:
