@@ -289,7 +289,7 @@ class IsPresent(_IsPresent):
     def __init__(self, path: str) -> None: ...
 
 class JPDATracker(_JPDATracker):
-    """Joint probabilistic data association with the unscented filter: tracks of an unknown number of targets."""
+    """Tracks an unknown number of targets by joint probabilistic data association (JPDA) and the unscented filter."""
     def __init__(self, path: str, *, period: _Number = ..., gate: _Number = ..., birth_density: _Number = ..., birth_variance: _Number = ..., confirm_hits: _Whole = ..., confirm_steps: _Whole = ..., confirm_probability: _Number = ..., delete_probability: _Number = ..., lifetime: _Number = ..., max_deviation: _Number = ..., merge_distance: _Number = ..., max_tracks: _Whole = ..., max_delay: _Number = ..., noise_direction: Literal['expected', 'predicted'] = ..., position_noise: _Number = ..., velocity_noise: _Number = ..., kappa: _Number = ...) -> None: ...
 
 class JavaRandom(_JavaRandom):
@@ -353,7 +353,7 @@ class MovingStatistics(_MovingStatistics):
     def __init__(self, path: str, *, size: _Whole | None = ..., span: _Number | None = ...) -> None: ...
 
 class MultiTargetSensor(_MultiTargetSensor):
-    """Detects bodies in range, each with some probability, together with false detections; the scan names none of them."""
+    """Detects the bodies in range, each with a probability, and clutter; the scan does not say which is which."""
     def __init__(self, path: str, *, kind: Literal['relative_position', 'range'] = ..., along: _Number = ..., across: _Number = ..., max_range: _Number = ..., detection_probability: _Number = ..., clutter: _Number = ..., robot_name: str = ...) -> None: ...
 
 class MultiplyDivide(_MultiplyDivide):
@@ -577,7 +577,7 @@ class Timer(_Timer):
     def __init__(self, path: str, *, one_at_a_time: bool = ..., value: object = ...) -> None: ...
 
 class TrackingError(_TrackingError):
-    """The GOSPA metric of tracks, whenever they come: the positions of the true bodies against those of the tracks."""
+    """The GOSPA metric of tracks: the distance between the positions of the true bodies and those of the tracks."""
     def __init__(self, path: str, *, cutoff: _Number = ...) -> None: ...
 
 class TransferFunction(_TransferFunction):

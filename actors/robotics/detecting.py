@@ -1,4 +1,4 @@
-"""Sensors that see several bodies at once, and do not know which is which."""
+"""Sensors that see several bodies at once and cannot tell them apart."""
 
 from __future__ import annotations
 
@@ -13,14 +13,15 @@ from .messages import RANGE, RELATIVE_POSITION, BodyState, Detections, enclosing
 
 
 class MultiTargetSensor(Actor):
-    """Detects bodies in range, each with some probability, together with false detections; the scan names none of them.
+    """Detects the bodies in range, each with a probability, and clutter; the scan does not say which is which.
 
-    The noise is that of ``Sensor``.  The number of false detections (clutter) has a Poisson distribution; they are
-    uniform over the disc in range, or over all ranges.  A scan is sent also if it is empty, as that tells something,
-    too.  It is sorted by its values, so that the order says nothing.  A body that sends no state at a tag is not there.
+    The noise is that of ``Sensor``.  The number of false detections (clutter) has a Poisson distribution.  They are
+    uniform over the disc in range, or over the interval of ranges.  The sensor sends empty scans, too: they show that a
+    body was missed.  The values are sorted, so that their order carries no information.  A body that sends no state at
+    a tag does not exist then.
 
-    Each body has the same draws at every firing, whether it is there and in range or not, so that one body does not
-    change what is measured of the others.
+    Every body has draws of its own at each firing, whether it is in range or not.  So one body does not change the
+    measurements of the others.
     """
 
     robot = InputPort(BodyState, doc="where the robot that carries the sensor is")

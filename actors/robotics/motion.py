@@ -10,8 +10,8 @@ from .messages import BodyState
 class WaypointMotion(Actor):
     """A body that moves from waypoint to waypoint with constant speed, computed from the time alone.
 
-    It appears at the first waypoint and sends nothing before.  At the last one it stops, or begins again from the
-    first, where it is at once unless both are the same place.  It sends nothing from the time when it leaves.
+    It sends nothing before it ``appears`` at the first waypoint, and nothing from the time when it ``leaves``.  At the
+    last waypoint it stops, or starts again from the first one, to which it jumps unless both are the same place.
     """
 
     trigger = InputPort(object, doc="sends the state now, if the body is there")

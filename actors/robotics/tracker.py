@@ -62,29 +62,29 @@ _time = attrgetter("time")
 
 
 class JPDATracker(TargetModel, Actor):
-    """Joint probabilistic data association with the unscented filter: tracks of an unknown number of targets.
+    """Tracks an unknown number of targets by joint probabilistic data association (JPDA) and the unscented filter.
 
-    At each trigger, all tracks are predicted to the present, and the scans of all robots are fused one after the other,
-    sorted by time, then by robot.  In each scan every track takes at most one detection inside its ``gate`` and every
-    detection belongs to at most one track; a track becomes the mean of all joint events by their probabilities.  These
-    are exact in every cluster of tracks that share detections, as long as 2^tracks (1 + detections) is at most
-    131,072; those of a larger one come from Fitzgerald's formula, and are counted at ``approximated``.
+    At each trigger the tracker predicts all tracks to the present and fuses the scans of all robots, one after the
+    other, sorted by time and robot.  In a scan, a track causes at most one detection inside its ``gate``, and a
+    detection has at most one cause.  A track becomes the mean over all such joint events, weighted by their
+    probabilities.  These are exact in every cluster of tracks that share detections if 2^tracks (1 + detections) is at
+    most 131,072.  A larger cluster is solved by Fitzgerald's formula, and its tracks are counted at ``approximated``.
 
-    A relative position that probably belongs to no track begins a tentative one; a range alone cannot begin any.  A
-    step, that is all scans of a time, is a hit if it detected the track at least half as often as it should have, and
-    a miss otherwise; scans that probably have it out of range do not count.  A tentative track is confirmed with
-    ``confirm_hits`` hits, as soon as it exists with ``confirm_probability``, and dropped when it has more misses than
-    ``confirm_steps`` leave.  A confirmed one is dropped when it exists with less than ``delete_probability``, or when
-    its position is less certain than ``max_deviation``.  Of two tracks that are nearer to each other than
-    ``merge_distance`` the younger is dropped.
+    Each track exists with a probability, which is part of the association (JIPDA); if it is 1, this is JPDA.  It starts
+    as the share of new targets in the detections that belong to no track.
 
-    A track exists at first with the share of new targets in all detections from elsewhere; how likely it does after
-    further scans is part of the association (JIPDA).  With a probability of 1 this is JPDA.
+    A relative position that probably belongs to no track starts a tentative track; a range cannot start one.  A step
+    (all scans of one time) is a *hit* if it detects the track at least half as often as expected, and a *miss*
+    otherwise.  Scans with the track probably out of range do not count.  A tentative track is confirmed when it has
+    ``confirm_hits`` hits and exists with ``confirm_probability``.  It is dropped after more misses than
+    ``confirm_steps`` allow.  A confirmed track is dropped when it exists with less than ``delete_probability``, or when
+    its position is less certain than ``max_deviation``.  If two tracks are nearer to each other than
+    ``merge_distance``, the younger is dropped.
 
-    A late scan is inserted at its time, and the tracker runs again from there: later tracks, and their numbers, are
-    those of a tracker that got it in time.  Scans more than ``max_delay`` late are not fused, but counted at
-    ``too_late``.  A scan from the future, from a wrong clock, is treated as made now; a copy has no effect; one that is
-    not finite is ignored.
+    A late scan is inserted at its time, and the tracker runs again from there.  Later tracks and their numbers are
+    those of a tracker that received it in time.  Scans more than ``max_delay`` late are not fused but counted at
+    ``too_late``.  A scan from the future, due to a wrong clock, counts as made now.  A copy has no effect.  A scan that
+    is not finite is ignored.
     """
 
     trigger = InputPort(object, doc="predict to the present time, fuse, and send the tracks")

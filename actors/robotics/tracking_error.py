@@ -9,11 +9,11 @@ from .messages import BodyState, Tracks
 
 
 class TrackingError(Actor):
-    """The GOSPA metric of tracks, whenever they come: the positions of the true bodies against those of the tracks.
+    """The GOSPA metric of tracks: the distance between the positions of the true bodies and those of the tracks.
 
-    With p = 2 and alpha = 2 its square is the sum of the squared errors of the pairs that are nearer than ``cutoff`` in
-    the best assignment, and of half the squared cutoff for every body without a track and every track without a body.
-    A body that sends no state at the tag is not there.
+    Tracks are assigned to bodies at the least cost.  With p = 2 and alpha = 2, the squared metric adds the squared
+    errors of the pairs nearer than ``cutoff``, and half the squared cutoff for each body without a track and each track
+    without a body.  A body that sends no state at the tag does not exist then.
     """
 
     bodies = InputPort(BodyState, multi=True, required=False, doc="the truth, a connection for each body")
