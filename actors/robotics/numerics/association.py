@@ -26,9 +26,9 @@ from .compiled import Array, inner, kernel
 from .entry import entry
 from .ukf import _KIND as KIND
 from .ukf import _OBSERVER as OBSERVER
-from .ukf import _VALUE as VALUE
 from .ukf import RANGE, _finite, _root, constant_velocity, measurement_noise, predict, sigma_points, update
 
+VALUE = OBSERVER + 2  # column; a scan is in the plane
 LARGEST = 1 << 17  # numbers of a pass over a cluster: 10 tracks with 127 detections, or 5 with 4095
 _TERMS = 1000  # of a series that ends long before
 
@@ -125,17 +125,17 @@ def _sum_events(weights: Array) -> Array:
 def _compete(weights: Array) -> Array:
     """The same by Fitzgerald's formula."""
     tracks, columns = weights.shape
-    result = np.zeros((tracks, columns))
+    result, claims = np.zeros((tracks, columns)), np.zeros(columns)
+    for t in range(tracks):
+        for j in range(1, columns):
+            claims[j] += weights[t, j]
     for t in range(tracks):
         rows, kept = 0.0, 1.0
         for j in range(1, columns):
             rows += weights[t, j]
         for j in range(1, columns):
-            others = rows + weights[t, 0] - weights[t, j]
-            for k in range(tracks):
-                others += weights[k, j]
             if weights[t, j] > 0.0:
-                result[t, j] = weights[t, j] / others
+                result[t, j] = weights[t, j] / (rows + weights[t, 0] - weights[t, j] + claims[j])
             kept -= result[t, j]
         result[t, 0] = max(kept, 0.0)
     return result
