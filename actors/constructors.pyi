@@ -36,8 +36,11 @@ from .robotics.controller import RobustController as _RobustController
 from .robotics.detecting import MultiTargetSensor as _MultiTargetSensor
 from .robotics.estimator import UnscentedEstimator as _UnscentedEstimator
 from .robotics.filterpy_estimator import FilterPyEstimator as _FilterPyEstimator
-from .robotics.monitors import DistanceMonitor as _DistanceMonitor, GoalMonitor as _GoalMonitor, SeparationMonitor as _SeparationMonitor
+from .robotics.monitors import ClearanceMonitor as _ClearanceMonitor, DistanceMonitor as _DistanceMonitor, GoalMonitor as _GoalMonitor, SeparationMonitor as _SeparationMonitor
+from .robotics.motion import WaypointMotion as _WaypointMotion
 from .robotics.planning import Barrier as _Barrier, Casadi as _Casadi, Inform as _Inform, Objective, ReachGoal as _ReachGoal, Solver, StayNear as _StayNear
+from .robotics.tracker import JPDATracker as _JPDATracker
+from .robotics.tracking_error import TrackingError as _TrackingError
 from .robotics.world import BroadcastChannel as _BroadcastChannel, CircularMotion as _CircularMotion, Flooding as _Flooding, Sensor as _Sensor, Vehicle as _Vehicle
 from .sinks import Display as _Display, Histogram as _Histogram, Recorder as _Recorder, Stop as _Stop, Test as _Test
 from .sources import Clock as _Clock, PoissonClock as _PoissonClock, Random as _Random, SingleEvent as _SingleEvent, VaryingRandom as _VaryingRandom
