@@ -13,6 +13,7 @@ DURATIONS = {
     "collision_avoidance": 0.5,
     "lift_group": 600.0,
     "machine_shop": 40_000.0,
+    "many_obstacles": 0.5,
     "pid_loop": 10.0,
     "switched_network": 1.5,
     "warehouse": 1800.0,

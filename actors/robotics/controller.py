@@ -21,7 +21,7 @@ from ..core import (
 from ..core.elementary import hypot
 from .arrays import Array, array_of, finite, joined, pair, read_only, stacked
 from .estimator import TargetModel
-from .messages import BodyState, Estimate, Plan, enclosing
+from .messages import BodyState, Estimate, Plan, Tracks, enclosing
 from .planning import Barrier, Objective, ReachGoal, Solver
 
 if TYPE_CHECKING:
@@ -109,6 +109,9 @@ class RobustController(TargetModel, Actor):
         triggers=False,
         doc="estimate of the target; without a connection, there is none to avoid",
     )
+    tracks = InputPort(
+        Tracks, required=False, triggers=False, doc="estimates of several targets, to avoid and observe all of them"
+    )
     peer_plans = InputPort(Plan, multi=True, required=False, triggers=False, doc="plans of the other robots")
     role = InputPort(
         str,
@@ -178,6 +181,7 @@ class RobustController(TargetModel, Actor):
         self._peers = _Peers(self.peers_at_start)
         self._objective: Objective = self.objective
         self._target: Estimate | None = None
+        self._tracks: Tracks | None = None
         self._infeasible = 0
 
     def fire(self) -> None:
@@ -218,6 +222,9 @@ class RobustController(TargetModel, Actor):
                     f"'objectives' has: {roles}"
                 )
             self._objective = self.objectives[role]
+        for tracks in self.tracks.tokens:
+            if tracks.finite and (self._tracks is None or tracks.time >= self._tracks.time):
+                self._tracks = tracks
 
     def _send(self, own: BodyState, problem: HorizonProblem, controls: Array) -> None:
         self._standing = _Standing(own.time, problem.position, problem.velocity, controls)
@@ -240,11 +247,7 @@ class RobustController(TargetModel, Actor):
         tube_centre, tube_radius, starts = self._standing_plan(
             *standing[1:], now - standing.made_at, self._radius, velocity, speed, self.max_acceleration, period
         )
-        target, expected = self._target, self._nobody
-        if target is not None:
-            elapsed = now - target.time
-            expected = self._expected_target(target.mean, target.covariance, *self._model, elapsed, self._steps)
-        target_mean, target_covariance, points, weights = expected
+        target_mean, target_covariance, points, weights = self._expected(now)
         peer_mean, peer_distance = self._peer_tubes(self._peers.table(), now, *self._room)
         posed = self._new_problem(
             period=period,
@@ -262,3 +265,17 @@ class RobustController(TargetModel, Actor):
             peer_distance=peer_distance,
         )
         return self._objective.pose(posed, points, weights, self._peers.names), starts
+
+    def _expected(self, now: float) -> tuple[Array, ...]:
+        """Means (K, N, 2) and covariances (K, N, 3) of all targets, sigma points of each (K M, 2) and their weights."""
+        targets = [self._target] if self._target is not None else []
+        if self._tracks is not None:
+            targets.extend(self._tracks.estimates)
+        each = [
+            self._expected_target(target.mean, target.covariance, *self._model, now - target.time, self._steps)
+            for target in targets
+        ]
+        if len(each) < 2:
+            return each[0] if each else self._nobody
+        means, covariances, points, weights = zip(*each, strict=True)
+        return np.concatenate(means), np.concatenate(covariances), np.concatenate(points), weights[0]

@@ -26,8 +26,9 @@ class Objective(Configurable):
     def pose(self, problem: HorizonProblem, points: Array, weights: Array, peers: Sequence[str] = ()) -> HorizonProblem:
         """The problem with this objective.
 
-        ``points`` (M, 2) and ``weights`` (M,) are the target's sigma points at the end of the horizon (M = 0
-        while no target is known); ``peers`` are the names of the robots in the problem, in its order.
+        ``points`` (T M, 2) are the sigma points of T targets at the end of the horizon, one target after the other,
+        each with the ``weights`` (M,).  T = 0 while no target is known.  ``peers`` are the names of the robots in the
+        problem, in its order.
         """
         raise NotImplementedError
 
@@ -78,7 +79,10 @@ class StayNear(Objective):
 
 
 class Inform(Objective):
-    """Eq. (5): the information of range measurements at the end of the horizon, minus a penalty for distance."""
+    """Eq. (5): the information of range measurements at the end of the horizon, minus a penalty for distance.
+
+    Of several targets it is the sum: they are independent, and each has its own measurements.
+    """
 
     range = Parameter(float, 30.0, unit="m", min=0, doc="Dmax: distances from the target beyond this are penalised")
     penalty = Parameter(float, 0.001, min=0, doc="gamma: the penalty for each metre too far, at each step")

@@ -29,14 +29,28 @@ _STEPS = 3
 @functools.cache
 def compile_kernels() -> None:
     """Call every kernel of a run with small arrays; only the first call in a process does something."""
-    message = "compiling the numeric kernels (once, about 20 s) ..."
+    with _announced("compiling the numeric kernels (once, about 20 s) ..."):
+        _call_every_kernel()
+
+
+@functools.cache
+def compile_tracking() -> None:
+    """The same for the kernels of a tracker, which other models do not need."""
+    compile_kernels()
+    with _announced("compiling the kernels of the tracker (once, about 20 s) ..."):
+        _call_tracking()
+
+
+@contextmanager
+def _announced(message: str) -> Iterator[None]:
+    """What is compiled here is announced if it takes long."""
     notice = threading.Timer(_PATIENCE, _LOGGER.info, (message,))
     notice.daemon = True
     notice.start()
     was_enabled = gc.isenabled()
     gc.disable()  # numba makes millions of objects, and garbage collection takes a sixth of the time
     try:
-        _call_every_kernel()
+        yield
     finally:
         if was_enabled:
             gc.enable()
@@ -94,3 +108,15 @@ def call_others() -> None:
     standing_plan(zero, zero, np.zeros((_STEPS, 2)), 0.0, ones, zero, 0.0, 1.0, period)
     peer_mean, _ = peer_tubes(np.zeros((1, 6)), 0.0, period, ones, 0.4, 1.0, 1.0)
     pairwise_distance(points, peer_mean, 1.0)
+
+
+def _call_tracking() -> None:
+    from .association import duplicates, fuse_scan, new_track, predict_tracks
+
+    means, covariances, existence = predict_tracks(
+        np.zeros((1, 4)), np.eye(4).reshape((1, 4, 4)), np.ones(1), np.eye(4), 0.1, 1.0
+    )
+    detection = np.array([0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0])
+    fuse_scan(means, covariances, existence, 0.0, detection, detection.reshape((1, 7)), 0.9, 1.0, 10.0, 16.0, True)
+    new_track(detection, 1.0)
+    duplicates(means, covariances, 1.0)
