@@ -86,7 +86,7 @@ __all__ = [
     "PortParameter", "Pose", "Posts", "Previous", "Process", "Pulse", "Quantity", "Quantizer", "Queue", "Ramp",
     "Random", "RandomInteger", "RangeBearingSensor", "RangeScanner", "Ranks", "ReachGoal", "RecordAssembler",
     "RecordDisassembler", "Recorder", "Register", "Repeat", "Replay", "ReplayError", "ResettableTimer",
-    "RobustController", "Router", "Sampler", "Scale", "Select", "Sensor", "SeparationMonitor", "Sequence", "Sequencer",
+    "RoamingEstimator", "RobustController", "Router", "SafeController", "Sampler", "Scale", "Select", "Sensor", "SeparationMonitor", "Sequence", "Sequencer",
     "Server", "SetFields", "SetVariable", "SharedQueue", "SingleEvent", "Solver", "Spread", "StateMachine",
     "StateSpace", "Station", "Stop", "Stream", "Streams", "StudentT", "Switch", "Synchronizer", "Tag", "Test",
     "TextFunction", "TimeAverage", "TimeCompare", "TimeDelay", "TimeGap", "Timer", "Times", "TransferFunction",
