@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
 from ..core import OutputPort, Parameter
 from ..core.elementary import cos, sin
-from .arrays import Array
+from .arrays import Array, pair
 from .controller import RobustController
 from .messages import BodyState
 from .numerics.horizon import HorizonProblem
@@ -52,7 +53,7 @@ class SafeController(RoamingModel, RobustController):
         from .numerics import reachability, retreat, ukf
 
         super().initialize()
-        self._expected_target = self._expected
+        self._expected_target: Callable[..., tuple[Array, Array, Array, Array]] = self._predicted
         self._propagate, self._predict = reachability.propagate, ukf.predict
         self._reaches, self._kept, self._best = retreat.reaches, retreat.kept_distance, retreat.best_retreat
         turn = 2.0 * math.pi / _DIRECTIONS
@@ -61,14 +62,15 @@ class SafeController(RoamingModel, RobustController):
         self._retreat: _Retreat | None = None
         self._overrides = 0
 
-    def _expected(
-        self, mean: Array, covariance: Array, *model: Any
-    ) -> tuple[Array, Array, Array, Array]:  # as ``reachability.expected_target``
-        elapsed, steps = model[-2:]
+    def _predicted(
+        self, mean: Array, covariance: Array, noise: Array, is_widened: bool, kappa: float, period: float,
+        elapsed: float, steps: int,
+    ) -> tuple[Array, Array, Array, Array]:  # fmt: skip
+        """``reachability.expected_target`` for a target that roams; without sigma points, which only eq. (5) needs."""
         mean, covariance = mean.copy(), covariance.copy()  # kernels would be compiled again for read-only arrays
-        if elapsed != 0.0:
-            mean, covariance = self._predict(mean, covariance, *self.roaming(max(elapsed, 0.0)))
-        means, covariances = self._propagate(mean, covariance, *self.roaming(self.period), steps)
+        if elapsed > 0.0:
+            mean, covariance = self._predict(mean, covariance, *self.roaming(elapsed))
+        means, covariances = self._propagate(mean, covariance, *self.roaming(period), steps)
         return means[np.newaxis], covariances[np.newaxis], np.empty((0, 2)), np.empty(0)
 
     def _problem(self, own: BodyState) -> tuple[HorizonProblem, Array]:
@@ -101,11 +103,12 @@ class SafeController(RoamingModel, RobustController):
                 return control
             if last is not None:
                 reach = last.reach + self.target_speed * (now - last.time)
-                if self._kept(*last.direction, reach, *start, control, *self._limits) >= self.safe_distance:
+                if self._kept(*pair(last.direction), reach, *start, control, *self._limits) >= self.safe_distance:
                     return control
         if last is not None:
             return self._away(last)
-        return self.max_acceleration * self._directions[row]
+        return self._away(_Retreat(self._directions[row], float(reaches[row]), now))
 
     def _away(self, retreat: _Retreat) -> Array:
-        return self.max_acceleration * retreat.direction
+        away: Array = self.max_acceleration * retreat.direction
+        return away

@@ -42,7 +42,8 @@ def kept_distance(
     """
     px, py = position[0] + period * velocity[0], position[1] + period * velocity[1]
     vx, vy = velocity[0] + period * control[0], velocity[1] + period * control[1]
-    push, least = period * max_acceleration, math.inf
+    least: float = math.inf
+    push = period * max_acceleration
     for k in range(FIRST, _STEPS):
         speed = hypot(vx, vy)
         if speed > max_speed:
