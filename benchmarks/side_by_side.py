@@ -53,13 +53,12 @@ def text(results: StudyResults) -> str:
     """All of it."""
     rows = results.table().to_pylist()
     found = ["within 2 m, paper", "safe", "arrival (s), paper", "safe", "difference (s)", ""]
-    tables = [
-        [*head(["", *found]), *lines(rows, [])],
-        [*head(["observers", "disturbance", *found]), *lines(rows, ["observers", "disturbance"])],
-    ]
-    if "measurement_range" in rows[0]:
-        factors = ["measurement_range", "disturbance", "observers"]
-        tables.append([*head([*factors, *found]), *lines(rows, factors)])
+    varied = [name for name in ("measurement_range", "disturbance", "observers") if name in rows[0]]
+    tables = []
+    for factors in ([], [name for name in varied if name != "measurement_range"], varied):
+        table = [*head([*(factors or [""]), *found]), *lines(rows, factors)]
+        if table not in tables:
+            tables.append(table)
     if judged := results.claims():
         tables.insert(0, list(claims(judged)))
     return "\n\n".join([about(results), *map("\n".join, tables)])

@@ -8,11 +8,20 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from ..core import Actor, InputPort, OutputPort, Parameter, array_parameter
+from ..core import (
+    Actor,
+    EpicycleError,
+    InputPort,
+    MappingParameter,
+    OutputPort,
+    Parameter,
+    array_parameter,
+    did_you_mean,
+)
 from ..core.elementary import hypot
 from .arrays import Array, array_of, finite, joined, pair, read_only, stacked
 from .estimator import TargetModel
-from .messages import BodyState, Estimate, Plan, enclosing
+from .messages import BodyState, Estimate, Plan, Tracks, enclosing
 from .planning import Barrier, Objective, ReachGoal, Solver
 
 if TYPE_CHECKING:
@@ -58,6 +67,11 @@ class _Peers:
         if known is None:
             self._rows = dict(sorted(self._rows.items(), key=itemgetter(0)))
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Whose the rows are; of who has sent no plan yet, a name that is no path."""
+        return tuple(self._rows)
+
     def table(self) -> Array:
         """The rows, sorted by name."""
         return stacked(self._rows.values(), _CONTROLS)
@@ -79,6 +93,9 @@ class RobustController(TargetModel, Actor):
     latest estimate is used, too: an old one is predicted to the time of the own state as its filter would predict it,
     with the process noise, so that its covariance grows.
 
+    With ``objectives`` and a ``role``, the objective changes during the run.  All else stays: the standing plan, to
+    which f3 ties the next one, the peers' plans and the estimate.
+
     Before the first plan or estimate comes, the robot avoids only the positions in ``peers_at_start``. Plans and
     estimates that are not finite are ignored; the last good ones are kept.  Without a finite own state the control is
     zero, and nothing else is sent.
@@ -92,14 +109,24 @@ class RobustController(TargetModel, Actor):
         triggers=False,
         doc="estimate of the target; without a connection, there is none to avoid",
     )
+    tracks = InputPort(
+        Tracks, required=False, triggers=False, doc="estimates of several targets, to avoid and observe all of them"
+    )
     peer_plans = InputPort(Plan, multi=True, required=False, triggers=False, doc="plans of the other robots")
+    role = InputPort(
+        str,
+        required=False,
+        triggers=False,
+        doc="name of one of the objectives, for this plan and all later ones until another role comes",
+    )
     control = OutputPort(np.ndarray, shape=(2,), doc="m/s^2, for the period after this one")
     plan = OutputPort(Plan, doc="plan of this robot, for the others")
     violation = OutputPort(float, doc="largest violation of a constraint by the plan in metres; 0 if it keeps all")
     infeasible = OutputPort(int, doc="number of plans so far that broke a constraint")
     iterations = OutputPort(int, doc="Newton (or solver) iterations for this plan")
 
-    objective = Parameter(Objective, ReachGoal(), doc="objective of the robot")
+    objective = Parameter(Objective, ReachGoal(), doc="objective of the robot, until a role comes")
+    objectives = MappingParameter(Parameter(Objective), {}, doc="objectives by role")
     solver = Parameter(Solver, Barrier(), doc="solver of the problem")
     max_speed = Parameter(float, 8.0, unit="m/s", min=1e-6, doc="Vmax")
     max_acceleration = Parameter(float, 8.0, unit="m/s^2", min=1e-6, doc="Amax")
@@ -152,7 +179,9 @@ class RobustController(TargetModel, Actor):
         self._applied = np.zeros(2)  # U_t
         self._standing = self._nothing = _Standing(-math.inf, np.zeros(2), np.zeros(2), np.zeros((self._steps, 2)))
         self._peers = _Peers(self.peers_at_start)
+        self._objective: Objective = self.objective
         self._target: Estimate | None = None
+        self._tracks: Tracks | None = None
         self._infeasible = 0
 
     def fire(self) -> None:
@@ -185,6 +214,17 @@ class RobustController(TargetModel, Actor):
         for estimate in self.estimate.tokens:
             if estimate.finite and (self._target is None or estimate.time >= self._target.time):
                 self._target = estimate
+        for role in self.role.tokens:
+            if role not in self.objectives:
+                roles = ", ".join(self.objectives) or "none"
+                raise EpicycleError(
+                    f"{self.path} has no objective for the role {role!r}{did_you_mean(role, self.objectives)}; "
+                    f"'objectives' has: {roles}"
+                )
+            self._objective = self.objectives[role]
+        for tracks in self.tracks.tokens:
+            if tracks.finite and (self._tracks is None or tracks.time >= self._tracks.time):
+                self._tracks = tracks
 
     def _send(self, own: BodyState, problem: HorizonProblem, controls: Array) -> None:
         self._standing = _Standing(own.time, problem.position, problem.velocity, controls)
@@ -207,11 +247,7 @@ class RobustController(TargetModel, Actor):
         tube_centre, tube_radius, starts = self._standing_plan(
             *standing[1:], now - standing.made_at, self._radius, velocity, speed, self.max_acceleration, period
         )
-        target, expected = self._target, self._nobody
-        if target is not None:
-            elapsed = now - target.time
-            expected = self._expected_target(target.mean, target.covariance, *self._model, elapsed, self._steps)
-        target_mean, target_covariance, points, weights = expected
+        target_mean, target_covariance, points, weights = self._expected(now)
         peer_mean, peer_distance = self._peer_tubes(self._peers.table(), now, *self._room)
         posed = self._new_problem(
             period=period,
@@ -228,4 +264,18 @@ class RobustController(TargetModel, Actor):
             peer_mean=peer_mean,
             peer_distance=peer_distance,
         )
-        return self.objective.pose(posed, points, weights), starts
+        return self._objective.pose(posed, points, weights, self._peers.names), starts
+
+    def _expected(self, now: float) -> tuple[Array, ...]:
+        """Means (K, N, 2) and covariances (K, N, 3) of all targets, sigma points of each (K M, 2) and their weights."""
+        targets = [self._target] if self._target is not None else []
+        if self._tracks is not None:
+            targets.extend(self._tracks.estimates)
+        each = [
+            self._expected_target(target.mean, target.covariance, *self._model, now - target.time, self._steps)
+            for target in targets
+        ]
+        if len(each) < 2:
+            return each[0] if each else self._nobody
+        means, covariances, points, weights = zip(*each, strict=True)
+        return np.concatenate(means), np.concatenate(covariances), np.concatenate(points), weights[0]

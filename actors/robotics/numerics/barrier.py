@@ -236,7 +236,7 @@ def solve(problem: HorizonProblem, starts: Array, rules: Rules = _RULES) -> Solu
 
 @entry(
     "Tuple((f8[:, ::1], f8, f8, i8))(f8, f8[::1], f8[::1], f8, f8, f8[:, ::1], f8[::1], f8, f8, f8[:, :, ::1], "
-    "f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1], i8, f8[::1], f8[:, ::1], f8[::1], f8[:, ::1], f8, f8, f8, "
+    "f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1], i8, f8[:, ::1], f8[:, ::1], f8[::1], f8[:, ::1], f8, f8, f8, "
     "f8, f8, i8, i8, f8[:, :, ::1])"
 )
 def _solve(*fields: Any) -> tuple[Array, float, float, int]:

@@ -51,15 +51,16 @@ PAIRS = 12  # others_distance_ij for all j < i, each followed by exp(-E_ij)
 
 @borrower
 def new_points(sigma_positions: Array, weights: Array, others_distance: Array, points: Array) -> int:
-    """Write the sigma points with a weight, in rows with room for ``informed``; returns how many."""
-    count = 0
-    for i in range(weights.shape[0]):
-        if weights[i] == 0.0:
+    """Write the sigma points with a weight, in rows with room for ``informed``, target by target; returns how many."""
+    count, size = 0, weights.shape[0]
+    for i in range(sigma_positions.shape[0]):
+        own = i % size
+        if weights[own] == 0.0:
             continue
         points[count, _PLACE], points[count, _PLACE + 1] = sigma_positions[i, 0], sigma_positions[i, 1]
-        points[count, _WEIGHT] = weights[i]
+        points[count, _WEIGHT] = weights[own]
         column = PAIRS
-        for j in range(i):
+        for j in range(own):
             if weights[j] != 0.0:
                 points[count, column] = others_distance[i, j]
                 column += 2
@@ -69,7 +70,7 @@ def new_points(sigma_positions: Array, weights: Array, others_distance: Array, p
 
 @borrower
 def informed(points: Array, x: float, y: float, variance: float) -> Term:
-    """-I at own position (x, y) with its gradient and Hessian: (value, d/dx, d/dy, xx, xy, yy).
+    """-I of one target at own position (x, y) with its gradient and Hessian: (value, d/dx, d/dy, xx, xy, yy).
 
     The density's constant factor (2 pi eta)^(-n/2) is left out: it shifts I but not the optimum.  Derivation: with E_ij
     = (r_i - r_j)^2 / (2 eta) + others_distance_ij and q_ij = w_j exp(-E_ij) normalised over j, grad(-I) = -sum_i w_i

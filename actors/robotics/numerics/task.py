@@ -22,8 +22,7 @@ _VELOCITY = 2
 _TRIED = 4  # the controls that position and velocity follow from
 TAKEN = 6  # the best controls so far
 _SHIFT = 8  # of the position, by a whole Newton step
-_TARGET = 10  # position of the obstacle in f6
-_COLUMNS = 12  # number of columns
+_COLUMNS = 10  # number of columns
 
 
 class Phase(IntEnum):
@@ -42,15 +41,17 @@ class Task(NamedTuple):
     max_speed: float
     max_acceleration: float
     seeks: bool  # the objective is eq. (2)
-    goal: Vector
+    goal: Array  # (n, 2) of the problem
     variance: float
     penalty: float
     reach: float
     free: int  # free controls, the last of which is held
-    plan: Array  # (N, 12)
+    targets: int  # the first of the obstacles, of which the objective is eq. (5); 0 unless it is
+    obstacles: Array  # (K, N, 2) of the problem
+    plan: Array  # (N, 10)
     stages: Array  # of ``newton``
     constraints: Array  # of ``constraints``, those within reach
-    points: Array  # of ``mutual_information``; none unless the objective is eq. (5) and there is an obstacle
+    points: Array  # of ``mutual_information``, as many for each target
 
 
 @inlined
@@ -58,7 +59,8 @@ def room_for(problem: HorizonProblem, steps: int) -> int:
     """The number of numbers in the tables of a task."""
     binding: int = (1 + problem.obstacle_mean.shape[0] + problem.peer_mean.shape[0]) * problem.tube_radius.shape[0]
     points: int = problem.sigma_weights.shape[0]
-    return steps * (_COLUMNS + STAGE) + binding * CONSTRAINT + points * (PAIRS + 2 * points)
+    rows: int = problem.sigma_positions.shape[0]
+    return steps * (_COLUMNS + STAGE) + binding * CONSTRAINT + rows * (PAIRS + 2 * points)
 
 
 @borrower
@@ -73,13 +75,13 @@ def new_task(problem: HorizonProblem, steps: int, free: int, spare: float, room:
         room[i] = 0.0
     plan, stages = room[:second].reshape((steps, _COLUMNS)), room[second:third].reshape((steps, STAGE))
     constraints = room[third:fourth].reshape((binding, CONSTRAINT))
-    points = room[fourth:].reshape((weights.shape[0], PAIRS + 2 * weights.shape[0]))
-    count = 0
+    points = room[fourth:].reshape((problem.sigma_positions.shape[0], PAIRS + 2 * weights.shape[0]))
+    count = targets = 0
     if not seeks and problem.obstacle_mean.shape[0] > 0:
         count = new_points(problem.sigma_positions, weights, problem.others_distance, points)
-        for s in range(steps):
-            for c in range(2):
-                plan[s, _TARGET + c] = problem.obstacle_mean[0, s, c]
+        told = problem.sigma_positions.shape[0] // max(weights.shape[0], 1)
+        targets = min(told, problem.obstacle_mean.shape[0]) if count > 0 else 0
+        count = count // max(told, 1) * targets
     return Task(
         period=problem.period,
         position=(problem.position[0], problem.position[1]),
@@ -87,11 +89,13 @@ def new_task(problem: HorizonProblem, steps: int, free: int, spare: float, room:
         max_speed=problem.max_speed,
         max_acceleration=problem.max_acceleration,
         seeks=seeks,
-        goal=(problem.goal[0], problem.goal[1]),
+        goal=problem.goal,
         variance=problem.measurement_variance,
         penalty=problem.range_penalty,
         reach=problem.measurement_range,
         free=free,
+        targets=targets,
+        obstacles=problem.obstacle_mean,
         plan=plan,
         stages=stages,
         constraints=constraints[: constraints_of(problem, spare, constraints)],
@@ -153,11 +157,28 @@ def look(task: Task) -> float:
 
 
 @inlined
-def _beyond(task: Task, s: int) -> Term:
-    """How far the position is beyond Dmax from the obstacle; the positive part is f6."""
-    plan = task.plan
+def _beyond(task: Task, k: int, s: int) -> Term:
+    """How far the position is beyond Dmax from an obstacle; the positive part is f6."""
+    plan, obstacles = task.plan, task.obstacles
     x, y = plan[s, _POSITION], plan[s, _POSITION + 1]
-    return stay_near(x, y, plan[s, _TARGET], plan[s, _TARGET + 1], task.reach)
+    return stay_near(x, y, obstacles[k, s, 0], obstacles[k, s, 1], task.reach)
+
+
+@inlined
+def _informed(task: Task, k: int) -> Term:
+    """-I of a target at the last position."""
+    plan, last = task.plan, task.plan.shape[0] - 1
+    each = task.points.shape[0] // task.targets
+    points = task.points[k * each : (k + 1) * each]
+    return informed(points, plan[last, _POSITION], plan[last, _POSITION + 1], task.variance)
+
+
+@inlined
+def _away(task: Task, s: int) -> Vector:
+    """The position as seen from the goal at that step."""
+    plan, goal = task.plan, task.goal
+    g = min(s, goal.shape[0] - 1)
+    return plan[s, _POSITION] - goal[g, 0], plan[s, _POSITION + 1] - goal[g, 1]
 
 
 @borrower
@@ -167,12 +188,12 @@ def objective_of(task: Task) -> float:
     steps, value = plan.shape[0], 0.0
     if task.seeks:
         for s in range(steps):
-            dx, dy = plan[s, _POSITION] - task.goal[0], plan[s, _POSITION + 1] - task.goal[1]
+            dx, dy = _away(task, s)
             value += dx * dx + dy * dy
-    elif task.points.shape[0] > 0:
-        value = informed(task.points, plan[steps - 1, _POSITION], plan[steps - 1, _POSITION + 1], task.variance)[0]
+    for k in range(task.targets):
+        value += _informed(task, k)[0]
         for s in range(steps):
-            value += task.penalty * max(0.0, _beyond(task, s)[0])
+            value += task.penalty * max(0.0, _beyond(task, k, s)[0])
     return value
 
 
@@ -191,21 +212,19 @@ def _add_objective(task: Task, mu: float) -> float:
     steps, value, product = plan.shape[0], 0.0, 1.0
     if task.seeks:
         for s in range(steps):
-            dx, dy = plan[s, _POSITION] - task.goal[0], plan[s, _POSITION + 1] - task.goal[1]
+            dx, dy = _away(task, s)
             value += dx * dx + dy * dy
             add(stages, s, 2.0, 2.0, 0.0, (0.0, dx, dy, 1.0, 0.0, 1.0))
-    if not task.points.shape[0] > 0:
-        return value
-    x, y = plan[steps - 1, _POSITION], plan[steps - 1, _POSITION + 1]
-    information = informed(task.points, x, y, task.variance)
-    add(stages, steps - 1, 1.0, 1.0, 0.0, information)
-    value = information[0]
-    for s in range(steps if gamma != 0.0 else 0):
-        beyond = _beyond(task, s)
-        t, over = smoothed(gamma, beyond[0], mu)
-        value, product = _less_log(value + gamma * t, product * (t * over), mu)
-        slope = mu / over
-        add(stages, s, slope, slope, mu / (over * over + t * t), beyond)
+    for k in range(task.targets):
+        information = _informed(task, k)
+        add(stages, steps - 1, 1.0, 1.0, 0.0, information)
+        value += information[0]
+        for s in range(steps if gamma != 0.0 else 0):
+            beyond = _beyond(task, k, s)
+            t, over = smoothed(gamma, beyond[0], mu)
+            value, product = _less_log(value + gamma * t, product * (t * over), mu)
+            slope = mu / over
+            add(stages, s, slope, slope, mu / (over * over + t * t), beyond)
     return value - mu * log(product)
 
 

@@ -29,14 +29,28 @@ _STEPS = 3
 @functools.cache
 def compile_kernels() -> None:
     """Call every kernel of a run with small arrays; only the first call in a process does something."""
-    message = "compiling the numeric kernels (once, about 20 s) ..."
+    with _announced("compiling the numeric kernels (once, about 20 s) ..."):
+        _call_every_kernel()
+
+
+@functools.cache
+def compile_tracking() -> None:
+    """The same for the kernels of a tracker, which other models do not need."""
+    compile_kernels()
+    with _announced("compiling the kernels of the tracker (once, about 20 s) ..."):
+        _call_tracking()
+
+
+@contextmanager
+def _announced(message: str) -> Iterator[None]:
+    """What is compiled here is announced if it takes long."""
     notice = threading.Timer(_PATIENCE, _LOGGER.info, (message,))
     notice.daemon = True
     notice.start()
     was_enabled = gc.isenabled()
     gc.disable()  # numba makes millions of objects, and garbage collection takes a sixth of the time
     try:
-        _call_every_kernel()
+        yield
     finally:
         if was_enabled:
             gc.enable()
@@ -76,7 +90,7 @@ def _call_solver() -> None:
     # Plans that solve it need only one Newton step, and compile everything.
     problem = HorizonProblem(
         0.1, zeros(2), zeros(2), 1.0, 1.0, zeros((steps, 2)), np.ones(steps), 1.0, 1.0, zeros((1, steps, 2)) + 100.0,
-        zeros((1, steps, 3)), zeros((1, steps, 2)) + 200.0, zeros((1, steps)), INFORM, zeros(2), zeros((9, 2)),
+        zeros((1, steps, 3)), zeros((1, steps, 2)) + 200.0, zeros((1, steps)), INFORM, zeros((1, 2)), zeros((9, 2)),
         np.ones(9), zeros((9, 9)), 1.0, 1.0, 1.0,
     )  # fmt: skip
     solve(problem, zeros((2, steps, 2)))
@@ -94,3 +108,15 @@ def call_others() -> None:
     standing_plan(zero, zero, np.zeros((_STEPS, 2)), 0.0, ones, zero, 0.0, 1.0, period)
     peer_mean, _ = peer_tubes(np.zeros((1, 6)), 0.0, period, ones, 0.4, 1.0, 1.0)
     pairwise_distance(points, peer_mean, 1.0)
+
+
+def _call_tracking() -> None:
+    from .association import duplicates, fuse_scan, new_track, predict_tracks
+
+    means, covariances, existence = predict_tracks(
+        np.zeros((1, 4)), np.eye(4).reshape((1, 4, 4)), np.ones(1), np.eye(4), 0.1, 1.0
+    )
+    detection = np.array([0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0])
+    fuse_scan(means, covariances, existence, 0.0, detection, detection.reshape((1, 7)), 0.9, 1.0, 10.0, 16.0, True)
+    new_track(detection, 1.0)
+    duplicates(means, covariances, 1.0)
