@@ -77,7 +77,7 @@ __all__ = [
     "Counter", "CurrentMicrostep", "CurrentTime", "DRand", "DeadZone", "Default", "Derivative", "Difference",
     "DiscreteFilter", "Display", "DistanceMonitor", "Distribution", "Emitter", "EpicycleError", "Equals", "Estimate",
     "Exponential", "Expression", "Extreme", "Filter", "FilterDesign", "FilterError", "FilterPyEstimator",
-    "FirstOfInstant", "FirstOrder", "Function", "Gamma", "Generator", "GoalMonitor", "Histogram", "HoldingExpression",
+    "FirstOfInstant", "FirstOrder", "FlyingController", "FlyingVehicle", "Function", "Gamma", "Generator", "GoalMonitor", "Histogram", "HoldingExpression",
     "Hysteresis", "InertialSensor", "Inform", "Inhibit", "InputPort", "Integrator", "IsPresent", "JavaRandom", "Latest",
     "LatestOfAll", "Limiter", "Line", "Link", "LogNormal", "LogicGate", "LookupTable", "Machine", "MappingParameter",
     "Match", "MathFunction", "Measurement", "Merge", "ModalActor", "Mode", "Moment", "MostRecent", "MovingAverage",
