@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from operator import itemgetter
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -243,7 +243,7 @@ class RobustController(TargetModel, Actor):
         )
         return self.objective.pose(posed, points, weights), starts
 
-    def _flight(self) -> dict[str, float]:
+    def _flight(self) -> dict[str, Any]:
         """The limits that hold in space only, by their names in the problem."""
         return {}
 
@@ -256,8 +256,8 @@ class FlyingController(RobustController):
     """A ``RobustController`` in space, with limits of climbing and of the height.
 
     Speed and acceleration stay in ellipsoids (f1 and f2), as those of a ``FlyingVehicle`` do.  From the second step on,
-    the plan stays above ``lowest`` and below ``highest`` (f7).  The target moves on the ground if its estimate is one in
-    the plane, and so do peers whose plans are.
+    the plan stays above ``lowest`` and below ``highest`` (f7).  The target is on the ground if its estimate is in the
+    plane, and so are peers whose plans are.
     """
 
     _dimensions = 3
@@ -272,7 +272,7 @@ class FlyingController(RobustController):
         (None, 3), (), unit="m", doc="positions of other robots at time 0, used until their plans come"
     )
 
-    def _flight(self) -> dict[str, float]:
+    def _flight(self) -> dict[str, Any]:
         return {
             "climb_speed": self.climb_speed,
             "climb_acceleration": self.climb_acceleration,

@@ -17,7 +17,7 @@ DEVIATIONS = 2.0  # shown around an estimate
 
 
 def positions(signal: Signal) -> Rows:
-    """The positions in a signal, shape (n, 2): the tokens' ``position``, or tokens that are pairs x, y.
+    """The positions in a signal, shape (n, 2): the tokens' ``position``, seen from above, or tokens that are pairs x, y.
 
     Raises ``EpicycleError`` for other signals.
     """
@@ -28,8 +28,10 @@ def positions(signal: Signal) -> Rows:
 
 
 def _position(token: Any) -> Any:
-    found = token.position if hasattr(token, "position") else token["position"] if isinstance(token, dict) else token
-    x, y = found
+    if hasattr(token, "position"):
+        x, y = token.position[:2]
+    else:
+        x, y = token["position"] if isinstance(token, dict) else token
     return x, y
 
 
@@ -52,7 +54,7 @@ def tubes(signal: Signal, period: float, initial: float, growth: float) -> Rows:
     for token in signal.tokens:
         position, velocity = np.array(token.state.position[:2]), np.array(token.state.velocity[:2])
         row = [*position, initial]
-        for step, control in enumerate(np.asarray(token.controls, dtype=float), start=1):
+        for step, control in enumerate(np.asarray(token.controls, dtype=float)[:, :2], start=1):
             position = position + period * velocity + 0.5 * period * period * control
             velocity = velocity + period * control
             row += [*position, initial + growth * step]
@@ -64,8 +66,9 @@ def tubes(signal: Signal, period: float, initial: float, growth: float) -> Rows:
 def sights(signal: Signal) -> tuple[list[int], Rows]:
     """Measurements of a relative position as lines from the sensor to its target, and the indices of their tokens."""
     found = [
-        (number, (*token.observer, token.observer[0] + token.value[0], token.observer[1] + token.value[1]))
+        (number, (x, y, x + token.value[0], y + token.value[1]))
         for number, token in enumerate(signal.tokens)
-        if len(token.value) == 2
+        for x, y in [token.observer[:2]]
+        if len(token.value) == len(token.observer)
     ]
     return [number for number, _ in found], np.array([row for _, row in found], dtype=float).reshape(-1, 4)

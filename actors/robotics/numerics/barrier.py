@@ -25,7 +25,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .compiled import Array, borrower, inner
+from .compiled import Array, borrower
 from .constraints import BOUND, ROUNDING, VALUE
 from .entry import entry
 from .horizon import HorizonProblem
@@ -251,20 +251,18 @@ _SIGNATURE = (
 @entry(_SIGNATURE)
 def _solve_in_plane(*fields: Any) -> tuple[Array, float, float, int]:
     """The fields of the problem and the rules, and the starts."""
-    return _solve(HorizonProblem(*fields[:-5]), Rules(*fields[-5:-1]), fields[-1], (0.0, 0.0))
+    problem, rules, starts = HorizonProblem(*fields[:-5]), Rules(*fields[-5:-1]), fields[-1]
+    best, room = np.empty(starts.shape[1:]), np.empty(room_for(problem, starts.shape[1], 2))
+    violation, objective, iterations = _search(problem, rules, starts, best, room, (0.0, 0.0))
+    return best, violation, objective, iterations
 
 
 @entry(_SIGNATURE)
 def _solve_in_space(*fields: Any) -> tuple[Array, float, float, int]:
     """The same with vectors of three numbers, compiled when first needed."""
-    return _solve(HorizonProblem(*fields[:-5]), Rules(*fields[-5:-1]), fields[-1], (0.0, 0.0, 0.0))
-
-
-@inner
-def _solve(problem: HorizonProblem, rules: Rules, starts: Array, zero: Vector) -> tuple[Array, float, float, int]:
-    """``zero``, a vector of zeros, tells the number of dimensions."""
-    best, room = np.empty(starts.shape[1:]), np.empty(room_for(problem, starts.shape[1], len(zero)))
-    violation, objective, iterations = _search(problem, rules, starts, best, room, zero)
+    problem, rules, starts = HorizonProblem(*fields[:-5]), Rules(*fields[-5:-1]), fields[-1]
+    best, room = np.empty(starts.shape[1:]), np.empty(room_for(problem, starts.shape[1], 3))
+    violation, objective, iterations = _search(problem, rules, starts, best, room, (0.0, 0.0, 0.0))
     return best, violation, objective, iterations
 
 

@@ -17,7 +17,6 @@ from .vectors import (
     replaced,
     squared,
     symmetric_size,
-    write,
     zero_symmetric,
 )
 
@@ -60,39 +59,38 @@ def constraints_of(problem: HorizonProblem, spare: float, table: Array, zero: Ve
     count = 0
     for other in range(subjects(problem, d)):
         for s in range(2, steps):
-            place, covariance = zero, zero_symmetric(zero)
             margin = 0.0
             if other == 0:
-                kind, place, distance = NEAR, read(zero, problem.tube_centre, s, 0), problem.tube_radius[s]
+                kind, distance = NEAR, problem.tube_radius[s]
                 if not distance < math.inf:
                     continue
+                for c in range(d):
+                    table[count, PLACE + c] = problem.tube_centre[s, c]
             elif other <= obstacles:
                 kind, distance, margin = UNCERTAIN, problem.safe_distance, problem.margin
                 for c in range(d):
-                    place = replaced(place, c, problem.obstacle_mean[other - 1, s, c])
+                    table[count, PLACE + c] = problem.obstacle_mean[other - 1, s, c]
                 for c in range(symmetric_size(d)):
-                    covariance = replaced(covariance, c, problem.obstacle_covariance[other - 1, s, c])
+                    table[count, PLACE + d + c] = problem.obstacle_covariance[other - 1, s, c]
                 if margin == 0.0:
                     kind = AWAY
             elif other <= obstacles + peers:
                 i = other - 1 - obstacles
                 kind, distance = AWAY, problem.peer_distance[i, s]
                 for c in range(d):
-                    place = replaced(place, c, problem.peer_mean[i, s, c])
+                    table[count, PLACE + c] = problem.peer_mean[i, s, c]
             else:
                 kind, distance = LEVEL, 1.0 if other > obstacles + peers + 1 else -1.0
                 level = problem.highest if distance > 0.0 else problem.lowest
                 if not abs(level) < math.inf:
                     continue
-                place = replaced(place, d - 1, level)
+                table[count, PLACE + d - 1] = level
             most = distance
             if kind == UNCERTAIN:
-                most += margin * math.sqrt(max(_largest(covariance), 0.0))
-            if _within_reach(problem, kind, s, place, most, spare):
+                most += margin * math.sqrt(max(_largest(read(zero_symmetric(zero), table, count, PLACE + d)), 0.0))
+            if _within_reach(problem, kind, s, read(zero, table, count, PLACE), most, spare):
                 table[count, OTHER], table[count, WHEN], table[count, KIND] = other, s, kind
                 table[count, DISTANCE], table[count, MARGIN] = distance, margin
-                write(table, count, PLACE, place)
-                write(table, count, PLACE + d, covariance)
                 count += 1
     return count
 

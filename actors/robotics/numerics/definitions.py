@@ -2,9 +2,9 @@
 
 Nothing here is fast.  The compiled kernels are tested against this module, and the solver ``Casadi`` builds its program
 from it: the functions take arrays of numbers and arrays of symbols.  Lengths are in metres, times in seconds,
-information in nats.  Vectors have d numbers: 2 in the plane, 3 in space with the height last; a symmetric matrix
-is given by the rows of its upper triangle.  N is the number of prediction steps s = 1..N, a row of an array each; step s lies at t + tau, tau
-= s * period.
+information in nats.  Vectors have d numbers: 2 in the plane, 3 in space with the height last; a symmetric matrix is
+given by the rows of its upper triangle.  N is the number of prediction steps s = 1..N, a row of an array each; step s
+lies at t + tau, tau = s * period.
 """
 
 from __future__ import annotations
@@ -161,7 +161,8 @@ def constraints(problem: HorizonProblem, positions: Any) -> Any:
     """f3, f4 of each obstacle, f5 of each peer with their margins alpha * sigma, and in space f7, in m: satisfied where
     <= 0.
 
-    (1 + K + n, N - 2), or two rows more: the positions at steps 1 and 2 are decided before the first unknown control acts.
+    (1 + K + n, N - 2), or two rows more: the positions at steps 1 and 2 are decided before the first unknown control
+    acts.
     ``peer_distance`` of the problem is Dmin with the margin of f5.  sigma_1 to sigma_3 are zero.
     """
     rows = [f3(positions, problem.tube_centre, problem.tube_radius)]

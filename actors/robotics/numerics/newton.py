@@ -214,7 +214,8 @@ def _slid(h: float, A: Quadratic, B: Matrix) -> Quadratic:
 def newton_step(stages: Array, period: float, free: int, zero: Vector) -> float:
     """Write the step in the controls; returns gradient . step (negative), or 0 without a descent.
 
-    ``zero`` is a vector of zeros.  Only the first ``free`` controls are variables; the last of them is held from there on.
+    ``zero`` is a vector of zeros.  Only the first ``free`` controls are variables; the last of them is held from there
+    on.
 
     Backwards, the cost to go from step s is kept as a quadratic function of (dP, dV): A in dP, C in dV, and B, its
     mixed second derivatives, with rows for dP.  The control of step s enters dV of the next one, so it is minimised out

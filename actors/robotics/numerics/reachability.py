@@ -64,14 +64,14 @@ def peer_tubes(
 ) -> tuple[Array, Array]:  # fmt: skip
     """f5: the positions of n peers at steps 1..N from now on (n, N, d), and the distances to keep from them (n, N).
 
-      Each row of ``plans`` is one plan: the time (s) when it was made, its number of dimensions, the number of controls,
-      the position and the velocity then, and the controls, the accelerations from then on; after the last one, the
-      velocity is kept.  Where the peer has fewer dimensions than the robot, it is on the ground.  Where it has more, what
-      the robot has to keep away from is the circle that the sphere around the peer cuts from the ground.
-    To the ``radius`` (N,) of eq. (3), eq.
-      (4) adds ``growth`` for every period since then except one, which is normal latency.  Plans older than ``OLDEST``
-      count as that old: the distance to keep exceeds any information in them.  For a peer whose periods begin at other
-      times, the position between two of its steps is used.
+    Each row of ``plans`` is one plan: the time (s) when it was made, its number of dimensions, the number of controls,
+    the position and the velocity then, and the controls, the accelerations from then on; after the last one, the
+    velocity is kept.  Where the peer has fewer dimensions than the robot, it is on the ground.  Where it has more, the
+    robot keeps out of the circle that the sphere around the peer cuts from the ground.
+
+    To the ``radius`` (N,) of eq. (3), eq. (4) adds ``growth`` for every period since then except one, which is normal
+    latency.  Plans older than ``OLDEST`` count as that old: the distance to keep exceeds any information in them.  For
+    a peer whose periods begin at other times, the position between two of its steps is used.
     """
     count, steps = plans.shape[0], radius.shape[0]
     positions, distances = np.zeros((count, steps, dimensions)), np.empty((count, steps))
@@ -143,7 +143,8 @@ def _after(mean: Array, covariance: Array, noise: Array, periods: float, period:
 
 
 @entry(
-    "Tuple((f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1], f8[::1]))(f8[::1], f8[:, ::1], f8[:, ::1], b1, f8, f8, f8, i8, i8)"
+    "Tuple((f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1], f8[::1]))(f8[::1], f8[:, ::1], f8[:, ::1], b1, f8, f8, f8, i8, "
+    "i8)"
 )
 def expected_target(
     mean: Array, covariance: Array, noise: Array, is_widened: bool, kappa: float, period: float, elapsed: float,

@@ -112,14 +112,16 @@ def _symmetrise(a: Array) -> None:
 @borrower
 def dimensions_of(measurements: Array) -> int:
     """The dimensions of the observers in a table of measurements."""
-    return (measurements.shape[1] - 3) // 2
+    d: int = (measurements.shape[1] - 3) // 2
+    return d
 
 
 @borrower
 def _away(points: Array, i: int, measurements: Array, m: int, c: int) -> float:
     """How far a point is from an observer along an axis."""
     there = points[i, c] if c < max(2, points.shape[1] // 2) else 0.0
-    return there - measurements[m, _OBSERVER + c]
+    away: float = there - measurements[m, _OBSERVER + c]
+    return away
 
 
 @kernel
@@ -146,8 +148,9 @@ def predict(mean: Array, covariance: Array, transition: Array, process_noise: Ar
 
 @kernel
 def measurement_noise(points: Array, weights: Array, measurements: Array) -> Array:
-    """Covariances (m, d (d + 1) / 2), upper triangles, of measurements (m, 3 + 2 d) of a target at ``points`` (M, n); of
-    a range the first number counts.
+    """Covariances (m, d (d + 1) / 2), upper triangles, of measurements (m, 3 + 2 d) of a target at ``points`` (M, n).
+
+    Of a range, the first number counts.
 
     A relative position has one deviation (sigma_d) on the line of sight and another (sigma_b) across it, so its
     covariance depends on where the target is.  It is averaged over the points.  With the sigma points it is the

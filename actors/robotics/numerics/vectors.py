@@ -35,9 +35,9 @@ def replaced(values: Vector, place: int, value: float) -> Vector:
     return (*values[:place], value, *values[place + 1 :])
 
 
-@_extending.overload(replaced, strict=False)
+@_extending.overload(replaced, strict=False)  # type: ignore[untyped-decorator]
 def _replaced(values: Any, place: Any, value: Any) -> Any:
-    return lambda values, place, value: _set(values, place, value)
+    return lambda values, place, value: _set(values, place, value)  # noqa: PLW0108 - numba reads its names
 
 
 @inlined

@@ -14,8 +14,8 @@ from tests.actors.robotics.numerics.numerics_parts import (
     PREFIX,
     inform_problem,
     negative_information,
-    packed,
     objective_by_definition,
+    packed,
     solve,
     spread,
 )

@@ -53,7 +53,7 @@ def records() -> list[Any]:
 
 
 def test_what_lies_in_a_plane_is_solved_as_in_the_plane(records: list[Any]) -> None:
-    """Nothing draws the plan out of the plane.  Steps on the way may differ, and with them the optimum that is found."""
+    """Nothing draws the plan out of the plane.  Steps on the way may differ, and so may the optimum that is found."""
     same = near = 0
     for problem, starts, ours in records:
         found = barrier.solve(in_space(problem, 3.0), lifted(starts))
@@ -92,9 +92,9 @@ def flight(random: np.random.Generator, informs: bool) -> "horizon.HorizonProble
         tube_radius=0.5 + 0.4 * np.arange(1, STEPS + 1),
         safe_distance=1.5,
         margin=1.0,
-        obstacle_mean=np.concatenate([problem.obstacle_mean, np.tile(own + [-2.5, -2.0, 0.5], (1, STEPS, 1))]),
+        obstacle_mean=np.concatenate([problem.obstacle_mean, np.tile(own + np.array([-2.5, -2.0, 0.5]), (1, STEPS, 1))]),
         obstacle_covariance=np.concatenate([problem.obstacle_covariance, np.tile(covariance, (1, STEPS, 1))]),
-        peer_mean=np.tile(own + [0.5, -2.6, -0.5], (1, STEPS, 1)),
+        peer_mean=np.tile(own + np.array([0.5, -2.6, -0.5]), (1, STEPS, 1)),
         peer_distance=np.full((1, STEPS), 1.5),
     )
     if informs:
