@@ -22,6 +22,7 @@ from ..language import (
     inherit,
     joined,
     load_disturbances,
+    only_acts,
     read_model,
     read_overrides,
     settings_of,
@@ -58,7 +59,8 @@ def load_model(
     ``{"observer[*].sensor.range": 5}``; ``overrides`` names a YAML file of such settings, or several; of several that
     match a parameter, the last one wins, and ``set`` wins over files.  ``disturb`` names packaged disturbances, or
     files of aspects, which are added to the model's aspects one after the other; ``without_aspects`` and ``aspects``
-    apply after that, and all settings win over what a disturbance sets.  ``types`` are your own actor and aspect
+    apply after that, and all settings win over what a disturbance sets.  A setting, too, is the list of the only acts
+    of aspects that happen, ``exactly=[{aspect: ..., at: ..., token: ...}]``.  ``types`` are your own actor and aspect
     classes, which the model may name besides the installed ones. ``max_actors`` is the limit for actors and composites,
     and a fifth of the limit for connections.  ``Model.warnings`` holds what is odd but not wrong.
     """
@@ -76,7 +78,7 @@ def load_model(
         check_usage(text, declared, composites, catalogue.actors, problems)
         # What is changed from outside; settings of disturbances come first, because the last one wins.
         text, set_by_them = add_disturbances(text, disturbances, problems)
-        settings = set_by_them + settings
+        text, settings = only_acts(text, set_by_them + settings, problems)
         for change in without_aspects:
             text = without(text, change, problems)
         for change in aspects:

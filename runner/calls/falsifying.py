@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import shlex
+from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import asdict
 from pathlib import Path
@@ -16,10 +17,11 @@ from ..bars import bar
 from ..build import load_model
 from ..catalogue import types_of_file
 from ..engine import Acts, Simulation
-from ..language import Setting, split_number
+from ..graph import ActName
+from ..language import EXACTLY, Setting, split_number
 from ..provenance import version_of
 from ..results import Verdict
-from ..search import Asked, Findings, Interval, Run
+from ..search import Asked, FaultSpace, Findings, Interval, Run
 from ..search import falsify as search
 from ..shown import finite, short
 from ..study import OK, StudyResults, open_study
@@ -151,9 +153,9 @@ class Falsified(Tabled):
         commands = [("repeat it", shlex.join(self.command)), ("explain it", shlex.join(self.explain))]
         known = [each for each in self.findings.runs if each.robustness is not None]
         least = sorted(known, key=lambda each: (each.robustness or 0.0, each.number))[:SHOWN]
-        head = ("run", *(axis.path for axis in self.findings.space.axes), "seed", "robustness")
+        head = ("run", *self.findings.space.columns, "seed", "robustness")
         runs = [
-            (str(each.number), *(value for _, value in _settings(each)), str(each.seed), short(each.robustness))
+            (str(each.number), *(value for _, value in _words(each)), str(each.seed), short(each.robustness))
             for each in least
         ]
         return [Table(("to", "command"), [each for each in commands if each[1]]), Table(head, runs)]
@@ -164,6 +166,7 @@ def falsify(
     monitor: str,
     *,
     vary: Iterable[str] | Mapping[str, object] = (),
+    acts: int = 0,
     runs: int = 500,
     seed: int = 0,
     out: str | Path | None = None,
@@ -177,8 +180,10 @@ def falsify(
     """Look for a run that breaks a monitor of a model, or a property that is given as a text.
 
     What is in ``vary`` is searched: ``{"load": "0.5..0.9", "policy": ["fifo", "lifo"]}``.  Run number n has the seed
-    ``seed + n - 1``.  All runs are kept in a folder (default: results/MODEL/falsification), where a search that was
-    killed continues.  That nothing is found does not show that the property holds.
+    ``seed + n - 1``.  With ``acts``, all runs have the same seed, and sets of at most so many single acts of aspects
+    (losses, delays, failures) are searched, of those that happen in the run of that seed.  All runs are kept in a
+    folder (default: results/MODEL/falsification), where a search that was killed continues.  That nothing is found does
+    not show that the property holds.
 
     >>> epicycle.falsify("mm1", "always server.size < 40", vary={"load": "0.5..0.9"}, runs=100).sentence
     """
@@ -193,6 +198,7 @@ def falsify(
         tuple(as_settings(set)),
         tuple(map(str, given)),
         tuple(map(Path, types)),
+        acts=acts,
     )
     return falsified(asked, out, jobs=jobs, timeout=run_timeout, progress=progress)
 
@@ -238,8 +244,23 @@ def _text(node: Node) -> str:
     return json.dumps(plain(node))
 
 
+def _acts(setting: Setting) -> list[ActName]:
+    """The acts that a setting lets happen."""
+    said: Any = plain(setting.node)
+    return [ActName(each["aspect"], each["at"], each["token"]) for each in said]
+
+
+def _words(run: Run) -> Iterator[tuple[str, str]]:
+    """What a run was given, for people."""
+    for setting in run.level.settings:
+        if setting.path == EXACTLY:
+            yield setting.path, "; ".join(map(str, _acts(setting))) or "no act"
+        else:
+            yield setting.path, _text(setting.node)
+
+
 def _said(run: Run) -> str:
-    given = ", ".join(f"{path}={value}" for path, value in _settings(run))
+    given = ", ".join(f"exactly {value}" if path == EXACTLY else f"{path}={value}" for path, value in _words(run))
     return f"{given} and seed {run.seed}" if given else f"seed {run.seed}"
 
 
@@ -253,7 +274,12 @@ def _covered(found: Findings) -> Iterator[str]:
     yield counted(len(runs), "run")
     if not runs:
         return
-    yield f"seeds {runs[0].seed} to {runs[-1].seed}" if len(runs) > 1 else f"seed {runs[0].seed}"
+    yield f"seeds {runs[0].seed} to {runs[-1].seed}" if runs[-1].seed > runs[0].seed else f"seed {runs[0].seed}"
+    if isinstance(found.space, FaultSpace):
+        made = Counter(len(_acts(each.level.settings[0])) for each in runs)
+        for size, of_size in enumerate(found.space.sizes()):
+            if made[size]:
+                yield f"{made[size]:,} of {of_size:,} sets of {counted(size, 'act')}" if size else "no act at all"
     for at, axis in enumerate(found.space.axes):
         nodes = [each.level.settings[at].node for each in runs]
         if isinstance(axis, Interval):

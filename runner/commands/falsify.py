@@ -21,6 +21,13 @@ def runs(text: str) -> int:
     option("model", metavar="MODEL", help="a path to a YAML file, or the name of a packaged model"),
     searching.monitor("always clearance.distance >= 2 m"),
     searching.VARY,
+    option(
+        "--acts",
+        type=whole(1, 10),
+        metavar="N",
+        default=0,
+        help="search the single acts of aspects (losses, delays, failures) in the run of the seed: sets of at most N",
+    ),
     searching.SET,
     DISTURB,
     option("--runs", type=runs, metavar="N", default=500, help="number of runs at most (default: 500)"),
@@ -51,6 +58,7 @@ def falsify(options: argparse.Namespace) -> int:
         tuple(options.disturb),
         tuple(map(Path, options.types)),
         tuple(options.given),
+        options.acts,
     )
 
     def code(found: Falsified) -> int:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 
 from epicycle.actors import NEVER
 
+from ..results import STOP_TIME
 from .errors import ActorError, LoopError, of_process
 from .pace import notice
 
@@ -60,7 +61,7 @@ def handle_events(
         if upcoming > last_time:
             if pace is not None:
                 pace.wait_for(last_time)
-            return "stop time"
+            return STOP_TIME
         if upcoming > now:
             if director.watch is not None and director.watch(upcoming):
                 break

@@ -15,7 +15,7 @@ from ..build import Model
 from ..collection import seldom_collecting, without_collection
 from ..graph import WovenAspect
 from ..interrupt import between_steps
-from ..results import EventLog, Record, Results, Signal, Verdict
+from ..results import STOP_TIME, EventLog, Record, Results, Signal, Verdict
 from ..text import describe, raised_at
 from .acts import Acts
 from .copies import Copies
@@ -271,7 +271,7 @@ class Run:
 
     def _end(self, stopped: str) -> int:
         end = self.director.last.time
-        if stopped == "stop time" and self._stop is not None:
+        if stopped == STOP_TIME and self._stop is not None:
             end = max(end, self._stop)  # the values at the last event last until then
         return end
 

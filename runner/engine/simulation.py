@@ -12,7 +12,7 @@ from epicycle.aspects import Aspect
 from ..build import Model
 from ..collection import without_collection
 from ..graph import WovenAspect
-from ..results import EventLog, Record, Results, Signal, Verdict
+from ..results import STOP_TIME, EventLog, Record, Results, Signal, Verdict
 from ..tables import Table, Tabled
 from .acts import Acts
 from .copies import Copies
@@ -144,7 +144,7 @@ class Simulation(Tabled):
         self._refuse_over()
         stop, last = to_nanoseconds(until), self.model.stop_time
         is_last = last is not None and stop >= last
-        return self._run.go(last if is_last else stop) == "stop time" and not is_last
+        return self._run.go(last if is_last else stop) == STOP_TIME and not is_last
 
     def reach(self, robustness: Mapping[str, float], *, until: float | None = None) -> bool:
         """Go on until the ``robustness`` of one of these monitors is at most the number given; whether one is.

@@ -28,12 +28,14 @@ from .dimensions import (
 )
 from .disturbance import (
     COMPOSITE_THERE,
+    EXACTLY,
     PARAMETER_THERE,
     Disturbance,
     add_disturbances,
     joined,
     load_disturbance,
     load_disturbances,
+    only_acts,
 )
 from .files import read_library, read_model
 from .inheritance import inherit
@@ -51,6 +53,7 @@ __all__ = [
     "ASPECTS",
     "COMPOSITE_THERE",
     "CONSTRUCTS",
+    "EXACTLY",
     "FALLS",
     "GREATER",
     "MAX_REPLICATIONS",
@@ -103,6 +106,7 @@ __all__ = [
     "load_disturbance",
     "load_disturbances",
     "number_node",
+    "only_acts",
     "parse_setting",
     "read_library",
     "read_model",

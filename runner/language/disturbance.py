@@ -25,6 +25,7 @@ class Disturbance:
     exactly: tuple[ActText, ...] | None = None
 
 
+EXACTLY = "exactly"
 T = TypeVar("T", CompositeText, ParameterText)
 PARAMETER_THERE, COMPOSITE_THERE = "the model already has a parameter {!r}", "there is already a composite {!r}"
 
@@ -76,7 +77,7 @@ DISTURBANCE = Construct(
         "parameters": PARAMETERS,
         "composites": COMPOSITES,
         "aspects": Key(parts("aspect", "added_aspect"), ASPECTS.doc),
-        "exactly": Key(
+        EXACTLY: Key(
             Shape({"type": ["array", "null"], "items": ref("act")}, _acts),
             "The only acts of aspects that happen, these and the model's own: a list of {aspect, at, token}.",
         ),
@@ -103,7 +104,7 @@ def _declared(node: Node, problems: Problems) -> Disturbance | None:
         return None
     before = len(problems)
     said = DISTURBANCE.values(reader, entries, "the disturbance", node.position)
-    composites, settings, exactly = said.pop("composites", {}), said.pop("set", ()), said.pop("exactly", None)
+    composites, settings, exactly = said.pop("composites", {}), said.pop("set", ()), said.pop(EXACTLY, None)
     text = CompositeText(said.pop("name", "disturbance"), node.position, **said)
     if len(problems) == before:
         check_own_usage(text, problems)
@@ -138,6 +139,18 @@ def add_disturbances(
         settings += disturbance.settings
         if disturbance.exactly is not None:
             text = replace(text, exactly=(*(text.exactly or ()), *disturbance.exactly))
+    return text, settings
+
+
+def only_acts(text: ModelText, settings: list[Setting], problems: Problems) -> tuple[ModelText, list[Setting]]:
+    """A model of whose acts the setting ``exactly`` lets only some happen, and the other settings.
+
+    A model's own parameter with that name comes first.
+    """
+    found = [] if EXACTLY in text.root.parameters else [each for each in settings if each.path == EXACTLY]
+    if found:
+        text = replace(text, exactly=_acts(NodeReader(problems), found[-1].node, EXACTLY))
+        settings = [each for each in settings if each.path != EXACTLY]
     return text, settings
 
 

@@ -5,12 +5,13 @@ from .encoding import TokenError, canonical, cell, leaves, plain
 from .log import EventLog, LogError, Names, Record, Writer
 from .log_file import LogFile, check_log_path, write_log
 from .outcome import Interval, Outcome
-from .results import Results
+from .results import STOP_TIME, Results
 from .samples import Past, Samples
 from .signal import Signal, SignalError
 from .verdict import Verdict
 
 __all__ = [
+    "STOP_TIME",
     "EventLog",
     "Interval",
     "LogError",

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     import pandas
 
 
+STOP_TIME = "stop time"  # what ended a run that came to its stop time
 COLUMNS = ("time", "time_ns", "microstep", "signal", "field", "type", "value", "text")  # of recorded signals
 
 

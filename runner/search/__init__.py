@@ -3,6 +3,7 @@
 from .calibrating import Calibration, Fitted, Match, Task, calibrate
 from .explaining import Effect, Explanation, Step, explain
 from .falsifying import MAX_RUNS, Asked, Findings, Run, falsify
+from .faults import FaultSpace
 from .minimal import minimal
 from .monitored import AD_HOC, monitor_named
 from .optimising import MAX_POINTS, Goal, Optimum, Outcome, Tested, optimise
@@ -18,6 +19,7 @@ __all__ = [
     "Calibration",
     "Effect",
     "Explanation",
+    "FaultSpace",
     "Findings",
     "Fitted",
     "Goal",

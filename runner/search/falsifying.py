@@ -8,13 +8,15 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from epicycle.actors import EpicycleError, counted
+from epicycle.actors import EpicycleError
 
-from ..build import load_model
+from ..build import Model, load_model
 from ..catalogue import types_of_file
+from ..engine import Acts, Simulation
 from ..language import Level, study_of_text
 from ..study import OK, Search, Trials, available_cores, open_trials
 from ..text import Problems
+from .faults import FaultSpace
 from .growing import Growing, place_of, text_of
 from .monitored import AD_HOC, monitor_named, property_of
 from .proposals import BATCH, SPREAD, Point, is_guided, proposals
@@ -38,6 +40,7 @@ class Asked:
     disturb: Sequence[str] = ()
     types: Sequence[Path] = ()
     command: Sequence[str] = ()
+    acts: int = 0  # the largest number of acts of aspects in a run; 0: all that happen
 
 
 @dataclass(frozen=True)
@@ -62,7 +65,7 @@ class Findings:
     model: str
     monitor: str
     source: str  # its property
-    space: Space
+    space: Space | FaultSpace
     guided: bool
     runs: list[Run] = field(default_factory=list)
     broken: Run | None = None  # the first run that breaks the property
@@ -137,26 +140,48 @@ class _Searching:
         problems = Problems()
         space = read_space(asked.vary, model, metrics, asked.set, problems)
         problems.raise_if_any()
-        if asked.runs * len(space.axes) > MAX_POINTS:
-            most = MAX_POINTS // len(space.axes)
+        searched = space if not asked.acts else self._faults(model)
+        if asked.runs * searched.width > MAX_POINTS:
+            most = MAX_POINTS // searched.width
             raise EpicycleError(
-                f"{asked.runs:,} runs are too many for one folder, where {counted(len(space.axes), 'parameter')} "
-                f"may take {most:,} values each\n   help: search with --runs {most} and several seeds, in a folder each"
+                f"{asked.runs:,} runs are too many for one folder, where {searched.content} may take {most:,} values "
+                f"each\n   help: search with --runs {most} and several seeds, in a folder each"
             )
         keys = self._keys(model.name)
         study = study_of_text(text_of(keys, []), FILE, asked.set, asked.types)
-        self.growing = Growing(study, keys, space, Search(runs=asked.runs, command=list(asked.command)))
+        self.growing = Growing(study, keys, searched, Search(runs=asked.runs, command=list(asked.command)))
         guided = is_guided() and any(isinstance(axis, Interval) for axis in space.axes)
-        self.findings = Findings(model.name, self._monitor, source, space, guided)
-        self._proposals = proposals(len(space.axes), asked.seed, guided)
+        self.findings = Findings(model.name, self._monitor, source, searched, guided)
+        self._proposals = (
+            searched.proposals(asked.seed)
+            if isinstance(searched, FaultSpace)
+            else proposals(len(space.axes), asked.seed, guided)
+        )
         self._latest: list[float | None] | None = None
 
+    def _faults(self, model: Model) -> FaultSpace:
+        """The acts that happen in the run of the seed."""
+        asked = self._asked
+        if asked.vary:
+            raise EpicycleError(
+                "acts are searched in one run, in which nothing varies\n   help: leave out --vary or --acts"
+            )
+        acts = Simulation(model, seed=asked.seed, acts=Acts(model.exactly)).run().acts
+        if not acts:
+            raise EpicycleError(
+                f"no aspect does anything in the run of {model.name} with seed {asked.seed}\n   help: add --disturb"
+            )
+        return FaultSpace([act.name for act in acts], asked.acts)
+
     def next(self) -> list[Point]:
-        """The points of the next batch; none if there are as many runs as were asked for."""
+        """The points of the next batch; none if there are as many runs as were asked for, or no others."""
         left = self._asked.runs - len(self.findings.runs)
         if left <= 0:
             return []
-        points = next(self._proposals) if self._latest is None else self._proposals.send(self._latest)
+        try:
+            points = next(self._proposals) if self._latest is None else self._proposals.send(self._latest)
+        except StopIteration:
+            return []
         return points[:left]
 
     def make(self, points: Sequence[Point], made: Trials, tell: Callable[[], None]) -> None:
@@ -166,7 +191,9 @@ class _Searching:
         self.growing.tell(made)
         order = list(distinct)
         start = len(found.runs)
-        numbers = [(order.index(place_of(level)), start + at) for at, level in enumerate(levels)]
+        # Acts are those of one run, which has the first seed.
+        step = 0 if self._asked.acts else 1
+        numbers = [(order.index(place_of(level)), step * (start + at)) for at, level in enumerate(levels)]
         rows = made.made(self.growing.plan(list(distinct.values())), numbers, tell)
         for at, (level, row) in enumerate(zip(levels, rows, strict=True), start=1):
             holds = row[found.monitor]

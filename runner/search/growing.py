@@ -10,6 +10,7 @@ import yaml
 
 from ..language import Level, Study
 from ..study import Plan, Search, Trials
+from .faults import FaultSpace
 from .proposals import Point
 from .space import Space, said
 
@@ -29,7 +30,7 @@ class Growing:
     ``keys`` are what its file says.  Raises ``ModelError`` unless the model loads at the ends of the space.
     """
 
-    def __init__(self, study: Study, keys: Mapping[str, Any], space: Space, search: Search) -> None:
+    def __init__(self, study: Study, keys: Mapping[str, Any], space: Space | FaultSpace, search: Search) -> None:
         tried = Plan.made(replace(study, dimensions=(*space.ends(), *study.dimensions)))
         extra = {name: digest for each in tried.extra for more in each.values() for name, digest in more.items()}
         self.study = study

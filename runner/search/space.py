@@ -8,7 +8,7 @@ from collections.abc import Sequence as Many
 from dataclasses import dataclass
 from decimal import Decimal
 
-from epicycle.actors import UnitError, declared_parameters, parse_unit
+from epicycle.actors import UnitError, counted, declared_parameters, parse_unit
 
 from ..build import Model
 from ..language import (
@@ -107,6 +107,8 @@ class Space:
 
     def __init__(self, axes: Many[Axis]) -> None:
         self.axes = tuple(axes)
+        self.width = len(self.axes)  # numbers in the text of a study that a point takes
+        self.content = counted(len(self.axes), "parameter")
 
     @property
     def columns(self) -> dict[str, str]:

@@ -25,7 +25,7 @@ from epicycle.actors.expression import PortFormula, PortFormulaParameter
 
 from ...build import Complaint, Model, figures_of
 from ...catalogue import Figure
-from ...results import Results
+from ...results import STOP_TIME, Results
 from ...study import Plan, half_width
 from ...text import Problems
 from ..pen import FORMATS, draw
@@ -100,7 +100,7 @@ class Series(RepeatedFigure):
                 )
             values.append(float(value))
         # The last value holds until the stop time, even if nothing else happens.
-        end = results.end if results.stopped != "stop time" or model.stop is None else model.stop
+        end = results.end if results.stopped != STOP_TIME or model.stop is None else model.stop
         return signal.times, np.array(values), end
 
     def draw(self, data: Data, extracts: Mapping[RunKey, Any], paths: Sequence[Path]) -> str:
