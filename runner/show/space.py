@@ -17,7 +17,7 @@ DEVIATIONS = 2.0  # shown around an estimate
 
 
 def positions(signal: Signal) -> Rows:
-    """The positions in a signal, shape (n, 2): the tokens' ``position``, seen from above, or tokens that are pairs x, y.
+    """The positions in a signal, shape (n, 2): the tokens' ``position`` from above, or tokens that are pairs x, y.
 
     Raises ``EpicycleError`` for other signals.
     """

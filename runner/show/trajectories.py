@@ -87,6 +87,8 @@ class Trajectories(Figure):
         shades = colours(len(robots))
         for index, (name, shade) in enumerate(zip(robots, shades, strict=True)):
             self._path(sheet, results.signals[name], shade, is_first=index == 0, named=len(robots) <= FEW)
+        from matplotlib.patches import Circle
+
         for x, y, radius, height in self.occluders.tolist():
             axes.add_patch(Circle((x, y), radius, facecolor="0.75", edgecolor="0.4", zorder=1))
             axes.annotate(f"{height:g} m", (x, y), ha="center", va="center", fontsize=7, zorder=2)

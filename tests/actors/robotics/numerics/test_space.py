@@ -74,7 +74,7 @@ def flight(random: np.random.Generator, informs: bool) -> "horizon.HorizonProble
     plane, steps = inform_problem(random, STEPS, reach=4.0), np.arange(STEPS)[:, np.newaxis]
     problem = in_space(plane)
     own, velocity = np.array([6.0, 5.0, 4.0]), random.uniform(-3.0, 3.0, size=3) * [1.0, 1.0, 0.3]
-    coasting = own + 0.1 * steps * velocity
+    coasting, other = own + 0.1 * steps * velocity, own + np.array([-2.5, -2.0, 0.5])
     points = np.ascontiguousarray(problem.sigma_positions)
     ends = np.tile(random.normal(scale=6.0, size=(2, 1, 3)), (1, STEPS, 1))
     cloud = np.linalg.cholesky(0.02 * spread(random, 3))
@@ -92,7 +92,7 @@ def flight(random: np.random.Generator, informs: bool) -> "horizon.HorizonProble
         tube_radius=0.5 + 0.4 * np.arange(1, STEPS + 1),
         safe_distance=1.5,
         margin=1.0,
-        obstacle_mean=np.concatenate([problem.obstacle_mean, np.tile(own + np.array([-2.5, -2.0, 0.5]), (1, STEPS, 1))]),
+        obstacle_mean=np.concatenate([problem.obstacle_mean, np.tile(other, (1, STEPS, 1))]),
         obstacle_covariance=np.concatenate([problem.obstacle_covariance, np.tile(covariance, (1, STEPS, 1))]),
         peer_mean=np.tile(own + np.array([0.5, -2.6, -0.5]), (1, STEPS, 1)),
         peer_distance=np.full((1, STEPS), 1.5),
