@@ -127,6 +127,9 @@ class RobustController(TargetModel, Actor):
     covariance_noise = Parameter(
         bool, True, doc="whether process noise widens the target's predicted covariance, in f4 and in eq. (5)"
     )
+    keep_out = array_parameter(
+        (None, 3), (), unit="m", doc="places that stand in the way: x, y, and the distance to keep from there"
+    )
     peers_at_start = array_parameter(
         (None, 2), (), unit="m", doc="positions of other robots at time 0, used until their plans come"
     )
@@ -158,6 +161,8 @@ class RobustController(TargetModel, Actor):
         # target.
         no_means, no_covariances = (np.empty((0, self._steps, columns)) for columns in (d, d * (d + 1) // 2))
         self._nobody = no_means, no_covariances, np.empty((0, d)), np.empty(0)
+        places, apart = self.keep_out[:, np.newaxis, :2], self.keep_out[:, 2:]
+        self._standing_there = np.repeat(places, self._steps, axis=1), np.repeat(apart, self._steps, axis=1)
         self._limits = self._flight()
         self._applied = np.zeros(d)  # U_t
         self._standing = self._nothing = _Standing(-math.inf, np.zeros(d), np.zeros(d), np.zeros((self._steps, d)))
@@ -241,7 +246,13 @@ class RobustController(TargetModel, Actor):
             peer_distance=peer_distance,
             **self._limits,
         )
-        return self.objective.pose(posed, points, weights), starts
+        posed = self.objective.pose(posed, points, weights)
+        if len(self.keep_out):  # as f5, but nobody who measures
+            there, apart = self._standing_there
+            posed = posed._replace(
+                peer_mean=np.concatenate((peer_mean, there)), peer_distance=np.concatenate((peer_distance, apart))
+            )
+        return posed, starts
 
     def _flight(self) -> dict[str, Any]:
         """The limits that hold in space only, by their names in the problem."""
@@ -264,6 +275,7 @@ class FlyingController(RobustController):
 
     control = OutputPort(np.ndarray, shape=(3,), doc="m/s^2, for the period after this one")
 
+    keep_out = array_parameter((0, 3), (), unit="m", doc="none: it flies above what stands in the way")
     climb_speed = Parameter(float, 4.0, unit="m/s", above=0, doc="largest vertical speed, up and down")
     climb_acceleration = Parameter(float, 4.0, unit="m/s^2", above=0, doc="largest vertical acceleration")
     lowest: Parameter[float | None] = Parameter(float, 1.0, unit="m", doc="height to stay above; none if null")

@@ -140,7 +140,7 @@ def test_log_formats(tmp_path: Path, ending: str) -> None:
             (
                 "error: there is no packaged model 'colision_avoidance', did you mean 'collision_avoidance'?\n"
                 "   help: packaged models: bouncing_ball, bouncing_modes, car_wash, collision_avoidance, feedback, "
-                "inspection_paradox, lift_group, machine_shop, manufacturing_cell, mg1, mm1, pid_loop, "
+                "flying_observers, inspection_paradox, lift_group, machine_shop, manufacturing_cell, mg1, mm1, pid_loop, "
                 "searching_robot, switched_network, thermostat, traffic_light, warehouse, waypoints; "
                 "a path to a file ends in .yaml\n"
             ),
