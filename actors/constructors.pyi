@@ -33,11 +33,15 @@ from .resources.line import WaitingLine as _WaitingLine
 from .resources.pool import Pool as _Pool
 from .resources.stations import Machine as _Machine, Station as _Station
 from .robotics.controller import FlyingController as _FlyingController, RobustController as _RobustController
+from .robotics.detecting import MultiTargetSensor as _MultiTargetSensor
 from .robotics.estimator import UnscentedEstimator as _UnscentedEstimator
 from .robotics.filterpy_estimator import FilterPyEstimator as _FilterPyEstimator
-from .robotics.monitors import DistanceMonitor as _DistanceMonitor, GoalMonitor as _GoalMonitor, SeparationMonitor as _SeparationMonitor
-from .robotics.planning import Barrier as _Barrier, Casadi as _Casadi, Inform as _Inform, Objective, ReachGoal as _ReachGoal, Solver
-from .robotics.world import BroadcastChannel as _BroadcastChannel, CircularMotion as _CircularMotion, FlyingVehicle as _FlyingVehicle, Sensor as _Sensor, Vehicle as _Vehicle
+from .robotics.monitors import ClearanceMonitor as _ClearanceMonitor, DistanceMonitor as _DistanceMonitor, GoalMonitor as _GoalMonitor, SeparationMonitor as _SeparationMonitor
+from .robotics.motion import WaypointMotion as _WaypointMotion
+from .robotics.planning import Barrier as _Barrier, Casadi as _Casadi, Inform as _Inform, Objective, ReachGoal as _ReachGoal, Solver, StayNear as _StayNear
+from .robotics.tracker import JPDATracker as _JPDATracker
+from .robotics.tracking_error import TrackingError as _TrackingError
+from .robotics.world import BroadcastChannel as _BroadcastChannel, CircularMotion as _CircularMotion, Flooding as _Flooding, FlyingVehicle as _FlyingVehicle, Sensor as _Sensor, Vehicle as _Vehicle
 from .sinks import Display as _Display, Histogram as _Histogram, Recorder as _Recorder, Stop as _Stop, Test as _Test
 from .sources import Clock as _Clock, PoissonClock as _PoissonClock, Random as _Random, SingleEvent as _SingleEvent, VaryingRandom as _VaryingRandom
 from .statistics import MovingAverage as _MovingAverage, MovingStatistics as _MovingStatistics
@@ -135,6 +139,10 @@ class Choice(_Choice):
 class CircularMotion(_CircularMotion):
     """A body on a circle of radius `speed / turn_rate` (Table III), computed from the time alone."""
     def __init__(self, path: str, *, start: _Row = ..., speed: _Number = ..., turn_rate: _Number = ..., heading: _Number = ...) -> None: ...
+
+class ClearanceMonitor(_ClearanceMonitor):
+    """The distance from a body to the nearest of several others that come and go."""
+    def __init__(self, path: str) -> None: ...
 
 class Clock(_Clock):
     """Ticks at fixed times without drift: in cycle k at `offset + k * period` plus each of `offsets`."""
@@ -236,9 +244,13 @@ class FirstOrder(_FirstOrder):
     """A first-order lag, `1 / (T s + 1)`, for an input held from sample to sample: exponential smoothing."""
     def __init__(self, *, time_constant: _Number, period: _Number) -> None: ...
 
+class Flooding(_Flooding):
+    """Sends the messages of its robot, and repeats those of others for the robots that are out of their reach."""
+    def __init__(self, path: str) -> None: ...
+
 class FlyingController(_FlyingController):
     """A `RobustController` in space, with limits of climbing and of the height."""
-    def __init__(self, path: str, *, keep_out: _Rows = ..., climb_speed: _Number = ..., climb_acceleration: _Number = ..., lowest: _Number = ..., highest: _Number | None = ..., peers_at_start: _Rows = ..., objective: Objective | abc.Mapping[str, object] = ..., solver: Solver | abc.Mapping[str, object] = ..., max_speed: _Number = ..., max_acceleration: _Number = ..., horizon: _Whole = ..., horizon_from: Literal['now', 'decision'] = ..., period: _Number = ..., safe_distance: _Number = ..., margin: _Number = ..., tube_initial: _Number = ..., tube_growth: _Number = ..., tube_time: Literal['steps', 'seconds'] = ..., covariance_noise: bool = ..., robot_name: str = ..., position_noise: _Number = ..., velocity_noise: _Number = ..., kappa: _Number = ...) -> None: ...
+    def __init__(self, path: str, *, keep_out: _Rows = ..., climb_speed: _Number = ..., climb_acceleration: _Number = ..., lowest: _Number = ..., highest: _Number | None = ..., peers_at_start: _Rows = ..., objective: Objective | abc.Mapping[str, object] = ..., objectives: abc.Mapping[str, Objective | abc.Mapping[str, object]] = ..., solver: Solver | abc.Mapping[str, object] = ..., max_speed: _Number = ..., max_acceleration: _Number = ..., horizon: _Whole = ..., horizon_from: Literal['now', 'decision'] = ..., period: _Number = ..., safe_distance: _Number = ..., margin: _Number = ..., tube_initial: _Number = ..., tube_growth: _Number = ..., tube_time: Literal['steps', 'seconds'] = ..., covariance_noise: bool = ..., robot_name: str = ..., position_noise: _Number = ..., velocity_noise: _Number = ..., kappa: _Number = ...) -> None: ...
 
 class FlyingVehicle(_FlyingVehicle):
     """A `Vehicle` in space, which climbs and sinks more slowly than it flies level."""
@@ -287,6 +299,10 @@ class Integrator(_Integrator):
 class IsPresent(_IsPresent):
     """Sends for each channel whether it has a token, whenever any channel has one."""
     def __init__(self, path: str) -> None: ...
+
+class JPDATracker(_JPDATracker):
+    """Tracks an unknown number of targets by joint probabilistic data association (JPDA) and the unscented filter."""
+    def __init__(self, path: str, *, period: _Number = ..., gate: _Number = ..., birth_density: _Number = ..., birth_variance: _Number = ..., confirm_hits: _Whole = ..., confirm_steps: _Whole = ..., confirm_probability: _Number = ..., delete_probability: _Number = ..., lifetime: _Number = ..., max_deviation: _Number = ..., merge_distance: _Number = ..., max_tracks: _Whole = ..., max_delay: _Number = ..., noise_direction: Literal['expected', 'predicted'] = ..., position_noise: _Number = ..., velocity_noise: _Number = ..., kappa: _Number = ...) -> None: ...
 
 class JavaRandom(_JavaRandom):
     """`java.util.Random`, from which most random actors of Ptolemy II draw their numbers."""
@@ -347,6 +363,10 @@ class MovingAverage(_MovingAverage):
 class MovingStatistics(_MovingStatistics):
     """Mean, standard deviation, minimum and maximum of the latest tokens; sent for each token."""
     def __init__(self, path: str, *, size: _Whole | None = ..., span: _Number | None = ...) -> None: ...
+
+class MultiTargetSensor(_MultiTargetSensor):
+    """Detects the bodies in range, each with a probability, and clutter; the scan does not say which is which."""
+    def __init__(self, path: str, *, kind: Literal['relative_position', 'range'] = ..., along: _Number = ..., across: _Number = ..., max_range: _Number = ..., detection_probability: _Number = ..., clutter: _Number = ..., robot_name: str = ...) -> None: ...
 
 class MultiplyDivide(_MultiplyDivide):
     """The product of the tokens at `multiply`, divided by each token at `divide`."""
@@ -454,7 +474,7 @@ class ResettableTimer(_ResettableTimer):
 
 class RobustController(_RobustController):
     """Solves the horizon problem at every trigger and sends the acceleration for the *next* period."""
-    def __init__(self, path: str, *, objective: Objective | abc.Mapping[str, object] = ..., solver: Solver | abc.Mapping[str, object] = ..., max_speed: _Number = ..., max_acceleration: _Number = ..., horizon: _Whole = ..., horizon_from: Literal['now', 'decision'] = ..., period: _Number = ..., safe_distance: _Number = ..., margin: _Number = ..., tube_initial: _Number = ..., tube_growth: _Number = ..., tube_time: Literal['steps', 'seconds'] = ..., covariance_noise: bool = ..., keep_out: _Rows = ..., peers_at_start: _Rows = ..., robot_name: str = ..., position_noise: _Number = ..., velocity_noise: _Number = ..., kappa: _Number = ...) -> None: ...
+    def __init__(self, path: str, *, objective: Objective | abc.Mapping[str, object] = ..., objectives: abc.Mapping[str, Objective | abc.Mapping[str, object]] = ..., solver: Solver | abc.Mapping[str, object] = ..., max_speed: _Number = ..., max_acceleration: _Number = ..., horizon: _Whole = ..., horizon_from: Literal['now', 'decision'] = ..., period: _Number = ..., safe_distance: _Number = ..., margin: _Number = ..., tube_initial: _Number = ..., tube_growth: _Number = ..., tube_time: Literal['steps', 'seconds'] = ..., covariance_noise: bool = ..., keep_out: _Rows = ..., peers_at_start: _Rows = ..., robot_name: str = ..., position_noise: _Number = ..., velocity_noise: _Number = ..., kappa: _Number = ...) -> None: ...
 
 class Router(_Router):
     """Sends each token to one channel of its output: in turn, at random, to the least loaded, or by a property of the token."""
@@ -524,6 +544,10 @@ class Station(_Station):
     """A station with `places`, each of which serves one token at a time; urgent tokens go first."""
     def __init__(self, path: str, *, places: _Whole = ..., service_time: Distribution | abc.Mapping[str, object]) -> None: ...
 
+class StayNear(_StayNear):
+    """The sum over the horizon of the squared distances to others, each times its weight: eq. (2) with moving goals."""
+    def __init__(self, *, to: abc.Mapping[str, _Number], offset: _Row = ...) -> None: ...
+
 class Stop(_Stop):
     """Ends the run with the tag at which a true token comes; that tag is completed."""
     def __init__(self, path: str) -> None: ...
@@ -567,6 +591,10 @@ class TimeGap(_TimeGap):
 class Timer(_Timer):
     """Sends a value after the number of seconds in each token; any number of times may run in parallel."""
     def __init__(self, path: str, *, one_at_a_time: bool = ..., value: object = ...) -> None: ...
+
+class TrackingError(_TrackingError):
+    """The GOSPA metric of tracks: the distance between the positions of the true bodies and those of the tracks."""
+    def __init__(self, path: str, *, cutoff: _Number = ...) -> None: ...
 
 class TransferFunction(_TransferFunction):
     """A linear system with one input and one output, given by its transfer function, such as `2 / (s^2 + 0.4 s + 4)`."""
@@ -619,3 +647,7 @@ class WaitingTime(_WaitingTime):
 class WaypointFollower(_WaypointFollower):
     """Drives a vehicle along straight lines from waypoint to waypoint, by pure pursuit."""
     def __init__(self, path: str, *, waypoints: _Rows, cruise: _Number = ..., lookahead: _Number = ..., tolerance: _Number = ..., deceleration: _Number | None = ..., wheelbase: _Number | None = ..., closed: bool = ...) -> None: ...
+
+class WaypointMotion(_WaypointMotion):
+    """A body that moves from waypoint to waypoint with constant speed, computed from the time alone."""
+    def __init__(self, path: str, *, waypoints: _Rows, speed: _Number = ..., appears: _Number = ..., leaves: _Number | None = ..., repeats: bool = ...) -> None: ...

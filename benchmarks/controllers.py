@@ -2,6 +2,7 @@
 
 - The horizon problem of eqs. (2)-(5): problems that the solver received in runs of collision_avoidance, without
   disturbance and at 50 %, with none to four observers, solved by ours and by the programs of ``programs.py``.
+- The same with five obstacles against one, and with eight robots, from runs of many_obstacles; a scan of the tracker.
 - The unscented Kalman filter against FilterPy's, on the same measurements.
 - The whole scenario against the authors' own model, and what compiling costs once.
 """
@@ -43,6 +44,13 @@ Recorded = tuple[Any, np.ndarray, Barrier]
 
 def record(count: int) -> list[Recorded]:
     """Problems with their starts and actors, evenly from runs under all conditions."""
+    conditions = [{"disturbance": level, "observers": observers} for level in (0.0, 0.5) for observers in range(5)]
+    found = recorded("collision_avoidance", conditions)
+    return [found[i] for i in np.linspace(0, len(found) - 1, count).astype(int)]
+
+
+def recorded(name: str, conditions: list[dict[str, Any]]) -> list[Recorded]:
+    """All problems of runs of a model under some conditions."""
     found: list[Recorded] = []
     solve = Barrier.solve
 
@@ -52,15 +60,12 @@ def record(count: int) -> list[Recorded]:
 
     Barrier.solve = note  # type: ignore[method-assign]
     try:
-        for level in (0.0, 0.5):
-            for observers in range(5):
-                model = load_model("collision_avoidance", set={"disturbance": level, "observers": observers})
-                for seed in SEEDS:
-                    Simulation(model, seed=seed).run()
+        for each in conditions:
+            for seed in SEEDS:
+                Simulation(load_model(name, set=each), seed=seed).run()
     finally:
         Barrier.solve = solve  # type: ignore[method-assign]
-    picked = np.linspace(0, len(found) - 1, count).astype(int)
-    return [found[i] for i in picked]
+    return found
 
 
 def seconds(work: Callable[[], Any]) -> tuple[float, Any]:
@@ -147,6 +152,70 @@ def stops() -> Iterator[Row]:
         f"scenario asks for, in {most:.1f} and {least:.1f} Newton steps; CPU time"
     )
     yield compare("horizon problem, one solve", results, names[0], names[1], how=how, unit=MS)
+
+
+def several_obstacles() -> Iterator[Row]:
+    """The same problems with all five obstacles, and with the nearest one alone; then those of eight robots."""
+    problems = [
+        (problem, starts, own)
+        for problem, starts, own in recorded("many_obstacles", [{"obstacles": 5, "observers": 2}])
+        if len(problem.obstacle_mean) == 5
+    ]
+    names = "with five obstacles", "with the nearest alone"
+    posed = {names[0]: problems, names[1]: [(nearest(problem), starts, own) for problem, starts, own in problems]}
+
+    def middle(name: str) -> float:
+        return median(seconds(lambda p=p, s=s, own=own: own.solve(p, s))[0] for p, s, own in posed[name])
+
+    results = take_turns({name: lambda name=name: middle(name) for name in names}, 7)
+    ratio = median(results[names[0]]) / median(results[names[1]])
+    how = (
+        f"{len(problems)} problems of three robots, recorded from runs of many_obstacles with seeds 0 and 1; both in "
+        "turns, medians of 7 rounds"
+    )
+    text = f"{ratio:.2f}x ({1000 * median(results[names[0]]):.3f} against {1000 * median(results[names[1]]):.3f} ms)"
+    yield Row("horizon problem, five obstacles", "one obstacle", text, "<= 3x", ratio <= 3.0, how)
+    crowd = recorded("many_obstacles", [{"obstacles": 5, "observers": 7}])
+    rounds = [
+        median(seconds(lambda p=p, s=s, own=own: own.solve(p, s))[0] for p, s, own in crowd) for _ in range(ROUNDS)
+    ]
+    how = f"{len(crowd)} problems recorded from two runs of many_obstacles with 7 observers; median of {ROUNDS} rounds"
+    took = 1000 * median(rounds)
+    yield Row("horizon problem, eight robots, five obstacles", "", f"{took:.3f} ms", "< 2 ms", took < 2.0, how)
+
+
+def nearest(problem: Any) -> Any:
+    """A problem with one of its obstacles."""
+    away = np.hypot(*(problem.obstacle_mean[:, 0] - problem.position).T)
+    k, size = int(away.argmin()), len(problem.sigma_weights)
+    rows = slice(k * size, (k + 1) * size)
+    return problem._replace(
+        obstacle_mean=problem.obstacle_mean[k : k + 1],
+        obstacle_covariance=problem.obstacle_covariance[k : k + 1],
+        sigma_positions=problem.sigma_positions[rows],
+        others_distance=problem.others_distance[rows],
+    )
+
+
+def scans() -> Iterator[Row]:
+    """A scan of ten tracks and twelve detections: far apart, and all in one cluster."""
+    from epicycle.actors.robotics.numerics import association
+
+    sensor = np.array([ukf.RELATIVE_POSITION, 0.0, -20.0, 0.0, 0.0, 0.2, 2.0])
+    for name, apart in (("far apart", 40.0), ("in one cluster", 1.5)):
+        means = np.zeros((10, 4))
+        means[:, 0] = apart * np.arange(10.0)
+        detections = np.repeat(sensor[np.newaxis], 12, axis=0)
+        detections[:, 3], detections[:, 4] = apart * np.arange(12.0), 20.0
+        given = means, np.repeat(np.eye(4)[np.newaxis], 10, axis=0), np.full(10, 0.9), 0.0, sensor, detections
+
+        def work(given: Any = given) -> None:
+            for _ in range(100):
+                association.fuse_scan(*given, 0.9, 1e-3, 1e4, 16.0, True)
+
+        took = median(take_turns({OURS: lambda work=work: cpu_seconds(work) / 100}, ROUNDS)[OURS])
+        how = f"100 scans in each of {ROUNDS} rounds; CPU time"
+        yield Row(f"a scan, 10 tracks {name}, 12 detections", "", f"{1000 * took:.3f} ms", "", None, how)
 
 
 def filters() -> Iterator[Row]:
@@ -255,6 +324,8 @@ def rows(problems: int = PROBLEMS) -> Iterator[Row]:
     """The lines of the table."""
     yield from horizon_problems(problems)
     yield from stops()
+    yield from several_obstacles()
+    yield from scans()
     yield from filters()
     yield from scenario()
     yield from compiling()

@@ -9,9 +9,11 @@ from epicycle.runner.engine import Results
 
 # How long tests of all packaged models let those run in which much happens (s).
 DURATIONS = {
+    "changing_roles": 2.5,
     "collision_avoidance": 0.5,
     "lift_group": 600.0,
     "machine_shop": 40_000.0,
+    "many_obstacles": 0.5,
     "pid_loop": 10.0,
     "switched_network": 1.5,
     "warehouse": 1800.0,

@@ -1,16 +1,44 @@
 """Robots that observe and avoid a moving obstacle: bodies, sensors, estimators, controllers, messages."""
 
 from .controller import FlyingController, RobustController
+from .detecting import MultiTargetSensor
 from .estimator import UnscentedEstimator
 from .filterpy_estimator import FilterError, FilterPyEstimator
-from .messages import BodyState, Estimate, Measurement, Plan
-from .monitors import DistanceMonitor, GoalMonitor, SeparationMonitor
-from .planning import Barrier, Casadi, Inform, Objective, ReachGoal, Solver
-from .world import BroadcastChannel, ChannelError, CircularMotion, FlyingVehicle, Sensor, Vehicle
+from .messages import (
+    BodyState,
+    Detections,
+    Estimate,
+    Measurement,
+    Plan,
+    Tracks,
+)
+from .monitors import ClearanceMonitor, DistanceMonitor, GoalMonitor, SeparationMonitor
+from .motion import WaypointMotion
+from .planning import (
+    Barrier,
+    Casadi,
+    Inform,
+    Objective,
+    ReachGoal,
+    Solver,
+    StayNear,
+)
+from .tracker import JPDATracker
+from .tracking_error import TrackingError
+from .world import (
+    BroadcastChannel,
+    ChannelError,
+    CircularMotion,
+    Flooding,
+    FlyingVehicle,
+    Sensor,
+    Vehicle,
+)
 
 __all__ = [
-    "Barrier", "BodyState", "BroadcastChannel", "Casadi", "ChannelError", "CircularMotion", "DistanceMonitor",
-    "Estimate", "FilterError", "FilterPyEstimator", "FlyingController", "FlyingVehicle", "GoalMonitor", "Inform",
-    "Measurement", "Objective", "Plan", "ReachGoal", "RobustController", "Sensor", "SeparationMonitor", "Solver",
-    "UnscentedEstimator", "Vehicle",
+    "Barrier", "BodyState", "BroadcastChannel", "Casadi", "ChannelError", "CircularMotion", "ClearanceMonitor",
+    "Detections", "DistanceMonitor", "Estimate", "FilterError", "FilterPyEstimator", "Flooding", "FlyingController",
+    "FlyingVehicle", "GoalMonitor", "Inform", "JPDATracker", "Measurement", "MultiTargetSensor", "Objective", "Plan",
+    "ReachGoal", "RobustController", "Sensor", "SeparationMonitor", "Solver", "StayNear", "TrackingError", "Tracks",
+    "UnscentedEstimator", "Vehicle", "WaypointMotion",
 ]  # fmt: skip

@@ -89,15 +89,16 @@ class _Attempt:
 
     def __init__(self, problem: HorizonProblem, steps: int, max_iterations: int) -> None:
         heavy = problem.sigma_weights > 0.0  # a point with weight 0 has no effect, and no logarithm
+        rows = np.resize(heavy, len(problem.sigma_positions))
         self.problem = problem._replace(
             tube_radius=np.where(np.isfinite(problem.tube_radius), problem.tube_radius, _FAR),
             climb_speed=min(problem.climb_speed, _FAR),
             climb_acceleration=min(problem.climb_acceleration, _FAR),
             lowest=max(problem.lowest, -_FAR),
             highest=min(problem.highest, _FAR),
-            sigma_positions=problem.sigma_positions[heavy],
+            sigma_positions=problem.sigma_positions[rows],
             sigma_weights=problem.sigma_weights[heavy],
-            others_distance=problem.others_distance[np.ix_(heavy, heavy)] if heavy.any() else np.empty((0, 0)),
+            others_distance=problem.others_distance[np.ix_(rows, heavy)] if heavy.any() else np.empty((0, 0)),
         )
         numbers = [getattr(self.problem, name) for name in _NUMBERS]
         self._parameters = np.concatenate([np.ravel(each) for each in numbers])
@@ -119,10 +120,10 @@ class _Attempt:
     def optimise(self, start: Array, bounds: Any) -> Array | None:
         """Minimise the objective with f3-f5 at most ``bounds``; None without a usable result."""
         beyond = np.empty(0)
-        if self.problem.objective != REACH_GOAL and len(self.problem.obstacle_mean):
+        if self.problem.objective != REACH_GOAL:
             positions, reach = definitions.driven(self.problem, start)[0], self.problem.measurement_range
-            beyond = definitions.f6(positions, self.problem.obstacle_mean[0], reach) + 1e-3
-        return self._run(self._programs.optimise, start, beyond, bounds)
+            beyond = definitions.f6(positions, definitions.targets(self.problem), reach) + 1e-3
+        return self._run(self._programs.optimise, start, beyond.ravel(), bounds)
 
     def restore(self, start: Array) -> Array | None:
         """Minimise the sum of the squared violations of f3-f5; None without a usable result."""
@@ -180,12 +181,14 @@ def _programs(steps: int, shapes: tuple[tuple[int, ...], ...], objective: int, m
         return cs.nlpsol("program", "ipopt", posed, {**_OPTIONS, "ipopt.max_iter": max_iterations})
 
     beyond, excess = symbols(0), symbols(0)
-    if objective != REACH_GOAL and len(problem.obstacle_mean):
-        beyond = symbols(steps)
-        excess = definitions.out_of_reach(positions, problem.obstacle_mean[0], problem.measurement_range) - beyond
+    if objective != REACH_GOAL:
+        watched = definitions.targets(problem)
+        beyond = symbols(len(watched), steps)
+        reached = [definitions.out_of_reach(positions, each, problem.measurement_range) for each in watched]
+        excess = np.reshape(reached, beyond.shape) - beyond
     missed = symbols(len(coupled))
     return _Programs(
-        program(definitions.objective(problem, positions, beyond), beyond, [*coupled, *excess]),
+        program(definitions.objective(problem, positions, beyond), beyond.ravel(), [*coupled, *excess.ravel()]),
         program((missed * missed).sum(), missed, [*(coupled - missed)]),
         len(coupled),
     )

@@ -8,11 +8,20 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from ..core import Actor, InputPort, OutputPort, Parameter, array_parameter
+from ..core import (
+    Actor,
+    EpicycleError,
+    InputPort,
+    MappingParameter,
+    OutputPort,
+    Parameter,
+    array_parameter,
+    did_you_mean,
+)
 from ..core.elementary import hypot
 from .arrays import Array, array_of, finite, floats, joined, read_only, stacked
 from .estimator import TargetModel
-from .messages import BodyState, Estimate, Plan, enclosing
+from .messages import BodyState, Estimate, Plan, Tracks, enclosing
 from .planning import Barrier, Objective, ReachGoal, Solver
 
 if TYPE_CHECKING:
@@ -62,6 +71,11 @@ class _Peers:
         if known is None:
             self._rows = dict(sorted(self._rows.items(), key=itemgetter(0)))
 
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Whose the rows are; of who has sent no plan yet, a name that is no path."""
+        return tuple(self._rows)
+
     def table(self) -> Array:
         """The rows, sorted by name."""
         return stacked(self._rows.values(), _CONTROLS)
@@ -83,6 +97,9 @@ class RobustController(TargetModel, Actor):
     latest estimate is used, too: an old one is predicted to the time of the own state as its filter would predict it,
     with the process noise, so that its covariance grows.
 
+    With ``objectives`` and a ``role``, the objective changes during the run.  All else stays: the standing plan, to
+    which f3 ties the next one, the peers' plans and the estimate.
+
     Before the first plan or estimate comes, the robot avoids only the positions in ``peers_at_start``. Plans and
     estimates that are not finite are ignored; the last good ones are kept.  Without a finite own state the control is
     zero, and nothing else is sent.
@@ -98,14 +115,24 @@ class RobustController(TargetModel, Actor):
         triggers=False,
         doc="estimate of the target; without a connection, there is none to avoid",
     )
+    tracks = InputPort(
+        Tracks, required=False, triggers=False, doc="estimates of several targets, to avoid and observe all of them"
+    )
     peer_plans = InputPort(Plan, multi=True, required=False, triggers=False, doc="plans of the other robots")
+    role = InputPort(
+        str,
+        required=False,
+        triggers=False,
+        doc="name of one of the objectives, for this plan and all later ones until another role comes",
+    )
     control = OutputPort(np.ndarray, shape=(2,), doc="m/s^2, for the period after this one")
     plan = OutputPort(Plan, doc="plan of this robot, for the others")
     violation = OutputPort(float, doc="largest violation of a constraint by the plan in metres; 0 if it keeps all")
     infeasible = OutputPort(int, doc="number of plans so far that broke a constraint")
     iterations = OutputPort(int, doc="Newton (or solver) iterations for this plan")
 
-    objective = Parameter(Objective, ReachGoal(), doc="objective of the robot")
+    objective = Parameter(Objective, ReachGoal(), doc="objective of the robot, until a role comes")
+    objectives = MappingParameter(Parameter(Objective), {}, doc="objectives by role")
     solver = Parameter(Solver, Barrier(), doc="solver of the problem")
     max_speed = Parameter(float, 8.0, unit="m/s", min=1e-6, doc="Vmax")
     max_acceleration = Parameter(float, 8.0, unit="m/s^2", min=1e-6, doc="Amax")
@@ -167,7 +194,9 @@ class RobustController(TargetModel, Actor):
         self._applied = np.zeros(d)  # U_t
         self._standing = self._nothing = _Standing(-math.inf, np.zeros(d), np.zeros(d), np.zeros((self._steps, d)))
         self._peers = _Peers(self.peers_at_start)
+        self._objective: Objective = self.objective
         self._target: Estimate | None = None
+        self._tracks: Tracks | None = None
         self._infeasible = 0
 
     def fire(self) -> None:
@@ -200,6 +229,17 @@ class RobustController(TargetModel, Actor):
         for estimate in self.estimate.tokens:
             if estimate.finite and (self._target is None or estimate.time >= self._target.time):
                 self._target = estimate
+        for role in self.role.tokens:
+            if role not in self.objectives:
+                roles = ", ".join(self.objectives) or "none"
+                raise EpicycleError(
+                    f"{self.path} has no objective for the role {role!r}{did_you_mean(role, self.objectives)}; "
+                    f"'objectives' has: {roles}"
+                )
+            self._objective = self.objectives[role]
+        for tracks in self.tracks.tokens:
+            if tracks.finite and (self._tracks is None or tracks.time >= self._tracks.time):
+                self._tracks = tracks
 
     def _send(self, own: BodyState, problem: HorizonProblem, controls: Array) -> None:
         self._standing = _Standing(own.time, problem.position, problem.velocity, controls)
@@ -222,13 +262,7 @@ class RobustController(TargetModel, Actor):
         tube_centre, tube_radius, starts = self._standing_plan(
             *standing[1:], now - standing.made_at, self._radius, velocity, speed, most, period
         )
-        target, expected = self._target, self._nobody
-        if target is not None:
-            elapsed = now - target.time
-            expected = self._expected_target(
-                target.mean, target.covariance, *self._model, elapsed, self._steps, self._dimensions
-            )
-        target_mean, target_covariance, points, weights = expected
+        target_mean, target_covariance, points, weights = self._expected(now)
         peer_mean, peer_distance = self._peer_tubes(self._peers.table(), now, *self._room, self._dimensions)
         posed = self._new_problem(
             period=period,
@@ -246,13 +280,30 @@ class RobustController(TargetModel, Actor):
             peer_distance=peer_distance,
             **self._limits,
         )
-        posed = self.objective.pose(posed, points, weights)
+        posed = self._objective.pose(posed, points, weights, self._peers.names)
         if len(self.keep_out):  # as f5, but nobody who measures
             there, apart = self._standing_there
             posed = posed._replace(
                 peer_mean=np.concatenate((peer_mean, there)), peer_distance=np.concatenate((peer_distance, apart))
             )
         return posed, starts
+
+    def _expected(self, now: float) -> tuple[Array, ...]:
+        """Means (K, N, d) and covariances (K, N, d (d + 1) / 2) of all targets, sigma points of each (K M, d) and their
+        weights."""
+        targets = [self._target] if self._target is not None else []
+        if self._tracks is not None:
+            targets.extend(self._tracks.estimates)
+        each = [
+            self._expected_target(
+                target.mean, target.covariance, *self._model, now - target.time, self._steps, self._dimensions
+            )
+            for target in targets
+        ]
+        if len(each) < 2:
+            return each[0] if each else self._nobody
+        means, covariances, points, weights = zip(*each, strict=True)
+        return np.concatenate(means), np.concatenate(covariances), np.concatenate(points), weights[0]
 
     def _flight(self) -> dict[str, Any]:
         """The limits that hold in space only, by their names in the problem."""

@@ -90,6 +90,59 @@ class Measurement:
 
 
 @dataclass(frozen=True, slots=True, eq=False, init=False)
+class Detections:
+    """One scan of a sensor that does not know which body it sees, with all data to fuse it elsewhere and later."""
+
+    robot: str  # dotted path of the measuring robot
+    observer: Array  # (2,) m, where the sensor was
+    kind: str  # "relative_position" or "range"
+    values: Array  # (m, 2) m from observer to whatever was detected, or (m, 1) m; m may be 0
+    along: float  # standard deviation along the line of sight, m
+    across: float  # standard deviation across it, m; not used for a range
+    probability: float  # of detecting a body in range
+    clutter: float  # expected number of false detections in a scan
+    max_range: float  # m
+    time: float  # s, when it was made
+
+    def __init__(
+        self, robot: str, observer: ArrayLike, kind: str, values: ArrayLike, along: float, across: float,
+        probability: float, clutter: float, max_range: float, time: float,
+    ) -> None:  # fmt: skip
+        _set(self, "robot", robot)
+        _set(self, "observer", read_only(observer))
+        _set(self, "kind", kind)
+        _set(self, "values", read_only(values))
+        _set(self, "along", along)
+        _set(self, "across", across)
+        _set(self, "probability", probability)
+        _set(self, "clutter", clutter)
+        _set(self, "max_range", max_range)
+        _set(self, "time", time)
+
+    @property
+    def finite(self) -> bool:
+        """Whether it can be fused: finite values of the shape for its kind, and numbers that describe a sensor."""
+        return (
+            self.values.ndim == 2
+            and self.values.shape[1] == (1 if self.kind == RANGE else 2)
+            and is_time(self.time)
+            and finite(self.values)
+            and finite(self.observer)
+            and 0.0 < self.along < math.inf
+            and (self.kind == RANGE or 0.0 < self.across < math.inf)
+            and 0.0 <= self.probability <= 1.0
+            and 0.0 <= self.clutter < math.inf
+            and 0.0 < self.max_range < math.inf
+        )
+
+    @property
+    def clutter_density(self) -> float:
+        """Expected number of false detections per m^2, or per m of range."""
+        space = self.max_range if self.kind == RANGE else math.pi * self.max_range * self.max_range
+        return self.clutter / space
+
+
+@dataclass(frozen=True, slots=True, eq=False, init=False)
 class Estimate:
     """A robot's estimate of the target at ``time``: a normal distribution over (x, y, vx, vy), or six in space."""
 
@@ -110,6 +163,25 @@ class Estimate:
         size = len(self.mean)
         shaped = size in (4, 6) and self.covariance.shape == (size, size)
         return shaped and is_time(self.time) and finite(self.mean) and finite(self.covariance)
+
+
+@dataclass(frozen=True, slots=True, eq=False, init=False)
+class Tracks:
+    """A robot's estimates of several targets at ``time``, each with the number of its track."""
+
+    numbers: tuple[int, ...]  # rising; a number is given once
+    estimates: tuple[Estimate, ...]
+    time: float  # s
+
+    def __init__(self, numbers: tuple[int, ...], estimates: tuple[Estimate, ...], time: float) -> None:
+        _set(self, "numbers", numbers)
+        _set(self, "estimates", estimates)
+        _set(self, "time", time)
+
+    @property
+    def finite(self) -> bool:
+        """Whether every number in it is finite."""
+        return is_time(self.time) and all(each.finite for each in self.estimates)
 
 
 @dataclass(frozen=True, slots=True, eq=False, init=False)

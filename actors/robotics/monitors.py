@@ -103,3 +103,19 @@ class SeparationMonitor(_DistanceBetween):
 
     def fire(self) -> None:
         self._tell(self.distance, self.bodies.by_channel())
+
+
+class ClearanceMonitor(Actor):
+    """The distance from a body to the nearest of several others that come and go.
+
+    Only those count that send a state at the same tag.
+    """
+
+    body = InputPort(BodyState, doc="the body")
+    others = InputPort(BodyState, multi=True, required=False, doc="a connection for each of the others")
+    distance = OutputPort(float, doc="distance to the nearest in metres, if there is one")
+
+    def fire(self) -> None:
+        if self.body.present and self.others.present:
+            here = pair(self.body.value.position)
+            self.distance.send(min(distance(here, pair(state.position)) for state in self.others.tokens))

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from functools import cached_property, partial
 from typing import TYPE_CHECKING
 
-from ..core import Configurable, Parameter, array_parameter
+import numpy as np
+
+from ..core import Configurable, MappingParameter, Parameter, ParameterError, array_parameter
 from .arrays import Array
 
 if TYPE_CHECKING:
@@ -14,17 +16,19 @@ if TYPE_CHECKING:
     from .numerics.horizon import HorizonProblem
 
 NAT, BIT = "nat", "bit"
+TARGET = "target"
 LN2 = 0.6931471805599453
 
 
 class Objective(Configurable):
     """Base of the objectives: fills in the objective's fields of a horizon problem."""
 
-    def pose(self, problem: HorizonProblem, points: Array, weights: Array) -> HorizonProblem:
+    def pose(self, problem: HorizonProblem, points: Array, weights: Array, peers: Sequence[str] = ()) -> HorizonProblem:
         """The problem with this objective.
 
-        ``points`` (M, 2) and ``weights`` (M,) are the target's sigma points at the end of the horizon (M = 0
-        while no target is known).
+        ``points`` (T M, 2) are the sigma points of T targets at the end of the horizon, one target after the other,
+        each with the ``weights`` (M,).  T = 0 while no target is known.  ``peers`` are the names of the robots in the
+        problem, in its order.
         """
         raise NotImplementedError
 
@@ -34,12 +38,51 @@ class ReachGoal(Objective):
 
     goal = array_parameter((2,), (0.0, 0.0), unit="m", doc="where to go")
 
-    def pose(self, problem: HorizonProblem, points: Array, weights: Array) -> HorizonProblem:
+    def pose(self, problem: HorizonProblem, points: Array, weights: Array, peers: Sequence[str] = ()) -> HorizonProblem:
         return problem.to_reach(self.goal)
 
 
+class _Weights(MappingParameter):
+    """Weights by name, all of them positive."""
+
+    def __init__(self, *, doc: str) -> None:
+        super().__init__(Parameter(float, above=0), doc=doc)
+
+    def convert(self, value: object) -> dict[str, float]:
+        weights: dict[str, float] = super().convert(value) or {}
+        if not weights:
+            raise ParameterError("it names nobody; expected at least one robot, or 'target'")
+        return weights
+
+
+class StayNear(Objective):
+    """The sum over the horizon of the squared distances to others, each times its weight: eq. (2) with moving goals.
+
+    This is eq. (2) with one goal that moves: their weighted mean.  Near two robots, the robot is a relay between them,
+    in the middle if the weights are equal; near the target and a robot, it guards that robot; near one robot, it goes
+    along.  The place of a robot is that of its latest plan, the place of the target that of the estimate.  Names of
+    which nothing is known do not count; if nothing is known of any, the robot stays where it is.
+    """
+
+    to = _Weights(doc="weights by the names of robots, as in their plans, or 'target'")
+    offset = array_parameter((2,), (0.0, 0.0), unit="m", doc="where to be, as seen from that place")
+
+    def pose(self, problem: HorizonProblem, points: Array, weights: Array, peers: Sequence[str] = ()) -> HorizonProblem:
+        from .numerics.definitions import station
+
+        known = dict(zip((*peers, TARGET), (*problem.peer_mean, *problem.obstacle_mean[:1]), strict=False))
+        near = [name for name in self.to if name in known]
+        if not near:
+            return problem.to_reach(problem.position)
+        places, shares = np.stack([known[name] for name in near]), np.array([self.to[name] for name in near])
+        return problem.to_reach(station(places, shares) + self.offset)
+
+
 class Inform(Objective):
-    """Eq. (5): the information of range measurements at the end of the horizon, minus a penalty for distance."""
+    """Eq. (5): the information of range measurements at the end of the horizon, minus a penalty for distance.
+
+    Of several targets it is the sum: they are independent, and each has its own measurements.
+    """
 
     range = Parameter(float, 30.0, unit="m", min=0, doc="Dmax: distances from the target beyond this are penalised")
     penalty = Parameter(float, 0.001, min=0, doc="gamma: the penalty for each metre too far, at each step")
@@ -49,7 +92,7 @@ class Inform(Objective):
         bool, True, doc="whether to count what all robots measure together, or only what this one measures"
     )
 
-    def pose(self, problem: HorizonProblem, points: Array, weights: Array) -> HorizonProblem:
+    def pose(self, problem: HorizonProblem, points: Array, weights: Array, peers: Sequence[str] = ()) -> HorizonProblem:
         others = problem.peer_mean if self.joint else problem.peer_mean[:0]
         # In bits, the information is larger by a factor of 1 / log 2; a penalty smaller by that factor has the same
         # optimum.

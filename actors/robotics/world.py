@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from ..core import Actor, EpicycleError, InputPort, OutputPort, Parameter, array_parameter, counted
+from ..core import Actor, EpicycleError, InputPort, OutputPort, Parameter, array_parameter, brief, counted
 from ..core.elementary import cos, hypot, sin
 from .arrays import all_finite, floats, pair
-from .messages import RANGE, RELATIVE_POSITION, BodyState, Measurement, enclosing
+from .messages import RANGE, RELATIVE_POSITION, BodyState, Measurement, Plan, enclosing
 from .sight import is_hidden
 
 
@@ -244,3 +244,28 @@ class BroadcastChannel(Actor):
                 for listener in listeners:
                     if listener != speaker:
                         send(token, listener)
+
+
+class Flooding(Actor):
+    """Sends the messages of its robot, and repeats those of others for the robots that are out of their reach.
+
+    A message is repeated once: its ``time`` serves as a sequence number, and only a message later than all earlier ones
+    of the same robot passes.  Messages that are not finite are dropped.
+    """
+
+    own = InputPort(Any, doc="plans or measurements of this robot")
+    heard = InputPort(
+        Any, multi=True, required=False, doc="plans or measurements of other robots, sent or repeated by any of them"
+    )
+    output = OutputPort(Any, doc="the messages that this robot sends")
+
+    def initialize(self) -> None:
+        self._latest: dict[str, float] = {}  # the time of the latest message of each robot
+
+    def fire(self) -> None:
+        for message in (*self.own.tokens, *self.heard.tokens):
+            if not isinstance(message, (Measurement, Plan)):
+                raise EpicycleError(f"{self.path} takes plans and measurements, not {brief(message)}")
+            if message.finite and message.time > self._latest.get(message.robot, -math.inf):
+                self._latest[message.robot] = message.time
+                self.output.send(message)

@@ -37,12 +37,45 @@ def _position(token: Any) -> Any:
 
 def ellipses(signal: Signal) -> Rows:
     """Estimates as x, y, half axes at two standard deviations, and the angle of the first in rad; shape (n, 5)."""
-    rows = []
-    for token in signal.tokens:
-        spread, axes = np.linalg.eigh(np.asarray(token.covariance, dtype=float)[:2, :2])
-        sizes = DEVIATIONS * np.sqrt(np.maximum(spread[::-1], 0.0))
-        rows.append((*token.mean[:2], *sizes, np.arctan2(axes[1, 1], axes[0, 1])))
-    return np.array(rows, dtype=float).reshape(-1, 5)
+    return np.array([ellipse(token) for token in signal.tokens], dtype=float).reshape(-1, 5)
+
+
+def ellipse(estimate: Any) -> tuple[float, ...]:
+    """A row of ``ellipses``."""
+    spread, axes = np.linalg.eigh(np.asarray(estimate.covariance, dtype=float)[:2, :2])
+    sizes = DEVIATIONS * np.sqrt(np.maximum(spread[::-1], 0.0))
+    return (*estimate.mean[:2], *sizes, np.arctan2(axes[1, 1], axes[0, 1]))
+
+
+def has_tracks(signal: Signal) -> bool:
+    """Whether the tokens are estimates of several targets."""
+    return any(hasattr(token, "estimates") for token in signal.tokens[:1])
+
+
+def tracked(signal: Signal) -> dict[str, tuple[list[int], Rows]]:
+    """The ``ellipses`` of each track of such a signal, by a name with its number, and the indices of their tokens; a
+    row is NaN where the track has ended."""
+    found: dict[int, list[tuple[int, tuple[float, ...]]]] = {}
+    before: tuple[int, ...] = ()
+    for index, token in enumerate(signal.tokens):
+        for number, estimate in zip(token.numbers, token.estimates, strict=True):
+            found.setdefault(number, []).append((index, ellipse(estimate)))
+        for number in sorted({*before} - {*token.numbers}):
+            found[number].append((index, (np.nan,) * 5))
+        before = tuple(token.numbers)
+    return _named(signal, found, 5)
+
+
+def _named(
+    signal: Signal, found: dict[int, list[tuple[int, tuple[float, ...]]]], width: int
+) -> dict[str, tuple[list[int], Rows]]:
+    return {
+        f"{signal.name}[{number}]": (
+            [index for index, _ in rows],
+            np.array([row for _, row in rows], dtype=float).reshape(-1, width),
+        )
+        for number, rows in sorted(found.items())
+    }
 
 
 def tubes(signal: Signal, period: float, initial: float, growth: float) -> Rows:
@@ -63,12 +96,29 @@ def tubes(signal: Signal, period: float, initial: float, growth: float) -> Rows:
     return np.array([row + row[-3:] * ((longest - len(row)) // 3) for row in rows], dtype=float).reshape(-1, longest)
 
 
-def sights(signal: Signal) -> tuple[list[int], Rows]:
-    """Measurements of a relative position as lines from the sensor to its target, and the indices of their tokens."""
-    found = [
-        (number, (x, y, x + token.value[0], y + token.value[1]))
-        for number, token in enumerate(signal.tokens)
-        for x, y in [token.observer[:2]]
-        if len(token.value) == len(token.observer)
-    ]
-    return [number for number, _ in found], np.array([row for _, row in found], dtype=float).reshape(-1, 4)
+def sights(signal: Signal) -> dict[str, tuple[list[int], Rows]]:
+    """Measurements of a relative position as lines from the sensor to its target, by name, with the indices of their
+    tokens.
+
+    The lines of a scan have a number each; a row is NaN where a scan has fewer.
+    """
+    if not any(hasattr(token, "values") for token in signal.tokens[:1]):
+        found = [
+            (index, _sight(token.observer, token.value))
+            for index, token in enumerate(signal.tokens)
+            if len(token.value) == len(token.observer)
+        ]
+        rows = np.array([row for _, row in found], dtype=float).reshape(-1, 4)
+        return {signal.name: ([index for index, _ in found], rows)}
+    most = max((len(token.values) for token in signal.tokens), default=0)
+    lines: dict[int, list[tuple[int, tuple[float, ...]]]] = {number: [] for number in range(most)}
+    for index, token in enumerate(signal.tokens):
+        values = token.values if np.shape(token.values)[1:] == (2,) else ()
+        for number in range(most):
+            there = number < len(values)
+            lines[number].append((index, _sight(token.observer, values[number]) if there else (np.nan,) * 4))
+    return _named(signal, lines, 4)
+
+
+def _sight(observer: Any, value: Any) -> tuple[float, ...]:
+    return observer[0], observer[1], observer[0] + value[0], observer[1] + value[1]

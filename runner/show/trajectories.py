@@ -16,23 +16,23 @@ from ..results import Results, Signal
 from .figures import title_of
 from .samples import Floats, selected
 from .sheet import FEW, LIMIT, Sheet, band_beside, colours, legend_beside
-from .space import ellipses, positions, sights, tubes
+from .space import ellipse, ellipses, has_tracks, positions, sights, tracked, tubes
 
 TIMES = 8  # written beside a path
 _APART = 34.0  # pixels between times
 
 
 class Trajectories(Figure):
-    """The paths of all robots around an obstacle, in the style of the paper's Figs. 6 and 8.
+    """The paths of all robots around obstacles, in the style of the paper's Figs. 6 and 8.
 
     A path starts with a circle and ends with an arrowhead; dots mark every second, and times are written beside the
-    first path.  Ellipses show the estimate of the obstacle at two standard deviations; discs show the obstacle with the
-    distance to keep, once a second.
+    first path.  Ellipses show the estimates of the obstacles at two standard deviations; discs show the obstacles with
+    the distance to keep, once a second.
     """
 
     robots = texts_parameter(doc="signals of the robots' states (patterns); the first robot is emphasized")
-    obstacle = Parameter(str, "", doc="signal of the obstacle's state")
-    estimate = Parameter(str, "", doc="signal of an estimate of the obstacle")
+    obstacle = texts_parameter((), doc="signals of the obstacles' states (patterns)")
+    estimate = Parameter(str, "", doc="signal of an estimate of the obstacle, or of tracks of several")
     goal = array_parameter((2,), (0.0, 0.0), unit="m", doc="destination of the first robot")
     safe_distance = Parameter(float, 2.0, unit="m", min=0.0, doc="radius of the obstacle's disc")
     occluders = array_parameter((None, 4), (), doc="what stands in the way: x, y, radius and height of each, in m")
@@ -44,7 +44,7 @@ class Trajectories(Figure):
     tube_growth = Parameter(float, 0.0, unit="m", min=0.0, doc="growth of the radius per period")
 
     def signal_patterns(self) -> tuple[str, ...]:
-        return tuple(pattern for pattern in (*self.robots, self.obstacle, self.estimate) if pattern)
+        return tuple(pattern for pattern in (*self.robots, *self.obstacle, self.estimate) if pattern)
 
     def mark_patterns(self) -> tuple[str, ...]:
         return (*self.plans, *self.sights)
@@ -57,20 +57,25 @@ class Trajectories(Figure):
         def made(names: Iterable[str], shape: Shape, colour: int | None, **look: float) -> Iterator[Mark]:
             for name in names:
                 signal, path = results.signals[name], name.rpartition(".")[0]
-                times = signal.times
+                whole: Any = slice(None)
                 if shape == "tube":
-                    rows = tubes(signal, self.period, self.tube_initial, self.tube_growth)
+                    found = {name: (whole, tubes(signal, self.period, self.tube_initial, self.tube_growth))}
                 elif shape == "line":
-                    seen, rows = sights(signal)
-                    times = times[seen]
+                    found = sights(signal)
+                elif shape == "ellipse":
+                    found = tracked(signal) if has_tracks(signal) else {name: (whole, ellipses(signal))}
                 else:
-                    rows = ellipses(signal) if shape == "ellipse" else positions(signal)
-                yield Mark(name, shape, times.tolist(), rows, colour=owners.get(path, colour), **look)
+                    found = {name: (whole, positions(signal))}
+                for part, (seen, rows) in found.items():
+                    times = signal.times[seen].tolist()
+                    if shape == "body" and (end := self._leaves(signal, results)) is not None:
+                        times, rows = [*times, end], np.vstack([rows, np.full((1, 2), np.nan)])
+                    yield Mark(part, shape, times, rows, colour=owners.get(path, colour), **look)
 
         yield from made(selected(self.sights, results), "line", None)
         yield from made(selected(self.plans, results), "tube", None)
         yield from made([self.estimate] if self.estimate else [], "ellipse", None)
-        yield from made([self.obstacle] if self.obstacle else [], "body", None, radius=self.safe_distance)
+        yield from made(selected(self.obstacle, results), "body", None, radius=self.safe_distance)
         yield from made(selected(self.robots, results), "body", 0)
         for number, (x, y, radius, _) in enumerate(self.occluders.tolist()):
             yield Mark(f"occluder[{number}]", "body", [0.0], np.array([[x, y]]), radius=radius)
@@ -79,8 +84,8 @@ class Trajectories(Figure):
     def draw(self, results: Results, path: Path) -> None:
         sheet = Sheet([title_of(results)], heights=[4.4])
         (axes,) = sheet.axes
-        if self.obstacle:
-            self._obstacle(sheet, results.signals[self.obstacle])
+        for number, name in enumerate(selected(self.obstacle, results)):
+            self._obstacle(sheet, results.signals[name], is_named=number == 0)
         if self.estimate:
             self._ellipses(axes, results.signals[self.estimate])
         robots = selected(self.robots, results)
@@ -108,6 +113,16 @@ class Trajectories(Figure):
             write_times(axes, positions(signal), signal.times, every(signal.times, self.interval), shades[0])
         sheet.save([path])
 
+    def _leaves(self, signal: Signal, results: Results) -> float | None:
+        """When a body is no longer there, if others go on sending: an interval after its last state."""
+        if len(signal.times) < 2:
+            return None
+        interval = float(np.median(np.diff(signal.times)))
+        others = selected((*self.robots, *self.obstacle), results)
+        last = max(float(results.signals[name].times[-1]) for name in others if len(results.signals[name].times))
+        end = float(signal.times[-1]) + interval
+        return end if last > end + 0.5 * interval else None
+
     def _path(self, sheet: Sheet, signal: Signal, shade: str, *, is_first: bool, named: bool) -> None:
         points = positions(signal)
         if len(points) == 0:
@@ -121,17 +136,24 @@ class Trajectories(Figure):
         arrows(axes, points, shade, size=8.0 + 3.0 * width, zorder=order + 0.5)
         tip_path(sheet, axes, signal.name, signal.times, points)
 
-    def _obstacle(self, sheet: Sheet, signal: Signal) -> None:
+    def _obstacle(self, sheet: Sheet, signal: Signal, is_named: bool) -> None:
         from matplotlib.patches import Circle
 
         (axes,) = sheet.axes
         points = positions(signal)
-        axes.plot(*points.T, "--", color="0.25", linewidth=1.2, label="obstacle" if len(points) else None, zorder=3)
+        axes.plot(
+            *points.T,
+            "--",
+            color="0.25",
+            linewidth=1.2,
+            label="obstacle" if is_named and len(points) else None,
+            zorder=3,
+        )
         arrows(axes, points, "0.25", zorder=3.5)
         tip_path(sheet, axes, signal.name, signal.times, points)
         marks = every(signal.times, self.interval)
         for number, index in enumerate(marks, start=1):
-            label = f"{self.safe_distance:g} m around it" if number == len(marks) else None
+            label = f"{self.safe_distance:g} m around it" if is_named and number == len(marks) else None
             look = {"color": "0.3", "alpha": 0.05 + 0.13 * number / len(marks), "linewidth": 0}
             axes.add_patch(Circle(points[index], self.safe_distance, label=label, **look))
 
@@ -139,13 +161,14 @@ class Trajectories(Figure):
         from matplotlib.patches import Ellipse
 
         label: str | None = "estimate, 2 std. dev."
-        rows = ellipses(signal)
         for index in every(signal.times, self.interval):
-            x, y, along, across, angle = map(float, rows[index])
-            look: Any = {"fill": False, "edgecolor": LIMIT, "linewidth": 0.8, "alpha": 0.8, "zorder": 3}
-            place, turned = (x, y), float(np.degrees(angle))
-            axes.add_patch(Ellipse(place, 2.0 * along, 2.0 * across, angle=turned, label=label, **look))
-            label = None
+            token = signal.tokens[index]
+            for estimate in token.estimates if has_tracks(signal) else [token]:
+                x, y, along, across, angle = map(float, ellipse(estimate))
+                look: Any = {"fill": False, "edgecolor": LIMIT, "linewidth": 0.8, "alpha": 0.8, "zorder": 3}
+                place, turned = (x, y), float(np.degrees(angle))
+                axes.add_patch(Ellipse(place, 2.0 * along, 2.0 * across, angle=turned, label=label, **look))
+                label = None
 
 
 def every(times: Floats, interval: float) -> list[int]:

@@ -25,7 +25,7 @@ from tests.actors.core.test_random import CONTINUOUS, DISCRETE
 from tests.test_docs import TUTORIALS, Reader, blocks
 
 DISTURBED = "collision_avoidance"
-UNTIL = {DISTURBED: 2.0}  # s; the other models run to their ends
+UNTIL = {DISTURBED: 2.0, "many_obstacles": 1.5}  # s; the other models run to their ends
 SETTINGS = {DISTURBED: {"observers": 2, "disturbance": 0.25}}
 TWO_ARGUMENTS = ("atan2", "hypot", "pow")
 GROWING = ("cosh", "exp", "expm1", "sinh")

@@ -10,6 +10,7 @@ lies at t + tau, tau = s * period.
 from __future__ import annotations
 
 import math
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -50,9 +51,24 @@ def dynamics(position: Any, velocity: Any, controls: Any, period: Any) -> tuple[
 
 
 def f0(positions: Any, goal: Any) -> Any:
-    """Eq. (2), (N,) in m^2: the squared distance to the goal, which the paper puts at the origin."""
+    """Eq. (2), (N,) in m^2: the squared distance to the goal (1, 2), which the paper puts at the origin, or to one that
+    moves (N, 2)."""
     offsets = positions - goal
     return (offsets * offsets).sum(axis=-1)
+
+
+def f0_of_several(positions: Any, places: Any, weights: Any) -> Any:
+    """f0 of several goals that move (k, N, d), each with its weight (k,): (N,) in m^2.
+
+    It is the f0 of their ``station``, times the sum of the weights, and a term that no plan changes.
+    """
+    offsets = positions - places
+    return (weights[:, np.newaxis] * (offsets * offsets).sum(axis=-1)).sum(axis=0)
+
+
+def station(places: Any, weights: Any) -> Any:
+    """The goal (N, d) in m that has the optimum of ``f0_of_several``: the weighted mean of the places (k, N, d)."""
+    return (weights[:, np.newaxis, np.newaxis] * places).sum(axis=0) / weights.sum()
 
 
 def f1(velocities: Any, max_speed: Any, climb_speed: Any = math.inf) -> Any:
@@ -142,19 +158,26 @@ def mutual_information(own: Any, points: Any, weights: Any, variance: Any, other
 
 
 def objective(problem: HorizonProblem, positions: Any, beyond: Any = None) -> Any:
-    """The objective: the sum of f0 of eq. (2), in m^2; or eq. (5), in nats, which is 0 while no obstacle is known.
+    """The objective: the sum of f0 of eq. (2), in m^2; or of eq. (5) over all targets, in nats, 0 while none is known.
 
-    ``beyond`` (N,) replaces f6 if a solver has variables for it.
+    ``beyond`` (T, N) replaces f6 if a solver has variables for it.  The sum of the informations is that of all targets
+    together: they are independent, and each has its own measurements.
     """
     if problem.objective == REACH_GOAL:
         return f0(positions, problem.goal).sum()
-    if not len(problem.obstacle_mean):
-        return 0.0
-    points, weights, others = problem.sigma_positions, problem.sigma_weights, problem.others_distance
-    information = mutual_information(positions[-1], points, weights, problem.measurement_variance, others)
-    if beyond is None:
-        beyond = f6(positions, problem.obstacle_mean[0], problem.measurement_range)
-    return -information + (problem.range_penalty * beyond).sum()
+    weights, total = problem.sigma_weights, 0.0
+    for k, obstacle in enumerate(targets(problem)):
+        rows = slice(k * len(weights), (k + 1) * len(weights))
+        points, others = problem.sigma_positions[rows], problem.others_distance[rows]
+        information = mutual_information(positions[-1], points, weights, problem.measurement_variance, others)
+        too_far = f6(positions, obstacle, problem.measurement_range) if beyond is None else beyond[k]
+        total = total - information + (problem.range_penalty * too_far).sum()
+    return total
+
+
+def targets(problem: HorizonProblem) -> Any:
+    """The positions (T, N, 2) of the obstacles that the objective of eq. (5) is about: the first ones."""
+    return problem.obstacle_mean[: len(problem.sigma_positions) // max(len(problem.sigma_weights), 1)]
 
 
 def constraints(problem: HorizonProblem, positions: Any) -> Any:
@@ -185,3 +208,70 @@ def violations(problem: HorizonProblem, controls: Array) -> Array:
     """The ``constraints`` of a problem under controls (N, d)."""
     values: Array = constraints(problem, driven(problem, controls)[0])
     return values
+
+
+def joint_events(tracks: int, detections: int) -> Any:
+    """All joint events: for each track the detection 1..m that it caused, no two the same, or 0 if it caused none."""
+    for event in product(range(detections + 1), repeat=tracks):
+        caused = [each for each in event if each]
+        if len(caused) == len(set(caused)):
+            yield event
+
+
+def association(missed: Array, likelihood: Array, density: float) -> Array:
+    """JPDA, (T, 1 + m): the probability that a track caused no detection, or each one, summed over all joint events.
+
+    The density of an event is the product of ``missed`` (T,), 1 - P_D P_G, of each track without a detection, of the
+    ``likelihood`` (T, m), P_D N(z_j; z, S) inside the gate and 0 outside, of each with one, and of the ``density`` of
+    detections from elsewhere for each that no track caused.
+    """
+    tracks, detections = likelihood.shape
+    result = np.zeros((tracks, 1 + detections))
+    for event in joint_events(tracks, detections):
+        worth = density ** (detections - sum(each > 0 for each in event))
+        for t, each in enumerate(event):
+            worth *= likelihood[t, each - 1] if each else missed[t]
+        result[np.arange(tracks), event] += worth
+    normalised: Array = result / result.sum(axis=1, keepdims=True)
+    return normalised
+
+
+def integrated_association(missed: Array, likelihood: Array, density: float, existence: Array) -> tuple[Array, Array]:
+    """JIPDA: how likely each track exists after the scan (T,), and what it caused if so, (T, 1 + m).
+
+    Each track exists with the probability ``existence`` (T,); a joint event is one of those that exist, and the others
+    caused nothing.
+    """
+    tracks, detections = likelihood.shape
+    result, total = np.zeros((tracks, 1 + detections)), 0.0
+    for there in product((False, True), repeat=tracks):
+        for event in joint_events(tracks, detections):
+            worth = density ** (detections - sum(each > 0 for each in event))
+            for t, each in enumerate(event):
+                if there[t]:
+                    worth *= existence[t] * (likelihood[t, each - 1] if each else missed[t])
+                else:
+                    worth *= 0.0 if each else 1.0 - existence[t]
+            total += worth
+            result[there, np.array(event)[list(there)]] += worth
+    after = result.sum(axis=1)
+    return after / total, result / after[:, np.newaxis]
+
+
+def mixture(probabilities: Array, means: Array, covariances: Array) -> tuple[Array, Array]:
+    """JPDA: the mean (n,) and covariance of a track that is one of several normal distributions."""
+    mean = (probabilities[:, np.newaxis] * means).sum(axis=0)
+    apart = means - mean
+    spread = covariances + apart[:, :, np.newaxis] * apart[:, np.newaxis]
+    return mean, (probabilities[:, np.newaxis, np.newaxis] * spread).sum(axis=0)
+
+
+def gospa(truth: Array, tracks: Array, cutoff: float) -> float:
+    """GOSPA, p = 2 and alpha = 2, m: of positions (n, 2) and (m, 2), by trying every assignment."""
+    squares = ((truth[:, np.newaxis] - tracks) ** 2).sum(axis=-1)
+    totals = []
+    for event in joint_events(len(truth), len(tracks)):
+        pairs = [(i, j - 1) for i, j in enumerate(event) if j]
+        alone = len(truth) + len(tracks) - 2 * len(pairs)
+        totals.append(sum(squares[pair] for pair in pairs) + cutoff**2 / 2.0 * alone)
+    return float(np.sqrt(min(totals)))

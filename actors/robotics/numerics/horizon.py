@@ -39,10 +39,10 @@ class HorizonProblem(NamedTuple):
     peer_mean: Array  # (n, N, d) Ro_{i,t+s}, f5
     peer_distance: Array  # (n, N) Dmin + alpha * sigma_5i
     objective: int = REACH_GOAL  # eq. (2); or INFORM, eq. (5)
-    goal: Array = np.zeros(2)  # (d,)
-    sigma_positions: Array = np.empty((0, 2))  # (M, d) sigma points of the obstacle's position at t + N
+    goal: Array = np.zeros((1, 2))  # (n, d) at steps 1..n of eq. (2); the last one is there for the other steps, too
+    sigma_positions: Array = np.empty((0, 2))  # (T M, d) sigma points at t + N of the first T obstacles' positions
     sigma_weights: Array = np.empty(0)  # (M,) w_{t,i}
-    others_distance: Array = np.empty((0, 0))  # (M, M) exponent that the others' measurements add, mutual_information
+    others_distance: Array = np.empty((0, 0))  # (T M, M) exponent that the others' measurements add, mutual_information
     measurement_variance: float = 1.0  # eta_t of eq. (5), m^2
     range_penalty: float = 0.0  # gamma
     measurement_range: float = 0.0  # Dmax, f6
@@ -53,18 +53,27 @@ class HorizonProblem(NamedTuple):
     highest: float = math.inf  # f7, the height to stay below
 
     def to_reach(self, goal: Array) -> HorizonProblem:
-        """The same problem with the objective of eq. (2)."""
-        return self._replace(objective=REACH_GOAL, goal=np.array(goal))
+        """The same problem with the objective of eq. (2); a ``goal`` (d,) that stands still, or (N, d) at each step."""
+        return self._replace(objective=REACH_GOAL, goal=np.array(goal).reshape(-1, np.shape(goal)[-1]))
 
     def to_inform(
         self, points: Array, weights: Array, others: Array, variance: float, gamma: float, reach: float
     ) -> HorizonProblem:
-        """The same problem with the objective of eq. (5), in which ``others`` (n, N, d) also measure at their ends."""
+        """The same problem with the objective of eq. (5), in which ``others`` (n, N, d) also measure at their ends.
+
+        Of several targets, one after the other in ``points`` (T M, d), it is the sum.
+        """
+        size = len(weights)
+        if len(points) == size:
+            distance = pairwise_distance(points, others, variance)
+        else:
+            each = [pairwise_distance(points[i : i + size], others, variance) for i in range(0, len(points), size)]
+            distance = np.concatenate(each)
         return self._replace(
             objective=INFORM,
             sigma_positions=points,
             sigma_weights=weights,
-            others_distance=pairwise_distance(points, others, variance),
+            others_distance=distance,
             measurement_variance=variance,
             range_penalty=gamma,
             measurement_range=reach,

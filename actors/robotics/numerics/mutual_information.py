@@ -90,19 +90,20 @@ def point_columns(d: int, points: int) -> int:
 
 @borrower
 def new_points(sigma_positions: Array, weights: Array, others_distance: Array, points: Array, zero: Vector) -> int:
-    """Write the sigma points with a weight, in rows with room for ``informed``; returns how many.
+    """Write the sigma points with a weight, in rows with room for ``informed``, target by target; returns how many.
 
     ``zero`` is a vector of zeros.
     """
-    count, d = 0, len(zero)
-    for i in range(weights.shape[0]):
-        if weights[i] == 0.0:
+    count, size, d = 0, weights.shape[0], len(zero)
+    for i in range(sigma_positions.shape[0]):
+        own = i % size
+        if weights[own] == 0.0:
             continue
         for c in range(d):
             points[count, _PLACE + c] = sigma_positions[i, c]
-        points[count, _WEIGHT] = weights[i]
+        points[count, _WEIGHT] = weights[own]
         column = _pairs(d)
-        for j in range(i):
+        for j in range(own):
             if weights[j] != 0.0:
                 points[count, column] = others_distance[i, j]
                 column += 2
@@ -112,7 +113,7 @@ def new_points(sigma_positions: Array, weights: Array, others_distance: Array, p
 
 @borrower
 def informed(points: Array, at: Vector, variance: float) -> Term:
-    """-I at the own position with its gradient and Hessian.
+    """-I of one target at the own position with its gradient and Hessian.
 
     The density's constant factor (2 pi eta)^(-n/2) is left out: it shifts I but not the optimum.  Derivation: with E_ij
     = (r_i - r_j)^2 / (2 eta) + others_distance_ij and q_ij = w_j exp(-E_ij) normalised over j, grad(-I) = -sum_i w_i

@@ -55,8 +55,7 @@ _VELOCITY = 1
 _TRIED = 2  # the controls that position and velocity follow from
 TAKEN = 3  # the best controls so far
 _SHIFT = 4  # of the position, by a whole Newton step
-_TARGET = 5  # position of the obstacle in f6
-_VECTORS = 6  # number of vectors
+_VECTORS = 5  # number of vectors
 
 
 class Phase(IntEnum):
@@ -77,15 +76,17 @@ class Task(NamedTuple):
     speed_ratio: float  # of the largest speed to that of climbing: times this, a height is as if it were a length
     acceleration_ratio: float
     seeks: bool  # the objective is eq. (2)
-    goal: Vector
+    goal: Array  # (n, 2) of the problem
     variance: float
     penalty: float
     reach: float
     free: int  # free controls, the last of which is held
-    plan: Array  # (N, 6 d)
+    targets: int  # the first of the obstacles, of which the objective is eq. (5); 0 unless it is
+    obstacles: Array  # (K, N, d) of the problem
+    plan: Array  # (N, 5 d)
     stages: Array  # of ``newton``
     constraints: Array  # of ``constraints``, those within reach
-    points: Array  # of ``mutual_information``; none unless the objective is eq. (5) and there is an obstacle
+    points: Array  # of ``mutual_information``, as many for each target
 
 
 @inlined
@@ -93,8 +94,9 @@ def room_for(problem: HorizonProblem, steps: int, d: int) -> int:
     """The number of numbers in the tables of a task."""
     binding: int = subjects(problem, d) * problem.tube_radius.shape[0]
     points: int = problem.sigma_weights.shape[0]
+    rows: int = problem.sigma_positions.shape[0]
     columns: int = point_columns(d, points)
-    return steps * (_VECTORS * d + stage_columns(d)) + binding * constraint_columns(d) + points * columns
+    return steps * (_VECTORS * d + stage_columns(d)) + binding * constraint_columns(d) + rows * columns
 
 
 @borrower
@@ -112,17 +114,16 @@ def new_task(problem: HorizonProblem, steps: int, free: int, spare: float, room:
         room[i] = 0.0
     plan, stages = room[:second].reshape((steps, _VECTORS * d)), room[second:third].reshape((steps, stage_columns(d)))
     constraints = room[third:fourth].reshape((binding, constraint_columns(d)))
-    points = room[fourth:].reshape((weights.shape[0], point_columns(d, weights.shape[0])))
-    count = 0
+    points = room[fourth:].reshape((problem.sigma_positions.shape[0], point_columns(d, weights.shape[0])))
+    count = targets = 0
     if not seeks and problem.obstacle_mean.shape[0] > 0:
         count = new_points(problem.sigma_positions, weights, problem.others_distance, points, zero)
-        for s in range(steps):
-            for c in range(d):
-                plan[s, _TARGET * d + c] = problem.obstacle_mean[0, s, c]
-    position = velocity = goal = zero
+        told = problem.sigma_positions.shape[0] // max(weights.shape[0], 1)
+        targets = min(told, problem.obstacle_mean.shape[0]) if count > 0 else 0
+        count = count // max(told, 1) * targets
+    position = velocity = zero
     for c in range(d):
         position, velocity = replaced(position, c, problem.position[c]), replaced(velocity, c, problem.velocity[c])
-        goal = replaced(goal, c, problem.goal[c] if c < problem.goal.shape[0] else 0.0)
     return Task(
         period=problem.period,
         position=position,
@@ -132,11 +133,13 @@ def new_task(problem: HorizonProblem, steps: int, free: int, spare: float, room:
         speed_ratio=problem.max_speed / problem.climb_speed,
         acceleration_ratio=problem.max_acceleration / problem.climb_acceleration,
         seeks=seeks,
-        goal=goal,
+        goal=problem.goal,
         variance=problem.measurement_variance,
         penalty=problem.range_penalty,
         reach=problem.measurement_range,
         free=free,
+        targets=targets,
+        obstacles=problem.obstacle_mean,
         plan=plan,
         stages=stages,
         constraints=constraints[: constraints_of(problem, spare, constraints, zero)],
@@ -202,9 +205,30 @@ def look(task: Task) -> float:
 
 
 @inlined
-def _beyond(task: Task, s: int) -> Term:
-    """How far the position is beyond Dmax from the obstacle; the positive part is f6."""
-    return stay_near(at(task, s, _POSITION), at(task, s, _TARGET), task.reach)
+def _beyond(task: Task, k: int, s: int) -> Term:
+    """How far the position is beyond Dmax from an obstacle; the positive part is f6."""
+    target = task.position
+    for c in range(len(target)):
+        target = replaced(target, c, task.obstacles[k, s, c])
+    return stay_near(at(task, s, _POSITION), target, task.reach)
+
+
+@inlined
+def _informed(task: Task, k: int) -> Term:
+    """-I of a target at the last position."""
+    each = task.points.shape[0] // task.targets
+    points = task.points[k * each : (k + 1) * each]
+    return informed(points, at(task, task.plan.shape[0] - 1, _POSITION), task.variance)
+
+
+@inlined
+def _away(task: Task, s: int) -> Vector:
+    """The position as seen from the goal at that step; a goal without a height is on the ground."""
+    away, goal = at(task, s, _POSITION), task.goal
+    g = min(s, goal.shape[0] - 1)
+    for c in range(len(away)):
+        away = replaced(away, c, away[c] - (goal[g, c] if c < goal.shape[1] else 0.0))
+    return away
 
 
 @borrower
@@ -213,11 +237,11 @@ def objective_of(task: Task) -> float:
     steps, value = task.plan.shape[0], 0.0
     if task.seeks:
         for s in range(steps):
-            value += squared(less(at(task, s, _POSITION), task.goal))
-    elif task.points.shape[0] > 0:
-        value = informed(task.points, at(task, steps - 1, _POSITION), task.variance)[0]
+            value += squared(_away(task, s))
+    for k in range(task.targets):
+        value += _informed(task, k)[0]
         for s in range(steps):
-            value += task.penalty * max(0.0, _beyond(task, s)[0])
+            value += task.penalty * max(0.0, _beyond(task, k, s)[0])
     return value
 
 
@@ -236,22 +260,21 @@ def _add_objective(task: Task, mu: float) -> float:
     steps, value, product = task.plan.shape[0], 0.0, 1.0
     if task.seeks:
         for s in range(steps):
-            offset, halved = less(at(task, s, _POSITION), task.goal), zero_term(task.position)
+            offset, halved = _away(task, s), zero_term(task.position)
             value += squared(offset)
             for c in range(d):
                 halved = replaced(replaced(halved, 1 + c, offset[c]), 1 + d + packed(d, c, c), 1.0)
             add(stages, s, 2.0, 2.0, 0.0, halved)
-    if not task.points.shape[0] > 0:
-        return value
-    information = informed(task.points, at(task, steps - 1, _POSITION), task.variance)
-    add(stages, steps - 1, 1.0, 1.0, 0.0, information)
-    value = information[0]
-    for s in range(steps if gamma != 0.0 else 0):
-        beyond = _beyond(task, s)
-        t, over = smoothed(gamma, beyond[0], mu)
-        value, product = _less_log(value + gamma * t, product * (t * over), mu)
-        slope = mu / over
-        add(stages, s, slope, slope, mu / (over * over + t * t), beyond)
+    for k in range(task.targets):
+        information = _informed(task, k)
+        add(stages, steps - 1, 1.0, 1.0, 0.0, information)
+        value += information[0]
+        for s in range(steps if gamma != 0.0 else 0):
+            beyond = _beyond(task, k, s)
+            t, over = smoothed(gamma, beyond[0], mu)
+            value, product = _less_log(value + gamma * t, product * (t * over), mu)
+            slope = mu / over
+            add(stages, s, slope, slope, mu / (over * over + t * t), beyond)
     return value - mu * log(product)
 
 

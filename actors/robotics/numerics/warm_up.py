@@ -32,14 +32,28 @@ def compile_kernels(dimensions: int = 2) -> None:
 
     All take any number of dimensions but the solver, which is compiled for the plane and for space by itself.
     """
-    message = "compiling the numeric kernels (once, about 20 s) ..."
+    with _announced("compiling the numeric kernels (once, about 20 s) ..."):
+        _call_every_kernel(dimensions)
+
+
+@functools.cache
+def compile_tracking() -> None:
+    """The same for the kernels of a tracker, which other models do not need."""
+    compile_kernels()
+    with _announced("compiling the kernels of the tracker (once, about 20 s) ..."):
+        _call_tracking()
+
+
+@contextmanager
+def _announced(message: str) -> Iterator[None]:
+    """What is compiled here is announced if it takes long."""
     notice = threading.Timer(_PATIENCE, _LOGGER.info, (message,))
     notice.daemon = True
     notice.start()
     was_enabled = gc.isenabled()
     gc.disable()  # numba makes millions of objects, and garbage collection takes a sixth of the time
     try:
-        _call_every_kernel(dimensions)
+        yield
     finally:
         if was_enabled:
             gc.enable()
@@ -79,7 +93,7 @@ def _call_solver(d: int) -> None:
     # Plans that solve it need only one Newton step, and compile everything.
     problem = HorizonProblem(
         0.1, zeros(d), zeros(d), 1.0, 1.0, zeros((steps, d)), np.ones(steps), 1.0, 1.0, zeros((1, steps, d)) + 100.0,
-        zeros((1, steps, d * (d + 1) // 2)), zeros((1, steps, d)) + 200.0, zeros((1, steps)), INFORM, zeros(d),
+        zeros((1, steps, d * (d + 1) // 2)), zeros((1, steps, d)) + 200.0, zeros((1, steps)), INFORM, zeros((1, d)),
         zeros((9, d)), np.ones(9), zeros((9, 9)), 1.0, 1.0, 1.0, 1.0, 1.0,
     )  # fmt: skip
     solve(problem, zeros((2, steps, d)))
@@ -97,3 +111,15 @@ def call_others() -> None:
     standing_plan(zero, zero, np.zeros((_STEPS, 2)), 0.0, ones, zero, 0.0, 1.0, period)
     peer_mean, _ = peer_tubes(np.zeros((1, 7)), 0.0, period, ones, 0.4, 1.0, 1.0, 2)
     pairwise_distance(points, peer_mean, 1.0)
+
+
+def _call_tracking() -> None:
+    from .association import duplicates, fuse_scan, new_track, predict_tracks
+
+    means, covariances, existence = predict_tracks(
+        np.zeros((1, 4)), np.eye(4).reshape((1, 4, 4)), np.ones(1), np.eye(4), 0.1, 1.0
+    )
+    detection = np.array([0.0, 0.0, 0.0, 1.0, 1.0, 1.0, 1.0])
+    fuse_scan(means, covariances, existence, 0.0, detection, detection.reshape((1, 7)), 0.9, 1.0, 10.0, 16.0, True)
+    new_track(detection, 1.0)
+    duplicates(means, covariances, 1.0)

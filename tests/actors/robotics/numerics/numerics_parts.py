@@ -74,7 +74,7 @@ def inform_problem(random: np.random.Generator, steps: int = 10, reach: float = 
         peer_mean=np.empty((0, steps, 2)),
         peer_distance=np.empty((0, steps)),
         objective=horizon.INFORM,
-        goal=np.zeros(2),
+        goal=np.zeros((1, 2)),
         sigma_positions=points,
         sigma_weights=weights,
         others_distance=np.zeros((9, 9)),
@@ -108,10 +108,11 @@ def crowded_problem(random: np.random.Generator) -> "horizon.HorizonProblem":
 def objective_by_definition(problem: "horizon.HorizonProblem", controls: np.ndarray) -> float:
     """Without the centre of the sigma points, which has no weight."""
     heavy = problem.sigma_weights > 0.0
+    rows = np.resize(heavy, len(problem.sigma_positions))  # of each target
     problem = problem._replace(
-        sigma_positions=problem.sigma_positions[heavy],
+        sigma_positions=problem.sigma_positions[rows],
         sigma_weights=problem.sigma_weights[heavy],
-        others_distance=problem.others_distance[np.ix_(heavy, heavy)],
+        others_distance=problem.others_distance[np.ix_(rows, heavy)],
     )
     return float(definitions.objective(problem, definitions.driven(problem, controls)[0]))
 

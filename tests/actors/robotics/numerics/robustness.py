@@ -102,7 +102,7 @@ def pose(random: np.random.Generator) -> Posed:
         peer_distance=2.0
         + 2.0 * (tube_radius[:1] + 0.4 * random.integers(0, 20, size=(peers, 1)) + np.zeros((peers, STEPS))),
         objective=horizon.INFORM if random.random() < 0.5 else horizon.REACH_GOAL,
-        goal=random.normal(scale=scale, size=2),
+        goal=random.normal(scale=scale, size=(1, 2)),
         sigma_positions=points,
         sigma_weights=np.append(0.0, np.full(8, 0.125)),
         others_distance=information.pairwise_distance(points, peer_mean, 2.0),

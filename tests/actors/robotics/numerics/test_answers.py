@@ -137,7 +137,11 @@ def posed(**changes: Any) -> Any:
         **({} if "objective" in changes else {"goal": np.array([8.0, 0.0])}),
         **changes,
     }
-    return horizon.HorizonProblem(**{**fields, "position": np.array(fields["position"], dtype=float)})
+    shapes = {"position": (2,), "goal": (1, 2)}
+    shaped = {
+        name: np.array(fields[name], dtype=float).reshape(shape) for name, shape in shapes.items() if name in fields
+    }
+    return horizon.HorizonProblem(**{**fields, **shaped})
 
 
 def starts() -> np.ndarray:

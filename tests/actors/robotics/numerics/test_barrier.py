@@ -29,7 +29,7 @@ def test_solution_is_stationary(random: np.random.Generator, kind: str) -> None:
     """The whole objective by finite differences: no small step within the limits improves the plan found."""
     problem = inform_problem(random, steps=6)._replace(max_speed=1e3, max_acceleration=1e3)
     if kind == "goal":
-        problem = problem._replace(objective=horizon.REACH_GOAL, goal=np.array([8.0, 5.0]))
+        problem = problem._replace(objective=horizon.REACH_GOAL, goal=np.array([[8.0, 5.0]]))
     solution = solve(problem)
     value = objective_by_definition(problem, solution.controls)
     gap = 1e-4 * max(1.0, abs(value))

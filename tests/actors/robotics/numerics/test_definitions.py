@@ -10,6 +10,7 @@ import numba
 import numpy as np
 import pytest
 
+from tests.actors.robotics.numerics import test_association
 from tests.actors.robotics.numerics.numerics_parts import (
     PREFIX,
     inform_problem,
@@ -261,21 +262,88 @@ def test_the_reported_objective(random: np.random.Generator, reach: float) -> No
         solution = solve(problem)
         expected = objective_by_definition(problem, solution.controls)
         assert solution.objective == pytest.approx(expected, abs=1e-9)
-        goal = problem._replace(objective=horizon.REACH_GOAL, goal=random.normal(size=2))
-        solution = solve(goal)
-        places = definitions.driven(goal, solution.controls)[0]
-        assert objective_by_definition(goal, solution.controls) == pytest.approx(((places - goal.goal) ** 2).sum())
-        assert solution.objective == pytest.approx(definitions.f0(places, goal.goal).sum(), abs=1e-9)
+        for rows in (1, 10):  # a goal that stands still, and one that moves
+            goal = problem._replace(objective=horizon.REACH_GOAL, goal=random.normal(size=(rows, 2)))
+            solution = solve(goal)
+            places = definitions.driven(goal, solution.controls)[0]
+            assert objective_by_definition(goal, solution.controls) == pytest.approx(((places - goal.goal) ** 2).sum())
+            assert solution.objective == pytest.approx(definitions.f0(places, goal.goal).sum(), abs=1e-9)
+
+
+def test_staying_near_several(random: np.random.Generator) -> None:
+    """It is to be at their weighted mean, which is where the weighted sum of f0 is least, at every step."""
+    for _ in range(20):
+        places, weights = random.normal(scale=9.0, size=(3, 10, 2)), random.uniform(0.1, 3.0, size=3)
+        station = definitions.station(places, weights)
+        least = definitions.f0_of_several(station, places, weights)
+        assert least == pytest.approx(
+            sum(w * definitions.f0(station, each) for w, each in zip(weights, places, strict=True))
+        )
+        for _ in range(10):
+            positions = random.normal(scale=9.0, size=(10, 2))
+            found = definitions.f0_of_several(positions, places, weights)
+            assert found - least == pytest.approx(weights.sum() * definitions.f0(positions, station))
+
+
+def several_targets(random: np.random.Generator, count: int, reach: float) -> "horizon.HorizonProblem":
+    """A robot that is to inform itself about several targets, with a peer that measures, too."""
+    each = [inform_problem(random, reach=reach) for _ in range(count)]
+    shifts = random.normal(scale=5.0, size=(count, 2))
+    posed = each[0]._replace(
+        obstacle_mean=np.concatenate([one.obstacle_mean + shift for one, shift in zip(each, shifts, strict=True)]),
+        obstacle_covariance=np.concatenate([one.obstacle_covariance for one in each]),
+    )
+    points = np.concatenate([one.sigma_positions + shift for one, shift in zip(each, shifts, strict=True)])
+    peer = random.normal(scale=8.0, size=(1, 10, 2))
+    return posed.to_inform(points, posed.sigma_weights, peer, 2.0, 0.01, reach)
+
+
+@pytest.mark.parametrize("reach", [8.0, 3.0])
+def test_what_is_minimised_for_several_targets(random: np.random.Generator, reach: float) -> None:
+    """Eq. (5) for each target, and their sum; one of them alone is as it always was."""
+    for count in (1, 2, 5):
+        problem = several_targets(random, count, reach)
+        solution = solve(problem)
+        assert solution.objective == pytest.approx(objective_by_definition(problem, solution.controls), abs=1e-9)
+        alone = [
+            problem._replace(
+                obstacle_mean=problem.obstacle_mean[k : k + 1],
+                sigma_positions=problem.sigma_positions[9 * k : 9 * k + 9],
+                others_distance=problem.others_distance[9 * k : 9 * k + 9],
+            )
+            for k in range(count)
+        ]
+        together = sum(objective_by_definition(each, solution.controls) for each in alone)
+        assert solution.objective == pytest.approx(together, abs=1e-9)
+        assert solution.violation == 0.0
+        for _ in range(20):  # and it is a minimum
+            other = np.clip(solution.controls + random.normal(scale=0.3, size=(10, 2)), -11.0, 11.0)
+            if definitions.violations(problem, other).max() <= 0.0:
+                assert objective_by_definition(problem, other) > solution.objective - 1e-3
+
+
+def test_the_information_about_independent_targets_is_the_sum(random: np.random.Generator) -> None:
+    """By the definition of eq. (5), for the pairs of sigma points of two targets, each with its own measurement."""
+    robot, weights = random.normal(size=(1, 2)), np.array([0.5, 0.3, 0.2])
+    first, second = random.normal(scale=3.0, size=(2, 3, 2))
+    ranges = np.array([[*definitions.measured_range(np.array([a, b]), robot[0])] for a in first for b in second])
+    both = np.array([one * other for one in weights for other in weights])
+    misfit = ((ranges[:, np.newaxis] - ranges) ** 2).sum(axis=-1) / 4.0
+    joint = -(both * np.log((both * np.exp(-misfit)).sum(axis=1))).sum()
+    none = np.zeros((3, 3))
+    each = [definitions.mutual_information(robot[0], points, weights, 2.0, none) for points in (first, second)]
+    assert joint == pytest.approx(sum(each))
 
 
 def test_the_table_of_the_equations() -> None:
     """Every definition is in it, and what it names is there."""
-    rows = re.findall(r"^\| \(\d\).*? \| `(\w+)` \| (.*) \| (.*) \|$", PAPER.read_text("utf-8"), flags=re.MULTILINE)
+    tests = {**globals(), **vars(test_association)}
+    rows = re.findall(r"^\| \([\w ]+\).*? \| `(\w+)` \| (.*) \| (.*) \|$", PAPER.read_text("utf-8"), flags=re.MULTILINE)
     written = {name for name, each in vars(definitions).items() if inspect.isfunction(each) and name[0] != "_"}
     assert {name for name, _, _ in rows} == written
-    for _, kernels, tests in rows:
+    for _, kernels, checks in rows:
         for module, name in re.findall(r"`(\w+)\.(\w+)`", kernels):
             assert hasattr(importlib.import_module(PREFIX + module), name), f"{module}.{name}"
-        named = re.findall(r"`(test_\w+)`", tests)
+        named = re.findall(r"`(test_\w+)`", checks)
         assert named
-        assert all(name in globals() for name in named), named
+        assert all(name in tests for name in named), named

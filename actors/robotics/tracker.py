@@ -1,0 +1,295 @@
+"""Tracks of several targets from the scans of all robots, by joint probabilistic data association."""
+
+from __future__ import annotations
+
+from bisect import bisect_left
+from dataclasses import dataclass, replace
+from operator import attrgetter
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..core import Actor, InputPort, OutputPort, Parameter, to_nanoseconds, to_seconds
+from .arrays import Array
+from .estimator import EXPECTED, PREDICTED, TargetModel
+from .messages import RANGE, Detections, Estimate, Tracks
+
+_LIKELY = 0.5  # probability from which a track counts as in range, or a detection as new; share of expected detections
+
+
+@dataclass(frozen=True, slots=True)
+class _Record:
+    """What is kept of a track besides its estimate."""
+
+    number: int = 0  # 0: not confirmed
+    hits: int = 0  # steps that detected it
+    steps: int = 0  # steps that could have
+    expected: float = 0.0  # detections at this step
+    detected: float = 0.0  # probably
+    sources: tuple[str, ...] = ()  # robots that detected it at this step
+
+
+class _Picture(NamedTuple):
+    """All tracks at one time, never modified; older ones come first."""
+
+    means: Array  # (T, 4)
+    covariances: Array  # (T, 4, 4)
+    existence: Array  # (T,) how likely each exists
+    records: tuple[_Record, ...]
+    confirmed: int = 0  # tracks so far
+    rough: int = 0  # probabilities so far that are not exact
+
+    def only(self, kept: list[int]) -> _Picture:
+        """The same with some of the tracks."""
+        if len(kept) == len(self.records):
+            return self
+        records = tuple(self.records[place] for place in kept)
+        return self._replace(
+            means=self.means[kept], covariances=self.covariances[kept], existence=self.existence[kept], records=records
+        )
+
+
+@dataclass(slots=True)
+class _Step:
+    """The scans of one time, and the tracks after them."""
+
+    time: int  # ns
+    scans: list[tuple[Any, Detections]]  # each with what sorts it
+    after: _Picture | None = None
+
+
+_time = attrgetter("time")
+
+
+class JPDATracker(TargetModel, Actor):
+    """Tracks an unknown number of targets by joint probabilistic data association (JPDA) and the unscented filter.
+
+    At each trigger the tracker predicts all tracks to the present and fuses the scans of all robots, one after the
+    other, sorted by time and robot.  In a scan, a track causes at most one detection inside its ``gate``, and a
+    detection has at most one cause.  A track becomes the mean over all such joint events, weighted by their
+    probabilities.  These are exact in every cluster of tracks that share detections if 2^tracks (1 + detections) is at
+    most 131,072.  A larger cluster is solved by Fitzgerald's formula, and its tracks are counted at ``approximated``.
+
+    Each track exists with a probability, which is part of the association (JIPDA); if it is 1, this is JPDA.  It starts
+    as the share of new targets in the detections that belong to no track.
+
+    A relative position that probably belongs to no track starts a tentative track; a range cannot start one.  A step
+    (all scans of one time) is a *hit* if it detects the track at least half as often as expected, and a *miss*
+    otherwise.  Scans with the track probably out of range do not count.  A tentative track is confirmed when it has
+    ``confirm_hits`` hits and exists with ``confirm_probability``.  It is dropped after more misses than
+    ``confirm_steps`` allow.  A confirmed track is dropped when it exists with less than ``delete_probability``, or when
+    its position is less certain than ``max_deviation``.  If two tracks are nearer to each other than
+    ``merge_distance``, the younger is dropped.
+
+    A late scan is inserted at its time, and the tracker runs again from there.  Later tracks and their numbers are
+    those of a tracker that received it in time.  Scans more than ``max_delay`` late are not fused but counted at
+    ``too_late``.  A scan from the future, due to a wrong clock, counts as made now.  A copy has no effect.  A scan that
+    is not finite is ignored.
+    """
+
+    trigger = InputPort(object, doc="predict to the present time, fuse, and send the tracks")
+    detections = InputPort(
+        Detections, multi=True, required=False, triggers=False, doc="scans of all robots, including this one"
+    )
+    tracks = OutputPort(Tracks, doc="all confirmed tracks (x, y, vx, vy) after fusion")
+    confirmed = OutputPort(int, doc="how many these are")
+    too_late = OutputPort(int, doc="number of scans so far that came more than max_delay late; sent with each of them")
+    approximated = OutputPort(
+        int, doc="number of tracks so far that were in too large a cluster in a scan; sent when it has changed"
+    )
+
+    period = Parameter(float, 0.1, unit="s", above=0, doc="the time over which the process noise was measured")
+    gate = Parameter(
+        float, 16.0, unit="1", above=0, max=1e3,
+        doc="squared Mahalanobis distance up to which a track may cause a detection; chi-square, with 2 degrees of "
+        "freedom for a relative position: 16 is exceeded by 0.03 % of them",
+    )  # fmt: skip
+    birth_density = Parameter(
+        float, 1e-5, above=0, max=1e6,
+        doc="expected detections of targets without a track per m^2 (m for ranges) of a scan, besides the clutter",
+    )  # fmt: skip
+    birth_variance = Parameter(float, 4.0, unit="m^2/s^2", min=0, doc="variance of a new track's velocity")
+    confirm_hits = Parameter(int, 3, min=1, doc="M: hits that confirm a track")
+    confirm_steps = Parameter(int, 4, min=1, doc="N: among its first steps, the one that began it included")
+    confirm_probability = Parameter(
+        float, 0.99, unit="1", min=0, max=1, doc="how likely a target must exist for a confirmed track"
+    )
+    delete_probability = Parameter(
+        float, 0.05, unit="1", min=0, max=1, doc="a confirmed track ends when it exists with less probability"
+    )
+    lifetime = Parameter(float, 30.0, unit="s", above=0, doc="mean time after which a target is gone")
+    max_deviation = Parameter(
+        float, 10.0, unit="m", above=0, doc="root mean square of the position's two deviations that ends a track"
+    )
+    merge_distance = Parameter(
+        float, 1.0, unit="1", min=0,
+        doc="squared Mahalanobis distance of two tracks, chi-square with 4 degrees of freedom, that makes them one",
+    )  # fmt: skip
+    max_tracks = Parameter(int, 64, min=1, max=1000, doc="number of tracks, tentative ones included, never exceeded")
+    max_delay = Parameter(float, 2.0, unit="s", min=0, max=1e9, doc="largest age of a scan that is still fused")
+    noise_direction = Parameter(
+        str, EXPECTED, choices=(EXPECTED, PREDICTED),
+        doc="the noise ellipse is averaged over the directions that the prediction allows, or turned along its mean",
+    )  # fmt: skip
+
+    def initialize(self) -> None:
+        from .numerics import association, ukf
+        from .numerics.warm_up import compile_tracking
+
+        compile_tracking()
+        self._kinds = {True: float(ukf.RANGE), False: float(ukf.RELATIVE_POSITION)}
+        self._predict, self._fuse = association.predict_tracks, association.fuse_scan
+        self._begin, self._duplicates = association.new_track, association.duplicates
+        self._noise = self.process_noise
+        self._averaged = self.noise_direction == EXPECTED
+        self._waiting: list[Detections] = []  # for the next trigger
+        self._too_late = self._rough = 0
+        self._steps: list[_Step] = []  # of the last ``max_delay``, and the tracks before them, with their time
+        self._before = _Picture(np.empty((0, 4)), np.empty((0, 4, 4)), np.empty(0), ())
+        self._before_at: int | None = None
+
+    def fire(self) -> None:
+        now = self.tag.time
+        earliest = now - to_nanoseconds(self.max_delay)
+        self._take(earliest)
+        if not self.trigger.present:
+            return
+        picture = self._catch_up(now)
+        self._forget(earliest)
+        if picture.rough != self._rough:
+            self._rough = picture.rough
+            self.approximated.send(self._rough)
+        told = sorted((each.number, place) for place, each in enumerate(picture.records) if each.number)
+        time = to_seconds(now)
+        estimates = tuple(
+            Estimate(picture.means[place], picture.covariances[place], time, picture.records[place].sources)
+            for _, place in told
+        )
+        self.tracks.send(Tracks(tuple(number for number, _ in told), estimates, time))
+        self.confirmed.send(len(told))
+
+    # --- in the order of time ---------------------------------------------------------------------------
+
+    def _take(self, earliest: int) -> None:
+        """Keep new scans for the next trigger, unless they are older than ``earliest``."""
+        come = [*self._waiting, *(each for each in self.detections.tokens if each.finite)]
+        self._waiting = [each for each in come if to_nanoseconds(each.time) >= earliest]
+        if len(self._waiting) < len(come):
+            self._too_late += len(come) - len(self._waiting)
+            self.too_late.send(self._too_late)
+
+    def _catch_up(self, now: int) -> _Picture:
+        """Insert waiting scans at their times, and bring all tracks to the present."""
+        steps, first = self._steps, self._place_of(now)
+        for scan in self._waiting:
+            place = self._place_of(min(to_nanoseconds(scan.time), now))
+            order = _order(scan)
+            if all(order != known for known, _ in steps[place].scans):
+                steps[place].scans.append((order, scan))
+                first = min(first, place)
+        self._waiting = []
+        before, at = self._before, self._before_at
+        if first:
+            last = steps[first - 1]
+            assert last.after is not None  # only new steps have none, and they follow
+            before, at = last.after, last.time
+        for step in steps[first:]:
+            # Sorted, so that the order of arrival has no influence.
+            step.scans.sort(key=lambda each: each[0])
+            before = self._step(before, 0.0 if at is None else to_seconds(step.time - at), step.scans)
+            step.after, at = before, step.time
+        return before
+
+    def _place_of(self, time: int) -> int:
+        """The index of the step at that time, which may be new."""
+        steps = self._steps
+        place = bisect_left(steps, time, key=_time)
+        if place == len(steps) or steps[place].time != time:
+            steps.insert(place, _Step(time, []))
+        return place
+
+    def _forget(self, earliest: int) -> None:
+        """Forget the steps before a time, which no scan can change any longer."""
+        count = bisect_left(self._steps, earliest, key=_time)
+        if count:
+            last = self._steps[count - 1]
+            assert last.after is not None
+            self._before, self._before_at = last.after, last.time
+            del self._steps[:count]
+
+    # --- tracks -----------------------------------------------------------------------------------------
+
+    def _step(self, picture: _Picture, elapsed: float, scans: list[tuple[Any, Detections]]) -> _Picture:
+        """All tracks ``elapsed`` seconds later, after the scans of that time."""
+        if elapsed > 0.0 and picture.records:
+            noise = self._noise * (elapsed / self.period)
+            means, covariances, existence = self._predict(*picture[:3], noise, elapsed, self.lifetime)
+            picture = picture._replace(means=means, covariances=covariances, existence=existence)
+        before = tuple(replace(each, expected=0.0, detected=0.0, sources=()) for each in picture.records)
+        picture = picture._replace(records=before)
+        for _, scan in scans:
+            picture = self._after_scan(picture, scan)
+        picture = self._managed(picture)
+        if len(picture.records) > 1 and self.merge_distance > 0.0:
+            extra = self._duplicates(picture.means, picture.covariances, self.merge_distance)
+            picture = picture.only([place for place, same in enumerate(extra.tolist()) if not same])
+        largest = 2.0 * self.max_deviation * self.max_deviation
+        spread = (picture.covariances[:, 0, 0] + picture.covariances[:, 1, 1]).tolist()
+        return picture.only([place for place, each in enumerate(spread) if each <= largest])
+
+    def _after_scan(self, picture: _Picture, scan: Detections) -> _Picture:
+        count = len(scan.values)
+        rows = np.zeros((1 + count, 7))  # the sensor, without a value, and each detection
+        rows[:, 0] = self._kinds[scan.kind == RANGE]
+        rows[:, 1:3] = scan.observer
+        rows[1:, 3 : 3 + scan.values.shape[1]] = scan.values
+        rows[:, 5], rows[:, 6] = scan.along, scan.across
+        density = scan.clutter_density + self.birth_density
+        means, covariances, existence, caused, in_range, rough = self._fuse(
+            *picture[:3], self.kappa, rows[0], rows[1:], scan.probability, density, scan.max_range, self.gate,
+            self._averaged,
+        )  # fmt: skip
+        left = [1.0] * count
+        for row in caused.tolist():
+            left = [each - taken for each, taken in zip(left, row[1:], strict=True)]
+        records = []
+        for known, missed, share in zip(picture.records, caused[:, 0].tolist(), in_range.tolist(), strict=True):
+            records.append(known if share < _LIKELY else _counted(known, scan, scan.probability * share, 1.0 - missed))
+        new = [rows[1 + place] for place, free in enumerate(left) if free >= _LIKELY and scan.kind != RANGE]
+        begun = [self._begin(row, self.birth_variance) for row in new[: max(self.max_tracks - len(records), 0)]]
+        if begun:
+            means = np.concatenate([means, [mean for mean, _ in begun]])
+            covariances = np.concatenate([covariances, [covariance for _, covariance in begun]])
+            existence = np.concatenate([existence, [self.birth_density / density] * len(begun)])
+            records.extend(_counted(_Record(), scan, scan.probability, 1.0) for _ in begun)
+        return _Picture(means, covariances, existence, tuple(records), picture.confirmed, picture.rough + rough)
+
+    def _managed(self, picture: _Picture) -> _Picture:
+        """The tracks that are left at the end of a step, newly confirmed ones with a number."""
+        records, kept, confirmed = [], [], picture.confirmed
+        for place, (known, exists) in enumerate(zip(picture.records, picture.existence.tolist(), strict=True)):
+            record = known
+            if known.expected > 0.0 or known.detected > 0.0:  # somebody looked there
+                is_hit = known.detected >= _LIKELY * known.expected
+                record = replace(known, hits=known.hits + is_hit, steps=known.steps + 1)
+            if record.number and exists < self.delete_probability:
+                continue
+            if not record.number:
+                if record.steps - record.hits > max(self.confirm_steps - self.confirm_hits, 0):
+                    continue
+                if record.hits >= self.confirm_hits and exists >= self.confirm_probability:
+                    confirmed += 1
+                    record = replace(record, number=confirmed)
+            records.append(record)
+            kept.append(place)
+        return picture.only(kept)._replace(records=tuple(records), confirmed=confirmed)
+
+
+def _counted(record: _Record, scan: Detections, expected: float, detected: float) -> _Record:
+    """A record after a scan with the probability that it should have detected the track, and that it has."""
+    sources = tuple(sorted({*record.sources, scan.robot})) if detected >= _LIKELY else record.sources
+    return replace(record, expected=record.expected + expected, detected=record.detected + detected, sources=sources)
+
+
+def _order(scan: Detections) -> Any:
+    return scan.robot, scan.time, scan.kind, scan.observer.tolist(), scan.values.tolist()

@@ -1,0 +1,410 @@
+"""Several targets: bodies that come and go, sensors that cannot tell them apart, the tracker, and how it is judged."""
+
+import importlib
+import math
+
+import numpy as np
+import pytest
+from scipy.stats import binom, chi2, kstest, poisson
+
+from epicycle.actors import (
+    BodyState,
+    Casadi,
+    ClearanceMonitor,
+    Detections,
+    EpicycleError,
+    Estimate,
+    Inform,
+    JPDATracker,
+    MultiTargetSensor,
+    ReachGoal,
+    RobustController,
+    TrackingError,
+    Tracks,
+    WaypointMotion,
+)
+from epicycle.actors.testing import Harness
+from tests.actors.robotics.scenario import _Recorder
+
+ORIGIN = (0.0, 0.0)
+
+
+def body(x: float, y: float, time: float = 0.0) -> BodyState:
+    return BodyState((x, y), ORIGIN, time)
+
+
+def scan(
+    *places: tuple[float, float], time: float = 0.0, robot: str = "main", observer: tuple[float, float] = ORIGIN,
+    deviation: float = 0.1, **changed: object,
+) -> Detections:  # fmt: skip
+    """What a good sensor at ``observer`` sees of bodies at ``places``."""
+    values = np.array(places, dtype=float).reshape(len(places), 2) - observer
+    fields = {
+        "robot": robot, "observer": observer, "kind": "relative_position", "values": values, "along": deviation,
+        "across": deviation, "probability": 0.9, "clutter": 0.1, "max_range": 50.0, "time": time, **changed,
+    }  # fmt: skip
+    return Detections(**fields)
+
+
+def track(*scans: list[Detections], **parameters: object) -> Harness:
+    """A tracker that is triggered ten times a second, with some scans each time."""
+    harness = Harness(JPDATracker("main.tracker", **{"velocity_noise": 0.01, **parameters}))
+    for tick, each in enumerate(scans):
+        harness.fire(tick / 10, trigger=tick, detections=each)
+    return harness
+
+
+def numbers(harness: Harness) -> list[tuple[int, ...]]:
+    return [each.numbers for each in harness.tokens("tracks")]
+
+
+# --- bodies ---------------------------------------------------------------------------------------------------------
+
+
+def test_a_body_appears_moves_and_leaves() -> None:
+    harness = Harness(WaypointMotion("body", waypoints=[[0, 0], [3, 4], [3, 6]], speed=2.0, appears=1.0, leaves=6.0))
+    for second in range(8):
+        harness.fire(float(second), trigger=second)
+    states = harness.tokens("state")
+    assert [each.time for each in states] == [1.0, 2.0, 3.0, 4.0, 5.0]
+    expected = [(0, 0), (1.2, 1.6), (2.4, 3.2), (3, 5), (3, 6)]
+    assert np.array([each.position for each in states]) == pytest.approx(np.array(expected, dtype=float))
+    assert states[0].velocity == pytest.approx([1.2, 1.6])
+    assert states[3].velocity == pytest.approx([0.0, 2.0])
+    assert states[4].velocity.tolist() == [0.0, 0.0]
+
+
+def test_a_body_that_repeats_its_way() -> None:
+    harness = Harness(WaypointMotion("body", waypoints=[[0, 0], [4, 0], [0, 0]], repeats=True))
+    for second in range(12):
+        harness.fire(float(second), trigger=second)
+    places = [each.position[0] for each in harness.tokens("state")]
+    assert places == pytest.approx([0, 1, 2, 3, 4, 3, 2, 1, 0, 1, 2, 3])
+
+
+def test_a_body_needs_a_place() -> None:
+    with pytest.raises(EpicycleError, match="needs at least one waypoint"):
+        WaypointMotion("body", waypoints=np.empty((0, 2)))
+    still = Harness(WaypointMotion("body", waypoints=[[1, 2]], repeats=True))
+    still.fire(5.0, trigger=0)
+    assert still.last("state").position.tolist() == [1.0, 2.0]
+
+
+# --- sensor ---------------------------------------------------------------------------------------------------------
+
+
+def sense(count: int, *targets: tuple[float, float], **parameters: object) -> list[Detections]:
+    harness = Harness(MultiTargetSensor("main.sensor", **parameters), widths={"targets": len(targets)})
+    for step in range(count):
+        bodies = [body(*each) for each in targets]
+        harness.fire(step / 10, robot=body(1.0, 2.0, step / 10), targets=bodies)
+    return harness.tokens("detections")
+
+
+def test_how_often_a_body_is_detected_and_with_what_noise() -> None:
+    scans = sense(2000, (4.0, 6.0), (1.0, 50.0), detection_probability=0.7)
+    seen = np.array([each.values[0] for each in scans if len(each.values)])
+    assert {len(each.values) for each in scans} == {0, 1}  # the other one is out of range
+    assert binom.ppf(0.0005, 2000, 0.7) <= len(seen) <= binom.ppf(0.9995, 2000, 0.7)
+    errors = (seen - [3.0, 4.0]) @ np.array([[0.6, 0.8], [-0.8, 0.6]]).T / [0.2, 2.0]  # along, across
+    low, high = chi2.ppf([0.0005, 0.9995], len(seen))
+    for component in errors.T:
+        assert low <= (component**2).sum() <= high
+
+
+@pytest.mark.parametrize("kind", ["relative_position", "range"])
+def test_clutter_is_poisson_and_uniform(kind: str) -> None:
+    scans = sense(1000, kind=kind, clutter=3.0, max_range=20.0)
+    counts = np.array([len(each.values) for each in scans])
+    assert poisson.ppf(0.0005, 3000) <= counts.sum() <= poisson.ppf(0.9995, 3000)
+    assert counts.var() == pytest.approx(3.0, rel=0.15)
+    values = np.concatenate([each.values for each in scans])
+    assert values.shape[1] == (1 if kind == "range" else 2)
+    shares = values[:, 0] / 20.0 if kind == "range" else (values**2).sum(axis=1) / 400.0
+    assert kstest(shares, "uniform").pvalue > 0.001
+    assert scans[0].clutter_density == pytest.approx(3.0 / (20.0 if kind == "range" else 400.0 * math.pi))
+
+
+def test_the_order_of_a_scan_says_nothing() -> None:
+    ways = sense(50, (9.0, 0.0), (-9.0, 0.0), clutter=2.0)
+    assert all(each.values.tolist() == sorted(each.values.tolist()) for each in ways)
+
+
+def test_a_body_that_is_gone_changes_nothing_about_the_others() -> None:
+    def seen(gone: bool) -> list[list[float]]:
+        harness = Harness(MultiTargetSensor("main.sensor", detection_probability=0.5), widths={"targets": 2})
+        found = []
+        for step in range(30):
+            bodies = [None if gone else body(-20.0, 0.0), body(5.0, 0.0)]
+            harness.fire(step / 10, robot=body(0.0, 0.0), targets=bodies)
+            found.append([each for each in harness.last("detections").values.tolist() if each[0] > -10.0])
+        return found
+
+    assert seen(gone=True) == seen(gone=False)
+
+
+def test_scans_that_cannot_be_used() -> None:
+    good = scan((1.0, 2.0))
+    assert good.finite
+    assert scan().finite
+    for field, bad in {
+        "values": np.zeros((1, 3)), "kind": "range", "along": 0.0, "across": -1.0, "probability": 1.5,
+        "clutter": -1.0, "max_range": 0.0, "time": math.inf,
+    }.items():  # fmt: skip
+        assert not scan((1.0, 2.0), **{field: bad}).finite
+    harness = track([scan((1.0, 2.0), time=math.nan)], [scan((1.0, 2.0), clutter=math.inf)])
+    assert numbers(harness) == [(), ()]
+
+
+# --- tracker --------------------------------------------------------------------------------------------------------
+
+
+def test_a_track_is_confirmed_and_ends() -> None:
+    """Three hits confirm it, and it ends when misses have made it unlikely: known answers, in clear sight."""
+    scans = [[scan(*([(10.0, 0.0)] if tick < 10 else []), time=tick / 10)] for tick in range(20)]
+    harness = track(*scans)
+    told = numbers(harness)
+    assert told[:10] == [(), ()] + [(1,)] * 8
+    # The odds were at most lifetime / period = 300, and each miss divides them by nearly ten.
+    assert told[10:14] == [(1,)] * 3 + [()]
+    assert told[14:] == [()] * 6
+    last = harness.tokens("tracks")[9].estimates[0]
+    assert last.mean[:2] == pytest.approx([10.0, 0.0], abs=1e-6)
+    assert last.sources == ("main",)
+    assert harness.tokens("confirmed") == [len(each) for each in told]
+
+
+def test_two_hits_of_four_are_not_enough() -> None:
+    """A detection, two misses and so on: with M = 3 of N = 4 nothing is ever confirmed; with M = 1, at once."""
+    scans = [[scan(*([(10.0, 0.0)] if tick % 3 == 0 else []), time=tick / 10)] for tick in range(12)]
+    assert set(numbers(track(*scans))) == {()}
+    eager = track(*scans, confirm_hits=1, confirm_steps=1, confirm_probability=0.0)
+    assert numbers(eager)[0] == (1,)
+    patient = track(*scans, confirm_hits=3, confirm_steps=9)
+    assert (1,) in numbers(patient)
+
+
+def test_who_could_not_see_it_does_not_count() -> None:
+    """A second sensor, 100 m away, neither confirms nor ends anything."""
+    near = [[scan((10.0, 0.0), time=tick / 10)] for tick in range(6)]
+    both = [[*each, scan(time=tick / 10, robot="far", observer=(100.0, 0.0))] for tick, each in enumerate(near)]
+    alone, together = track(*near), track(*both)
+    assert numbers(alone) == numbers(together)
+    for one, other in zip(alone.tokens("tracks"), together.tokens("tracks"), strict=True):
+        assert [each.mean.tolist() for each in one.estimates] == [each.mean.tolist() for each in other.estimates]
+
+
+def test_obstacles_that_cross_keep_their_tracks() -> None:
+    """Two of them meet head on; a number stays with its body, and both are tracked to a decimetre."""
+
+    def places(tick: int) -> list[tuple[float, float]]:
+        return [(10.0 - 0.2 * tick + 2.0, 0.3), (8.0 + 0.2 * tick - 2.0, -0.3)]
+
+    random = np.random.default_rng(4)
+    scans = []
+    for tick in range(40):
+        noisy = [tuple(np.add(place, random.normal(scale=0.1, size=2))) for place in places(tick)]
+        scans.append([scan(*sorted(noisy), time=tick / 10)])
+    harness = track(*scans, velocity_noise=0.001)
+    nearest = []
+    for tick in (8, 39):
+        told = harness.tokens("tracks")[tick]
+        assert told.numbers == (1, 2)
+        errors = np.array([[math.dist(each.mean[:2], place) for place in places(tick)] for each in told.estimates])
+        nearest.append(errors.argmin(axis=1).tolist())
+        assert errors.min(axis=1).max() < 0.2
+    assert sorted(nearest[0]) == [0, 1]
+    assert nearest[0] == nearest[1]
+
+
+def test_the_order_of_arrival_has_no_influence() -> None:
+    random = np.random.default_rng(5)
+
+    def ticks(turned: bool) -> list[list[Detections]]:
+        return [each[::-1] if turned else each for each in scans]
+
+    scans = [
+        [
+            scan(*random.normal((8.0, 3.0), 0.3, size=(3, 2)), time=tick / 10, robot=robot, observer=(place, 0.0))
+            for robot, place in (("a", 0.0), ("b", 5.0), ("c", 9.0))
+        ]
+        for tick in range(10)
+    ]
+    assert same(track(*ticks(False)), track(*ticks(True)))
+
+
+def same(one: Harness, other: Harness, since: int = 0) -> bool:
+    """Whether two trackers say the same, to the bit."""
+
+    def words(harness: Harness) -> list[object]:
+        return [
+            (each.numbers, [(e.mean.tobytes(), e.covariance.tobytes(), e.time) for e in each.estimates])
+            for each in harness.tokens("tracks")[since:]
+        ]
+
+    return words(one) == words(other)
+
+
+def test_late_scans_are_fused_at_their_time() -> None:
+    """Scans that come 0.3 s late: from then on, tracks and numbers are those of a tracker that got them in time."""
+    random = np.random.default_rng(6)
+    own = [[scan((10 + 0.1 * tick, 0.0), time=tick / 10)] for tick in range(12)]
+    others = [
+        scan((10 + 0.1 * tick, 0.0), (20.0, 5.0), tuple(random.uniform(-9, 9, size=2)), time=tick / 10, robot="b")
+        for tick in range(9)
+    ]
+    punctual = track(*[[*each, *others[tick : tick + 1]] for tick, each in enumerate(own)])
+    late = track(*[[*each, *(others[tick - 3 : tick - 2] if tick >= 3 else [])] for tick, each in enumerate(own)])
+    assert len(punctual.tokens("tracks")[-1].numbers) == 2
+    assert not same(punctual, late)
+    assert same(punctual, late, since=11)
+    copied = track(*[[*each, *others[tick : tick + 1] * 3] for tick, each in enumerate(own)])
+    assert same(punctual, copied)
+
+
+def test_scans_that_come_too_late_are_counted() -> None:
+    harness = track([], [], [], max_delay=0.15)
+    harness.fire(0.5, detections=[scan(time=0.3), scan((1.0, 1.0), time=0.2), scan(time=0.4)])
+    assert harness.tokens("too_late") == [2]
+    harness.fire(0.6, trigger=6)  # the third one has waited for too long
+    assert harness.tokens("too_late") == [2, 3]
+    assert harness.tokens("approximated") == []
+
+
+def test_ranges_keep_a_track_but_begin_none() -> None:
+    ranges = [
+        Detections("b", (10.0, 10.0), "range", [[10.0]], 0.1, 0.1, 0.9, 0.1, 50.0, tick / 10) for tick in range(30)
+    ]
+    assert set(numbers(track(*[[each] for each in ranges]))) == {()}
+    harness = track(*[[scan((10.0, 0.0), time=tick / 10)] if tick < 5 else [ranges[tick]] for tick in range(30)])
+    assert numbers(harness)[-1] == (1,)
+    # From there, a range tells how far it is, which is y, and little about x.
+    spread = harness.last("tracks").estimates[0].covariance
+    assert spread[1, 1] < 0.1 < spread[0, 0]
+
+
+def test_tracks_are_limited_and_uncertain_ones_end() -> None:
+    places = [(3.0 * place, 20.0) for place in range(10)]
+    harness = track(*[[scan(*places, time=tick / 10)] for tick in range(5)], max_tracks=4)
+    assert numbers(harness)[-1] == (1, 2, 3, 4)
+    blind = [[scan((10.0, 0.0), time=tick / 10)] if tick < 5 else [] for tick in range(200)]
+    told = numbers(track(*blind, max_deviation=3.0))
+    assert told[6] == (1,)
+    assert told[-1] == ()
+
+
+def test_two_tracks_of_one_target_become_one() -> None:
+    """Two sensors that disagree by a metre until one of them is corrected."""
+
+    def scans(tick: int) -> list[Detections]:
+        off = 4.0 if tick < 5 else 0.0
+        return [
+            scan((10.0, 0.0), time=tick / 10, probability=0.6),
+            scan((10.0, off), time=tick / 10, robot="off", probability=0.6),
+        ]
+
+    told = numbers(track(*[scans(tick) for tick in range(40)]))
+    assert told[4] == (1, 2)
+    assert told[-1] == (1,)
+
+
+def test_too_many_tracks_at_one_place_are_approximated() -> None:
+    """Beyond 2^tracks (1 + detections) = 131,072, and the count says so."""
+    places = [(2.0 * (place % 5), 20.0 + 2.0 * (place // 5)) for place in range(20)]
+    crowd = [scan(*places, time=tick / 10, deviation=0.8, clutter=0.0) for tick in range(4)]
+    harness = track(*[[each] for each in crowd], confirm_probability=0.5, merge_distance=0.0)
+    assert harness.tokens("approximated")[-1] > 0
+    assert len(harness.last("tracks").numbers) > 10
+
+
+# --- what judges them -----------------------------------------------------------------------------------------------
+
+
+def test_the_tracking_error() -> None:
+    harness = Harness(TrackingError("error", cutoff=5.0), widths={"bodies": 3})
+    tracks = Tracks((1, 4), tuple(Estimate((x, 0.0, 0.0, 0.0), np.eye(4), 0.0) for x in (1.0, 40.0)), 0.0)
+    harness.fire(0.0, bodies=[body(0.0, 0.0), None, body(20.0, 0.0)], tracks=tracks)
+    assert harness.last("gospa") == pytest.approx(math.sqrt(1.0 + 12.5 + 12.5))
+    assert (harness.last("error"), harness.last("missed"), harness.last("false")) == (1.0, 1, 1)
+    harness.fire(0.1, tracks=Tracks((), (), 0.1))
+    assert (harness.last("gospa"), harness.last("missed"), harness.last("false")) == (0.0, 0, 0)
+    assert len(harness.tokens("error")) == 1
+
+
+def test_the_clearance() -> None:
+    harness = Harness(ClearanceMonitor("clearance"), widths={"others": 2})
+    harness.fire(0.0, body=body(0.0, 0.0), others=[body(3.0, 4.0), body(0.0, 9.0)])
+    harness.fire(0.1, body=body(0.0, 0.0), others=[None, body(0.0, 9.0)])
+    harness.fire(0.2, body=body(0.0, 0.0))
+    assert harness.tokens("distance") == [5.0, 9.0]
+
+
+def test_the_warm_up_calls_every_kernel_of_the_tracker() -> None:
+    """So that nothing is compiled while a model runs."""
+    module = importlib.import_module("epicycle.actors.robotics.numerics.association")
+    track([scan((10.0, 0.0))])
+    before = {name: len(each.signatures) for name, each in vars(module).items() if hasattr(each, "signatures")}
+    track(*[[scan((10.0, 0.0), (12.0, 1.0), time=tick / 10)] for tick in range(5)])
+    assert before == {name: len(each.signatures) for name, each in vars(module).items() if hasattr(each, "signatures")}
+
+
+# --- controller -----------------------------------------------------------------------------------------------------
+
+
+def told(*places: tuple[float, float], time: float = 0.0) -> Tracks:
+    estimates = tuple(Estimate((x, y, -1.0, 0.5), 0.1 * np.eye(4), time) for x, y in places)
+    return Tracks(tuple(range(1, 1 + len(places))), estimates, time)
+
+
+def problem_of(objective: object, **tokens: object) -> object:
+    recorder = _Recorder()
+    harness = Harness(RobustController("main.controller", solver=recorder, objective=objective))
+    harness.fire(0.3, trigger=0, state=body(8.0, 0.0, 0.3), **tokens)
+    return recorder.records[0][0]
+
+
+@pytest.mark.parametrize("objective", [ReachGoal(), Inform()])
+def test_the_controller_takes_all_tracks(objective: object) -> None:
+    """Each as it takes an estimate, brought to the time of its own state."""
+    places = [(3.0, 1.0), (-2.0, 5.0), (9.0, -4.0)]
+    together = problem_of(objective, tracks=told(*places, time=0.1))
+    size = len(together.sigma_weights)
+    for k, place in enumerate(places):
+        alone = problem_of(objective, estimate=told(place, time=0.1).estimates[0])
+        assert together.obstacle_mean[k].tolist() == alone.obstacle_mean[0].tolist()
+        assert together.obstacle_covariance[k].tolist() == alone.obstacle_covariance[0].tolist()
+        rows = slice(k * size, (k + 1) * size)
+        assert together.sigma_positions[rows].tolist() == alone.sigma_positions.tolist()
+        assert together.others_distance[rows].tolist() == alone.others_distance.tolist()
+    assert len(together.obstacle_mean) == 3
+
+
+def test_one_track_is_an_estimate() -> None:
+    """To the bit; and no track is no estimate."""
+    known = told((3.0, 1.0))
+    one, other = problem_of(Inform(), tracks=known), problem_of(Inform(), estimate=known.estimates[0])
+    assert [np.array(each).tolist() for each in one] == [np.array(each).tolist() for each in other]
+    assert len(problem_of(Inform(), tracks=told()).obstacle_mean) == 0
+    both = problem_of(Inform(), tracks=known, estimate=told((9.0, 9.0)).estimates[0])
+    assert len(both.obstacle_mean) == 2
+
+
+def test_old_tracks_and_those_that_are_not_finite_are_ignored() -> None:
+    recorder = _Recorder()
+    harness = Harness(RobustController("main.controller", solver=recorder))
+    bad = Tracks((1,), (Estimate((math.nan, 0.0, 0.0, 0.0), np.eye(4), 0.3),), 0.3)
+    for time, tracks in ((0.1, told((3.0, 1.0), (5.0, 5.0), time=0.1)), (0.2, told((3.0, 1.0), time=0.0)), (0.3, bad)):
+        harness.fire(time, trigger=0, state=body(8.0, 0.0, time), tracks=tracks)
+    assert [len(problem.obstacle_mean) for problem, _, _ in recorder.records] == [2, 2, 2]
+
+
+def test_it_keeps_away_from_all_of_them_and_informs_itself_about_all() -> None:
+    """CasADi, an independent program, finds no better plan."""
+    pytest.importorskip("casadi")
+    for objective in (ReachGoal(), Inform(range=6.0, penalty=0.05)):
+        posed = problem_of(objective, tracks=told((4.5, 1.2), (5.0, -3.0), (12.0, 2.0)))
+        starts = np.zeros((2, len(posed.tube_radius), 2))
+        recorder = _Recorder()
+        ours, theirs = recorder.solve(posed, starts), Casadi().solve(posed, starts)
+        assert ours.violation == theirs.violation == 0.0
+        assert ours.objective <= theirs.objective + 1e-3 * max(1.0, abs(theirs.objective))
