@@ -126,7 +126,7 @@ def _away(points: Array, i: int, measurements: Array, m: int, c: int) -> float:
 
 @kernel
 def constant_velocity(period: float, dimensions: int = 2) -> Array:
-    """Transition of eq. (1) for the state (x, y, vx, vy), or the like in other dimensions."""
+    """Transition of eq. (1) for the state (x, y, vx, vy)."""
     transition = np.zeros((2 * dimensions, 2 * dimensions))  # np.eye takes half a second to compile
     for i in range(2 * dimensions):
         transition[i, i] = 1.0
