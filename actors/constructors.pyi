@@ -39,6 +39,8 @@ from .robotics.filterpy_estimator import FilterPyEstimator as _FilterPyEstimator
 from .robotics.monitors import ClearanceMonitor as _ClearanceMonitor, DistanceMonitor as _DistanceMonitor, GoalMonitor as _GoalMonitor, SeparationMonitor as _SeparationMonitor
 from .robotics.motion import WaypointMotion as _WaypointMotion
 from .robotics.planning import Barrier as _Barrier, Casadi as _Casadi, Inform as _Inform, Objective, ReachGoal as _ReachGoal, Solver, StayNear as _StayNear
+from .robotics.roaming import RoamingEstimator as _RoamingEstimator
+from .robotics.safe_controller import SafeController as _SafeController
 from .robotics.tracker import JPDATracker as _JPDATracker
 from .robotics.tracking_error import TrackingError as _TrackingError
 from .robotics.world import BroadcastChannel as _BroadcastChannel, CircularMotion as _CircularMotion, Flooding as _Flooding, FlyingVehicle as _FlyingVehicle, Sensor as _Sensor, Vehicle as _Vehicle
@@ -472,6 +474,10 @@ class ResettableTimer(_ResettableTimer):
     """Sends a value after the number of seconds in the latest token."""
     def __init__(self, path: str, *, preemptive: bool = ..., value: object = ...) -> None: ...
 
+class RoamingEstimator(_RoamingEstimator):
+    """The paper's filter with two changes, for a `SafeController`; the process noise of eq. (1) is not used."""
+    def __init__(self, path: str, *, freedom: _Number = ..., target_speed: _Number = ..., turn_time: _Number = ..., period: _Number = ..., prior_mean: _Row = ..., prior_variance: _Row = ..., max_delay: _Number = ..., noise_direction: Literal['expected', 'predicted'] = ..., position_noise: _Number = ..., velocity_noise: _Number = ..., kappa: _Number = ...) -> None: ...
+
 class RobustController(_RobustController):
     """Solves the horizon problem at every trigger and sends the acceleration for the *next* period."""
     def __init__(self, path: str, *, objective: Objective | abc.Mapping[str, object] = ..., objectives: abc.Mapping[str, Objective | abc.Mapping[str, object]] = ..., solver: Solver | abc.Mapping[str, object] = ..., max_speed: _Number = ..., max_acceleration: _Number = ..., horizon: _Whole = ..., horizon_from: Literal['now', 'decision'] = ..., period: _Number = ..., safe_distance: _Number = ..., margin: _Number = ..., tube_initial: _Number = ..., tube_growth: _Number = ..., tube_time: Literal['steps', 'seconds'] = ..., covariance_noise: bool = ..., keep_out: _Rows = ..., peers_at_start: _Rows = ..., robot_name: str = ..., position_noise: _Number = ..., velocity_noise: _Number = ..., kappa: _Number = ...) -> None: ...
@@ -479,6 +485,10 @@ class RobustController(_RobustController):
 class Router(_Router):
     """Sends each token to one channel of its output: in turn, at random, to the least loaded, or by a property of the token."""
     def __init__(self, path: str, *, policy: Literal['round robin', 'random', 'shortest queue', 'expression'] = ..., weights: _Row | None = ..., channel: str | float | Formula | None = ...) -> None: ...
+
+class SafeController(_SafeController):
+    """A `RobustController` that also keeps a retreat open, for a target of bounded speed."""
+    def __init__(self, path: str, *, confidence: _Number = ..., target_speed: _Number = ..., turn_time: _Number = ..., objective: Objective | abc.Mapping[str, object] = ..., objectives: abc.Mapping[str, Objective | abc.Mapping[str, object]] = ..., solver: Solver | abc.Mapping[str, object] = ..., max_speed: _Number = ..., max_acceleration: _Number = ..., horizon: _Whole = ..., horizon_from: Literal['now', 'decision'] = ..., period: _Number = ..., safe_distance: _Number = ..., margin: _Number = ..., tube_initial: _Number = ..., tube_growth: _Number = ..., tube_time: Literal['steps', 'seconds'] = ..., covariance_noise: bool = ..., peers_at_start: _Rows = ..., robot_name: str = ..., position_noise: _Number = ..., velocity_noise: _Number = ..., kappa: _Number = ...) -> None: ...
 
 class Sampler(_Sampler):
     """Passes on tokens that come at the same tag as a trigger; all others are lost."""

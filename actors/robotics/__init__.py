@@ -23,6 +23,8 @@ from .planning import (
     Solver,
     StayNear,
 )
+from .roaming import RoamingEstimator
+from .safe_controller import SafeController
 from .tracker import JPDATracker
 from .tracking_error import TrackingError
 from .world import (
@@ -39,6 +41,6 @@ __all__ = [
     "Barrier", "BodyState", "BroadcastChannel", "Casadi", "ChannelError", "CircularMotion", "ClearanceMonitor",
     "Detections", "DistanceMonitor", "Estimate", "FilterError", "FilterPyEstimator", "Flooding", "FlyingController",
     "FlyingVehicle", "GoalMonitor", "Inform", "JPDATracker", "Measurement", "MultiTargetSensor", "Objective", "Plan",
-    "ReachGoal", "RobustController", "Sensor", "SeparationMonitor", "Solver", "StayNear", "TrackingError", "Tracks",
-    "UnscentedEstimator", "Vehicle", "WaypointMotion",
+    "ReachGoal", "RoamingEstimator", "RobustController", "SafeController", "Sensor", "SeparationMonitor", "Solver",
+    "StayNear", "TrackingError", "Tracks", "UnscentedEstimator", "Vehicle", "WaypointMotion",
 ]  # fmt: skip

@@ -190,7 +190,7 @@ class RobustController(TargetModel, Actor):
         self._nobody = no_means, no_covariances, np.empty((0, d)), np.empty(0)
         places, apart = self.keep_out[:, np.newaxis, :2], self.keep_out[:, 2:]
         self._standing_there = np.repeat(places, self._steps, axis=1), np.repeat(apart, self._steps, axis=1)
-        self._limits = self._flight()
+        self._in_space = self._flight()
         self._applied = np.zeros(d)  # U_t
         self._standing = self._nothing = _Standing(-math.inf, np.zeros(d), np.zeros(d), np.zeros((self._steps, d)))
         self._peers = _Peers(self.peers_at_start)
@@ -278,7 +278,7 @@ class RobustController(TargetModel, Actor):
             obstacle_covariance=target_covariance,
             peer_mean=peer_mean,
             peer_distance=peer_distance,
-            **self._limits,
+            **self._in_space,
         )
         posed = self._objective.pose(posed, points, weights, self._peers.names)
         if len(self.keep_out):  # as f5, but nobody who measures

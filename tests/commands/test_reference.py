@@ -124,7 +124,7 @@ def test_parts_are_described_with_the_actor(capsys: pytest.CaptureFixture[str]) 
     assert "Casadi  solver\n" in text
     parts = json.loads(printed(capsys, "actors", "RobustController", "--json"))["parts"]
     assert {base: [each["name"] for each in known] for base, known in parts.items()} == {
-        "Objective": ["Inform", "ReachGoal"],
+        "Objective": ["Inform", "ReachGoal", "StayNear"],
         "Solver": ["Barrier", "Casadi"],
     }
 

@@ -275,3 +275,24 @@ def gospa(truth: Array, tracks: Array, cutoff: float) -> float:
         alone = len(truth) + len(tracks) - 2 * len(pairs)
         totals.append(sum(squares[pair] for pair in pairs) + cutoff**2 / 2.0 * alone)
     return float(np.sqrt(min(totals)))
+
+
+def roaming(speed: float, turn_time: float, elapsed: float, kept: float) -> tuple[Array, Array]:
+    """The model of a target of bounded speed: transition (4, 4) of its state (x, y, vx, vy), and the covariance gained.
+
+    Its velocity is an Ornstein-Uhlenbeck process of which the share ``kept`` = exp(-elapsed / turn_time) is left; in
+    each direction the stationary variance is speed^2 / 2, which is that of ``speed`` in an unknown direction.  With
+    T = turn_time, r = kept and s = 1 - r:
+
+        x' = x + T s v,  v' = r v
+        gained, times speed^2 / 2:  var v' 1 - r^2,  cov(x', v') T s^2,  var x' T (2 t - T s (2 + s))
+    """
+    variance, lost = 0.5 * speed * speed, 1.0 - kept
+    way = turn_time * lost
+    transition, gained = np.eye(4), np.zeros((4, 4))
+    for i in range(2):
+        transition[i, i + 2], transition[i + 2, i + 2] = way, kept
+        gained[i, i] = max(0.0, variance * turn_time * (2.0 * elapsed - way * (2.0 + lost)))
+        gained[i, i + 2] = gained[i + 2, i] = variance * way * lost
+        gained[i + 2, i + 2] = variance * (1.0 - kept * kept)
+    return transition, gained

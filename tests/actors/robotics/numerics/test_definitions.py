@@ -2,6 +2,7 @@
 
 import importlib
 import inspect
+import math
 import re
 from pathlib import Path
 from typing import Any
@@ -45,6 +46,21 @@ def test_the_target_s_model(random: np.random.Generator) -> None:
     after = definitions.target_after(state, 0.1)
     assert after == pytest.approx([state[0] + 0.1 * state[2], state[1] + 0.1 * state[3], state[2], state[3]])
     assert ukf.constant_velocity(0.1) @ state == pytest.approx(after, abs=1e-15)
+
+
+def test_a_roaming_target() -> None:
+    """Two spans are one of both lengths; many short steps of v' = v - v h / T + noise tend to it."""
+    first, second, both = (definitions.roaming(1.5, 2.0, t, math.exp(-t / 2.0)) for t in (0.3, 0.9, 1.2))
+    assert second[0] @ first[0] == pytest.approx(both[0], abs=1e-14)
+    assert second[0] @ first[1] @ second[0].T + second[1] == pytest.approx(both[1], abs=1e-14)
+    h, transition, gained = 1e-4, np.eye(4), np.zeros((4, 4))
+    step = ukf.constant_velocity(h) - np.diag([0, 0, h / 2.0, h / 2.0])
+    for _ in range(12_000):
+        transition, gained = step @ transition, step @ gained @ step.T
+        gained[[2, 3], [2, 3]] += 1.5**2 * h / 2.0
+    assert transition == pytest.approx(both[0], abs=1e-4)
+    assert gained == pytest.approx(both[1], abs=1e-4)
+    assert np.diag(definitions.roaming(1.5, 2.0, 100.0, 0.0)[1])[2:] == pytest.approx([1.125, 1.125])
 
 
 def test_dynamics(random: np.random.Generator) -> None:

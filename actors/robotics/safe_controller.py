@@ -1,0 +1,114 @@
+"""A controller that can always still turn away from the target, whatever the target does within its bounds."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from ..core import OutputPort, Parameter
+from ..core.elementary import cos, sin
+from .arrays import Array, pair
+from .controller import RobustController
+from .messages import BodyState
+from .numerics.horizon import HorizonProblem
+from .roaming import RoamingModel
+
+_DIRECTIONS = 64  # of a retreat that are tried
+_SHARES = 1.0, 0.75, 0.5, 0.25  # of the planned control, the rest being that of the retreat
+
+
+class _Retreat(NamedTuple):
+    """A retreat that was certain to keep the safe distance."""
+
+    direction: Array  # (2,), of unit length
+    reach: float  # m, the target's largest coordinate along it
+    time: float  # s, when that was so
+
+
+class SafeController(RoamingModel, RobustController):
+    """A ``RobustController`` that also keeps a retreat open, for a target of bounded speed.
+
+    It differs in two things:
+
+    * It predicts the target as one that roams (``RoamingModel``), and keeps ``confidence`` standard deviations from it;
+      ``margin`` is for other robots alone.
+    * A plan's first control is sent only if, after it, there is a retreat: a direction in which the robot, once it
+      accelerates that way with all it has, is certain to keep ``safe_distance`` for ever, wherever the target is within
+      ``confidence`` standard deviations of its estimate, and wherever it goes at up to ``target_speed``.  Otherwise the
+      control is mixed with that of the last retreat that was certain, or replaced by it.
+
+    So if the estimate is right to ``confidence`` standard deviations whenever a retreat is found, and the robot moves
+    as its controls say, then it never comes within ``safe_distance``: a retreat that was certain stays so.  Other
+    robots are avoided by the plan alone.  Before there is a first retreat, the best one that there is decides.
+    """
+
+    overrides = OutputPort(int, doc="number of controls so far that a retreat has changed")
+
+    confidence = Parameter(float, 3.5, unit="1", min=0, doc="standard deviations to keep from the target")
+
+    def initialize(self) -> None:
+        from .numerics import reachability, retreat, ukf
+
+        super().initialize()
+        self._expected_target: Callable[..., tuple[Array, Array, Array, Array]] = self._predicted
+        self._propagate, self._predict = reachability.propagate, ukf.predict
+        self._reaches, self._kept, self._best = retreat.reaches, retreat.kept_distance, retreat.best_retreat
+        turn = 2.0 * math.pi / _DIRECTIONS
+        self._directions = np.array([(cos(i * turn), sin(i * turn)) for i in range(_DIRECTIONS)])
+        self._limits = self.target_speed, self.max_speed, self.max_acceleration, self.period
+        self._retreat: _Retreat | None = None
+        self._overrides = 0
+
+    def _predicted(
+        self, mean: Array, covariance: Array, noise: Array, is_widened: bool, kappa: float, period: float,
+        elapsed: float, steps: int, dimensions: int,
+    ) -> tuple[Array, Array, Array, Array]:  # fmt: skip
+        """``reachability.expected_target`` for a target that roams; without sigma points, which only eq. (5) needs."""
+        mean, covariance = mean.copy(), covariance.copy()  # kernels would be compiled again for read-only arrays
+        if elapsed > 0.0:
+            mean, covariance = self._predict(mean, covariance, *self.roaming(elapsed))
+        means, covariances = self._propagate(mean, covariance, *self.roaming(period), steps, dimensions)
+        return means[np.newaxis], covariances[np.newaxis], np.empty((0, 2)), np.empty(0)
+
+    def _problem(self, own: BodyState) -> tuple[HorizonProblem, Array]:
+        problem, starts = super()._problem(own)
+        return problem._replace(margin=self.confidence), starts
+
+    def _send(self, own: BodyState, problem: HorizonProblem, controls: Array) -> None:
+        if self._target is not None:
+            first = self._safe(own.time, problem, controls[0])
+            if first is not controls[0] and (first != controls[0]).any():
+                controls = controls.copy()
+                controls[0] = first
+                self._overrides += 1
+        self.overrides.send(self._overrides)
+        super()._send(own, problem, controls)
+
+    # --- retreats ---------------------------------------------------------------------------------------
+
+    def _safe(self, now: float, problem: HorizonProblem, planned: Array) -> Array:
+        """The control to send in place of the planned one: itself, if it leaves a retreat."""
+        target, start, last = self._target, (problem.position, problem.velocity), self._retreat
+        assert target is not None
+        estimate = target.mean.copy(), target.covariance.copy(), max(now - target.time, 0.0)
+        reaches = self._reaches(self._directions, *estimate, self.confidence, self.target_speed)
+        for share in _SHARES if last is not None else _SHARES[:1]:
+            control = planned if last is None else share * planned + (1.0 - share) * self._away(last)
+            kept, row = self._best(self._directions, reaches, *start, control, *self._limits)
+            if kept >= self.safe_distance:
+                self._retreat = _Retreat(self._directions[row], float(reaches[row]), now)
+                return control
+            if last is not None:
+                reach = last.reach + self.target_speed * (now - last.time)
+                if self._kept(*pair(last.direction), reach, *start, control, *self._limits) >= self.safe_distance:
+                    return control
+        if last is not None:
+            return self._away(last)
+        return self._away(_Retreat(self._directions[row], float(reaches[row]), now))
+
+    def _away(self, retreat: _Retreat) -> Array:
+        away: Array = self.max_acceleration * retreat.direction
+        return away
