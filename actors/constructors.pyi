@@ -32,7 +32,7 @@ from .replay import Replay as _Replay
 from .resources.line import WaitingLine as _WaitingLine
 from .resources.pool import Pool as _Pool
 from .resources.stations import Machine as _Machine, Station as _Station
-from .robotics.controller import RobustController as _RobustController
+from .robotics.controller import FlyingController as _FlyingController, RobustController as _RobustController
 from .robotics.detecting import MultiTargetSensor as _MultiTargetSensor
 from .robotics.estimator import UnscentedEstimator as _UnscentedEstimator
 from .robotics.filterpy_estimator import FilterPyEstimator as _FilterPyEstimator
@@ -43,7 +43,7 @@ from .robotics.roaming import RoamingEstimator as _RoamingEstimator
 from .robotics.safe_controller import SafeController as _SafeController
 from .robotics.tracker import JPDATracker as _JPDATracker
 from .robotics.tracking_error import TrackingError as _TrackingError
-from .robotics.world import BroadcastChannel as _BroadcastChannel, CircularMotion as _CircularMotion, Flooding as _Flooding, Sensor as _Sensor, Vehicle as _Vehicle
+from .robotics.world import BroadcastChannel as _BroadcastChannel, CircularMotion as _CircularMotion, Flooding as _Flooding, FlyingVehicle as _FlyingVehicle, Sensor as _Sensor, Vehicle as _Vehicle
 from .sinks import Display as _Display, Histogram as _Histogram, Recorder as _Recorder, Stop as _Stop, Test as _Test
 from .sources import Clock as _Clock, PoissonClock as _PoissonClock, Random as _Random, SingleEvent as _SingleEvent, VaryingRandom as _VaryingRandom
 from .statistics import MovingAverage as _MovingAverage, MovingStatistics as _MovingStatistics
@@ -249,6 +249,14 @@ class FirstOrder(_FirstOrder):
 class Flooding(_Flooding):
     """Sends the messages of its robot, and repeats those of others for the robots that are out of their reach."""
     def __init__(self, path: str) -> None: ...
+
+class FlyingController(_FlyingController):
+    """A `RobustController` in space, with limits of climbing and of the height."""
+    def __init__(self, path: str, *, keep_out: _Rows = ..., climb_speed: _Number = ..., climb_acceleration: _Number = ..., lowest: _Number = ..., highest: _Number | None = ..., peers_at_start: _Rows = ..., objective: Objective | abc.Mapping[str, object] = ..., objectives: abc.Mapping[str, Objective | abc.Mapping[str, object]] = ..., solver: Solver | abc.Mapping[str, object] = ..., max_speed: _Number = ..., max_acceleration: _Number = ..., horizon: _Whole = ..., horizon_from: Literal['now', 'decision'] = ..., period: _Number = ..., safe_distance: _Number = ..., margin: _Number = ..., tube_initial: _Number = ..., tube_growth: _Number = ..., tube_time: Literal['steps', 'seconds'] = ..., covariance_noise: bool = ..., robot_name: str = ..., position_noise: _Number = ..., velocity_noise: _Number = ..., kappa: _Number = ...) -> None: ...
+
+class FlyingVehicle(_FlyingVehicle):
+    """A `Vehicle` in space, which climbs and sinks more slowly than it flies level."""
+    def __init__(self, path: str, *, start: _Row, start_velocity: _Row = ..., climb_speed: _Number = ..., climb_acceleration: _Number = ..., max_speed: _Number = ..., max_acceleration: _Number = ...) -> None: ...
 
 class Function(_Function):
     """Calls a Python function whenever one of its inputs gets a token, and sends what it returns."""
@@ -472,7 +480,7 @@ class RoamingEstimator(_RoamingEstimator):
 
 class RobustController(_RobustController):
     """Solves the horizon problem at every trigger and sends the acceleration for the *next* period."""
-    def __init__(self, path: str, *, objective: Objective | abc.Mapping[str, object] = ..., objectives: abc.Mapping[str, Objective | abc.Mapping[str, object]] = ..., solver: Solver | abc.Mapping[str, object] = ..., max_speed: _Number = ..., max_acceleration: _Number = ..., horizon: _Whole = ..., horizon_from: Literal['now', 'decision'] = ..., period: _Number = ..., safe_distance: _Number = ..., margin: _Number = ..., tube_initial: _Number = ..., tube_growth: _Number = ..., tube_time: Literal['steps', 'seconds'] = ..., covariance_noise: bool = ..., peers_at_start: _Rows = ..., robot_name: str = ..., position_noise: _Number = ..., velocity_noise: _Number = ..., kappa: _Number = ...) -> None: ...
+    def __init__(self, path: str, *, objective: Objective | abc.Mapping[str, object] = ..., objectives: abc.Mapping[str, Objective | abc.Mapping[str, object]] = ..., solver: Solver | abc.Mapping[str, object] = ..., max_speed: _Number = ..., max_acceleration: _Number = ..., horizon: _Whole = ..., horizon_from: Literal['now', 'decision'] = ..., period: _Number = ..., safe_distance: _Number = ..., margin: _Number = ..., tube_initial: _Number = ..., tube_growth: _Number = ..., tube_time: Literal['steps', 'seconds'] = ..., covariance_noise: bool = ..., keep_out: _Rows = ..., peers_at_start: _Rows = ..., robot_name: str = ..., position_noise: _Number = ..., velocity_noise: _Number = ..., kappa: _Number = ...) -> None: ...
 
 class Router(_Router):
     """Sends each token to one channel of its output: in turn, at random, to the least loaded, or by a property of the token."""
@@ -496,7 +504,7 @@ class Select(_Select):
 
 class Sensor(_Sensor):
     """Measures the target's relative position, or its distance, with normal noise (Table II)."""
-    def __init__(self, path: str, *, kind: Literal['relative_position', 'range'] = ..., along: _Number = ..., across: _Number = ..., max_range: _Number | None = ..., robot_name: str = ...) -> None: ...
+    def __init__(self, path: str, *, kind: Literal['relative_position', 'range'] = ..., along: _Number = ..., across: _Number = ..., max_range: _Number | None = ..., occluders: _Rows = ..., robot_name: str = ...) -> None: ...
 
 class SeparationMonitor(_SeparationMonitor):
     """The smallest distance between any two of several bodies, whenever a state comes and two or more are known."""

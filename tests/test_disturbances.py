@@ -231,10 +231,10 @@ def test_every_plan_is_as_old_as_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
         for plan, (now, known) in zip(plans, used, strict=True):
             solved_for = when[*plan.state.position.tolist(), *plan.state.velocity.tolist()]
             for row in known:
-                made_at = when[tuple(row[:4].tolist())]
+                made_at = when[tuple(row[3:7].tolist())]
                 if len(solved_for) == len(made_at) == 1:  # at the start, robots stand where they were
                     ages += 1
-                    wrong += round((solved_for[0] - made_at[0]) / 1e8) != round((now - row[4]) / 0.1)
+                    wrong += round((solved_for[0] - made_at[0]) / 1e8) != round((now - row[0]) / 0.1)
     assert ages > 900
     assert wrong == 0
 
@@ -274,7 +274,7 @@ def test_an_estimate_that_is_late_is_not_taken_for_fresh(monkeypatch: pytest.Mon
     original = reachability.expected_target
 
     def watched(*arguments: Any) -> Any:
-        ages.append(arguments[-2])
+        ages.append(arguments[-3])
         return original(*arguments)
 
     monkeypatch.setattr(reachability, "expected_target", watched)

@@ -1,6 +1,6 @@
 """Robots that observe and avoid a moving obstacle: bodies, sensors, estimators, controllers, messages."""
 
-from .controller import RobustController
+from .controller import FlyingController, RobustController
 from .detecting import MultiTargetSensor
 from .estimator import UnscentedEstimator
 from .filterpy_estimator import FilterError, FilterPyEstimator
@@ -32,14 +32,15 @@ from .world import (
     ChannelError,
     CircularMotion,
     Flooding,
+    FlyingVehicle,
     Sensor,
     Vehicle,
 )
 
 __all__ = [
     "Barrier", "BodyState", "BroadcastChannel", "Casadi", "ChannelError", "CircularMotion", "ClearanceMonitor",
-    "Detections", "DistanceMonitor", "Estimate", "FilterError", "FilterPyEstimator", "Flooding", "GoalMonitor",
-    "Inform", "JPDATracker", "Measurement", "MultiTargetSensor", "Objective", "Plan", "ReachGoal", "RoamingEstimator",
-    "RobustController", "SafeController", "Sensor", "SeparationMonitor", "Solver", "StayNear", "TrackingError",
-    "Tracks", "UnscentedEstimator", "Vehicle", "WaypointMotion",
+    "Detections", "DistanceMonitor", "Estimate", "FilterError", "FilterPyEstimator", "Flooding", "FlyingController",
+    "FlyingVehicle", "GoalMonitor", "Inform", "JPDATracker", "Measurement", "MultiTargetSensor", "Objective", "Plan",
+    "ReachGoal", "RoamingEstimator", "RobustController", "SafeController", "Sensor", "SeparationMonitor", "Solver",
+    "StayNear", "TrackingError", "Tracks", "UnscentedEstimator", "Vehicle", "WaypointMotion",
 ]  # fmt: skip

@@ -71,6 +71,17 @@ cpdef tuple pair(values):
     return x, y
 
 
+cpdef tuple floats(values):
+    cdef double* data
+    if is_plain(values) and (<numpy.ndarray>values).ndim == 1:
+        data = numbers_of(values)
+        if size_of(values) == 2:
+            return data[0], data[1]
+        if size_of(values) == 3:
+            return data[0], data[1], data[2]
+    return tuple(np.asarray(values, dtype=FLOAT).tolist())
+
+
 cpdef bint all_finite(numbers) except -1:
     return all(map(math.isfinite, numbers))
 

@@ -52,7 +52,7 @@ def load_casadi() -> Any:
 
 
 def solve(problem: HorizonProblem, starts: Array, max_iterations: int = 500) -> Solution:
-    """Solve from ``starts[0]`` (k, N, 2); never raises."""
+    """Solve from ``starts[0]`` (k, N, d); never raises."""
     attempt = _Attempt(problem, starts.shape[1], max_iterations)
     candidates = [start for start in starts if attempt.keeps_limits(start)]
     start = candidates[0] if candidates else np.zeros(starts.shape[1:])
@@ -75,6 +75,15 @@ def solve(problem: HorizonProblem, starts: Array, max_iterations: int = 500) -> 
     return Solution(controls, worst if worst > TOLERANCE else 0.0, value, attempt.iterations)
 
 
+def _limits(problem: HorizonProblem, controls: Any, share: float) -> tuple[Any, Any]:
+    """f1 of all speeds but the first, which is decided already, and f2, with ``share`` of what they allow."""
+    velocities = definitions.driven(problem, controls)[1][1:]
+    return (
+        definitions.f1(velocities, share * problem.max_speed, share * problem.climb_speed),
+        definitions.f2(controls, share * problem.max_acceleration, share * problem.climb_acceleration),
+    )
+
+
 class _Attempt:
     """One problem: its numbers, its two programs, and how many iterations they have taken."""
 
@@ -83,6 +92,10 @@ class _Attempt:
         rows = np.resize(heavy, len(problem.sigma_positions))
         self.problem = problem._replace(
             tube_radius=np.where(np.isfinite(problem.tube_radius), problem.tube_radius, _FAR),
+            climb_speed=min(problem.climb_speed, _FAR),
+            climb_acceleration=min(problem.climb_acceleration, _FAR),
+            lowest=max(problem.lowest, -_FAR),
+            highest=min(problem.highest, _FAR),
             sigma_positions=problem.sigma_positions[rows],
             sigma_weights=problem.sigma_weights[heavy],
             others_distance=problem.others_distance[np.ix_(rows, heavy)] if heavy.any() else np.empty((0, 0)),
@@ -102,8 +115,7 @@ class _Attempt:
 
     def keeps_limits(self, controls: Array) -> bool:
         """Whether f1 and f2 are kept; the speed at step 1 is decided already."""
-        fast = definitions.f1(definitions.driven(self.problem, controls)[1][1:], self.problem.max_speed)
-        return bool((fast <= 0.0).all() and (definitions.f2(controls, self.problem.max_acceleration) <= 0.0).all())
+        return all(bool((limit <= 0.0).all()) for limit in _limits(self.problem, controls, 1.0))
 
     def optimise(self, start: Array, bounds: Any) -> Array | None:
         """Minimise the objective with f3-f5 at most ``bounds``; None without a usable result."""
@@ -154,12 +166,9 @@ def _programs(steps: int, shapes: tuple[tuple[int, ...], ...], objective: int, m
     ]  # NumPy would treat a single symbol as an argument of a function
     problem = HorizonProblem(**dict(zip(_NUMBERS, numbers, strict=True)), objective=objective)
     parameters = cs.vertcat(*np.concatenate([np.ravel(each) for each in numbers]))
-    controls = symbols(steps, 2)
-    positions, velocities = definitions.driven(problem, controls)
-    limits = [
-        *definitions.f1(velocities[1:], _STRICT * problem.max_speed),
-        *definitions.f2(controls, _STRICT * problem.max_acceleration),
-    ]
+    controls = symbols(steps, *shapes[_NUMBERS.index("position")])
+    positions, _ = definitions.driven(problem, controls)
+    limits = [row for each in _limits(problem, controls, _STRICT) for row in each]
     coupled = definitions.constraints(problem, positions).ravel()
 
     def program(cost: Any, extra: Any, rows: list[Any]) -> Any:

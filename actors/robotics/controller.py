@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from operator import itemgetter
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -19,7 +19,7 @@ from ..core import (
     did_you_mean,
 )
 from ..core.elementary import hypot
-from .arrays import Array, array_of, finite, joined, pair, read_only, stacked
+from .arrays import Array, array_of, finite, floats, joined, read_only, stacked
 from .estimator import TargetModel
 from .messages import BodyState, Estimate, Plan, Tracks, enclosing
 from .planning import Barrier, Objective, ReachGoal, Solver
@@ -29,16 +29,16 @@ if TYPE_CHECKING:
 
 STEPS, SECONDS = "steps", "seconds"
 DECISION, NOW = "decision", "now"
-_MADE_AT, _CONTROLS = 4, 6  # columns of a table of plans, see ``peer_tubes``
+_MADE_AT, _CONTROLS = 0, 7  # columns of a table of plans of robots in the plane, see ``peer_tubes``
 
 
 class _Standing(NamedTuple):
     """The latest plan of the controller; one made an infinite time ago has no effect."""
 
     made_at: float  # s, the time of its initial state
-    position: Array  # (2,) and velocity at step 1 from made_at
+    position: Array  # (d,) and velocity at step 1 from made_at
     velocity: Array
-    controls: Array  # (N, 2) U_{t+1} .. U_{t+N}, as seen from made_at
+    controls: Array  # (N, d) U_{t+1} .. U_{t+N}, as seen from made_at
 
 
 class _Peers:
@@ -50,20 +50,24 @@ class _Peers:
 
     def __init__(self, places: Array) -> None:
         # Their names are not paths.
-        self._nobody = {f"[{number}]": (x, y) for number, (x, y) in enumerate(places.tolist())}
-        self._rows = {name: array_of((*self._nobody[name], 0.0, 0.0, 0.0, 0.0)) for name in sorted(self._nobody)}
+        self._nobody = {f"[{number}]": tuple(place) for number, place in enumerate(places.tolist())}
+        self._rows = {
+            name: array_of((0.0, float(len(place)), 0.0, *place, *[0.0] * len(place)))
+            for name, place in sorted(self._nobody.items())
+        }
 
     def hear(self, plan: Plan) -> None:
         """Store a plan, unless a later one of that robot is known."""
         known = self._rows.get(plan.robot)
         if known is not None and plan.time < known[_MADE_AT]:
             return
-        (x, y), (vx, vy) = pair(plan.state.position), pair(plan.state.velocity)
+        place, velocity = floats(plan.state.position), floats(plan.state.velocity)
         if known is None and self._nobody:
-            away = {name: hypot(x - there[0], y - there[1]) for name, there in self._nobody.items()}
+            away = {name: hypot(place[0] - there[0], place[1] - there[1]) for name, there in self._nobody.items()}
             nearest = min(away, key=away.__getitem__)
             del self._nobody[nearest], self._rows[nearest]
-        self._rows[plan.robot] = joined((x, y, vx, vy, plan.time, float(len(plan.controls))), plan.controls)
+        begun = plan.time, float(len(place)), float(len(plan.controls))
+        self._rows[plan.robot] = joined((*begun, *place, *velocity), plan.controls)
         if known is None:
             self._rows = dict(sorted(self._rows.items(), key=itemgetter(0)))
 
@@ -100,6 +104,8 @@ class RobustController(TargetModel, Actor):
     estimates that are not finite are ignored; the last good ones are kept.  Without a finite own state the control is
     zero, and nothing else is sent.
     """
+
+    _dimensions = 2
 
     trigger = InputPort(object, doc="plan now")
     state = InputPort(BodyState, triggers=False, doc="where the robot is")
@@ -148,6 +154,9 @@ class RobustController(TargetModel, Actor):
     covariance_noise = Parameter(
         bool, True, doc="whether process noise widens the target's predicted covariance, in f4 and in eq. (5)"
     )
+    keep_out = array_parameter(
+        (None, 3), (), unit="m", doc="places that stand in the way: x, y, and the distance to keep from there"
+    )
     peers_at_start = array_parameter(
         (None, 2), (), unit="m", doc="positions of other robots at time 0, used until their plans come"
     )
@@ -159,8 +168,9 @@ class RobustController(TargetModel, Actor):
         from .numerics import definitions, horizon, reachability
         from .numerics.warm_up import compile_kernels
 
+        d = self._dimensions
         self.solver.prepare()
-        compile_kernels()
+        compile_kernels(d)
         # Kept, as executing an import takes 1 us each time.
         self._standing_plan, self._peer_tubes = reachability.standing_plan, reachability.peer_tubes
         self._expected_target, self._new_problem = reachability.expected_target, horizon.HorizonProblem
@@ -174,10 +184,15 @@ class RobustController(TargetModel, Actor):
         )
         self._room = self.period, self._radius, self.tube_growth, self.safe_distance, self.margin
         self._model = self.process_noise, self.covariance_noise, self.kappa, self.period
-        # Means (K, N, 2), covariances (K, N, 3), sigma points (M, 2) at step N and their weights, without a target.
-        self._nobody = *(np.empty((0, self._steps, columns)) for columns in (2, 3)), np.empty((0, 2)), np.empty(0)
-        self._applied = np.zeros(2)  # U_t
-        self._standing = self._nothing = _Standing(-math.inf, np.zeros(2), np.zeros(2), np.zeros((self._steps, 2)))
+        # Means (K, N, d), covariances (K, N, d (d + 1) / 2), sigma points (M, d) at step N and their weights, without a
+        # target.
+        no_means, no_covariances = (np.empty((0, self._steps, columns)) for columns in (d, d * (d + 1) // 2))
+        self._nobody = no_means, no_covariances, np.empty((0, d)), np.empty(0)
+        places, apart = self.keep_out[:, np.newaxis, :2], self.keep_out[:, 2:]
+        self._standing_there = np.repeat(places, self._steps, axis=1), np.repeat(apart, self._steps, axis=1)
+        self._in_space = self._flight()
+        self._applied = np.zeros(d)  # U_t
+        self._standing = self._nothing = _Standing(-math.inf, np.zeros(d), np.zeros(d), np.zeros((self._steps, d)))
         self._peers = _Peers(self.peers_at_start)
         self._objective: Objective = self.objective
         self._target: Estimate | None = None
@@ -189,10 +204,10 @@ class RobustController(TargetModel, Actor):
         if not self.trigger.present:
             return
         own = self.state.value if self.state.present else None
-        if own is None or not own.finite:
-            self._applied = np.zeros(2)
+        if own is None or not own.finite or len(own.position) != self._dimensions:
+            self._applied = np.zeros(self._dimensions)
             self._standing = self._nothing
-            self.control.send(np.zeros(2))
+            self.control.send(np.zeros(self._dimensions))
             return
         problem, starts = self._problem(own)
         solution = self.solver.solve(problem, starts)
@@ -228,27 +243,27 @@ class RobustController(TargetModel, Actor):
 
     def _send(self, own: BodyState, problem: HorizonProblem, controls: Array) -> None:
         self._standing = _Standing(own.time, problem.position, problem.velocity, controls)
-        announced = joined(pair(self._applied), controls[: self.horizon])
-        self.plan.send(Plan(self._name, own.time, own, announced.reshape(self.horizon + 1, 2)))
+        announced = joined(floats(self._applied), controls[: self.horizon])
+        self.plan.send(Plan(self._name, own.time, own, announced.reshape(self.horizon + 1, self._dimensions)))
         self._applied = read_only(controls[0])
         self.control.send(self._applied)
 
     # --- the problem ------------------------------------------------------------------------------------
 
     def _problem(self, own: BodyState) -> tuple[HorizonProblem, Array]:
-        """The problem, and the starts of its solver (2, N, 2): the standing plan from the next period on; braking."""
+        """The problem, and the starts of its solver (2, N, d): the standing plan from the next period on; braking."""
         # Floats: arithmetic on arrays of two takes ten times as long.
-        (x, y), (vx, vy), (ux, uy) = pair(own.position), pair(own.velocity), pair(self._applied)
+        place, moving, pushed = floats(own.position), floats(own.velocity), floats(self._applied)
         now, period = own.time, self.period
-        position = array_of((x + period * vx, y + period * vy))
-        vx, vy = vx + period * ux, vy + period * uy
-        velocity, speed = array_of((vx, vy)), hypot(vx, vy)
+        position = array_of(tuple([p + period * v for p, v in zip(place, moving, strict=True)]))
+        moving = tuple([v + period * u for v, u in zip(moving, pushed, strict=True)])
+        velocity, (speed, most) = array_of(moving), self._braking(moving)
         standing = self._standing
         tube_centre, tube_radius, starts = self._standing_plan(
-            *standing[1:], now - standing.made_at, self._radius, velocity, speed, self.max_acceleration, period
+            *standing[1:], now - standing.made_at, self._radius, velocity, speed, most, period
         )
         target_mean, target_covariance, points, weights = self._expected(now)
-        peer_mean, peer_distance = self._peer_tubes(self._peers.table(), now, *self._room)
+        peer_mean, peer_distance = self._peer_tubes(self._peers.table(), now, *self._room, self._dimensions)
         posed = self._new_problem(
             period=period,
             position=position,
@@ -263,19 +278,76 @@ class RobustController(TargetModel, Actor):
             obstacle_covariance=target_covariance,
             peer_mean=peer_mean,
             peer_distance=peer_distance,
+            **self._in_space,
         )
-        return self._objective.pose(posed, points, weights, self._peers.names), starts
+        posed = self._objective.pose(posed, points, weights, self._peers.names)
+        if len(self.keep_out):  # as f5, but nobody who measures
+            there, apart = self._standing_there
+            posed = posed._replace(
+                peer_mean=np.concatenate((peer_mean, there)), peer_distance=np.concatenate((peer_distance, apart))
+            )
+        return posed, starts
 
     def _expected(self, now: float) -> tuple[Array, ...]:
-        """Means (K, N, 2) and covariances (K, N, 3) of all targets, sigma points of each (K M, 2) and their weights."""
+        """Means (K, N, d) and covariances (K, N, d (d + 1) / 2) of all targets, sigma points of each (K M, d) and their
+        weights."""
         targets = [self._target] if self._target is not None else []
         if self._tracks is not None:
             targets.extend(self._tracks.estimates)
         each = [
-            self._expected_target(target.mean, target.covariance, *self._model, now - target.time, self._steps)
+            self._expected_target(
+                target.mean, target.covariance, *self._model, now - target.time, self._steps, self._dimensions
+            )
             for target in targets
         ]
         if len(each) < 2:
             return each[0] if each else self._nobody
         means, covariances, points, weights = zip(*each, strict=True)
         return np.concatenate(means), np.concatenate(covariances), np.concatenate(points), weights[0]
+
+    def _flight(self) -> dict[str, Any]:
+        """The limits that hold in space only, by their names in the problem."""
+        return {}
+
+    def _braking(self, velocity: tuple[float, ...]) -> tuple[float, float]:
+        """The speed, and the largest acceleration against it."""
+        return hypot(velocity[0], velocity[1]), self.max_acceleration
+
+
+class FlyingController(RobustController):
+    """A ``RobustController`` in space, with limits of climbing and of the height.
+
+    Speed and acceleration stay in ellipsoids (f1 and f2), as those of a ``FlyingVehicle`` do.  From the second step on,
+    the plan stays above ``lowest`` and below ``highest`` (f7).  The target is on the ground if its estimate is in the
+    plane, and so are peers whose plans are.
+    """
+
+    _dimensions = 3
+
+    control = OutputPort(np.ndarray, shape=(3,), doc="m/s^2, for the period after this one")
+
+    keep_out = array_parameter((0, 3), (), unit="m", doc="none: it flies above what stands in the way")
+    climb_speed = Parameter(float, 4.0, unit="m/s", above=0, doc="largest vertical speed, up and down")
+    climb_acceleration = Parameter(float, 4.0, unit="m/s^2", above=0, doc="largest vertical acceleration")
+    lowest: Parameter[float | None] = Parameter(float, 1.0, unit="m", doc="height to stay above; none if null")
+    highest: Parameter[float | None] = Parameter(float, None, unit="m", doc="height to stay below; none if left out")
+    peers_at_start = array_parameter(
+        (None, 3), (), unit="m", doc="positions of other robots at time 0, used until their plans come"
+    )
+
+    def _flight(self) -> dict[str, Any]:
+        return {
+            "climb_speed": self.climb_speed,
+            "climb_acceleration": self.climb_acceleration,
+            "lowest": -math.inf if self.lowest is None else self.lowest,
+            "highest": math.inf if self.highest is None else self.highest,
+        }
+
+    def _braking(self, velocity: tuple[float, ...]) -> tuple[float, float]:
+        x, y, z = velocity
+        level = hypot(x, y)
+        speed = hypot(level, z)
+        if not 0.0 < speed < math.inf:
+            return speed, self.max_acceleration
+        weighted = hypot(level, z * (self.max_acceleration / self.climb_acceleration))
+        return speed, self.max_acceleration * (speed / weighted)

@@ -11,10 +11,11 @@ from typing import Any, TypeAlias
 import numpy as np
 
 from ..core import Actor, Configurable, InputPort, OutputPort, Parameter, array_parameter, to_nanoseconds, to_seconds
-from .arrays import Array, array_of, pair, stacked
+from .arrays import Array, array_of, floats, stacked
 from .messages import RANGE, RELATIVE_POSITION, Estimate, Measurement
 
 EXPECTED, PREDICTED = "expected", "predicted"
+_NOTHING = 0.0, 0.0
 State: TypeAlias = tuple[Array, Array]  # of a filter: mean and covariance, never modified
 
 
@@ -172,13 +173,15 @@ class _Estimator(TargetModel, Actor):
         return self._process_noise * (elapsed / self.period)
 
     def _rows(self, measurements: list[Measurement]) -> Array:
-        """The measurements (m, 7) as the kernels take them."""
-        rows = []
+        """The measurements (m, 3 + 2 d) as the kernels take them; an observer in the plane is on the ground."""
+        rows, d = [], 2
         for each in measurements:
-            x, y = pair(each.observer)
-            values = pair(each.value) if len(each.value) == 2 else (each.value.item(), 0.0)
-            rows.append(array_of((self._kinds[each.kind], x, y, *values, each.along, each.across)))
-        return stacked(rows, 7)
+            d = max(d, len(each.observer))
+        for each in measurements:
+            place, value = floats(each.observer), floats(each.value)
+            vectors = (*place, *_NOTHING[: d - len(place)], *value, *_NOTHING[: d - len(value)])
+            rows.append(array_of((self._kinds[each.kind], *vectors, each.along, each.across)))
+        return stacked(rows, 3 + 2 * d)
 
 
 _time, _robot = attrgetter("time"), attrgetter("robot")

@@ -84,6 +84,11 @@ class FilterPyEstimator(_Estimator):
 
     def _fuse(self, measurement: Measurement, noise: Array) -> None:
         observer, ranged = measurement.observer, measurement.kind == RANGE
+        if len(observer) != 2:
+            raise FilterError(
+                f"{self.path}: FilterPy's filters take observers in the plane, and {measurement.robot} measures from a "
+                "height; use an UnscentedEstimator"
+            )
         used = self._filter
 
         def observe(state: Array) -> Array:

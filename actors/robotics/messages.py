@@ -1,5 +1,7 @@
 """The tokens that robots and their parts exchange.  All are immutable; their arrays are read-only.
 
+Vectors have two numbers in the plane, and three in space, with the height above the plane last.
+
 Each has the ``time`` (s) of what it describes, not of when it was sent or received.  The source sets it, and users of
 the token rely on it, however long it was on the way.
 """
@@ -21,6 +23,9 @@ _LATEST = to_seconds(LATEST)
 _set = object.__setattr__  # in a frozen token; each has its own __init__, as the dataclass's would set arrays twice
 
 
+SHAPES = (2,), (3,)  # of a vector
+
+
 def is_time(seconds: float) -> bool:
     """Whether a number is a valid time."""
     return abs(seconds) <= _LATEST
@@ -30,8 +35,8 @@ def is_time(seconds: float) -> bool:
 class BodyState:
     """Position and velocity of a body at ``time``."""
 
-    position: Array  # (2,) m
-    velocity: Array  # (2,) m/s
+    position: Array  # (d,) m; d = 2 or 3
+    velocity: Array  # (d,) m/s
     time: float  # s
 
     def __init__(self, position: ArrayLike, velocity: ArrayLike, time: float) -> None:
@@ -41,8 +46,9 @@ class BodyState:
 
     @property
     def finite(self) -> bool:
-        """Whether every number in it is finite."""
-        return is_time(self.time) and finite(self.position) and finite(self.velocity)
+        """Whether it has as many numbers as it should, and every one is finite."""
+        shaped = self.position.shape in SHAPES and self.velocity.shape == self.position.shape
+        return shaped and is_time(self.time) and finite(self.position) and finite(self.velocity)
 
 
 @dataclass(frozen=True, slots=True, eq=False, init=False)
@@ -50,9 +56,9 @@ class Measurement:
     """A measurement of the target by a robot's sensor at ``time``, with all data to fuse it elsewhere and later."""
 
     robot: str  # dotted path of the measuring robot
-    observer: Array  # (2,) m, where the sensor was
+    observer: Array  # (d,) m, where the sensor was
     kind: str  # "relative_position" or "range"
-    value: Array  # (2,) m from observer to target, or (1,) m
+    value: Array  # (d,) m from observer to target, or (1,) m
     along: float  # standard deviation along the line of sight, m
     across: float  # standard deviation across it, m; not used for a range
     time: float  # s, when it was made
@@ -71,9 +77,10 @@ class Measurement:
     @property
     def finite(self) -> bool:
         """Whether it can be fused: finite values of the shape for its kind, and positive deviations."""
-        shape = (1,) if self.kind == RANGE else (2,)
+        shape = (1,) if self.kind == RANGE else self.observer.shape
         return (
-            self.value.shape == shape
+            self.observer.shape in SHAPES
+            and self.value.shape == shape
             and is_time(self.time)
             and finite(self.value)
             and finite(self.observer)
@@ -137,10 +144,10 @@ class Detections:
 
 @dataclass(frozen=True, slots=True, eq=False, init=False)
 class Estimate:
-    """A robot's estimate of the target at ``time``: a normal distribution over (x, y, vx, vy)."""
+    """A robot's estimate of the target at ``time``: a normal distribution over (x, y, vx, vy), or six in space."""
 
-    mean: Array  # (4,) m and m/s
-    covariance: Array  # (4, 4)
+    mean: Array  # (2 d,) m and m/s
+    covariance: Array  # (2 d, 2 d)
     time: float  # s
     sources: tuple[str, ...]  # robots whose measurements were fused at this step, sorted
 
@@ -152,8 +159,10 @@ class Estimate:
 
     @property
     def finite(self) -> bool:
-        """Whether every number in it is finite."""
-        return is_time(self.time) and finite(self.mean) and finite(self.covariance)
+        """Whether it has as many numbers as it should, and every one is finite."""
+        size = len(self.mean)
+        shaped = size in (4, 6) and self.covariance.shape == (size, size)
+        return shaped and is_time(self.time) and finite(self.mean) and finite(self.covariance)
 
 
 @dataclass(frozen=True, slots=True, eq=False, init=False)
@@ -182,7 +191,7 @@ class Plan:
     robot: str  # dotted path of the robot
     time: float  # s, that of ``state``
     state: BodyState
-    controls: Array  # (N + 1, 2) m/s^2: the one being applied now, then the planned ones
+    controls: Array  # (N + 1, d) m/s^2: the one being applied now, then the planned ones
 
     def __init__(self, robot: str, time: float, state: BodyState, controls: ArrayLike) -> None:
         _set(self, "robot", robot)
@@ -194,7 +203,7 @@ class Plan:
     def finite(self) -> bool:
         """Whether it can be rolled out: finite numbers, and at least one control."""
         controls = self.controls
-        shaped = controls.ndim == 2 and controls.shape[1] == 2 and len(controls) > 0
+        shaped = controls.ndim == 2 and controls.shape[1:] == self.state.position.shape and len(controls) > 0
         return shaped and is_time(self.time) and finite(controls) and self.state.finite
 
 

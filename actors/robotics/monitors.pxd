@@ -1,3 +1,3 @@
 # Types for C; monitors.py documents everything.
 
-from epicycle.actors.robotics.arrays cimport pair
+from epicycle.actors.robotics.arrays cimport floats, pair

@@ -7,7 +7,7 @@ from itertools import combinations
 
 from ..core import Actor, InputPort, OutputPort, Parameter, array_parameter
 from ..core.elementary import distance
-from .arrays import Pair, pair
+from .arrays import Pair, floats, pair
 from .messages import BodyState
 
 
@@ -61,13 +61,19 @@ class _DistanceBetween(Actor):
         now = max((state.time for state in self._states.values()), default=0.0)
         places = []
         for state in self._states.values():
-            (x, y), elapsed = pair(state.position), now - state.time
+            place, elapsed = floats(state.position), now - state.time
             if elapsed > 0.0:
-                vx, vy = pair(state.velocity)
-                x, y = x + elapsed * vx, y + elapsed * vy
-            places.append((x, y))
+                place = tuple([p + elapsed * v for p, v in zip(place, floats(state.velocity), strict=True)])
+            places.append(place)
         if len(places) >= 2:
-            output.send(min(distance(a, b) for a, b in combinations(places, 2)))
+            output.send(min(_apart(a, b) for a, b in combinations(places, 2)))
+
+
+def _apart(a: tuple[float, ...], b: tuple[float, ...]) -> float:
+    """The distance of two places; one without a height is on the ground."""
+    if len(a) == len(b):
+        return distance(a, b)
+    return distance((*a, 0.0)[:3], (*b, 0.0)[:3])
 
 
 class DistanceMonitor(_DistanceBetween):

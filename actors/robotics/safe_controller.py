@@ -64,13 +64,13 @@ class SafeController(RoamingModel, RobustController):
 
     def _predicted(
         self, mean: Array, covariance: Array, noise: Array, is_widened: bool, kappa: float, period: float,
-        elapsed: float, steps: int,
+        elapsed: float, steps: int, dimensions: int,
     ) -> tuple[Array, Array, Array, Array]:  # fmt: skip
         """``reachability.expected_target`` for a target that roams; without sigma points, which only eq. (5) needs."""
         mean, covariance = mean.copy(), covariance.copy()  # kernels would be compiled again for read-only arrays
         if elapsed > 0.0:
             mean, covariance = self._predict(mean, covariance, *self.roaming(elapsed))
-        means, covariances = self._propagate(mean, covariance, *self.roaming(period), steps)
+        means, covariances = self._propagate(mean, covariance, *self.roaming(period), steps, dimensions)
         return means[np.newaxis], covariances[np.newaxis], np.empty((0, 2)), np.empty(0)
 
     def _problem(self, own: BodyState) -> tuple[HorizonProblem, Array]:

@@ -9,8 +9,9 @@ import numpy as np
 
 from ..core import Actor, EpicycleError, InputPort, OutputPort, Parameter, array_parameter, brief, counted
 from ..core.elementary import cos, hypot, sin
-from .arrays import Pair, all_finite, pair
+from .arrays import all_finite, floats, pair
 from .messages import RANGE, RELATIVE_POSITION, BodyState, Measurement, Plan, enclosing
+from .sight import is_hidden
 
 
 class Vehicle(Actor):
@@ -32,9 +33,10 @@ class Vehicle(Actor):
     max_acceleration = Parameter(float, 8.0, unit="m/s^2", min=0, doc="limit of the acceleration")
 
     def initialize(self) -> None:
-        self._position = pair(self.start)
-        self._velocity = shortened(pair(self.start_velocity), self.max_speed)
-        self._held: Pair = 0.0, 0.0
+        self._speed_ratio, self._acceleration_ratio = self._ratios()
+        self._position = floats(self.start)
+        self._velocity = shortened(floats(self.start_velocity), self.max_speed, self._speed_ratio)
+        self._held = (0.0,) * len(self._position)
         self._next = self._held
         self._moved_at: int | None = None
 
@@ -46,22 +48,53 @@ class Vehicle(Actor):
             self._held = self._next
             self._moved_at = now
             self.state.send(BodyState(self._position, self._velocity, self.now))
-        if self.acceleration.present and all_finite(wanted := pair(self.acceleration.value)):
-            self._next = shortened(wanted, self.max_acceleration)
+        if self.acceleration.present and all_finite(wanted := floats(self.acceleration.value)):
+            self._next = shortened(wanted, self.max_acceleration, self._acceleration_ratio)
             if self._moved_at == now:
                 self._held = self._next
 
     def _move(self, elapsed: float) -> None:
-        (x, y), (vx, vy), (ux, uy) = self._position, self._velocity, self._held
-        self._position = x + elapsed * vx, y + elapsed * vy
-        self._velocity = shortened((vx + elapsed * ux, vy + elapsed * uy), self.max_speed)
+        velocity = self._velocity
+        self._position = _moved(self._position, elapsed, velocity)
+        self._velocity = shortened(_moved(velocity, elapsed, self._held), self.max_speed, self._speed_ratio)
+
+    def _ratios(self) -> tuple[float, float]:
+        """Of the limits of speed and acceleration to those of climbing."""
+        return 1.0, 1.0
 
 
-def shortened(vector: Pair, longest: float) -> Pair:
-    """The vector itself, or, if it is longer than ``longest``, the vector of that length in its direction."""
-    x, y = vector
-    length = hypot(x, y)
-    return (x * (longest / length), y * (longest / length)) if length > longest else vector
+class FlyingVehicle(Vehicle):
+    """A ``Vehicle`` in space, which climbs and sinks more slowly than it flies level.
+
+    Its velocity stays in the ellipsoid ``(vx^2 + vy^2) / max_speed^2 + vz^2 / climb_speed^2 <= 1``, and its
+    acceleration in that of the other two limits; what leaves one is shortened in its direction.
+    """
+
+    acceleration = InputPort(np.ndarray, shape=(3,), triggers=False, doc="m/s^2, control to apply from now on")
+
+    start = array_parameter((3,), unit="m", doc="position at the first trigger, with the height last")
+    start_velocity = array_parameter((3,), (0.0, 0.0, 0.0), unit="m/s", doc="velocity at the first trigger")
+    climb_speed = Parameter(float, 4.0, unit="m/s", above=0, doc="limit of the vertical speed, up and down")
+    climb_acceleration = Parameter(float, 4.0, unit="m/s^2", above=0, doc="limit of the vertical acceleration")
+
+    def _ratios(self) -> tuple[float, float]:
+        return self.max_speed / self.climb_speed, self.max_acceleration / self.climb_acceleration
+
+
+def _moved(place: tuple[float, ...], elapsed: float, velocity: tuple[float, ...]) -> tuple[float, ...]:
+    return tuple([p + elapsed * v for p, v in zip(place, velocity, strict=True)])
+
+
+def shortened(vector: tuple[float, ...], longest: float, ratio: float = 1.0) -> tuple[float, ...]:
+    """The vector itself, or, if it is longer than ``longest``, the vector of that length in its direction; a height
+    counts times ``ratio``."""
+    length = hypot(vector[0], vector[1])
+    if len(vector) > 2:
+        length = hypot(length, ratio * vector[2])
+    if not length > longest:
+        return vector
+    share = longest / length
+    return tuple([x * share for x in vector])
 
 
 class CircularMotion(Actor):
@@ -104,9 +137,14 @@ def _sinc(x: float) -> float:
 class Sensor(Actor):
     """Measures the target's relative position, or its distance, with normal noise (Table II).
 
-    The noise of a relative position is an ellipse: ``along`` the true line of sight and ``across`` it.  Both of its
-    components are drawn at every firing, used or not, so that neither ``kind`` nor ``max_range`` changes the noise of
-    later measurements.  A measurement has the time of the robot's own state, by the robot's own clock.
+    The noise of a relative position is an ellipse: ``along`` the true line of sight and ``across`` it; seen from a
+    flying robot, it is an ellipsoid, as wide in both directions across.  All of its components are drawn at every
+    firing, used or not, so that neither ``kind`` nor ``max_range`` nor ``occluders`` change the noise of later
+    measurements.  A measurement has the time of the robot's own state, by the robot's own clock.
+
+    Robot and target are on the ground, at height 0, unless their positions have a third number.  What hides the target
+    stands on the ground: upright cylinders up to a height.  No line of sight goes through one, and a measurement behind
+    it is not sent.
     """
 
     robot = InputPort(BodyState, doc="where the robot that carries the sensor is")
@@ -117,7 +155,7 @@ class Sensor(Actor):
     )
     target = InputPort(BodyState, doc="where the target is")
     measurement = OutputPort(
-        Measurement, doc="measurement, sent at tags where both are known and the target is in range"
+        Measurement, doc="measurement, sent at tags where both are known, and the target is in range and in sight"
     )
 
     kind = Parameter(str, RELATIVE_POSITION, choices=(RELATIVE_POSITION, RANGE), doc="what is measured")
@@ -126,32 +164,54 @@ class Sensor(Actor):
     max_range: Parameter[float | None] = Parameter(
         float, None, unit="m", min=0, doc="no measurement beyond this distance; unlimited if left out"
     )
+    occluders = array_parameter(
+        (None, 4), (), doc="cylinders that hide the target: x, y, radius and height of each, in m"
+    )
     robot_name = Parameter(
         str, "", doc="name in the measurement; if empty, the path of the composite that contains the sensor"
     )
 
     def initialize(self) -> None:
         self._draw = self.random_stream("noise").standard_normal
+        self._draw_upright = self.random_stream("upright noise").standard_normal  # of a flying robot
+        self._hidden_by = [tuple(each) for each in self.occluders.tolist()]
         self._name = self.robot_name or enclosing(self.path)
 
     def fire(self) -> None:
-        error_along, error_across = self._draw(), self._draw()
+        error_along, error_across, error_upright = self._draw(), self._draw(), self._draw_upright()
         if not (self.robot.present and self.target.present):
             return
         robot = self.robot.value
         position = robot.position
         believed = self.location.value.position if self.location.present else position
         # Floats: arithmetic on arrays of two takes ten times as long.
-        (tx, ty), (x, y) = pair(self.target.value.position), pair(position)
-        dx, dy = tx - x, ty - y
-        distance = hypot(dx, dy)
+        there, here = floats(self.target.value.position), floats(position)
+        flies = len(here) > 2
+        dx, dy, dz = there[0] - here[0], there[1] - here[1], 0.0
+        distance = level = hypot(dx, dy)
+        if flies or len(there) > 2:
+            here, there = (*here, 0.0)[:3], (*there, 0.0)[:3]
+            dz = there[2] - here[2]
+            distance = hypot(level, dz)
         if self.max_range is not None and distance > self.max_range:
+            return
+        if self._hidden_by and is_hidden((*here, 0.0)[:3], (*there, 0.0)[:3], self._hidden_by):
             return
         along, across = self.along * error_along, self.across * error_across
         if self.kind == RANGE:
             value: tuple[float, ...] = (distance + along,)
+        elif flies:
+            # The line of sight; and across it, a level direction and the one upright to both.
+            nx, ny, nz = (dx / distance, dy / distance, dz / distance) if distance > 0.0 else (1.0, 0.0, 0.0)
+            lx, ly = (dx / level, dy / level) if level > 0.0 else (1.0, 0.0)
+            upright = self.across * error_upright
+            value = (
+                dx + along * nx - across * ly - upright * nz * lx,
+                dy + along * ny + across * lx - upright * nz * ly,
+                dz + along * nz + upright * (nx * lx + ny * ly),
+            )
         else:
-            nx, ny = (dx / distance, dy / distance) if distance > 0.0 else (1.0, 0.0)  # the line of sight
+            nx, ny = (dx / level, dy / level) if level > 0.0 else (1.0, 0.0)  # the line of sight
             value = dx + along * nx - across * ny, dy + along * ny + across * nx
         self.measurement.send(Measurement(self._name, believed, self.kind, value, self.along, self.across, robot.time))
 

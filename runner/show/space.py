@@ -17,7 +17,7 @@ DEVIATIONS = 2.0  # shown around an estimate
 
 
 def positions(signal: Signal) -> Rows:
-    """The positions in a signal, shape (n, 2): the tokens' ``position``, or tokens that are pairs x, y.
+    """The positions in a signal, shape (n, 2): the tokens' ``position`` from above, or tokens that are pairs x, y.
 
     Raises ``EpicycleError`` for other signals.
     """
@@ -28,8 +28,10 @@ def positions(signal: Signal) -> Rows:
 
 
 def _position(token: Any) -> Any:
-    found = token.position if hasattr(token, "position") else token["position"] if isinstance(token, dict) else token
-    x, y = found
+    if hasattr(token, "position"):
+        x, y = token.position[:2]
+    else:
+        x, y = token["position"] if isinstance(token, dict) else token
     return x, y
 
 
@@ -85,7 +87,7 @@ def tubes(signal: Signal, period: float, initial: float, growth: float) -> Rows:
     for token in signal.tokens:
         position, velocity = np.array(token.state.position[:2]), np.array(token.state.velocity[:2])
         row = [*position, initial]
-        for step, control in enumerate(np.asarray(token.controls, dtype=float), start=1):
+        for step, control in enumerate(np.asarray(token.controls, dtype=float)[:, :2], start=1):
             position = position + period * velocity + 0.5 * period * period * control
             velocity = velocity + period * control
             row += [*position, initial + growth * step]
@@ -104,7 +106,7 @@ def sights(signal: Signal) -> dict[str, tuple[list[int], Rows]]:
         found = [
             (index, _sight(token.observer, token.value))
             for index, token in enumerate(signal.tokens)
-            if len(token.value) == 2
+            if len(token.value) == len(token.observer)
         ]
         rows = np.array([row for _, row in found], dtype=float).reshape(-1, 4)
         return {signal.name: ([index for index, _ in found], rows)}

@@ -35,6 +35,7 @@ class Trajectories(Figure):
     estimate = Parameter(str, "", doc="signal of an estimate of the obstacle, or of tracks of several")
     goal = array_parameter((2,), (0.0, 0.0), unit="m", doc="destination of the first robot")
     safe_distance = Parameter(float, 2.0, unit="m", min=0.0, doc="radius of the obstacle's disc")
+    occluders = array_parameter((None, 4), (), doc="what stands in the way: x, y, radius and height of each, in m")
     interval = Parameter(float, 1.0, unit="s", min=1e-3, doc="time between dots, discs and ellipses")
     plans = texts_parameter((), doc="signals of the robots' plans (patterns), which the page of a run shows as tubes")
     sights = texts_parameter((), doc="signals of measurements (patterns), which the page shows as lines of sight")
@@ -76,6 +77,8 @@ class Trajectories(Figure):
         yield from made([self.estimate] if self.estimate else [], "ellipse", None)
         yield from made(selected(self.obstacle, results), "body", None, radius=self.safe_distance)
         yield from made(selected(self.robots, results), "body", 0)
+        for number, (x, y, radius, _) in enumerate(self.occluders.tolist()):
+            yield Mark(f"occluder[{number}]", "body", [0.0], np.array([[x, y]]), radius=radius)
         yield Mark("goal", "goal", [0.0], np.array([self.goal], dtype=float))
 
     def draw(self, results: Results, path: Path) -> None:
@@ -89,6 +92,11 @@ class Trajectories(Figure):
         shades = colours(len(robots))
         for index, (name, shade) in enumerate(zip(robots, shades, strict=True)):
             self._path(sheet, results.signals[name], shade, is_first=index == 0, named=len(robots) <= FEW)
+        from matplotlib.patches import Circle
+
+        for x, y, radius, height in self.occluders.tolist():
+            axes.add_patch(Circle((x, y), radius, facecolor="0.75", edgecolor="0.4", zorder=1))
+            axes.annotate(f"{height:g} m", (x, y), ha="center", va="center", fontsize=7, zorder=2)
         axes.plot(*self.goal, marker="*", markersize=15, color=LIMIT, linestyle="none", label="goal", zorder=6)
         sheet.call_axes("x (m)", "y (m)")
         # One metre is as long in x as in y; the shape of the sheet follows its content.

@@ -140,9 +140,9 @@ def test_log_formats(tmp_path: Path, ending: str) -> None:
             (
                 "error: there is no packaged model 'colision_avoidance', did you mean 'collision_avoidance'?\n"
                 "   help: packaged models: bouncing_ball, bouncing_modes, car_wash, changing_roles, "
-                "collision_avoidance, feedback, inspection_paradox, lift_group, machine_shop, manufacturing_cell, "
-                "many_obstacles, mg1, mm1, pid_loop, safe_avoidance, searching_robot, switched_network, thermostat, "
-                "traffic_light, warehouse, waypoints; "
+                "collision_avoidance, feedback, flying_observers, inspection_paradox, lift_group, machine_shop, "
+                "manufacturing_cell, many_obstacles, mg1, mm1, pid_loop, safe_avoidance, searching_robot, "
+                "switched_network, thermostat, traffic_light, warehouse, waypoints; "
                 "a path to a file ends in .yaml\n"
             ),
         ),

@@ -2,7 +2,7 @@
 
 The problem is not convex, so two things are done beyond the textbook:
 
-* A Newton step uses the exact gradient and the exact second derivatives, summed per prediction step into one 2x2
+* A Newton step uses the exact gradient and the exact second derivatives, summed per prediction step into one d x d
   block for each of position, velocity and control; a block that is not positive semidefinite is replaced by its
   nearest one that is.  The step then always descends, and near a minimum with full curvature it is Newton's own.
 * *Restoration* comes first if the start breaks a constraint: it minimises half the sum of the squared violations
@@ -25,7 +25,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...core.elementary import hypot
 from .compiled import Array, borrower
 from .constraints import BOUND, ROUNDING, VALUE
 from .entry import entry
@@ -35,6 +34,7 @@ from .task import (
     TAKEN,
     Phase,
     Task,
+    at,
     evaluate,
     keeps_limits,
     longest_step,
@@ -42,9 +42,11 @@ from .task import (
     move,
     new_task,
     objective_of,
+    put,
     room_for,
     take,
 )
+from .vectors import Vector, length_of, read, replaced, steeper, total, write, zero_vector
 
 TOLERANCE = 1e-6  # m; smaller violations count as none
 _SLACK = 1e-4  # m; added to an infeasible problem's bounds, and the margin of restoration
@@ -108,7 +110,7 @@ def _minimise(task: Task, phase: Phase, mu: float, dual: float, tolerance: float
     if not value < math.inf:  # NaN, or numbers too large to be squared
         return 0
     for iteration in range(_NEWTON_STEPS):
-        descent = newton_step(task.stages, task.period, task.free)
+        descent = newton_step(task.stages, task.period, task.free, zero_vector(task.position))
         rough = phase == Phase.RESTORE and _is_hopeless(task, 2.0 * value)
         if not -0.5 * descent > (max(tolerance, _ROUGH * value) if rough else tolerance):
             return iteration
@@ -131,14 +133,18 @@ def _minimise(task: Task, phase: Phase, mu: float, dual: float, tolerance: float
 def _brake(task: Task, share: float) -> None:
     """Accept controls that brake with at most ``share`` of f2's limit, and in one step with at most that share of the
     remaining speed."""
-    plan = task.plan
-    speed = hypot(task.velocity[0], task.velocity[1])
+    speed, most = length_of(task.velocity), task.max_acceleration
     moving = 1e-9 < speed < math.inf
+    if len(task.velocity) == 3 and moving:  # f2 in that direction
+        most *= speed / length_of(steeper(task.velocity, task.acceleration_ratio))
     left = speed
-    for s in range(plan.shape[0]):
-        push = share * min(task.max_acceleration, left / task.period) if moving else 0.0
-        plan[s, TAKEN] = -push * task.velocity[0] / speed if moving else 0.0
-        plan[s, TAKEN + 1] = -push * task.velocity[1] / speed if moving else 0.0
+    for s in range(task.plan.shape[0]):
+        push, control = 0.0, zero_vector(task.velocity)
+        if moving:
+            push = share * min(most, left / task.period)
+            for c in range(len(control)):
+                control = replaced(control, c, -push * task.velocity[c] / speed)
+        put(task, s, TAKEN, control)
         left -= push * task.period
 
 
@@ -205,23 +211,23 @@ def _optimise(task: Task, gap: float, last_parameter: float) -> tuple[int, float
 @borrower
 def _hold(task: Task) -> None:
     """Replace the held controls by the mean of those that move the robot within the horizon."""
-    plan, first = task.plan, task.free - 1
-    steps = plan.shape[0]
+    first, steps = task.free - 1, task.plan.shape[0]
     if first + 1 >= steps:
         return
-    for c in range(TAKEN, TAKEN + 2):
-        mean = 0.0
-        for s in range(first, steps - 1):
-            mean += plan[s, c]
-        for s in range(first, steps):
-            plan[s, c] = mean / (steps - 1 - first)
+    mean = zero_vector(task.position)
+    for s in range(first, steps - 1):
+        mean = total(mean, at(task, s, TAKEN))
+    for c in range(len(mean)):
+        mean = replaced(mean, c, mean[c] / (steps - 1 - first))
+    for s in range(first, steps):
+        put(task, s, TAKEN, mean)
 
 
 @borrower
-def _read(plan: Array, controls: Array) -> None:
+def _read(task: Task, controls: Array) -> None:
     """Write the accepted controls."""
-    for s in range(plan.shape[0]):
-        controls[s, 0], controls[s, 1] = plan[s, TAKEN], plan[s, TAKEN + 1]
+    for s in range(task.plan.shape[0]):
+        write(controls, s, 0, at(task, s, TAKEN))
 
 
 def solve(problem: HorizonProblem, starts: Array, rules: Rules = _RULES) -> Solution:
@@ -231,60 +237,76 @@ def solve(problem: HorizonProblem, starts: Array, rules: Rules = _RULES) -> Solu
     hardest braking that f2 allows.  Never raises, and the controls are always finite and keep f2; if numbers of the
     problem are not finite, or too large to be squared, the violation may be inf.
     """
-    return Solution(*_solve(*problem, *rules, starts))  # field by field, as a named tuple takes numba 4 us longer
+    solve_here = _solve_in_plane if len(problem.position) == 2 else _solve_in_space
+    return Solution(*solve_here(*problem, *rules, starts))  # field by field, as a named tuple takes numba 4 us longer
 
 
-@entry(
+_SIGNATURE = (
     "Tuple((f8[:, ::1], f8, f8, i8))(f8, f8[::1], f8[::1], f8, f8, f8[:, ::1], f8[::1], f8, f8, f8[:, :, ::1], "
     "f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1], i8, f8[:, ::1], f8[:, ::1], f8[::1], f8[:, ::1], f8, f8, f8, "
-    "f8, f8, i8, i8, f8[:, :, ::1])"
+    "f8, f8, f8, f8, f8, f8, i8, i8, f8[:, :, ::1])"
 )
-def _solve(*fields: Any) -> tuple[Array, float, float, int]:
+
+
+@entry(_SIGNATURE)
+def _solve_in_plane(*fields: Any) -> tuple[Array, float, float, int]:
     """The fields of the problem and the rules, and the starts."""
     problem, rules, starts = HorizonProblem(*fields[:-5]), Rules(*fields[-5:-1]), fields[-1]
-    best, room = np.empty(starts.shape[1:]), np.empty(room_for(problem, starts.shape[1]))
-    violation, objective, iterations = _search(problem, rules, starts, best, room)
+    best, room = np.empty(starts.shape[1:]), np.empty(room_for(problem, starts.shape[1], 2))
+    violation, objective, iterations = _search(problem, rules, starts, best, room, (0.0, 0.0))
+    return best, violation, objective, iterations
+
+
+@entry(_SIGNATURE)
+def _solve_in_space(*fields: Any) -> tuple[Array, float, float, int]:
+    """The same with vectors of three numbers, compiled when first needed."""
+    problem, rules, starts = HorizonProblem(*fields[:-5]), Rules(*fields[-5:-1]), fields[-1]
+    best, room = np.empty(starts.shape[1:]), np.empty(room_for(problem, starts.shape[1], 3))
+    violation, objective, iterations = _search(problem, rules, starts, best, room, (0.0, 0.0, 0.0))
     return best, violation, objective, iterations
 
 
 @borrower
-def _search(problem: HorizonProblem, rules: Rules, starts: Array, best: Array, room: Array) -> tuple[float, float, int]:
+def _search(
+    problem: HorizonProblem, rules: Rules, starts: Array, best: Array, room: Array, zero: Vector
+) -> tuple[float, float, int]:
     """Write the best plan."""
     free = min(rules.free, starts.shape[1]) if rules.free > 0 else starts.shape[1]
-    task = new_task(problem, starts.shape[1], free, ROUNDING, room)
-    plan = task.plan
+    task = new_task(problem, starts.shape[1], free, ROUNDING, room, zero)
+    steps = task.plan.shape[0]
     least, iterations = math.inf, 0
     for index in range(starts.shape[0]):
         _brake(task, 0.5)
-        for s in range(plan.shape[0]):
-            for c in range(2):
-                plan[s, TAKEN + c] = (1.0 - _CENTRING) * starts[index, s, c] + _CENTRING * plan[s, TAKEN + c]
+        for s in range(steps):
+            taken = at(task, s, TAKEN)
+            for c in range(len(zero)):
+                taken = replaced(taken, c, (1.0 - _CENTRING) * starts[index, s, c] + _CENTRING * taken[c])
+            put(task, s, TAKEN, taken)
         _hold(task)
         if not keeps_limits(task):
             continue
         left = 0.0
         if not look(task) < 0.0:
-            taken, left = _restore(task)
-            iterations += taken
+            more, left = _restore(task)
+            iterations += more
         if left < least:
             least = left
-            _read(plan, best)
+            _read(task, best)
         if least == 0.0:
             break
     if least == math.inf or (least > 0.0 and rules.infeasible == BRAKE):
-        task = new_task(
-            problem, starts.shape[1], free, math.inf, room
-        )  # what is out of reach is so only within f1 and f2
+        # What is out of reach is so only within f1 and f2.
+        task = new_task(problem, starts.shape[1], free, math.inf, room, zero)
         _brake(task, 0.999)
-        _read(task.plan, best)
+        _read(task, best)
         return max(0.0, look(task)), math.inf, iterations
-    for s in range(plan.shape[0]):
-        plan[s, TAKEN], plan[s, TAKEN + 1] = best[s, 0], best[s, 1]
+    for s in range(steps):
+        put(task, s, TAKEN, read(zero, best, s, 0))
     if least > 0.0 and rules.infeasible == LEAST_VIOLATION:
         look(task)  # the last start tried may be another one
-        taken, objective = 0, objective_of(task)
+        more, objective = 0, objective_of(task)
     else:
-        taken, objective = _optimise(task, rules.gap, rules.last_parameter)
-    _read(plan, best)
+        more, objective = _optimise(task, rules.gap, rules.last_parameter)
+    _read(task, best)
     largest = look(task)
-    return largest if largest > TOLERANCE else 0.0, objective, iterations + taken
+    return largest if largest > TOLERANCE else 0.0, objective, iterations + more

@@ -2,12 +2,14 @@
 
 Nothing here is fast.  The compiled kernels are tested against this module, and the solver ``Casadi`` builds its program
 from it: the functions take arrays of numbers and arrays of symbols.  Lengths are in metres, times in seconds,
-information in nats.  N is the number of prediction steps s = 1..N, a row of an array each; step s lies at t + tau, tau
-= s * period.
+information in nats.  Vectors have d numbers: 2 in the plane, 3 in space with the height last; a symmetric matrix is
+given by the rows of its upper triangle.  N is the number of prediction steps s = 1..N, a row of an array each; step s
+lies at t + tau, tau = s * period.
 """
 
 from __future__ import annotations
 
+import math
 from itertools import product
 from typing import Any
 
@@ -20,7 +22,7 @@ _TINY = 1e-18  # m^2; gives a root a slope also at zero, and changes it by less 
 
 
 def _norm(offsets: Any) -> Any:
-    """The Euclidean lengths of offsets (..., 2)."""
+    """The Euclidean lengths of offsets (..., d)."""
     return np.sqrt((offsets * offsets).sum(axis=-1) + _TINY)
 
 
@@ -31,15 +33,15 @@ def target_after(state: Any, period: float) -> Any:
 
 
 def measured_range(target: Any, robot: Any) -> Any:
-    """z_t of eq. (1), m: the ranges of targets (..., 2) from robots (..., 2), without their noise eta."""
+    """z_t of eq. (1), m: the ranges of targets (..., d) from robots (..., d), without their noise eta."""
     return _norm(target - robot)
 
 
 def dynamics(position: Any, velocity: Any, controls: Any, period: Any) -> tuple[Any, Any]:
-    """The equality constraint of eq. (2): positions and velocities (N, 2) at steps 1..N.
+    """The equality constraint of eq. (2): positions and velocities (N, d) at steps 1..N.
 
-    They begin with ``position`` Pr_{t+1} and ``velocity`` V_{t+1} (2,), which no unknown control can change; the row of
-    ``controls`` (N, 2) for step s is U_{t+s}, in m/s^2.
+    They begin with ``position`` Pr_{t+1} and ``velocity`` V_{t+1} (d,), which no unknown control can change; the row of
+    ``controls`` (N, d) for step s is U_{t+s}, in m/s^2.
     """
     positions, velocities = [position], [velocity]
     for control in controls[:-1]:
@@ -56,7 +58,7 @@ def f0(positions: Any, goal: Any) -> Any:
 
 
 def f0_of_several(positions: Any, places: Any, weights: Any) -> Any:
-    """f0 of several goals that move (k, N, 2), each with its weight (k,): (N,) in m^2.
+    """f0 of several goals that move (k, N, d), each with its weight (k,): (N,) in m^2.
 
     It is the f0 of their ``station``, times the sum of the weights, and a term that no plan changes.
     """
@@ -65,32 +67,46 @@ def f0_of_several(positions: Any, places: Any, weights: Any) -> Any:
 
 
 def station(places: Any, weights: Any) -> Any:
-    """The goal (N, 2) in m that has the optimum of ``f0_of_several``: the weighted mean of the places (k, N, 2)."""
+    """The goal (N, d) in m that has the optimum of ``f0_of_several``: the weighted mean of the places (k, N, d)."""
     return (weights[:, np.newaxis, np.newaxis] * places).sum(axis=0) / weights.sum()
 
 
-def f1(velocities: Any, max_speed: Any) -> Any:
-    """Eq. (2), (N,) in m^2/s^2: |V|^2 - Vmax^2."""
-    return (velocities * velocities).sum(axis=-1) - max_speed * max_speed
+def f1(velocities: Any, max_speed: Any, climb_speed: Any = math.inf) -> Any:
+    """Eq. (2), (N,) in m^2/s^2: |V|^2 - Vmax^2.
+
+    In space, Vz counts times Vmax / ``climb_speed``: an ellipsoid with ``climb_speed`` as its vertical half axis.
+    """
+    return _weighed(velocities, max_speed, climb_speed) - max_speed * max_speed
 
 
-def f2(controls: Any, max_acceleration: Any) -> Any:
-    """Eq. (2), (N,) in m^2/s^4: |U|^2 - Amax^2."""
-    return (controls * controls).sum(axis=-1) - max_acceleration * max_acceleration
+def f2(controls: Any, max_acceleration: Any, climb_acceleration: Any = math.inf) -> Any:
+    """Eq. (2), (N,) in m^2/s^4: |U|^2 - Amax^2; in space, with ``climb_acceleration`` as its vertical half axis."""
+    return _weighed(controls, max_acceleration, climb_acceleration) - max_acceleration * max_acceleration
+
+
+def _weighed(vectors: Any, limit: Any, climb: Any) -> Any:
+    """(N,), the squared lengths, where what is vertical counts times ``limit`` / ``climb``."""
+    level, upright = vectors[:, :2], vectors[:, 2:] * (limit / climb)
+    return (level * level).sum(axis=-1) + (upright * upright).sum(axis=-1)
+
+
+def f7(positions: Any, lowest: Any, highest: Any) -> Any:
+    """(2, N) in m: how far the height is below the lowest one, and above the highest one."""
+    return np.stack([lowest - positions[:, 2], positions[:, 2] - highest])
 
 
 def f3(positions: Any, planned: Any, radius: Any) -> Any:
-    """Eq. (2), (N,) in m: the distance to the standing plan Rs (N, 2) minus its ``radius`` sigma_r (N,)."""
+    """Eq. (2), (N,) in m: the distance to the standing plan Rs (N, d) minus its ``radius`` sigma_r (N,)."""
     return _norm(planned - positions) - radius
 
 
 def f4(positions: Any, obstacle: Any, safe_distance: Any) -> Any:
-    """Eq. (2), (N,) in m: Dmin minus the distance to the obstacle Po (N, 2)."""
+    """Eq. (2), (N,) in m: Dmin minus the distance to the obstacle Po (N, d)."""
     return safe_distance - _norm(obstacle - positions)
 
 
 def f5(positions: Any, peer: Any, safe_distance: Any) -> Any:
-    """Eq. (2), (N,) in m: Dmin minus the distance to another robot Ro_i (N, 2)."""
+    """Eq. (2), (N,) in m: Dmin minus the distance to another robot Ro_i (N, d)."""
     return safe_distance - _norm(peer - positions)
 
 
@@ -100,10 +116,11 @@ def sigma_r(initial: float, growth: float, tau: Array) -> Array:
 
 
 def sigma_4(positions: Any, obstacle: Any, covariance: Any) -> Any:
-    """Eq. (4), (N,) in m: the standard deviation of f4, from C (N, 3) of the obstacle's position as (xx, xy, yy)."""
+    """Eq. (4), (N,) in m: the standard deviation of f4, from C (N, d (d + 1) / 2) of the obstacle's position."""
     slope = (positions - obstacle) / _norm(positions - obstacle)[:, np.newaxis]  # d f4 / d Po
-    x, y, (xx, xy, yy) = slope[:, 0], slope[:, 1], covariance.T
-    return np.sqrt(x * xx * x + 2.0 * x * xy * y + y * yy * y + _TINY)
+    rows, columns = np.triu_indices(slope.shape[1])
+    twice = np.where(rows == columns, 1.0, 2.0)
+    return np.sqrt((twice * slope[:, rows] * covariance * slope[:, columns]).sum(axis=-1) + _TINY)
 
 
 def sigma_5(radius: Array, growth: float, lost: int) -> Array:
@@ -112,7 +129,7 @@ def sigma_5(radius: Array, growth: float, lost: int) -> Array:
 
 
 def f6(positions: Any, obstacle: Any, reach: Any) -> Any:
-    """Eq. (5), (N,) in m: max(0, distance to the obstacle Po (N, 2) minus Dmax)."""
+    """Eq. (5), (N,) in m: max(0, distance to the obstacle Po (N, d) minus Dmax)."""
     return np.maximum(0.0, out_of_reach(positions, obstacle, reach))
 
 
@@ -122,7 +139,7 @@ def out_of_reach(positions: Any, obstacle: Any, reach: Any) -> Any:
 
 
 def misfit(points: Any, robots: Any, variance: Any) -> Any:
-    """Eq. (5), (M, M): -log PDF(z_i; z_j, eta) for ranges of sigma points (M, 2) from robots (n, 2), of variance eta.
+    """Eq. (5), (M, M): -log PDF(z_i; z_j, eta) for ranges of sigma points (M, d) from robots (n, d), of variance eta.
 
     Without the constant of the normal density, which shifts the information but not the optimum.
     """
@@ -132,9 +149,9 @@ def misfit(points: Any, robots: Any, variance: Any) -> Any:
 
 
 def mutual_information(own: Any, points: Any, weights: Any, variance: Any, others: Any) -> Any:
-    """I of eq. (5), nat, of the ranges from ``own`` (2,) and from other robots, whose ``misfit`` is ``others`` (M, M).
+    """I of eq. (5), nat, of the ranges from ``own`` (d,) and from other robots, whose ``misfit`` is ``others`` (M, M).
 
-    The sigma points (M, 2) at the end of the horizon have the ``weights`` (M,), all of them positive.
+    The sigma points (M, d) at the end of the horizon have the ``weights`` (M,), all of them positive.
     """
     density = np.exp(-misfit(points, own[np.newaxis], variance) - others)  # PDF(z_i; z_j, eta)
     return -(weights * np.log((weights * density).sum(axis=1))).sum()
@@ -164,9 +181,11 @@ def targets(problem: HorizonProblem) -> Any:
 
 
 def constraints(problem: HorizonProblem, positions: Any) -> Any:
-    """f3, f4 of each obstacle and f5 of each peer with their margins alpha * sigma, in m: satisfied where <= 0.
+    """f3, f4 of each obstacle, f5 of each peer with their margins alpha * sigma, and in space f7, in m: satisfied where
+    <= 0.
 
-    (1 + K + n, N - 2): the positions at steps 1 and 2 are decided before the first unknown control acts.
+    (1 + K + n, N - 2), or two rows more: the positions at steps 1 and 2 are decided before the first unknown control
+    acts.
     ``peer_distance`` of the problem is Dmin with the margin of f5.  sigma_1 to sigma_3 are zero.
     """
     rows = [f3(positions, problem.tube_centre, problem.tube_radius)]
@@ -175,16 +194,18 @@ def constraints(problem: HorizonProblem, positions: Any) -> Any:
         rows.append(f4(positions, mean, problem.safe_distance) + margin)
     for mean, distance in zip(problem.peer_mean, problem.peer_distance, strict=True):
         rows.append(f5(positions, mean, distance))
+    if positions.shape[1] == 3:
+        rows.extend(f7(positions, problem.lowest, problem.highest))
     return np.stack(rows)[:, 2:]
 
 
 def driven(problem: HorizonProblem, controls: Any) -> tuple[Any, Any]:
-    """The ``dynamics`` of a problem: positions and velocities (N, 2) at steps 1..N under controls (N, 2)."""
+    """The ``dynamics`` of a problem: positions and velocities (N, d) at steps 1..N under controls (N, d)."""
     return dynamics(problem.position, problem.velocity, controls, problem.period)
 
 
 def violations(problem: HorizonProblem, controls: Array) -> Array:
-    """The ``constraints`` of a problem under controls (N, 2)."""
+    """The ``constraints`` of a problem under controls (N, d)."""
     values: Array = constraints(problem, driven(problem, controls)[0])
     return values
 

@@ -7,6 +7,7 @@ Row ``s - 1`` of an array over the horizon belongs to the prediction step s = 1.
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -25,37 +26,42 @@ class HorizonProblem(NamedTuple):
     """
 
     period: float  # Delta t
-    position: Array  # (2,) Pr_{t+1}
-    velocity: Array  # (2,) V_{t+1}
+    position: Array  # (d,) Pr_{t+1}; d = 2 in the plane, and 3 in space, with the height last
+    velocity: Array  # (d,) V_{t+1}
     max_speed: float  # Vmax, f1
     max_acceleration: float  # Amax, f2
-    tube_centre: Array  # (N, 2) Rs_{t+s}, f3
+    tube_centre: Array  # (N, d) Rs_{t+s}, f3
     tube_radius: Array  # (N,) sigma_r of eq. (3); inf where the tube is free
     safe_distance: float  # Dmin, f4
     margin: float  # alpha
-    obstacle_mean: Array  # (K, N, 2) Po_{t+s}; K = 0 while no obstacle is known
-    obstacle_covariance: Array  # (K, N, 3) C_{t+s} as (xx, xy, yy)
-    peer_mean: Array  # (n, N, 2) Ro_{i,t+s}, f5
+    obstacle_mean: Array  # (K, N, d) Po_{t+s}; K = 0 while no obstacle is known
+    obstacle_covariance: Array  # (K, N, d (d + 1) / 2) C_{t+s} as (xx, xy, yy), or (xx, xy, xz, yy, yz, zz)
+    peer_mean: Array  # (n, N, d) Ro_{i,t+s}, f5
     peer_distance: Array  # (n, N) Dmin + alpha * sigma_5i
     objective: int = REACH_GOAL  # eq. (2); or INFORM, eq. (5)
-    goal: Array = np.zeros((1, 2))  # (n, 2) at steps 1..n of eq. (2); the last one is there for the other steps, too
-    sigma_positions: Array = np.empty((0, 2))  # (T M, 2) sigma points at t + N of the first T obstacles' positions
+    goal: Array = np.zeros((1, 2))  # (n, d) at steps 1..n of eq. (2); the last one is there for the other steps, too
+    sigma_positions: Array = np.empty((0, 2))  # (T M, d) sigma points at t + N of the first T obstacles' positions
     sigma_weights: Array = np.empty(0)  # (M,) w_{t,i}
     others_distance: Array = np.empty((0, 0))  # (T M, M) exponent that the others' measurements add, mutual_information
     measurement_variance: float = 1.0  # eta_t of eq. (5), m^2
     range_penalty: float = 0.0  # gamma
     measurement_range: float = 0.0  # Dmax, f6
+    # In space only.  f1 and f2 are ellipsoids: what climbs counts more, by the ratio of the limits.
+    climb_speed: float = math.inf  # largest vertical speed
+    climb_acceleration: float = math.inf  # largest vertical acceleration
+    lowest: float = -math.inf  # f7, the height to stay above
+    highest: float = math.inf  # f7, the height to stay below
 
     def to_reach(self, goal: Array) -> HorizonProblem:
-        """The same problem with the objective of eq. (2); a ``goal`` (2,) that stands still, or (N, 2) at each step."""
-        return self._replace(objective=REACH_GOAL, goal=np.array(goal).reshape(-1, 2))
+        """The same problem with the objective of eq. (2); a ``goal`` (d,) that stands still, or (N, d) at each step."""
+        return self._replace(objective=REACH_GOAL, goal=np.array(goal).reshape(-1, np.shape(goal)[-1]))
 
     def to_inform(
         self, points: Array, weights: Array, others: Array, variance: float, gamma: float, reach: float
     ) -> HorizonProblem:
-        """The same problem with the objective of eq. (5), in which ``others`` (n, N, 2) also measure at their ends.
+        """The same problem with the objective of eq. (5), in which ``others`` (n, N, d) also measure at their ends.
 
-        Of several targets, one after the other in ``points`` (T M, 2), it is the sum.
+        Of several targets, one after the other in ``points`` (T M, d), it is the sum.
         """
         size = len(weights)
         if len(points) == size:
@@ -76,19 +82,18 @@ class HorizonProblem(NamedTuple):
 
 @kernel
 def trajectory(position: Array, velocity: Array, controls: Array, period: float, steps: int) -> Array:
-    """Positions at steps 1..``steps`` from the state at step 1 and the controls from there on, shape (steps, 2).
+    """Positions at steps 1..``steps`` from the state at step 1 and the controls from there on, shape (steps, d).
 
     The equality constraint of eq. (2): ``P' = P + period * V``, ``V' = V + period * U``; past the last control the
     velocity is kept.
     """
-    positions = np.empty((steps, 2))
-    px, py = position[0], position[1]
-    vx, vy = velocity[0], velocity[1]
-    for s in range(steps):
-        positions[s, 0], positions[s, 1] = px, py
-        px += period * vx
-        py += period * vy
-        if s < controls.shape[0]:
-            vx += period * controls[s, 0]
-            vy += period * controls[s, 1]
+    d = position.shape[0]
+    positions = np.empty((steps, d))
+    for c in range(d):
+        p, v = position[c], velocity[c]
+        for s in range(steps):
+            positions[s, c] = p
+            p += period * v
+            if s < controls.shape[0]:
+                v += period * controls[s, c]
     return positions

@@ -1,6 +1,6 @@
 """A Newton step for a sum of functions of each step's position, velocity and control.
 
-The sum is kept as its gradient and second derivatives in one 2x2 block for each of them, and the dynamics
+The sum is kept as its gradient and second derivatives in one d x d block for each of them, d = 2 or 3, and the dynamics
 ``P' = P + period * V``, ``V' = V + period * U`` link the steps: a linear-quadratic control problem, which a Riccati
 recursion solves in time linear in the horizon (Rao, Wright & Rawlings, 1998).  For ten steps it takes a fifth of the
 time of writing out the dense Hessian in the controls and factorising it.
@@ -11,39 +11,71 @@ from __future__ import annotations
 import math
 
 from .compiled import Array, borrower, inlined
-from .terms import Term
-
-Vector = tuple[float, float]
-Matrix = tuple[float, float, float, float]  # by rows
-Quadratic = tuple[float, float, float, float, float]  # gradient and Hessian in the plane: x, y, xx, xy, yy
+from .vectors import (
+    Matrix,
+    Quadratic,
+    Term,
+    Vector,
+    applied,
+    dot,
+    head,
+    inverse_of,
+    packed,
+    plus,
+    quadratic_size,
+    read,
+    replaced,
+    scaled,
+    symmetric_size,
+    times,
+    total,
+    turned,
+    write,
+    zero_matrix,
+    zero_quadratic,
+    zero_symmetric,
+)
 
 _CURVATURE = 1e-9  # smallest eigenvalue of a repaired block
+_SWEEPS = 8  # of rotations, to the last digit of a block's eigenvalues in space
 
-# Columns of the table of stages, with a row for each prediction step.  It is one array, as seven would need five
-# times the words at every call; and it is indexed, never sliced: a slice costs as much as a whole term.
+# Columns of the table of stages, with a row for each prediction step, in d dimensions.  It is one array, as seven would
+# need five times the words at every call; and it is indexed, never sliced: a slice costs as much as a whole term.
 POSITION = 0  # a quadratic function of the position at the step
-VELOCITY = 5  # a quadratic function of the velocity at the step
-CONTROL = 10  # a quadratic function of the control that begins to act at the step
-STEP = 15  # vector, the Newton step in the control: -(constant + by_position * dP + by_velocity * dV)
-_CONSTANT = 17  # vector
-_BY_POSITION = 19  # matrix
-_BY_VELOCITY = 23  # matrix
-STAGE = 27  # columns in all; zeros are the zero function
-
-
-@borrower
-def clear(stages: Array) -> None:
-    """Make the function zero in the positions."""
-    for s in range(stages.shape[0]):
-        for c in range(5):
-            stages[s, POSITION + c] = 0.0
 
 
 @inlined
-def put(stages: Array, s: int, column: int, function: Quadratic) -> None:
-    """Set the function in the velocity or the control of step ``s``."""
-    for c in range(5):
-        stages[s, column + c] = function[c]
+def velocity_column(d: int) -> int:
+    """A quadratic function of the velocity at the step."""
+    return quadratic_size(d)
+
+
+@inlined
+def control_column(d: int) -> int:
+    """A quadratic function of the control that begins to act at the step."""
+    return 2 * quadratic_size(d)
+
+
+@inlined
+def step_column(d: int) -> int:
+    """The Newton step in the control: -(constant + by_position * dP + by_velocity * dV).
+
+    A vector; then the constant, a vector, and the two matrices.
+    """
+    return 3 * quadratic_size(d)
+
+
+@inlined
+def stage_columns(d: int) -> int:
+    """Columns in all; zeros are the zero function."""
+    return 3 * quadratic_size(d) + 2 * d + 2 * d * d
+
+
+@borrower
+def clear(stages: Array, zero: Vector) -> None:
+    """Make the function zero in the positions."""
+    for s in range(stages.shape[0]):
+        write(stages, s, POSITION, zero_quadratic(zero))
 
 
 @borrower
@@ -52,17 +84,20 @@ def add(stages: Array, s: int, slope: float, curvature: float, bend: float, insi
 
     p has the first derivative ``slope``, which ``curvature`` replaces in the Hessian, and the second ``bend``.
     """
-    _, gx, gy, hxx, hxy, hyy = inside
-    stages[s, POSITION] += slope * gx
-    stages[s, POSITION + 1] += slope * gy
-    stages[s, POSITION + 2] += curvature * hxx + bend * gx * gx
-    stages[s, POSITION + 3] += curvature * hxy + bend * gx * gy
-    stages[s, POSITION + 4] += curvature * hyy + bend * gy * gy
+    d = 2 if len(inside) == 6 else 3
+    for i in range(d):
+        stages[s, POSITION + i] += slope * inside[1 + i]
+        for j in range(i, d):
+            place = d + packed(d, i, j)
+            stages[s, POSITION + place] += curvature * inside[1 + place] + bend * inside[1 + i] * inside[1 + j]
 
 
 @borrower
-def _repair(stages: Array, s: int) -> None:
+def _repair(stages: Array, s: int, zero: Vector) -> None:
     """Replace the position's Hessian at step ``s`` by the nearest positive semidefinite one."""
+    if len(zero) == 3:
+        _repair_in_space(stages, s, zero)
+        return
     xx, xy, yy = stages[s, POSITION + 2], stages[s, POSITION + 3], stages[s, POSITION + 4]
     if xx + yy >= 2.0 * _CURVATURE and (xx - _CURVATURE) * (yy - _CURVATURE) >= xy * xy:
         return
@@ -75,63 +110,112 @@ def _repair(stages: Array, s: int) -> None:
     stages[s, POSITION + 3] = xy * scale
 
 
-@inlined
-def _at(stages: Array, s: int, column: int) -> Quadratic:
-    return (
-        stages[s, column], stages[s, column + 1],
-        stages[s, column + 2], stages[s, column + 3], stages[s, column + 4],
-    )  # fmt: skip
+@borrower
+def _repair_in_space(stages: Array, s: int, zero: Vector) -> None:
+    """The same in three dimensions, by Jacobi's rotations: in the plane, one of them would do."""
+    d = len(zero)
+    block = read(zero_symmetric(zero), stages, s, POSITION + d)
+    above = block
+    for i in range(d):
+        above = replaced(above, packed(d, i, i), block[packed(d, i, i)] - _CURVATURE)
+    if inverse_of(above, zero_matrix(zero))[0]:
+        return
+    m = axes = zero_matrix(zero)  # m = axes * block * axes^T, in the end diagonal
+    for i in range(d):
+        axes = replaced(axes, i * d + i, 1.0)
+        for j in range(d):
+            m = replaced(m, i * d + j, block[packed(d, i, j)])
+    for _ in range(_SWEEPS):
+        for i in range(d):
+            for j in range(i + 1, d):
+                mixed = m[i * d + j]
+                if mixed == 0.0:
+                    continue
+                ratio = (m[j * d + j] - m[i * d + i]) / (2.0 * mixed)
+                tangent = 1.0 / (abs(ratio) + math.sqrt(ratio * ratio + 1.0))
+                tangent = tangent if ratio >= 0.0 else -tangent
+                cosine = 1.0 / math.sqrt(tangent * tangent + 1.0)
+                sine = cosine * tangent
+                turn = zero_matrix(zero)
+                for k in range(d):
+                    turn = replaced(turn, k * d + k, 1.0)
+                turn = replaced(replaced(turn, i * d + i, cosine), j * d + j, cosine)
+                turn = replaced(replaced(turn, i * d + j, -sine), j * d + i, sine)
+                m, axes = times(times(turn, m), turned(turn)), times(turn, axes)
+    for i in range(d):
+        for j in range(i, d):
+            summed = 0.0
+            for k in range(d):
+                summed += max(m[k * d + k], _CURVATURE) * axes[k * d + i] * axes[k * d + j]
+            stages[s, POSITION + d + packed(d, i, j)] = summed
 
 
 @inlined
-def _sum(p: Quadratic, q: Quadratic) -> Quadratic:
-    return p[0] + q[0], p[1] + q[1], p[2] + q[2], p[3] + q[3], p[4] + q[4]
+def _dimensions(q: Quadratic) -> int:
+    return 2 if len(q) == 5 else 3
 
 
 @inlined
 def _of_times(k: float, q: Quadratic) -> Quadratic:
     """The function q(k v) of a vector v."""
-    return k * q[0], k * q[1], k * k * q[2], k * k * q[3], k * k * q[4]
+    d = _dimensions(q)
+    for c in range(len(q)):
+        q = replaced(q, c, (k if c < d else k * k) * q[c])
+    return q
 
 
 @inlined
 def _less(q: Quadratic, gradient: Vector, hessian: Matrix) -> Quadratic:
-    (x, y), (xx, xy, _, yy) = gradient, hessian
-    return q[0] - x, q[1] - y, q[2] - xx, q[3] - xy, q[4] - yy
+    d = _dimensions(q)
+    for i in range(d):
+        q = replaced(q, i, q[i] - gradient[i])
+        for j in range(i, d):
+            place = d + packed(d, i, j)
+            q = replaced(q, place, q[place] - hessian[i * d + j])
+    return q
 
 
 @inlined
-def _hessian(q: Quadratic) -> Matrix:
-    return q[2], q[3], q[3], q[4]
+def _hessian(like: Matrix, q: Quadratic) -> Matrix:
+    d = _dimensions(q)
+    for i in range(d):
+        for j in range(d):
+            like = replaced(like, i * d + j, q[d + packed(d, i, j)])
+    return like
 
 
 @inlined
-def _plus(m: Matrix, k: float, n: Matrix) -> Matrix:
-    """m + k n."""
-    return m[0] + k * n[0], m[1] + k * n[1], m[2] + k * n[2], m[3] + k * n[3]
+def _next_velocity(h: float, C: Quadratic, VU: Matrix) -> Quadratic:
+    """The function of a control that becomes h times it in the velocity of the next step."""
+    d, made = _dimensions(C), C
+    for i in range(d):
+        made = replaced(made, i, h * C[i])
+        for j in range(i, d):
+            made = replaced(made, d + packed(d, i, j), h * VU[i * d + j])
+    return made
 
 
 @inlined
-def _scaled(k: float, m: Matrix) -> Matrix:
-    return k * m[0], k * m[1], k * m[2], k * m[3]
-
-
-@inlined
-def _times(m: Matrix, n: Matrix) -> Matrix:
-    (a, b, c, d), (xx, xy, yx, yy) = m, n
-    return a * xx + b * yx, a * xy + b * yy, c * xx + d * yx, c * xy + d * yy
-
-
-@inlined
-def _applied(m: Matrix, v: Vector) -> Vector:
-    return m[0] * v[0] + m[1] * v[1], m[2] * v[0] + m[3] * v[1]
+def _slid(h: float, A: Quadratic, B: Matrix) -> Quadratic:
+    """What dP + h dV in place of dP adds in dV."""
+    d, made = _dimensions(A), A
+    for i in range(d):
+        made = replaced(made, i, h * A[i])
+        for j in range(i, d):
+            place = d + packed(d, i, j)
+            if i == j:
+                made = replaced(made, place, h * (h * A[place] + 2.0 * B[i * d + i]))
+            else:
+                made = replaced(made, place, h * (h * A[place] + B[i * d + j] + B[j * d + i]))
+    return made
 
 
 @borrower
-def newton_step(stages: Array, period: float, free: int) -> float:
+def newton_step(stages: Array, period: float, free: int, zero: Vector) -> float:
     """Write the step in the controls; returns gradient . step (negative), or 0 without a descent.
 
-    Only the first ``free`` controls are variables; the last of them is held from there on.
+    ``zero`` is a vector of zeros.  Only the first ``free`` controls are variables; the last of them is held from there
+    on.
 
     Backwards, the cost to go from step s is kept as a quadratic function of (dP, dV): A in dP, C in dV, and B, its
     mixed second derivatives, with rows for dP.  The control of step s enters dV of the next one, so it is minimised out
@@ -142,69 +226,64 @@ def newton_step(stages: Array, period: float, free: int) -> float:
     position, in addition to the effects of dV of step f and dP of the next one, so everything that follows is summed in
     these three.
     """
-    h, descent = period, 0.0
-    A = C = U = (0.0, 0.0, 0.0, 0.0, 0.0)
-    B = PU = VU = (0.0, 0.0, 0.0, 0.0)  # mixed: PU of dP of the next step with the control, VU of dV with it
+    h, descent, d = period, 0.0, len(zero)
+    velocity_at, control_at, step_at = velocity_column(d), control_column(d), step_column(d)
+    constant_at, by_position_at = step_at + d, step_at + 2 * d
+    by_velocity_at = by_position_at + d * d
+    nothing = A = C = U = zero_quadratic(zero)
+    none = B = PU = VU = zero_matrix(zero)  # mixed: PU of dP of the next step with the control, VU of dV with it
     for s in range(free, stages.shape[0]):
         held = s - free + 1.0
         w, by_v = held * h, (held - 1.0) * h
         by_u = 0.5 * w * by_v
-        _repair(stages, s)
-        position, velocity = _at(stages, s, POSITION), _at(stages, s, VELOCITY)
-        A = _sum(A, position)
-        B = _plus(B, by_v, _hessian(position))
-        C = _sum(_sum(C, _of_times(by_v, position)), velocity)
-        PU = _plus(PU, by_u, _hessian(position))
-        VU = _plus(_plus(VU, by_v * by_u, _hessian(position)), w, _hessian(velocity))
-        U = _sum(U, _sum(_sum(_of_times(by_u, position), _of_times(w, velocity)), _at(stages, s, CONTROL)))
+        _repair(stages, s, zero)
+        position, velocity = read(nothing, stages, s, POSITION), read(nothing, stages, s, velocity_at)
+        A = total(A, position)
+        B = plus(B, by_v, _hessian(none, position))
+        C = total(total(C, _of_times(by_v, position)), velocity)
+        PU = plus(PU, by_u, _hessian(none, position))
+        VU = plus(plus(VU, by_v * by_u, _hessian(none, position)), w, _hessian(none, velocity))
+        acting = total(total(_of_times(by_u, position), _of_times(w, velocity)), read(nothing, stages, s, control_at))
+        U = total(U, acting)
     for s in range(free - 1, -1, -1):
         if s < free - 1:  # it is the velocity of the next step
-            PU, VU = _scaled(h, B), _scaled(h, _hessian(C))
-            U = h * C[0], h * C[1], h * VU[0], h * VU[1], h * VU[3]
-        ux, uy, xx, xy, yy = _sum(_at(stages, s, CONTROL), U)
-        determinant = xx * yy - xy * xy
-        if not (determinant > 0.0 and xx > 0.0):
+            PU, VU = scaled(h, B), scaled(h, _hessian(none, C))
+            U = _next_velocity(h, C, VU)
+        function = total(read(nothing, stages, s, control_at), U)
+        gradient = head(zero, function)
+        block = zero_symmetric(zero)
+        for c in range(symmetric_size(d)):
+            block = replaced(block, c, function[d + c])
+        definite, inverse = inverse_of(block, none)
+        if not definite:
             return 0.0
-        scale = 1.0 / determinant
-        inverse = scale * yy, -scale * xy, -scale * xy, scale * xx
-        constant = _applied(inverse, (ux, uy))
-        by_position = _times(inverse, (PU[0], PU[2], PU[1], PU[3]))
-        by_velocity = _times(inverse, VU)
-        descent -= ux * constant[0] + uy * constant[1]
-        stages[s, _CONSTANT], stages[s, _CONSTANT + 1] = constant
-        by_both = _plus(by_velocity, h, by_position)
-        for c in range(4):
-            stages[s, _BY_POSITION + c], stages[s, _BY_VELOCITY + c] = by_position[c], by_both[c]
+        constant = applied(inverse, gradient)
+        by_position = times(inverse, turned(PU))
+        by_velocity = times(inverse, VU)
+        descent -= dot(gradient, constant)
+        write(stages, s, constant_at, constant)
+        write(stages, s, by_position_at, by_position)
+        write(stages, s, by_velocity_at, plus(by_velocity, h, by_position))
         # The cost without the control, still in dP of the next step and dV of this one.
-        A = _less(A, _applied(PU, constant), _times(PU, by_position))
-        B = _plus(B, -1.0, _times(PU, by_velocity))
-        C = _less(C, _applied(VU, constant), _times(VU, by_velocity))
+        A = _less(A, applied(PU, constant), times(PU, by_position))
+        B = plus(B, -1.0, times(PU, by_velocity))
+        C = _less(C, applied(VU, constant), times(VU, by_velocity))
         # dP of the next step is dP + h dV; then what step s itself costs.
-        _repair(stages, s)
-        slid = (
-            h * A[0], h * A[1],
-            h * (h * A[2] + 2.0 * B[0]), h * (h * A[3] + B[1] + B[2]), h * (h * A[4] + 2.0 * B[3]),
-        )  # fmt: skip
-        C = _sum(C, _sum(slid, _at(stages, s, VELOCITY)))
-        B = _plus(B, h, _hessian(A))
-        A = _sum(A, _at(stages, s, POSITION))
-    px = py = vx = vy = ux = uy = 0.0
+        _repair(stages, s, zero)
+        C = total(C, total(_slid(h, A, B), read(nothing, stages, s, velocity_at)))
+        B = plus(B, h, _hessian(none, A))
+        A = total(A, read(nothing, stages, s, POSITION))
+    p = v = u = zero
     for s in range(stages.shape[0]):
         if s < free:
-            for c in range(2):
-                p, v = _BY_POSITION + 2 * c, _BY_VELOCITY + 2 * c
-                stages[s, STEP + c] = -(
-                    stages[s, _CONSTANT + c]
-                    + stages[s, p] * px
-                    + stages[s, p + 1] * py
-                    + stages[s, v] * vx
-                    + stages[s, v + 1] * vy
-                )
-            ux, uy = stages[s, STEP], stages[s, STEP + 1]
-        else:
-            stages[s, STEP], stages[s, STEP + 1] = ux, uy
-        px += h * vx
-        py += h * vy
-        vx += h * ux
-        vy += h * uy
+            for c in range(d):
+                summed = stages[s, constant_at + c]
+                for k in range(d):
+                    summed += stages[s, by_position_at + d * c + k] * p[k]
+                for k in range(d):
+                    summed += stages[s, by_velocity_at + d * c + k] * v[k]
+                u = replaced(u, c, -summed)
+        write(stages, s, step_at, u)
+        p = plus(p, h, v)
+        v = plus(v, h, u)
     return descent if descent < 0.0 else 0.0

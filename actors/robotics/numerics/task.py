@@ -8,21 +8,54 @@ from typing import NamedTuple
 
 from ...core.elementary import log
 from .compiled import Array, borrower, inlined
-from .constraints import BOUND, CONSTRAINT, MARGIN, VALUE, WHEN, X, Y, certainly_kept, circle, constraints_of, term
+from .constraints import (
+    AWAY,
+    BOUND,
+    DISTANCE,
+    KIND,
+    LEVEL,
+    PLACE,
+    VALUE,
+    WHEN,
+    ball,
+    certainly_kept,
+    constraint_columns,
+    constraints_of,
+    subjects,
+    term,
+)
 from .horizon import REACH_GOAL, HorizonProblem
-from .mutual_information import PAIRS, informed, new_points
-from .newton import CONTROL, STAGE, STEP, VELOCITY, Quadratic, Vector, add, clear, put
-from .terms import Term, smoothed, stay_near
+from .mutual_information import informed, new_points, point_columns
+from .newton import add, clear, control_column, stage_columns, step_column, velocity_column
+from .terms import smoothed, stay_near
+from .vectors import (
+    Quadratic,
+    Term,
+    Vector,
+    dot,
+    less,
+    packed,
+    plus,
+    read,
+    replaced,
+    squared,
+    steeper,
+    total,
+    write,
+    zero_quadratic,
+    zero_term,
+    zero_vector,
+)
 
 _SHARE = 0.8  # largest share of the way to the nearest limit in one step
 
-# Columns of the table of a plan, with a row for each prediction step: vectors (x, y).
+# The table of a plan has a row for each prediction step, of vectors; each begins at the dimensions times its number.
 _POSITION = 0
-_VELOCITY = 2
-_TRIED = 4  # the controls that position and velocity follow from
-TAKEN = 6  # the best controls so far
-_SHIFT = 8  # of the position, by a whole Newton step
-_COLUMNS = 10  # number of columns
+_VELOCITY = 1
+_TRIED = 2  # the controls that position and velocity follow from
+TAKEN = 3  # the best controls so far
+_SHIFT = 4  # of the position, by a whole Newton step
+_VECTORS = 5  # number of vectors
 
 
 class Phase(IntEnum):
@@ -36,10 +69,12 @@ class Task(NamedTuple):
     """A problem for repeated evaluation: some numbers, and four working tables."""
 
     period: float
-    position: Vector  # at step 1
+    position: Vector  # at step 1; its length is the number of dimensions
     velocity: Vector
     max_speed: float
     max_acceleration: float
+    speed_ratio: float  # of the largest speed to that of climbing: times this, a height is as if it were a length
+    acceleration_ratio: float
     seeks: bool  # the objective is eq. (2)
     goal: Array  # (n, 2) of the problem
     variance: float
@@ -47,47 +82,56 @@ class Task(NamedTuple):
     reach: float
     free: int  # free controls, the last of which is held
     targets: int  # the first of the obstacles, of which the objective is eq. (5); 0 unless it is
-    obstacles: Array  # (K, N, 2) of the problem
-    plan: Array  # (N, 10)
+    obstacles: Array  # (K, N, d) of the problem
+    plan: Array  # (N, 5 d)
     stages: Array  # of ``newton``
     constraints: Array  # of ``constraints``, those within reach
     points: Array  # of ``mutual_information``, as many for each target
 
 
 @inlined
-def room_for(problem: HorizonProblem, steps: int) -> int:
+def room_for(problem: HorizonProblem, steps: int, d: int) -> int:
     """The number of numbers in the tables of a task."""
-    binding: int = (1 + problem.obstacle_mean.shape[0] + problem.peer_mean.shape[0]) * problem.tube_radius.shape[0]
+    binding: int = subjects(problem, d) * problem.tube_radius.shape[0]
     points: int = problem.sigma_weights.shape[0]
     rows: int = problem.sigma_positions.shape[0]
-    return steps * (_COLUMNS + STAGE) + binding * CONSTRAINT + rows * (PAIRS + 2 * points)
+    columns: int = point_columns(d, points)
+    return steps * (_VECTORS * d + stage_columns(d)) + binding * constraint_columns(d) + rows * columns
 
 
 @borrower
-def new_task(problem: HorizonProblem, steps: int, free: int, spare: float, room: Array) -> Task:
-    """A task with its tables in ``room``, one after the other; for callers that do not count references either."""
-    binding = (1 + problem.obstacle_mean.shape[0] + problem.peer_mean.shape[0]) * problem.tube_radius.shape[0]
+def new_task(problem: HorizonProblem, steps: int, free: int, spare: float, room: Array, zero: Vector) -> Task:
+    """A task with its tables in ``room``, one after the other; for callers that do not count references either.
+
+    ``zero`` is a vector of zeros: its type is that of all vectors.
+    """
+    d, binding = len(zero), subjects(problem, len(zero)) * problem.tube_radius.shape[0]
     weights, seeks = problem.sigma_weights, problem.objective == REACH_GOAL
-    second = steps * _COLUMNS
-    third = second + steps * STAGE
-    fourth = third + binding * CONSTRAINT
+    second = steps * _VECTORS * d
+    third = second + steps * stage_columns(d)
+    fourth = third + binding * constraint_columns(d)
     for i in range(third):
         room[i] = 0.0
-    plan, stages = room[:second].reshape((steps, _COLUMNS)), room[second:third].reshape((steps, STAGE))
-    constraints = room[third:fourth].reshape((binding, CONSTRAINT))
-    points = room[fourth:].reshape((problem.sigma_positions.shape[0], PAIRS + 2 * weights.shape[0]))
+    plan, stages = room[:second].reshape((steps, _VECTORS * d)), room[second:third].reshape((steps, stage_columns(d)))
+    constraints = room[third:fourth].reshape((binding, constraint_columns(d)))
+    points = room[fourth:].reshape((problem.sigma_positions.shape[0], point_columns(d, weights.shape[0])))
     count = targets = 0
     if not seeks and problem.obstacle_mean.shape[0] > 0:
-        count = new_points(problem.sigma_positions, weights, problem.others_distance, points)
+        count = new_points(problem.sigma_positions, weights, problem.others_distance, points, zero)
         told = problem.sigma_positions.shape[0] // max(weights.shape[0], 1)
         targets = min(told, problem.obstacle_mean.shape[0]) if count > 0 else 0
         count = count // max(told, 1) * targets
+    position = velocity = zero
+    for c in range(d):
+        position, velocity = replaced(position, c, problem.position[c]), replaced(velocity, c, problem.velocity[c])
     return Task(
         period=problem.period,
-        position=(problem.position[0], problem.position[1]),
-        velocity=(problem.velocity[0], problem.velocity[1]),
+        position=position,
+        velocity=velocity,
         max_speed=problem.max_speed,
         max_acceleration=problem.max_acceleration,
+        speed_ratio=problem.max_speed / problem.climb_speed,
+        acceleration_ratio=problem.max_acceleration / problem.climb_acceleration,
         seeks=seeks,
         goal=problem.goal,
         variance=problem.measurement_variance,
@@ -98,58 +142,62 @@ def new_task(problem: HorizonProblem, steps: int, free: int, spare: float, room:
         obstacles=problem.obstacle_mean,
         plan=plan,
         stages=stages,
-        constraints=constraints[: constraints_of(problem, spare, constraints)],
+        constraints=constraints[: constraints_of(problem, spare, constraints, zero)],
         points=points[:count],
     )
+
+
+@inlined
+def at(task: Task, s: int, vector: int) -> Vector:
+    """A vector of the plan at step ``s``."""
+    return read(task.position, task.plan, s, vector * len(task.position))
+
+
+@inlined
+def put(task: Task, s: int, vector: int, value: Vector) -> None:
+    write(task.plan, s, vector * len(task.position), value)
 
 
 @borrower
 def _drive(task: Task) -> None:
     """Compute the positions and velocities for the trial controls."""
-    plan = task.plan
-    (px, py), (vx, vy) = task.position, task.velocity
-    for s in range(plan.shape[0]):
-        plan[s, _POSITION], plan[s, _POSITION + 1] = px, py
-        plan[s, _VELOCITY], plan[s, _VELOCITY + 1] = vx, vy
-        px += task.period * vx
-        py += task.period * vy
-        vx += task.period * plan[s, _TRIED]
-        vy += task.period * plan[s, _TRIED + 1]
+    p, v = task.position, task.velocity
+    for s in range(task.plan.shape[0]):
+        put(task, s, _POSITION, p)
+        put(task, s, _VELOCITY, v)
+        p = plus(p, task.period, v)
+        v = plus(v, task.period, at(task, s, _TRIED))
 
 
 @borrower
 def move(task: Task, length: float) -> None:
     """Try the accepted controls plus a share of the Newton step."""
-    plan, stages = task.plan, task.stages
-    for s in range(plan.shape[0]):
-        for c in range(2):
-            plan[s, _TRIED + c] = plan[s, TAKEN + c] + length * stages[s, STEP + c]
+    d = len(task.position)
+    for s in range(task.plan.shape[0]):
+        step = read(task.position, task.stages, s, step_column(d))
+        put(task, s, _TRIED, plus(at(task, s, TAKEN), length, step))
     _drive(task)
 
 
 @borrower
 def take(task: Task) -> None:
-    plan = task.plan
-    for s in range(plan.shape[0]):
-        for c in range(2):
-            plan[s, TAKEN + c] = plan[s, _TRIED + c]
+    for s in range(task.plan.shape[0]):
+        put(task, s, TAKEN, at(task, s, _TRIED))
 
 
 @borrower
 def look(task: Task) -> float:
-    """Try the accepted controls, and write the value of each of f3-f5; returns the largest.
+    """Try the accepted controls, and write the value of each of f3-f5 and f7; returns the largest.
 
     It is negative if all are kept strictly, and inf if one is NaN.
     """
-    plan, constraints = task.plan, task.constraints
-    for s in range(plan.shape[0]):
-        for c in range(2):
-            plan[s, _TRIED + c] = plan[s, TAKEN + c]
+    constraints = task.constraints
+    for s in range(task.plan.shape[0]):
+        put(task, s, _TRIED, at(task, s, TAKEN))
     _drive(task)
     largest = -math.inf
     for i in range(constraints.shape[0]):
-        s = int(constraints[i, WHEN])
-        value = term(constraints, i, plan[s, _POSITION], plan[s, _POSITION + 1])[0]
+        value = term(constraints, i, at(task, int(constraints[i, WHEN]), _POSITION))[0]
         constraints[i, VALUE] = value
         if not value <= largest:
             largest = value if value < math.inf else math.inf
@@ -159,37 +207,37 @@ def look(task: Task) -> float:
 @inlined
 def _beyond(task: Task, k: int, s: int) -> Term:
     """How far the position is beyond Dmax from an obstacle; the positive part is f6."""
-    plan, obstacles = task.plan, task.obstacles
-    x, y = plan[s, _POSITION], plan[s, _POSITION + 1]
-    return stay_near(x, y, obstacles[k, s, 0], obstacles[k, s, 1], task.reach)
+    target = task.position
+    for c in range(len(target)):
+        target = replaced(target, c, task.obstacles[k, s, c])
+    return stay_near(at(task, s, _POSITION), target, task.reach)
 
 
 @inlined
 def _informed(task: Task, k: int) -> Term:
     """-I of a target at the last position."""
-    plan, last = task.plan, task.plan.shape[0] - 1
     each = task.points.shape[0] // task.targets
     points = task.points[k * each : (k + 1) * each]
-    return informed(points, plan[last, _POSITION], plan[last, _POSITION + 1], task.variance)
+    return informed(points, at(task, task.plan.shape[0] - 1, _POSITION), task.variance)
 
 
 @inlined
 def _away(task: Task, s: int) -> Vector:
-    """The position as seen from the goal at that step."""
-    plan, goal = task.plan, task.goal
+    """The position as seen from the goal at that step; a goal without a height is on the ground."""
+    away, goal = at(task, s, _POSITION), task.goal
     g = min(s, goal.shape[0] - 1)
-    return plan[s, _POSITION] - goal[g, 0], plan[s, _POSITION + 1] - goal[g, 1]
+    for c in range(len(away)):
+        away = replaced(away, c, away[c] - (goal[g, c] if c < goal.shape[1] else 0.0))
+    return away
 
 
 @borrower
 def objective_of(task: Task) -> float:
     """The objective of eq. (2) or (5) with the trial controls."""
-    plan = task.plan
-    steps, value = plan.shape[0], 0.0
+    steps, value = task.plan.shape[0], 0.0
     if task.seeks:
         for s in range(steps):
-            dx, dy = _away(task, s)
-            value += dx * dx + dy * dy
+            value += squared(_away(task, s))
     for k in range(task.targets):
         value += _informed(task, k)[0]
         for s in range(steps):
@@ -208,13 +256,15 @@ def _less_log(value: float, product: float, mu: float) -> tuple[float, float]:
 @borrower
 def _add_objective(task: Task, mu: float) -> float:
     """Add the objective to the stages, with f6 smoothed; returns its value."""
-    plan, stages, gamma = task.plan, task.stages, task.penalty
-    steps, value, product = plan.shape[0], 0.0, 1.0
+    stages, gamma, d = task.stages, task.penalty, len(task.position)
+    steps, value, product = task.plan.shape[0], 0.0, 1.0
     if task.seeks:
         for s in range(steps):
-            dx, dy = _away(task, s)
-            value += dx * dx + dy * dy
-            add(stages, s, 2.0, 2.0, 0.0, (0.0, dx, dy, 1.0, 0.0, 1.0))
+            offset, halved = _away(task, s), zero_term(task.position)
+            value += squared(offset)
+            for c in range(d):
+                halved = replaced(replaced(halved, 1 + c, offset[c]), 1 + d + packed(d, c, c), 1.0)
+            add(stages, s, 2.0, 2.0, 0.0, halved)
     for k in range(task.targets):
         information = _informed(task, k)
         add(stages, steps - 1, 1.0, 1.0, 0.0, information)
@@ -229,14 +279,24 @@ def _add_objective(task: Task, mu: float) -> float:
 
 
 @borrower
-def _ball(x: float, y: float, radius: float, mu: float, dual: float) -> tuple[float, Quadratic]:
-    """The barrier of f1 or f2, -mu log(1 - |(x, y)|^2 / radius^2): the argument of the log, gradient and Hessian."""
+def _ellipsoid(v: Vector, radius: float, ratio: float, mu: float, dual: float) -> tuple[float, Quadratic]:
+    """The barrier of f1 or f2, -mu log(1 - |S v|^2 / radius^2), where S multiplies the height by ``ratio``: the
+    argument of the log, gradient and Hessian."""
+    d, function = len(v), zero_quadratic(v)
     inverse = 1.0 / (radius * radius)
-    inside = 1.0 - inverse * (x * x + y * y)
+    weighted = steeper(v, ratio * ratio)
+    inside = 1.0 - inverse * dot(v, weighted)
     slope = 2.0 * inverse / inside
     first, second = mu * slope, dual * slope
     bend = second * slope
-    return inside, (first * x, first * y, second + bend * x * x, bend * x * y, second + bend * y * y)
+    for i in range(d):
+        function = replaced(function, i, first * weighted[i])
+        for j in range(i, d):
+            curvature = bend * weighted[i] * weighted[j]
+            if i == j:
+                curvature = (second if i < 2 else second * (ratio * ratio)) + curvature
+            function = replaced(function, d + packed(d, i, j), curvature)
+    return inside, function
 
 
 @borrower
@@ -246,28 +306,28 @@ def evaluate(task: Task, phase: Phase, mu: float, dual: float, limit: float) -> 
     The second derivatives of the barriers are taken with ``dual`` in place of ``mu``, see ``barrier``.  If the value
     exceeds ``limit``, a smaller value above ``limit`` may be returned.
     """
-    plan, stages, constraints = task.plan, task.stages, task.constraints
-    clear(stages)
+    stages, constraints, d = task.stages, task.constraints, len(task.position)
+    clear(stages, task.position)
     value, product = 0.0, 1.0  # of all arguments of logs: one log of a product instead of many of factors
-    for s in range(plan.shape[0]):
-        inside, barrier = _ball(plan[s, _TRIED], plan[s, _TRIED + 1], task.max_acceleration, mu, dual)
+    for s in range(task.plan.shape[0]):
+        inside, barrier = _ellipsoid(at(task, s, _TRIED), task.max_acceleration, task.acceleration_ratio, mu, dual)
         if not inside > 0.0:
             return math.inf
         product *= inside
-        put(stages, s, CONTROL, barrier)
+        write(stages, s, control_column(d), barrier)
         if s > 0:  # the speed at step 1 is decided already
-            inside, barrier = _ball(plan[s, _VELOCITY], plan[s, _VELOCITY + 1], task.max_speed, mu, dual)
+            inside, barrier = _ellipsoid(at(task, s, _VELOCITY), task.max_speed, task.speed_ratio, mu, dual)
             if not inside > 0.0:
                 return math.inf
             product *= inside
-            put(stages, s, VELOCITY, barrier)
+            write(stages, s, velocity_column(d), barrier)
         value, product = _less_log(value, product, mu)
     for i in range(constraints.shape[0]):
         s = int(constraints[i, WHEN])
-        x, y = plan[s, _POSITION], plan[s, _POSITION + 1]
-        if phase == Phase.RESTORE and certainly_kept(constraints, i, x, y):
+        position = at(task, s, _POSITION)
+        if phase == Phase.RESTORE and certainly_kept(constraints, i, position):
             continue  # most are
-        kept = term(constraints, i, x, y)
+        kept = term(constraints, i, position)
         slack = constraints[i, BOUND] - kept[0]
         if phase == Phase.OPTIMISE:
             if not slack > 0.0:
@@ -285,65 +345,62 @@ def evaluate(task: Task, phase: Phase, mu: float, dual: float, limit: float) -> 
 
 
 @borrower
-def _share(x: float, y: float, dx: float, dy: float, radius: float) -> float:
-    """The share of (dx, dy) from (x, y) to the circle, if the whole step crosses it."""
-    a, b, c = dx * dx + dy * dy, x * dx + y * dy, x * x + y * y - radius * radius
+def _share(v: Vector, step: Vector, radius: float) -> float:
+    """The share of a ``step`` from ``v`` to the sphere, if the whole step crosses it."""
+    a, b, c = squared(step), dot(v, step), squared(v) - radius * radius
     root = math.sqrt(max(b * b - a * c, 0.0))
     if c > 0.0:  # from outside, the nearer crossing
         return c / (root - b)
     return -c / (root + b) if b > 0.0 else (root - b) / a
 
 
-@inlined
-def _squared(x: float, y: float) -> float:
-    return x * x + y * y
-
-
 @borrower
 def longest_step(task: Task, phase: Phase) -> float:
     """The largest share of the step that can be taken: all of it, or ``_SHARE`` of the way to the nearest limit.
 
-    All limits are circles except the obstacle's, whose margin changes with the direction; it is left to the
-    backtracking, as a step along it is far longer than one to the circle with the present margin.
+    All limits are spheres or levels except the obstacle's, whose margin changes with the direction; it is left to the
+    backtracking, as a step along it is far longer than one to the sphere with the present margin.
     """
-    plan, stages, constraints, h = task.plan, task.stages, task.constraints, task.period
+    stages, constraints, h, d = task.stages, task.constraints, task.period, len(task.position)
     share = 1.0
-    px = py = vx = vy = 0.0
-    for s in range(plan.shape[0]):
-        plan[s, _SHIFT], plan[s, _SHIFT + 1] = px, py
-        x, y = plan[s, _VELOCITY], plan[s, _VELOCITY + 1]
-        if _squared(x + vx, y + vy) >= task.max_speed * task.max_speed and s > 0:
-            share = min(share, _share(x, y, vx, vy, task.max_speed))
-        px += h * vx
-        py += h * vy
-        x, y, dx, dy = plan[s, TAKEN], plan[s, TAKEN + 1], stages[s, STEP], stages[s, STEP + 1]
-        if _squared(x + dx, y + dy) >= task.max_acceleration * task.max_acceleration:
-            share = min(share, _share(x, y, dx, dy, task.max_acceleration))
-        vx += h * dx
-        vy += h * dy
+    p = v = zero_vector(task.position)
+    for s in range(task.plan.shape[0]):
+        put(task, s, _SHIFT, p)
+        start, step = steeper(at(task, s, _VELOCITY), task.speed_ratio), steeper(v, task.speed_ratio)
+        if squared(total(start, step)) >= task.max_speed * task.max_speed and s > 0:
+            share = min(share, _share(start, step, task.max_speed))
+        p = plus(p, h, v)
+        change = read(task.position, stages, s, step_column(d))
+        start, step = steeper(at(task, s, TAKEN), task.acceleration_ratio), steeper(change, task.acceleration_ratio)
+        if squared(total(start, step)) >= task.max_acceleration * task.max_acceleration:
+            share = min(share, _share(start, step, task.max_acceleration))
+        v = plus(v, h, change)
     for i in range(constraints.shape[0] if phase == Phase.OPTIMISE else 0):
-        if constraints[i, MARGIN] != 0.0:
-            continue
-        s = int(constraints[i, WHEN])
-        x, y = plan[s, _POSITION] - constraints[i, X], plan[s, _POSITION + 1] - constraints[i, Y]
-        dx, dy = plan[s, _SHIFT], plan[s, _SHIFT + 1]
-        then, (near, radius) = _squared(x + dx, y + dy), circle(constraints, i)
-        if then >= radius * radius if near else then <= radius * radius and radius > 0.0:
-            share = min(share, _share(x, y, dx, dy, radius))
+        s, kind = int(constraints[i, WHEN]), constraints[i, KIND]
+        if kind <= AWAY:
+            start = less(at(task, s, _POSITION), read(task.position, constraints, i, PLACE))
+            step = at(task, s, _SHIFT)
+            then, (near, radius) = squared(total(start, step)), ball(constraints, i)
+            if then >= radius * radius if near else then <= radius * radius and radius > 0.0:
+                share = min(share, _share(start, step, radius))
+        elif d == 3 and kind == LEVEL:
+            sign = constraints[i, DISTANCE]
+            above = sign * (at(task, s, _POSITION)[d - 1] - constraints[i, PLACE + d - 1])
+            slack, rise = constraints[i, BOUND] - above, sign * at(task, s, _SHIFT)[d - 1]
+            if rise >= slack:
+                share = min(share, slack / rise)
     return 1.0 if share == 1.0 else _SHARE * share
 
 
 @borrower
 def keeps_limits(task: Task) -> bool:
     """Whether the accepted controls keep f1 and f2 strictly."""
-    plan = task.plan
-    vx, vy = task.velocity
-    for s in range(plan.shape[0]):
-        ux, uy = plan[s, TAKEN], plan[s, TAKEN + 1]
-        if not _squared(ux, uy) < task.max_acceleration * task.max_acceleration:
+    v, steps = task.velocity, task.plan.shape[0]
+    for s in range(steps):
+        u = at(task, s, TAKEN)
+        if not squared(steeper(u, task.acceleration_ratio)) < task.max_acceleration * task.max_acceleration:
             return False
-        vx += task.period * ux
-        vy += task.period * uy
-        if s < plan.shape[0] - 1 and not _squared(vx, vy) < task.max_speed * task.max_speed:
+        v = plus(v, task.period, u)
+        if s < steps - 1 and not squared(steeper(v, task.speed_ratio)) < task.max_speed * task.max_speed:
             return False
     return True

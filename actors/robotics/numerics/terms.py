@@ -1,6 +1,6 @@
 """The constraint functions of eqs. (2)-(4) at one point: value, gradient and Hessian, all exact; f6 without its kink.
 
-Each constraint returns ``(value, d/dx, d/dy, d2/dxx, d2/dxy, d2/dyy)`` and is satisfied where its value is <= 0.
+Each constraint returns a ``Term`` and is satisfied where its value is <= 0; points have two or three dimensions.
 """
 
 from __future__ import annotations
@@ -8,62 +8,119 @@ from __future__ import annotations
 import math
 
 from .compiled import inlined, kernel
+from .vectors import (
+    Symmetric,
+    Term,
+    Vector,
+    dot,
+    frame_of,
+    less,
+    packed,
+    replaced,
+    row,
+    scaled,
+    spread,
+    squared,
+    zero_matrix,
+    zero_term,
+)
 
-Term = tuple[float, float, float, float, float, float]
 _TINY = 1e-9  # keeps the direction defined at distance zero
 
 
 @kernel
-def stay_near(x: float, y: float, cx: float, cy: float, radius: float) -> Term:
-    """f3, and the argument of f6: distance to (cx, cy) minus ``radius``."""
-    dx, dy = x - cx, y - cy
-    d = max(math.sqrt(dx * dx + dy * dy), _TINY)
-    bend = 1.0 / d
-    nx, ny = bend * dx, bend * dy
-    return d - radius, nx, ny, bend * ny * ny, -bend * nx * ny, bend * nx * nx
+def stay_near(at: Vector, centre: Vector, radius: float) -> Term:
+    """f3, and the argument of f6: distance to ``centre`` minus ``radius``."""
+    d, offset, term = len(at), less(at, centre), zero_term(at)
+    distance = max(math.sqrt(squared(offset)), _TINY)
+    bend = 1.0 / distance
+    n = scaled(bend, offset)
+    for i in range(d):
+        term = replaced(term, 1 + i, n[i])
+        for j in range(i, d):
+            if i == j:  # bend (1 - n_i^2), without cancellation
+                other = 0 if i > 0 else 1
+                curvature = bend * n[other] * n[other]
+                for k in range(other + 1, d):
+                    if k != i:
+                        curvature += bend * n[k] * n[k]
+            else:
+                curvature = -bend * n[i] * n[j]
+            term = replaced(term, 1 + d + packed(d, i, j), curvature)
+    return replaced(term, 0, distance - radius)
 
 
 @kernel
-def keep_away(x: float, y: float, cx: float, cy: float, distance: float) -> Term:
-    """f5 with its margin: ``distance`` minus the distance to (cx, cy)."""
-    value, gx, gy, hxx, hxy, hyy = stay_near(x, y, cx, cy, distance)
-    return -value, -gx, -gy, -hxx, -hxy, -hyy
+def keep_away(at: Vector, centre: Vector, distance: float) -> Term:
+    """f5 with its margin: ``distance`` minus the distance to ``centre``."""
+    return scaled(-1.0, stay_near(at, centre, distance))
 
 
 @kernel
-def keep_away_uncertain(
-    x: float, y: float, cx: float, cy: float, cxx: float, cxy: float, cyy: float, distance: float, margin: float,
-) -> Term:  # fmt: skip
+def keep_level(at: Vector, level: float, sign: float) -> Term:
+    """f7: the height above a ``level`` with ``sign`` 1, or below it with -1."""
+    term, last = zero_term(at), len(at) - 1
+    return replaced(replaced(term, 0, sign * (at[last] - level)), 1 + last, sign)
+
+
+@kernel
+def keep_away_uncertain(at: Vector, centre: Vector, covariance: Symmetric, distance: float, margin: float) -> Term:
     """f4 + alpha * sigma_4 of eqs. (2) and (4): the margin is the deviation along the line of sight.
 
-    In polar coordinates around the obstacle, h(r, a) = distance - r + margin * sigma(a), where
-    sigma^2(a) = n(a)^T C n(a); derivatives are taken there and rotated back.
+    In an orthonormal frame of the line of sight n and the directions t_k across it, h = distance - r + margin *
+    sigma(n), where sigma^2(n) = n^T C n; a step along t_k turns n by 1 / r towards t_k.  Derivatives are taken there
+    and rotated back.
     """
-    dx, dy = x - cx, y - cy
-    r = max(math.sqrt(dx * dx + dy * dy), _TINY)
+    d, offset, term = len(at), less(at, centre), zero_term(at)
+    r = max(math.sqrt(squared(offset)), _TINY)
     inverse = 1.0 / r
-    nx, ny = inverse * dx, inverse * dy
-    if dx == 0.0 and dy == 0.0:
-        nx, ny = 1.0, 0.0
-    tx, ty = -ny, nx
-    along = nx * (cxx * nx + cxy * ny) + ny * (cxy * nx + cyy * ny)
-    across = tx * (cxx * tx + cxy * ty) + ty * (cxy * tx + cyy * ty)
-    mixed = tx * (cxx * nx + cxy * ny) + ty * (cxy * nx + cyy * ny)
+    n = scaled(inverse, offset)
+    nowhere = True
+    for c in range(d):
+        nowhere = nowhere and offset[c] == 0.0
+    if nowhere:
+        n = replaced(n, 0, 1.0)
+    frame = frame_of(n, zero_matrix(at))
+    seen = spread(covariance, n)
+    along = dot(n, seen)
     sigma = math.sqrt(max(along, 1e-18))
     steep = 1.0 / sigma
-    slope = steep * mixed  # d sigma / d a
-    bend = steep * (across - along - slope * slope)  # d2 sigma / d a2
-    radial, tangential = -1.0, margin * slope * inverse
-    h_rt = -inverse * tangential
-    h_tt = inverse * (margin * bend * inverse - 1.0)
-    return (
-        distance - r + margin * sigma,
-        radial * nx + tangential * tx,
-        radial * ny + tangential * ty,
-        2.0 * h_rt * nx * tx + h_tt * tx * tx,
-        h_rt * (nx * ty + ny * tx) + h_tt * tx * ty,
-        2.0 * h_rt * ny * ty + h_tt * ty * ty,
-    )
+    gradient = replaced(n, 0, -1.0)  # in the frame; h is linear in r
+    curved, slopes = zero_matrix(at), n
+    for k in range(1, d):
+        tangent = row(n, frame, k)
+        slope = steep * dot(tangent, seen)  # d sigma / d a_k
+        slopes = replaced(slopes, k, slope)
+        gradient = replaced(gradient, k, margin * slope * inverse)
+        curved = replaced(curved, k, -inverse * gradient[k])
+        across = spread(covariance, tangent)
+        for m in range(1, k + 1):
+            bend = dot(row(n, frame, m), across)  # steep times this, below: d2 sigma / d a_k d a_m
+            if m == k:
+                bend = steep * (bend - along - slope * slope)
+                bend = inverse * (margin * bend * inverse - 1.0)
+            else:
+                bend = steep * (bend - slope * slopes[m])
+                bend = inverse * (margin * bend * inverse)
+            curved = replaced(replaced(curved, k * d + m, bend), m * d + k, bend)
+    for i in range(d):
+        slope = gradient[0] * n[i]
+        for k in range(1, d):
+            slope += gradient[k] * frame[k * d + i]
+        term = replaced(term, 1 + i, slope)
+        for j in range(i, d):
+            place, bend = 1 + d + packed(d, i, j), 0.0
+            for k in range(1, d):
+                if i == j:
+                    turn = 2.0 * curved[k] * n[i] * frame[k * d + i]
+                else:
+                    turn = curved[k] * (n[i] * frame[k * d + j] + n[j] * frame[k * d + i])
+                bend = turn if k == 1 else bend + turn
+            for k in range(1, d):
+                for m in range(1, d):
+                    bend += curved[k * d + m] * frame[k * d + i] * frame[m * d + j]
+            term = replaced(term, place, bend)
+    return replaced(term, 0, distance - r + margin * sigma)
 
 
 @inlined

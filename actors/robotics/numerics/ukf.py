@@ -13,12 +13,12 @@ from .entry import entry
 RELATIVE_POSITION = 0
 RANGE = 1
 
-# Columns of a table of measurements, one per row.
+# Columns of a table of measurements, one per row, from observers with d dimensions.  A target with fewer is on the
+# ground.
 _KIND = 0
-_OBSERVER = 1  # x, y
-_VALUE = 3  # x, y from there to the target, or the range and anything
-_ALONG = 5  # standard deviation along the line of sight
-_ACROSS = 6  # standard deviation across the line of sight; not used for a range
+_OBSERVER = 1  # vector; then another one from there to the target, or the range and anything
+_ALONG = -2  # standard deviation along the line of sight
+_ACROSS = -1  # standard deviation across the line of sight; not used for a range
 
 
 @inner
@@ -109,13 +109,29 @@ def _symmetrise(a: Array) -> None:
             a[i, j] = a[j, i] = 0.5 * (a[i, j] + a[j, i])
 
 
+@borrower
+def dimensions_of(measurements: Array) -> int:
+    """The dimensions of the observers in a table of measurements."""
+    d: int = (measurements.shape[1] - 3) // 2
+    return d
+
+
+@borrower
+def _away(points: Array, i: int, measurements: Array, m: int, c: int) -> float:
+    """How far a point is from an observer along an axis."""
+    there = points[i, c] if c < max(2, points.shape[1] // 2) else 0.0
+    away: float = there - measurements[m, _OBSERVER + c]
+    return away
+
+
 @kernel
-def constant_velocity(period: float) -> Array:
+def constant_velocity(period: float, dimensions: int = 2) -> Array:
     """Transition of eq. (1) for the state (x, y, vx, vy)."""
-    transition = np.zeros((4, 4))  # np.eye takes half a second to compile
-    for i in range(4):
+    transition = np.zeros((2 * dimensions, 2 * dimensions))  # np.eye takes half a second to compile
+    for i in range(2 * dimensions):
         transition[i, i] = 1.0
-    transition[0, 2] = transition[1, 3] = period
+    for i in range(dimensions):
+        transition[i, dimensions + i] = period
     return transition
 
 
@@ -132,7 +148,9 @@ def predict(mean: Array, covariance: Array, transition: Array, process_noise: Ar
 
 @kernel
 def measurement_noise(points: Array, weights: Array, measurements: Array) -> Array:
-    """Covariances (m, 3) as (xx, xy, yy) of measurements (m, 7) of a target at ``points`` (M, n); of a range xx counts.
+    """Covariances (m, d (d + 1) / 2), upper triangles, of measurements (m, 3 + 2 d) of a target at ``points`` (M, n).
+
+    Of a range, the first number counts.
 
     A relative position has one deviation (sigma_d) on the line of sight and another (sigma_b) across it, so its
     covariance depends on where the target is.  It is averaged over the points.  With the sigma points it is the
@@ -140,7 +158,8 @@ def measurement_noise(points: Array, weights: Array, measurements: Array) -> Arr
     the mean, which would let the large deviation leak into the small one.  With the mean as the only point, it is the
     ellipse turned along the mean.
     """
-    noises = np.zeros((measurements.shape[0], 3))
+    d = dimensions_of(measurements)
+    noises, n = np.zeros((measurements.shape[0], d * (d + 1) // 2)), np.empty(d)
     for m in range(measurements.shape[0]):
         along, across = measurements[m, _ALONG], measurements[m, _ACROSS]
         a, b = along * along, across * across
@@ -148,18 +167,38 @@ def measurement_noise(points: Array, weights: Array, measurements: Array) -> Arr
             noises[m, 0] = a
             continue
         for i in range(points.shape[0]):
-            dx, dy = points[i, 0] - measurements[m, _OBSERVER], points[i, 1] - measurements[m, _OBSERVER + 1]
-            length = hypot(dx, dy)
-            nx, ny = (dx / length, dy / length) if length > 0.0 else (1.0, 0.0)
-            noises[m, 0] += weights[i] * (a * nx * nx + b * ny * ny)
-            noises[m, 1] += weights[i] * (a - b) * nx * ny
-            noises[m, 2] += weights[i] * (a * ny * ny + b * nx * nx)
+            length = _range(points, i, measurements, m)
+            for c in range(d):
+                n[c] = _away(points, i, measurements, m, c) / length if length > 0.0 else 0.0
+            if not length > 0.0:
+                n[0] = 1.0
+            place = 0
+            for p in range(d):
+                for q in range(p, d):
+                    if p == q:
+                        part = a * n[p] * n[p]
+                        for k in range(d):
+                            if k != p:
+                                part += b * n[k] * n[k]
+                        noises[m, place] += weights[i] * part
+                    else:
+                        noises[m, place] += weights[i] * (a - b) * n[p] * n[q]
+                    place += 1
     return noises
+
+
+@borrower
+def _range(points: Array, i: int, measurements: Array, m: int) -> float:
+    """The distance of a point from an observer."""
+    length = hypot(_away(points, i, measurements, m, 0), _away(points, i, measurements, m, 1))
+    for c in range(2, dimensions_of(measurements)):
+        length = hypot(length, _away(points, i, measurements, m, c))
+    return length
 
 
 @kernel
 def update(mean: Array, covariance: Array, kappa: float, measurements: Array, noises: Array) -> tuple[Array, Array]:
-    """Fuse measurements (m, 7) with covariances ``noises`` (m, 3), all at once.
+    """Fuse measurements (m, 3 + 2 d) with covariances ``noises`` (m, d (d + 1) / 2), all at once.
 
     Stacking them makes the result independent of their order up to rounding.  The posterior covariance is built as
     sum_i w_i e_i e_i^T + K R K^T with e_i = (x_i - x) - K (z_i - z), which is C - K S K^T written so that rounding
@@ -175,25 +214,25 @@ def update(mean: Array, covariance: Array, kappa: float, measurements: Array, no
 @inner
 def _fuse(mean: Array, covariance: Array, points: Array, weights: Array, measurements: Array, noises: Array) -> None:
     """``update`` in place, with the sigma points, which are overwritten."""
-    size, count = mean.shape[0], points.shape[0]
+    size, count, d = mean.shape[0], points.shape[0], dimensions_of(measurements)
     rows = 0
     for m in range(measurements.shape[0]):
-        rows += 1 if measurements[m, _KIND] == RANGE else 2
+        rows += 1 if measurements[m, _KIND] == RANGE else d
     noise, images, observed = np.zeros((rows, rows)), np.empty((count, rows)), np.empty(rows)
     row = 0
     for m in range(measurements.shape[0]):
-        width = 1 if measurements[m, _KIND] == RANGE else 2
-        noise[row, row] = noises[m, 0]
-        if width == 2:
-            noise[row, row + 1] = noise[row + 1, row] = noises[m, 1]
-            noise[row + 1, row + 1] = noises[m, 2]
-        for c in range(width):
-            observed[row + c] = measurements[m, _VALUE + c]
+        is_range = measurements[m, _KIND] == RANGE
+        width, place = 1 if is_range else d, 0
+        for p in range(width):
+            for q in range(p, width):
+                noise[row + p, row + q] = noise[row + q, row + p] = noises[m, place]
+                place += 1
+            observed[row + p] = measurements[m, _OBSERVER + d + p]
         for i in range(count):
-            dx, dy = points[i, 0] - measurements[m, _OBSERVER], points[i, 1] - measurements[m, _OBSERVER + 1]
-            images[i, row] = hypot(dx, dy) if width == 1 else dx
-            if width == 2:
-                images[i, row + 1] = dy
+            for c in range(width):
+                images[i, row + c] = (
+                    _range(points, i, measurements, m) if is_range else _away(points, i, measurements, m, c)
+                )
         row += width
     for k in range(rows):  # from here on, all relative to the expected values
         expected = 0.0
@@ -237,7 +276,7 @@ def predict_and_fuse(
     mean: Array, covariance: Array, transition: Array, process_noise: Array, kappa: float, measurements: Array,
     averaged: bool,
 ) -> tuple[Array, Array, bool]:  # fmt: skip
-    """``predict``, then ``update`` with measurements (m, 7), and whether anything was fused.
+    """``predict``, then ``update`` with measurements (m, 3 + 2 d), and whether anything was fused.
 
     All noises are as seen from the prediction, and ``averaged`` over its sigma points, or turned along its mean.  If
     the result would not be finite, the prediction is kept.

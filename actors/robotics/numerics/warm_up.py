@@ -27,10 +27,13 @@ _STEPS = 3
 
 
 @functools.cache
-def compile_kernels() -> None:
-    """Call every kernel of a run with small arrays; only the first call in a process does something."""
+def compile_kernels(dimensions: int = 2) -> None:
+    """Call every kernel of a run with small arrays; only the first call in a process does something.
+
+    All take any number of dimensions but the solver, which is compiled for the plane and for space by itself.
+    """
     with _announced("compiling the numeric kernels (once, about 20 s) ..."):
-        _call_every_kernel()
+        _call_every_kernel(dimensions)
 
 
 @functools.cache
@@ -57,9 +60,9 @@ def _announced(message: str) -> Iterator[None]:
         notice.cancel()
 
 
-def _call_every_kernel() -> None:
+def _call_every_kernel(dimensions: int) -> None:
     with _others_meanwhile():
-        _call_solver()
+        _call_solver(dimensions)
     call_others()
 
 
@@ -85,15 +88,15 @@ def _others_meanwhile() -> Iterator[None]:
         yield
 
 
-def _call_solver() -> None:
+def _call_solver(d: int) -> None:
     zeros, steps = np.zeros, _STEPS
     # Plans that solve it need only one Newton step, and compile everything.
     problem = HorizonProblem(
-        0.1, zeros(2), zeros(2), 1.0, 1.0, zeros((steps, 2)), np.ones(steps), 1.0, 1.0, zeros((1, steps, 2)) + 100.0,
-        zeros((1, steps, 3)), zeros((1, steps, 2)) + 200.0, zeros((1, steps)), INFORM, zeros((1, 2)), zeros((9, 2)),
-        np.ones(9), zeros((9, 9)), 1.0, 1.0, 1.0,
+        0.1, zeros(d), zeros(d), 1.0, 1.0, zeros((steps, d)), np.ones(steps), 1.0, 1.0, zeros((1, steps, d)) + 100.0,
+        zeros((1, steps, d * (d + 1) // 2)), zeros((1, steps, d)) + 200.0, zeros((1, steps)), INFORM, zeros((1, d)),
+        zeros((9, d)), np.ones(9), zeros((9, 9)), 1.0, 1.0, 1.0, 1.0, 1.0,
     )  # fmt: skip
-    solve(problem, zeros((2, steps, 2)))
+    solve(problem, zeros((2, steps, d)))
 
 
 def call_others() -> None:
@@ -104,9 +107,9 @@ def call_others() -> None:
     )
     for token in (mean, covariance):
         token.setflags(write=False)
-    _, _, points, _ = expected_target(mean, covariance, np.eye(4), False, 0.0, period, 0.0, _STEPS)
+    _, _, points, _ = expected_target(mean, covariance, np.eye(4), False, 0.0, period, 0.0, _STEPS, 2)
     standing_plan(zero, zero, np.zeros((_STEPS, 2)), 0.0, ones, zero, 0.0, 1.0, period)
-    peer_mean, _ = peer_tubes(np.zeros((1, 6)), 0.0, period, ones, 0.4, 1.0, 1.0)
+    peer_mean, _ = peer_tubes(np.zeros((1, 7)), 0.0, period, ones, 0.4, 1.0, 1.0, 2)
     pairwise_distance(points, peer_mean, 1.0)
 
 

@@ -438,7 +438,8 @@ def test_compiling_is_announced_only_if_it_takes_long(
     caplog.set_level(logging.INFO, "epicycle")
     calls = []
 
-    def work() -> None:
+    def work(dimensions: int) -> None:
+        assert dimensions == 2
         calls.append(1)
         deadline = time.monotonic() + 10.0
         while patience < 1.0 and not caplog.messages and time.monotonic() < deadline:

@@ -16,29 +16,36 @@ ukf = importlib.import_module(PREFIX + "ukf")
 
 # Called by kernels only; numba looks them up as globals.
 information = importlib.import_module(PREFIX + "mutual_information")
-informed, new_points, PAIRS = information.informed, information.new_points, information.PAIRS
+informed, new_points, point_columns = information.informed, information.new_points, information.point_columns
 
-Six = tuple[float, float, float, float, float, float]
+Floats = tuple[float, ...]
 
 
-def check_derivatives(function: Callable[[float, float], Six], x: float, y: float, tolerance: float = 1e-6) -> None:
+def packed(matrix: np.ndarray) -> Floats:
+    """The rows of the upper triangle of a symmetric matrix, as the kernels take it."""
+    return tuple(matrix[np.triu_indices(len(matrix))].tolist())
+
+
+def check_derivatives(function: Callable[[Floats], Floats], at: np.ndarray, tolerance: float = 1e-6) -> None:
     """Gradient against differences of values, Hessian against differences of gradients."""
-    step = 1e-5
-    _, gx, gy, hxx, hxy, hyy = function(x, y)
-    by_x = (np.array(function(x + step, y)) - function(x - step, y)) / (2 * step)
-    by_y = (np.array(function(x, y + step)) - function(x, y - step)) / (2 * step)
-    scale = tolerance * (1.0 + max(map(abs, (gx, gy, hxx, hxy, hyy))))
-    assert [gx, gy] == pytest.approx([by_x[0], by_y[0]], abs=scale)
-    assert [hxx, hxy, hyy] == pytest.approx([by_x[1], by_x[2], by_y[2]], abs=scale)
-    assert by_x[2] == pytest.approx(by_y[1], abs=scale)
+    step, d = 1e-5, len(at)
+    found = np.array(function(tuple(at.tolist())))
+    gradient, hessian = found[1 : 1 + d], np.empty((d, d))
+    hessian[np.triu_indices(d)] = found[1 + d :]
+    scale = tolerance * (1.0 + abs(found[1:]).max())
+    for axis, unit in enumerate(step * np.eye(d)):
+        slope = (np.array(function(tuple((at + unit).tolist()))) - function(tuple((at - unit).tolist()))) / (2 * step)
+        assert gradient[axis] == pytest.approx(slope[0], abs=scale)
+        assert hessian[axis, axis:] == pytest.approx(slope[1 + axis : 1 + d], abs=scale)
+        assert hessian[:axis, axis] == pytest.approx(slope[1 : 1 + axis], abs=scale)
 
 
 @numba.njit
 def negative_information(
-    x: float, y: float, points: np.ndarray, weights: np.ndarray, others_distance: np.ndarray, variance: float
-) -> Six:
-    table = np.empty((len(weights), PAIRS + 2 * len(weights)))
-    return informed(table[: new_points(points, weights, others_distance, table)], x, y, variance)
+    at: Floats, points: np.ndarray, weights: np.ndarray, others_distance: np.ndarray, variance: float
+) -> Floats:
+    table = np.empty((len(weights), point_columns(len(at), len(weights))))
+    return informed(table[: new_points(points, weights, others_distance, table, at)], at, variance)
 
 
 def spread(random: np.random.Generator, size: int) -> np.ndarray:

@@ -14,16 +14,16 @@ definitions = importlib.import_module(PREFIX + "definitions")
 horizon = importlib.import_module(PREFIX + "horizon")
 HorizonProblem = horizon.HorizonProblem
 # Called by kernels only; numba looks them up as globals.
-constraints_of, ROUNDING, CONSTRAINT = constraints.constraints_of, constraints.ROUNDING, constraints.CONSTRAINT
+constraints_of, ROUNDING, columns = constraints.constraints_of, constraints.ROUNDING, constraints.constraint_columns
 
 
 @numba.njit
 def kept_and_all(*fields: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     problem = HorizonProblem(*fields)
     others = 1 + len(problem.obstacle_mean) + len(problem.peer_mean)
-    tables = np.empty((2, others * len(problem.tube_radius), CONSTRAINT))
-    every = tables[0, : constraints_of(problem, np.inf, tables[0])].astype(np.int64)
-    kept = tables[1, : constraints_of(problem, ROUNDING, tables[1])].astype(np.int64)
+    tables = np.empty((2, others * len(problem.tube_radius), columns(2)))
+    every = tables[0, : constraints_of(problem, np.inf, tables[0], (0.0, 0.0))].astype(np.int64)
+    kept = tables[1, : constraints_of(problem, ROUNDING, tables[1], (0.0, 0.0))].astype(np.int64)
     return every[:, 0], every[:, 1], kept[:, 0], kept[:, 1]
 
 

@@ -17,6 +17,7 @@ from tests.actors.robotics.numerics.numerics_parts import (
     inform_problem,
     negative_information,
     objective_by_definition,
+    packed,
     solve,
     spread,
 )
@@ -31,9 +32,11 @@ terms = importlib.import_module(PREFIX + "terms")
 ukf = importlib.import_module(PREFIX + "ukf")
 # Called by kernels only; numba looks them up as globals.
 HorizonProblem, constraints_of, term = horizon.HorizonProblem, constraints.constraints_of, constraints.term
-CONSTRAINT = constraints.CONSTRAINT
-ball, keeps_limits, new_task, smoothed, TAKEN = task._ball, task.keeps_limits, task.new_task, terms.smoothed, task.TAKEN
+constraint_columns = constraints.constraint_columns
+ellipsoid, keeps_limits, new_task, smoothed = task._ellipsoid, task.keeps_limits, task.new_task, terms.smoothed
+TAKEN = task.TAKEN
 room_for = task.room_for
+read = importlib.import_module(PREFIX + "vectors").read
 
 PAPER = Path(__file__).parents[4] / "docs" / "paper.md"
 
@@ -72,27 +75,35 @@ def test_dynamics(random: np.random.Generator) -> None:
 
 
 @numba.njit
-def inside(x: float, y: float, radius: float) -> float:
-    return ball(x, y, radius, 1.0, 1.0)[0]
+def inside(v: tuple[float, ...], radius: float, ratio: float) -> float:
+    return ellipsoid(v, radius, ratio, 1.0, 1.0)[0]
 
 
 def test_limits_of_speed_and_acceleration(random: np.random.Generator) -> None:
     vectors = random.normal(scale=5.0, size=(200, 2))
-    found = [inside(x, y, 8.0) for x, y in vectors]
+    found = [inside(tuple(each), 8.0, 1.0) for each in vectors.tolist()]
     assert definitions.f1(vectors, 8.0) == pytest.approx(-64.0 * np.array(found), abs=1e-12)
     assert definitions.f2(vectors, 8.0) == pytest.approx((vectors**2).sum(axis=1) - 64.0)
 
 
+def test_limits_of_climbing(random: np.random.Generator) -> None:
+    vectors = random.normal(scale=5.0, size=(200, 3))
+    found = [inside(tuple(each), 8.0, 8.0 / 2.0) for each in vectors.tolist()]
+    assert definitions.f1(vectors, 8.0, 2.0) == pytest.approx(-64.0 * np.array(found), abs=1e-12)
+    assert definitions.f2(np.array([[8.0, 0.0, 0.0], [0.0, 0.0, 2.0]]), 8.0, 2.0).tolist() == [0.0, 0.0]
+    assert definitions.f2(vectors, 8.0).tolist() == definitions.f2(vectors[:, :2], 8.0).tolist()  # without a limit
+
+
 @numba.njit
 def room_of(*fields: Any) -> int:
-    return room_for(HorizonProblem(*fields), 10)
+    return room_for(HorizonProblem(*fields), 10, 2)
 
 
 @numba.njit(_nrt=False)
 def keeps(controls: np.ndarray, room: np.ndarray, *fields: Any) -> bool:
-    posed = new_task(HorizonProblem(*fields), len(controls), len(controls), np.inf, room)
+    posed = new_task(HorizonProblem(*fields), len(controls), len(controls), np.inf, room, (0.0, 0.0))
     for s in range(len(controls)):
-        posed.plan[s, TAKEN], posed.plan[s, TAKEN + 1] = controls[s, 0], controls[s, 1]
+        posed.plan[s, 2 * TAKEN], posed.plan[s, 2 * TAKEN + 1] = controls[s, 0], controls[s, 1]
     return keeps_limits(posed)
 
 
@@ -110,19 +121,21 @@ def test_who_keeps_the_limits(random: np.random.Generator) -> None:
     assert 20 < sum(kept) < 180
 
 
-def test_distances_and_their_margins(random: np.random.Generator) -> None:
+@pytest.mark.parametrize("d", [2, 3])
+def test_distances_and_their_margins(random: np.random.Generator, d: int) -> None:
     for _ in range(100):
-        x, y, cx, cy = random.normal(scale=5.0, size=4)
-        here, there, c = np.array([[x, y]]), np.array([[cx, cy]]), spread(random, 2)
-        distance = np.hypot(x - cx, y - cy)
-        sigma = definitions.sigma_4(here, there, np.array([[c[0, 0], c[0, 1], c[1, 1]]]))[0]
-        n = np.array([x - cx, y - cy]) / distance
+        own, other = random.normal(scale=5.0, size=(2, d))
+        here, there, c = own[np.newaxis], other[np.newaxis], spread(random, d)
+        distance = np.linalg.norm(own - other)
+        sigma = definitions.sigma_4(here, there, np.array([packed(c)]))[0]
+        n = (own - other) / distance
         assert sigma == pytest.approx(np.sqrt(n @ c @ n))
         assert definitions.f3(here, there, 1.5)[0] == pytest.approx(distance - 1.5)
         assert definitions.f4(here, there, 1.5)[0] == pytest.approx(1.5 - distance)
-        assert terms.stay_near(x, y, cx, cy, 1.5)[0] == pytest.approx(definitions.f3(here, there, 1.5)[0], abs=1e-12)
-        assert terms.keep_away(x, y, cx, cy, 1.5)[0] == pytest.approx(definitions.f5(here, there, 1.5)[0], abs=1e-12)
-        robust = terms.keep_away_uncertain(x, y, cx, cy, c[0, 0], c[0, 1], c[1, 1], 2.0, 3.0)[0]
+        at, place = tuple(own.tolist()), tuple(other.tolist())
+        assert terms.stay_near(at, place, 1.5)[0] == pytest.approx(definitions.f3(here, there, 1.5)[0], abs=1e-12)
+        assert terms.keep_away(at, place, 1.5)[0] == pytest.approx(definitions.f5(here, there, 1.5)[0], abs=1e-12)
+        robust = terms.keep_away_uncertain(at, place, packed(c), 2.0, 3.0)[0]
         assert robust == pytest.approx(definitions.f4(here, there, 2.0)[0] + 3.0 * sigma, abs=1e-12)
 
 
@@ -135,8 +148,10 @@ def test_radii_of_reachability_sets() -> None:
 @pytest.mark.parametrize("lost", [0, 1, 7])
 def test_a_peer_that_is_not_heard_is_given_more_room(lost: int) -> None:
     radius = definitions.sigma_r(0.2, 0.4, np.arange(1, 11))
-    table = np.array([[0.0, 0.0, 0.0, 0.0, 7.0 - 0.1 * (1 + lost), 0.0]])  # of the period before, when none is lost
-    distances = reachability.peer_tubes(table, 7.0, 0.1, radius, 0.4, 2.0, 3.0)[1]
+    table = np.array(
+        [[7.0 - 0.1 * (1 + lost), 2.0, 0.0, 0.0, 0.0, 0.0, 0.0]]
+    )  # of the period before, when none is lost
+    distances = reachability.peer_tubes(table, 7.0, 0.1, radius, 0.4, 2.0, 3.0, 2)[1]
     assert distances[0] == pytest.approx(2.0 + 3.0 * definitions.sigma_5(radius, 0.4, lost))
 
 
@@ -149,7 +164,7 @@ def test_mutual_information(random: np.random.Generator, kappa: float) -> None:
         own = random.normal(scale=10.0, size=2)
         distance = information.pairwise_distance(points, others[:, np.newaxis], 2.0)
         assert distance == pytest.approx(definitions.misfit(points, others, 2.0), abs=1e-12)
-        found = negative_information(*own, points, weights, distance, 2.0)[0]
+        found = negative_information(tuple(own.tolist()), points, weights, distance, 2.0)[0]
         expected = definitions.mutual_information(
             own, points[heavy], weights[heavy], 2.0, distance[np.ix_(heavy, heavy)]
         )
@@ -183,13 +198,13 @@ def test_f6_without_its_kink(gamma: float, g: float) -> None:
 
 
 @numba.njit
-def all_values(positions: np.ndarray, rows: int, *fields: Any) -> np.ndarray:
-    table = np.empty((rows * len(positions), CONSTRAINT))
-    table = table[: constraints_of(HorizonProblem(*fields), np.inf, table)]
+def all_values(positions: np.ndarray, zero: tuple[float, ...], rows: int, *fields: Any) -> np.ndarray:
+    table = np.empty((rows * len(positions), constraint_columns(len(zero))))
+    table = table[: constraints_of(HorizonProblem(*fields), np.inf, table, zero)]
     found = np.full((rows, len(positions)), np.nan)
     for i in range(len(table)):
         s = int(table[i, 1])
-        found[int(table[i, 0]), s] = term(table, i, positions[s, 0], positions[s, 1])[0]
+        found[int(table[i, 0]), s] = term(table, i, read(zero, positions, s, 0))[0]
     return found
 
 
@@ -215,8 +230,44 @@ def test_constraints_with_their_margins(random: np.random.Generator) -> None:
     ]
     expected = definitions.violations(problem, controls)
     assert expected == pytest.approx(np.array(written)[:, 2:], abs=1e-12)
-    found = all_values(places, 4, *problem)
+    found = all_values(places, (0.0, 0.0), 4, *problem)
     assert np.isnan(found[:, :2]).all()  # decided before the first control acts
+    assert found[:, 2:] == pytest.approx(expected, abs=1e-12)
+
+
+def test_constraints_in_space(random: np.random.Generator) -> None:
+    """Own plan, obstacle and peer, and the lowest and the highest height."""
+    cloud = spread(random, 3)
+    problem = inform_problem(random)._replace(
+        position=random.normal(size=3),
+        velocity=random.normal(size=3),
+        safe_distance=2.0,
+        margin=2.0,
+        obstacle_mean=random.normal(size=(1, 10, 3)),
+        obstacle_covariance=np.tile(packed(cloud), (1, 10, 1)),
+        peer_mean=random.normal(size=(1, 10, 3)),
+        peer_distance=np.full((1, 10), 3.0),
+        tube_centre=random.normal(size=(10, 3)),
+        tube_radius=np.linspace(0.6, 4.2, 10),
+        climb_speed=2.0,
+        climb_acceleration=2.0,
+        lowest=-1.0,
+        highest=1.5,
+    )
+    controls = random.normal(size=(10, 3))
+    places = definitions.driven(problem, controls)[0]
+    away = places - problem.obstacle_mean[0]
+    n = away / np.linalg.norm(away, axis=1)[:, np.newaxis]
+    written = [
+        np.linalg.norm(places - problem.tube_centre, axis=1) - problem.tube_radius,
+        2.0 - np.linalg.norm(away, axis=1) + 2.0 * np.sqrt(((n @ cloud) * n).sum(axis=1)),
+        3.0 - np.linalg.norm(places - problem.peer_mean[0], axis=1),
+        -1.0 - places[:, 2],
+        places[:, 2] - 1.5,
+    ]
+    expected = definitions.violations(problem, controls)
+    assert expected == pytest.approx(np.array(written)[:, 2:], abs=1e-12)
+    found = all_values(places, (0.0, 0.0, 0.0), 5, *problem)
     assert found[:, 2:] == pytest.approx(expected, abs=1e-12)
 
 

@@ -30,8 +30,9 @@ def test_both_ways_give_the_same(random: np.random.Generator) -> None:
     assert found.flags.c_contiguous
     assert found.flags.writeable
     assert found.flags.owndata
-    plans, radius = random.normal(size=(2, 8)), random.uniform(size=5)
-    given = plans, 0.3, 0.1, radius, 0.4, 1.0, 1.0
+    plans, radius = random.normal(size=(2, 7)), random.uniform(size=5)
+    plans[:, 1:3] = 2, 0  # dimensions and controls
+    given = plans, 0.3, 0.1, radius, 0.4, 1.0, 1.0, 2
     for one, other in zip(reachability.peer_tubes(*given), reachability.peer_tubes.jitted(*given), strict=True):
         assert (one.shape, one.tobytes()) == (other.shape, other.tobytes())
 

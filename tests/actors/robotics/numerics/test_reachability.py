@@ -12,16 +12,17 @@ reachability = importlib.import_module(PREFIX + "reachability")
 ukf = importlib.import_module(PREFIX + "ukf")
 
 
-def test_peers_are_where_their_plans_take_them(random: np.random.Generator) -> None:
+@pytest.mark.parametrize("d", [2, 3])
+def test_peers_are_where_their_plans_take_them(random: np.random.Generator, d: int) -> None:
     ages, lengths = (0, 1, 3, 9, 25), (11, 2, 11, 1, 30)
-    states, plans = random.normal(size=(5, 4)), [random.normal(size=(length, 2)) for length in lengths]
+    states, plans = random.normal(size=(5, 2 * d)), [random.normal(size=(length, d)) for length in lengths]
     made_at, radius = 7.0 - 0.1 * np.array(ages), 0.2 + 0.4 * np.arange(1, 11)
-    table = np.full((5, 6 + 2 * 30), np.nan)  # what is past a plan's end is not looked at
+    table = np.full((5, 3 + 2 * d + d * 30), np.nan)  # what is past a plan's end is not looked at
     for row, state, made, plan in zip(table, states, made_at, plans, strict=True):
-        row[: 6 + plan.size] = [*state, made, len(plan), *plan.ravel()]
-    positions, distances = reachability.peer_tubes(table, 7.0, 0.1, radius, 0.4, 2.0, 3.0)
+        row[: 3 + 2 * d + plan.size] = [made, d, len(plan), *state, *plan.ravel()]
+    positions, distances = reachability.peer_tubes(table, 7.0, 0.1, radius, 0.4, 2.0, 3.0, d)
     for row, (age, state, plan) in enumerate(zip(ages, states, plans, strict=True)):
-        place, speed, driven = state[:2], state[2:], []
+        place, speed, driven = state[:d], state[d:], []
         for k in range(age + 10):
             place, speed = place + 0.1 * speed, speed + 0.1 * (plan[k] if k < len(plan) else 0.0)
             driven.append(place)
@@ -29,13 +30,26 @@ def test_peers_are_where_their_plans_take_them(random: np.random.Generator) -> N
         assert distances[row] == pytest.approx(2.0 + 3.0 * (radius + 0.4 * max(0, age - 1)))
 
 
+def test_peers_above_and_below() -> None:
+    """For a robot in the plane, a circle of the sphere around one above; for one above, another one on the ground."""
+    radius = np.zeros(3)
+    above = np.array([[7.0, 3.0, 0.0, 1.0, 2.0, 3.0, 0.0, 0.0, 1.0]])  # it climbs at 1 m/s from 3 m
+    positions, distances = reachability.peer_tubes(above, 7.0, 1.0, radius, 0.0, 5.0, 1.0, 2)
+    assert positions.tolist() == [[[1.0, 2.0]] * 3]
+    assert distances[0] == pytest.approx([3.0, 0.0, 0.0])  # at heights of 4, 5 and 6 m
+    below = np.array([[7.0, 2.0, 0.0, 1.0, 2.0, 1.0, 0.0]])
+    positions, distances = reachability.peer_tubes(below, 7.0, 1.0, radius, 0.0, 5.0, 1.0, 3)
+    assert positions.tolist() == [[[2.0, 2.0, 0.0], [3.0, 2.0, 0.0], [4.0, 2.0, 0.0]]]
+    assert distances.tolist() == [[5.0] * 3]
+
+
 @pytest.mark.parametrize("elapsed", [0.0, 0.03, 0.08, 0.1, 0.24, 0.36, -0.04, 1.17])
 def test_a_peer_between_two_of_its_steps_is_on_the_line_between_them(
     random: np.random.Generator, elapsed: float
 ) -> None:
     state, plan, radius = random.normal(size=4), random.normal(size=(5, 2)), 0.2 + 0.4 * np.arange(1, 11)
-    table = np.array([[*state, 7.0 - elapsed, 5, *plan.ravel()]])
-    positions, distances = reachability.peer_tubes(table, 7.0, 0.1, radius, 0.4, 2.0, 3.0)
+    table = np.array([[7.0 - elapsed, 2, 5, *state, *plan.ravel()]])
+    positions, distances = reachability.peer_tubes(table, 7.0, 0.1, radius, 0.4, 2.0, 3.0, 2)
     place, speed, steps = state[:2], state[2:], [state[:2]]
     for k in range(30):
         place, speed = place + 0.1 * speed, speed + 0.1 * (plan[k] if k < 5 else 0.0)
@@ -54,7 +68,7 @@ def test_an_estimate_between_two_steps_is_predicted_to_now(
     random: np.random.Generator, elapsed: float, whole: int, part: float, is_widened: bool
 ) -> None:
     mean, covariance, noise = random.normal(size=4), spread(random, 4), np.diag([0.002, 0.002, 0.4, 0.4])
-    found = reachability.expected_target(mean, covariance, noise, is_widened, 0.5, 0.1, elapsed, 10)
+    found = reachability.expected_target(mean, covariance, noise, is_widened, 0.5, 0.1, elapsed, 10, 2)
     transition = ukf.constant_velocity(0.1)
     for _ in range(whole):
         mean, covariance = ukf.predict(mean, covariance, transition, noise)
@@ -74,8 +88,8 @@ def test_an_estimate_between_two_steps_is_predicted_to_now(
 
 @pytest.mark.parametrize("made_at", [-1e5, -1e12, -1.7e308])
 def test_plans_from_time_immemorial_are_lost_in_the_distance_to_keep(made_at: float) -> None:
-    table, radius = np.array([[1.0, 2.0, 0.0, 0.0, made_at, 2.0, 0.0, 0.0, 0.0, 0.0]]), np.ones(10)
-    positions, distances = reachability.peer_tubes(table, 0.0, 0.1, radius, 0.4, 2.0, 3.0)
+    table, radius = np.array([[made_at, 2.0, 2.0, 1.0, 2.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]]), np.ones(10)
+    positions, distances = reachability.peer_tubes(table, 0.0, 0.1, radius, 0.4, 2.0, 3.0, 2)
     assert positions == pytest.approx(np.tile([1.0, 2.0], (1, 10, 1)))
     assert distances == pytest.approx(2.0 + 3.0 * (1.0 + 0.4 * (reachability.OLDEST - 1)))
 
@@ -105,7 +119,7 @@ def test_target_is_expected_where_prediction_takes_it(random: np.random.Generato
         now = ukf.predict(*now, transition, noise)
     for is_widened in (True, False):
         means, covariances, points, weights = reachability.expected_target(
-            mean, covariance, noise, is_widened, 0.5, 0.1, 0.1 * age, 10
+            mean, covariance, noise, is_widened, 0.5, 0.1, 0.1 * age, 10, 2
         )
         every = reachability.propagate(*now, transition, is_widened * noise, 10)
         assert means[0].tolist() == every[0].tolist()

@@ -1,0 +1,34 @@
+"""Lines of sight between points in space, and what stands on the ground between them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+
+
+def is_hidden(
+    eye: Sequence[float], target: Sequence[float], cylinders: Iterable[tuple[float, float, float, float]]
+) -> bool:
+    """Whether a line of sight between two points (x, y, z) goes through an upright cylinder.
+
+    A cylinder is (x, y, radius, height) and stands on the plane z = 0.  A line that only touches one is not hidden.
+    """
+    (ex, ey, ez), (tx, ty, tz) = eye, target
+    dx, dy, dz = tx - ex, ty - ey, tz - ez
+    a = dx * dx + dy * dy
+    for x, y, radius, height in cylinders:
+        # Seen from above, the points eye + s (target - eye) in the disk are those with s between the roots of
+        # a s^2 + 2 b s + c; the lowest of them is an end.
+        b = (ex - x) * dx + (ey - y) * dy
+        c = (ex - x) * (ex - x) + (ey - y) * (ey - y) - radius * radius
+        root = b * b - a * c
+        if a == 0.0:
+            first, last = (0.0, 1.0) if c < 0.0 else (1.0, 0.0)
+        elif root <= 0.0:
+            continue
+        else:
+            half = math.sqrt(root)
+            first, last = max(0.0, (-b - half) / a), min(1.0, (-b + half) / a)
+        if first < last and min(ez + first * dz, ez + last * dz) < height:
+            return True
+    return False
