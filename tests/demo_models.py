@@ -11,10 +11,12 @@ from epicycle.runner.engine import Results
 DURATIONS = {
     "changing_roles": 2.5,
     "collision_avoidance": 0.5,
+    "flying_observers": 1.0,
     "lift_group": 600.0,
     "machine_shop": 40_000.0,
     "many_obstacles": 0.5,
     "pid_loop": 10.0,
+    "safe_avoidance": 0.5,
     "switched_network": 1.5,
     "warehouse": 1800.0,
     "waypoints": 20.0,

@@ -50,8 +50,10 @@ class RoamingEstimator(RoamingModel, UnscentedEstimator):
 
     def initialize(self) -> None:
         from .numerics import lines_of_sight
+        from .numerics.warm_up import compile_retreats
 
         super().initialize()
+        compile_retreats()
         self._model = lru_cache(8)(self.roaming)
         self._sight = lines_of_sight.predict_and_fuse
 

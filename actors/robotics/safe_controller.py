@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -13,8 +13,10 @@ from ..core.elementary import cos, sin
 from .arrays import Array, pair
 from .controller import RobustController
 from .messages import BodyState
-from .numerics.horizon import HorizonProblem
 from .roaming import RoamingModel
+
+if TYPE_CHECKING:
+    from .numerics.horizon import HorizonProblem
 
 _DIRECTIONS = 64  # of a retreat that are tried
 _SHARES = 1.0, 0.75, 0.5, 0.25  # of the planned control, the rest being that of the retreat
@@ -51,8 +53,10 @@ class SafeController(RoamingModel, RobustController):
 
     def initialize(self) -> None:
         from .numerics import reachability, retreat, ukf
+        from .numerics.warm_up import compile_retreats
 
         super().initialize()
+        compile_retreats()
         self._expected_target: Callable[..., tuple[Array, Array, Array, Array]] = self._predicted
         self._propagate, self._predict = reachability.propagate, ukf.predict
         self._reaches, self._kept, self._best = retreat.reaches, retreat.kept_distance, retreat.best_retreat

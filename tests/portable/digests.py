@@ -25,7 +25,8 @@ from tests.actors.core.test_random import CONTINUOUS, DISCRETE
 from tests.test_docs import TUTORIALS, Reader, blocks
 
 DISTURBED = "collision_avoidance"
-UNTIL = {DISTURBED: 2.0, "many_obstacles": 1.5}  # s; the other models run to their ends
+# s; the other models run to their ends.
+UNTIL = {DISTURBED: 2.0, "changing_roles": 4.0, "flying_observers": 2.0, "many_obstacles": 1.5, "safe_avoidance": 2.0}
 SETTINGS = {DISTURBED: {"observers": 2, "disturbance": 0.25}}
 TWO_ARGUMENTS = ("atan2", "hypot", "pow")
 GROWING = ("cosh", "exp", "expm1", "sinh")

@@ -44,6 +44,14 @@ def compile_tracking() -> None:
         _call_tracking()
 
 
+@functools.cache
+def compile_retreats() -> None:
+    """The same for the kernels of a main robot that keeps a retreat open, and of its filter."""
+    compile_kernels()
+    with _announced("compiling the kernels of the safe robot (once, about 20 s) ..."):
+        _call_retreats()
+
+
 @contextmanager
 def _announced(message: str) -> Iterator[None]:
     """What is compiled here is announced if it takes long."""
@@ -123,3 +131,17 @@ def _call_tracking() -> None:
     fuse_scan(means, covariances, existence, 0.0, detection, detection.reshape((1, 7)), 0.9, 1.0, 10.0, 16.0, True)
     new_track(detection, 1.0)
     duplicates(means, covariances, 1.0)
+
+
+def _call_retreats() -> None:
+    from . import lines_of_sight, retreat
+    from .reachability import propagate
+    from .ukf import predict
+
+    mean, covariance, zero, one = np.zeros(4), np.eye(4), np.zeros(2), np.array([[1.0, 0.0]])
+    lines_of_sight.predict_and_fuse(mean, covariance, covariance, covariance, 0.0, np.zeros((1, 7)), 4.0)
+    predict(mean, covariance, covariance, covariance)
+    propagate(mean, covariance, covariance, covariance, _STEPS, 2)
+    reaches = retreat.reaches(one, mean, covariance, 0.0, 1.0, 1.0)
+    retreat.best_retreat(one, reaches, zero, zero, zero, 1.0, 2.0, 1.0, 0.1)
+    retreat.kept_distance(1.0, 0.0, 0.0, zero, zero, zero, 1.0, 2.0, 1.0, 0.1)

@@ -15,6 +15,8 @@ from .conftest import Opened, written
 
 Open = Callable[..., Opened]
 SHORT = {
+    "changing_roles": 5.0,
+    "flying_observers": 2.0,
     "lift_group": 600.0,
     "machine_shop": 7e4,
     "manufacturing_cell": 3600.0,

@@ -33,8 +33,8 @@ def test_a_recorded_run_has_the_bits_of_any_other() -> None:
 def test_columns_say_what_a_tracer_is_told() -> None:
     model = load_model("switched_network")
     told: list[Firing] = []
-    Simulation(model, tracer=Tracer(model.graph.actors, told.append)).run()
-    recording = recorded(model)
+    Simulation(model, tracer=Tracer(model.graph.actors, told.append)).run(until=1.5)
+    recording = recorded(model, until=1.5)
     columns, tags, texts = recording.kept()
     places, ports = list(recording.places), list(recording.ports)
 
