@@ -9,7 +9,7 @@ from epicycle.runner.engine import Results
 
 # How long tests of all packaged models let those run in which much happens (s).
 DURATIONS = {
-    "changing_roles": 2.5,
+    "changing_roles": 1.2,
     "collision_avoidance": 0.5,
     "flying_observers": 1.0,
     "lift_group": 600.0,

@@ -24,6 +24,10 @@ def test_compiled_functions_have_the_same_bits() -> None:
 
 
 def test_digests_hold_with_the_libraries_of_an_old_processor() -> None:
-    found, wrong, _ = outcome(Setting("old", {**old_libraries(), "PYTHONHASHSEED": "2"}))
+    golden = json.loads(GOLDEN.read_text())
+    # What tutorials print is compared with them elsewhere, and here by `make portable`.
+    parts = tuple(name for name in golden if not name.startswith("tutorial "))
+    found, wrong, _ = outcome(Setting("old", {**old_libraries(), "PYTHONHASHSEED": "2"}, parts=parts))
     assert wrong == ""
-    assert differences(found, json.loads(GOLDEN.read_text())) == []
+    assert tuple(found) == parts
+    assert differences(found, golden) == []

@@ -286,7 +286,7 @@ def test_more_runs_continue_it() -> None:
 def test_a_search_that_is_killed_comes_to_the_same() -> None:
     Path("walk.yaml").write_text(MODEL, encoding="utf-8")
     said = ["falsify", "walk.yaml", "--monitor", "always walk.output < 8.5", "--vary", "drift=-1 m/s..0.2 m/s"]
-    words = command(*said, "--types", THIS, "--runs", 80, "--jobs", 2, "--set", "pause=0.02")
+    words = command(*said, "--types", THIS, "--runs", 80, "--jobs", 2, "--set", "pause=0.01")
     calm = subprocess.run([*words, "--out", "calm", "--json"], capture_output=True, check=False)
     out = Path("out")
     for _ in range(2):

@@ -67,6 +67,7 @@ def test_table_is_that_of_local_processes(cluster: Cluster, tmp_path: Path, caps
     assert f"0 new runs, {statuses.total()} already there" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 def test_workers_and_the_scheduler_are_lost(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     write(tmp_path, STUDY.replace("replications: 5", "replications: 20"))
     pause = ("--set", "pause=0.1")
