@@ -262,6 +262,7 @@ def table(folder: str) -> bytes:
     return (Path(folder) / "table.parquet").read_bytes()
 
 
+@pytest.mark.slow
 def test_it_depends_on_its_seed_alone() -> None:
     arguments = ["--vary", BOX[0], "--vary", BOX[1], "--vary", "noise=0.0..0.1", "--runs", 90]
     arguments += [word for each in ALONE for word in ("--set", each)]

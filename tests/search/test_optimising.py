@@ -101,6 +101,7 @@ def test_of_noisy_runs_the_best_is_told_with_new_seeds(bowl: str) -> None:
     assert sum(row["cost"] for row in best[4:]) / 4 == pytest.approx(found.checked.value)
 
 
+@pytest.mark.slow
 def test_the_runs_hang_on_the_seed_alone(bowl: str) -> None:
     one = optimum(bowl, points=120, out="one", jobs=1)
     two = optimum(bowl, points=120, out="two", jobs=2)
