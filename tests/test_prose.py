@@ -71,6 +71,7 @@ def test_plain_english_passes(sentence: str) -> None:
     assert found(sentence, "part.md") == []
 
 
+@pytest.mark.slow  # `make lint` looks at the same
 def test_nothing_of_ours_is_on_the_list() -> None:
     listed = phrases()
     paths = [path for path in sources() if re.search(r"\S", path.read_text(encoding="utf-8"))]

@@ -65,6 +65,7 @@ def are_among(found: Iterable[dict[str, Any]], whole: dict[str, dict[str, Any]])
     return all(whole.get(row["run"]) == row for row in found)
 
 
+@pytest.mark.slow
 def test_flipped_bits_are_told_or_repaired(done: Path, tmp_path: Path) -> None:
     """300 bits, each in its own folder; some of the folders are resumed."""
     plan = plan_of(done / "walks.yaml")

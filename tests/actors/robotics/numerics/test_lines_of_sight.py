@@ -48,6 +48,7 @@ def by_bayes(mean: np.ndarray, covariance: np.ndarray, measurement: np.ndarray) 
     return found, (points - found).T @ (weights[:, np.newaxis] * (points - found))
 
 
+@pytest.mark.slow
 def test_it_is_nearer_to_bayes_than_an_ellipse_turned_as_predicted() -> None:
     """Targets 5 m away that are known to within 0.7 m, where the direction is good to 8 degrees alone."""
     random = np.random.default_rng(2)

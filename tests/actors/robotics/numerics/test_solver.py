@@ -81,6 +81,7 @@ def compare(problem: Any, start: np.ndarray, ours: Any) -> tuple[str, str]:
     return "WRONG: violation", f"{mine:.3g} m where IPOPT gets {violation(problem, again.controls):.3g} m from there"
 
 
+@pytest.mark.slow
 def test_against_ipopt(records: list[Any], record_property: Any) -> None:
     compared = [compare(problem, starts[0], ours) for problem, starts, ours in records]
     cases = Counter(case for case, _ in compared)
