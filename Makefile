@@ -7,6 +7,7 @@ USE := $(VENV)/installed
 DEV := $(VENV)/installed-dev
 DOCS := $(VENV)/installed-docs
 LINKED := $(VENV)/linked
+CORE := $(VENV)/compiled
 
 .NOTPARALLEL:
 .PHONY: help run paper test check bench fuzz mutants robust portable core cores lint reference docs wheel clean
@@ -16,7 +17,7 @@ help:
 	@echo "make paper  the paper's evaluation: 6,000 runs and their report, into results/table_1"
 	@echo "make test   the quick tests"
 	@echo "make portable  every digest under settings that stand for other machines (10 min)"
-	@echo "make core   recompile the core, after a change of its sources"
+	@echo "make core   compile the core, or recompile it after a change of its sources"
 	@echo "make cores  100,000 random networks: does each core make the same runs? (20 min)"
 	@echo "make lint   check style, formatting, portable arithmetic, prose, the order of imports, and types"
 	@echo "make check  lint and every test, including the slow ones"
@@ -32,37 +33,38 @@ help:
 run: $(USE)
 	$(BIN)/epicycle run collision_avoidance --set observers=3 --set disturbance=0.25 --seed 7 --out results/collision_avoidance
 
-paper: $(USE)
+paper: $(USE) $(CORE)
 	$(BIN)/epicycle study table_1 --out results/table_1
 	$(BIN)/epicycle report results/table_1
 
-test: $(DEV)
+test: $(DEV) $(CORE)
 	$(BIN)/python -m pytest -n 2 -q
 
-check: lint
+check: lint $(CORE)
 	$(BIN)/python -m pytest -n 2 -q -m ""
 
-bench: $(DEV)
+bench: $(DEV) $(CORE)
 	$(BIN)/python -m benchmarks.all
 
-fuzz: $(DEV)
+fuzz: $(DEV) $(CORE)
 	$(BIN)/python -m tests.fuzz.fuzz
 
-mutants: $(DEV)
+mutants: $(DEV) $(CORE)
 	$(BIN)/python -m tests.mutation
 
-robust: $(DEV)
+robust: $(DEV) $(CORE)
 	$(BIN)/python -m tests.actors.robotics.numerics.robustness
 	$(BIN)/python -m tests.actors.robotics.numerics.robustness --gap 0.03
 
-core: $(DEV)
-	$(PIP) install --editable .
+core: $(USE)
+	@rm -f $(CORE)
+	@$(MAKE) --no-print-directory $(CORE)
 	$(BIN)/epicycle --version
 
-cores: $(DEV)
+cores: $(DEV) $(CORE)
 	$(BIN)/python -m tests.engine.cores
 
-portable: $(DEV)
+portable: $(DEV) $(CORE)
 	$(BIN)/python -m tests.portable.portable
 
 lint: $(DEV)
@@ -82,12 +84,12 @@ docs: $(DOCS)
 
 wheel: $(DEV)
 	rm -rf build dist
-	$(BIN)/python -m build --wheel
+	EPICYCLE_BUILD=all $(BIN)/python -m build --wheel
 	rm -rf build
 
 clean:
 	rm -rf $(VENV) build dist site site-parts epicycle.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis .coverage htmlcov
-	rm -f actors/compiled.json
+	rm -rf actors/built
 	find actors aspects models runner tests -name __pycache__ -type d -prune -exec rm -rf {} +
 	find actors aspects runner \( -name '*.so' -o -name '*.pyd' \) -exec rm -f {} +
 
@@ -114,6 +116,12 @@ $(DEV): pyproject.toml setup.py | $(BIN)/python $(LINKED)
 	@echo "Installing epicycle[dev] into $(VENV) (first time only, and when pyproject.toml changes)"
 	@$(PIP) install --editable '.[dev]'
 	@touch $(USE) $@
+
+# The compiled core, for what makes many runs; where there is no compiler, all goes on in Python.
+$(CORE): setup.py actors/compiled.py | $(USE)
+	@echo "Compiling the core (a minute, the first time and after a change of the list of its modules)"
+	@EPICYCLE_BUILD=all $(PIP) install --editable .
+	@touch $@
 
 $(DOCS): pyproject.toml setup.py | $(BIN)/python $(LINKED)
 	@echo "Installing epicycle[docs] into $(VENV) (first time only, and when pyproject.toml changes)"

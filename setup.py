@@ -1,14 +1,14 @@
 """Builds the compiled core, if there is a compiler; everything else about the package is in pyproject.toml.
 
 Its modules are the Python sources themselves, with types for C in a ``.pxd`` beside them, or have a twin in Cython
-(``.pyx``).  They are compiled from a copy under ``build``, where folders have the names under which they are imported.
-A manifest records their sources: they do not replace other ones (``actors/compiled.py``).
+(``.pyx``).  They are compiled from a copy under ``build``, where folders have the names under which they are imported,
+and linked into a few libraries.  A manifest records their sources: they do not replace other ones
+(``actors/compiled.py``).
 """
 
 from __future__ import annotations
 
 import ast
-import hashlib
 import json
 import os
 import re
@@ -24,23 +24,16 @@ ROOT = Path(__file__).parent
 TREE = ROOT / "build" / "core"
 core = runpy.run_path(str(ROOT / "actors" / "compiled.py"), run_name="setup")
 OF_TYPES = "classmethod(__import__('types').GenericAlias)"  # what makes InputPort[float] a name of a type
+CHOICES = {"none": (), "core": core["CORE_LIBRARIES"], "all": tuple(core["LIBRARIES"])}
+if (choice := os.environ.get("EPICYCLE_BUILD") or "none") not in CHOICES:
+    sys.exit(f"EPICYCLE_BUILD={choice} is unknown; choose {', '.join(CHOICES)}")
+WANTED = CHOICES[choice]
 # The same bits everywhere: no fused multiplication and addition, no reordering.
 FLAGS = ["-DNPY_NO_DEPRECATED_API=NPY_1_7_API_VERSION"]
-FLAGS += [] if sys.platform == "win32" else ["-O2", "-ffp-contract=off", "-fno-fast-math", "-Wno-unused-function"]
-
-
-def check_forms() -> None:
-    """Refuse to build native forms of actors that have changed."""
-    told = re.findall(
-        r'"([\w/]+\.py)", "(\w+)", "(\w*)"', (ROOT / "runner/engine/forms.pyx").read_text(encoding="utf-8")
-    )
-    for file, name, digest in told:
-        found = hashlib.sha256(core["text_of"](ROOT / "actors" / file, name).encode()).hexdigest()[:16]
-        if found != digest:
-            sys.exit(
-                f"{name} in actors/{file} has changed since its native form was written: make the form in "
-                f"runner/engine/forms.pyx do the same, and write {found} there"
-            )
+OPTIMISED: dict[str, list[str]] = {name: [] for name in core["LIBRARIES"]}
+if sys.platform != "win32":
+    FLAGS += ["-g0", "-ffp-contract=off", "-fno-fast-math", "-Wno-unused-function"]
+    OPTIMISED = {name: ["-O2" if name == "kernel" else "-O1"] for name in OPTIMISED}  # -O2 takes twice the time
 
 
 def for_cython(source: Path) -> str:
@@ -79,7 +72,7 @@ def for_cython(source: Path) -> str:
     return "\n".join(lines) + "\n"
 
 
-def copied() -> list[Path]:
+def copied(modules: list[str]) -> list[Path]:
     """Copy the sources to the places that their module names require; returns those to compile."""
     found = []
     for face in ROOT.glob("*/**/__init__.pxd"):
@@ -88,7 +81,7 @@ def copied() -> list[Path]:
         target = TREE / "epicycle" / face.relative_to(ROOT)
         target.parent.mkdir(parents=True, exist_ok=True)
         shutil.copy2(face, target)
-    for name in core["CORE_MODULES"]:
+    for name in modules:
         source = ROOT / Path(*name.split(".")[1:])
         target = TREE / Path(*name.split("."))
         target.parent.mkdir(parents=True, exist_ok=True)
@@ -107,12 +100,15 @@ def copied() -> list[Path]:
 
 
 class BuildCore(build_ext):
-    """Builds all modules of the core or, if one cannot be built, leaves no manifest: then the Python core is used."""
+    """Builds the libraries of the core or, if one cannot be built, leaves no manifest: then the Python core is used.
+
+    EPICYCLE_BUILD chooses: ``none`` (the default), ``core``, or ``all`` (the modules of robots, too).
+    """
 
     def run(self) -> None:
         """Build what has changed."""
-        check_forms()
-        self.remove_stale()
+        if not WANTED:
+            return
         self.parallel = self.parallel or os.cpu_count()
         try:
             from Cython import __version__ as cython
@@ -122,43 +118,46 @@ class BuildCore(build_ext):
             if [int(each) for each in cython.split(".")[:2]] >= [3, 3]:
                 raise RuntimeError(f"Cython {cython} adds 0 and -0.0 wrongly: install a version below 3.3")
             options = {"language_level": 3, "annotation_typing": False, "auto_pickle": False, "binding": False}
-            pairs = zip(core["CORE_MODULES"], copied(), strict=True)
-            made = [Extension(name, [str(path)], include_dirs=[get_include()]) for name, path in pairs]
+            modules = [module for library in WANTED for module in core["LIBRARIES"][library]]
+            pairs = zip(modules, copied(modules), strict=True)
+            made = [Extension(name, [str(path)]) for name, path in pairs]
             made = cythonize(made, include_path=[str(TREE)], compiler_directives=options, quiet=True)
         except Exception as error:  # no Cython or NumPy, or an unsuitable one
             print(f"the core is not compiled, so the Python core is used: {error}", file=sys.stderr)
-            self.extensions = []
             return
-        # setuptools has filled in what it needs to know about the first ones.
-        for extension, ready in zip(self.extensions, made, strict=True):
-            extension.sources, extension.depends = ready.sources, ready.depends
-            extension.include_dirs = [*extension.include_dirs, *ready.include_dirs]
+        written = {each.name: each for each in made}
+        # setuptools has filled in what it needs to know about the libraries.
+        for extension in self.extensions:
+            parts = [written[module] for module in core["LIBRARIES"][extension.name.rpartition(".")[2]]]
+            extension.sources = [source for part in parts for source in part.sources]
+            extension.depends = [file for part in parts for file in part.depends]
+            extension.include_dirs = [*extension.include_dirs, get_include()]
+        (ROOT / core["FOLDER"]).mkdir(exist_ok=True)  # where setuptools copies what is built in place
         super().run()
         self._say()
 
-    def remove_stale(self) -> None:
-        """Remove the compiled files of modules that are no longer in the core: Python would prefer them to the sources.
-
-        These are the files in the folders of our packages with the suffix of this Python's compiled modules that belong
-        to no module of the core.  Files that another Python has compiled have another suffix.
-        """
-        wanted = {Path(self.get_ext_fullpath(name)) for name in core["CORE_MODULES"]}
-        for package in self.distribution.packages or ():
-            any_module = Path(self.get_ext_fullpath(f"{package}.x"))
-            for file in set(any_module.parent.glob(f"*{any_module.name[1:]}")) - wanted:
-                file.unlink()
+    def get_export_symbols(self, ext: Extension) -> list[str]:
+        """The modules in a library."""
+        return [f"PyInit_{Path(source).stem}" for source in ext.sources]
 
     def _say(self) -> None:
         files = [Path(self.get_ext_fullpath(each.name)) for each in self.extensions]
-        made = [Path(each.sources[0]).stat().st_mtime for each in self.extensions]
-        # A module that could not be compiled may have left an older file in its place.
-        if all(file.exists() and file.stat().st_mtime >= time for file, time in zip(files, made, strict=True)):
-            place = files[0].parents[len(core["CORE_MODULES"][0].split(".")) - 2] / core["MANIFEST"]
-            built = {"python": sys.implementation.cache_tag, "modules": core["digests"](ROOT)}
+        sources = [max(Path(source).stat().st_mtime for source in each.sources) for each in self.extensions]
+        # A library that could not be compiled may have left an older file in its place.
+        if all(file.exists() and file.stat().st_mtime >= time for file, time in zip(files, sources, strict=True)):
+            current = core["digests"](ROOT)
+            names = [each.name.rpartition(".")[2] for each in self.extensions]
+            built = {"python": sys.implementation.cache_tag, "libraries": {name: current[name] for name in names}}
+            place = files[0].with_name(Path(core["MANIFEST"]).name)
             place.write_text(json.dumps(built, indent=1), encoding="utf-8")
 
 
+PACKAGE = "epicycle." + core["FOLDER"].replace("/", ".")
 setup(
-    ext_modules=[Extension(name, [], optional=True, extra_compile_args=FLAGS) for name in core["CORE_MODULES"]],
+    ext_modules=[
+        Extension(f"{PACKAGE}.{name}", [], optional=True, extra_compile_args=[*FLAGS, *OPTIMISED[name]])
+        for name in WANTED
+    ],
+    setup_requires=["Cython>=3.1,<3.3", "numpy>=2"] if WANTED else [],
     cmdclass={"build_ext": BuildCore},
 )

@@ -1,105 +1,103 @@
 """Which core runs: the modules that were compiled when Epicycle was installed, or their Python sources.
 
-Both do the same, to the bit.  A compiled module is beside its source, and Python prefers it.  If the sources have
-changed since, or if EPICYCLE_CORE=python is set, all compiled modules are ignored.  This module is imported first, by
-the package, and read by ``setup.py``, which builds the core.
+Both do the same, to the bit.  The compiled modules lie in a few libraries in ``built``, apart from their sources.  If
+the sources have changed since, or if EPICYCLE_CORE=python is set, they are ignored.  This module is imported first, by
+the package, and read by ``setup.py``, which builds the libraries.
 """
 
 from __future__ import annotations
 
-import ast
 import hashlib
 import json
 import os
 import sys
-from importlib.machinery import ModuleSpec
+from collections.abc import Sequence
+from importlib.machinery import EXTENSION_SUFFIXES, ExtensionFileLoader, ModuleSpec, PathFinder
 from importlib.util import spec_from_file_location
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-# In the order of their imports.  Each costs 2 to 4 s of CPU time at installation.
-CORE_MODULES = (
-    "epicycle.actors.core.primitives",
-    "epicycle.actors.core.tag",
-    "epicycle.actors.core.moment",
-    "epicycle.actors.core.order",
-    "epicycle.actors.core.ports",
-    "epicycle.actors.core.parameter",
-    "epicycle.actors.core.port_parameter",
-    "epicycle.actors.core.actor",
-    "epicycle.actors.core.authoring",
-    "epicycle.actors.core.process",
-    "epicycle.actors.core.random",
-    "epicycle.actors.core.laws",
-    "epicycle.actors.robotics.arrays",
-    "epicycle.actors.robotics.messages",
-    "epicycle.actors.robotics.world",
-    "epicycle.actors.robotics.monitors",
-    "epicycle.actors.robotics.estimator",
-    "epicycle.actors.robotics.controller",
-    "epicycle.aspects.core.join_point",
-    "epicycle.aspects.core.kinds",
-    "epicycle.runner.results.packing",
-    "epicycle.runner.results.samples",
-    "epicycle.runner.results.waiting",
-    "epicycle.runner.results.log",
-    "epicycle.runner.engine.agenda",
-    "epicycle.runner.engine.native",
-    "epicycle.runner.engine.computing",
-    "epicycle.runner.engine.forms",
-    "epicycle.runner.engine.director",
-    "epicycle.runner.engine.loop",
-    "epicycle.runner.engine.way",
-    "epicycle.runner.engine.batches",
-    "epicycle.runner.engine.statistic",
-    "epicycle.runner.engine.measurement",
-    "epicycle.runner.engine.listeners",
-    "epicycle.runner.engine.aspect_context",
-)
-MANIFEST = "actors/compiled.json"
+# By library, in the order of their imports; each module costs 1 to 3 s of CPU time at installation.
+LIBRARIES = {
+    "kernel": (
+        "epicycle.actors.core.primitives",
+        "epicycle.actors.core.tag",
+        "epicycle.actors.core.moment",
+        "epicycle.actors.core.order",
+        "epicycle.actors.core.ports",
+        "epicycle.actors.core.parameter",
+        "epicycle.actors.core.port_parameter",
+        "epicycle.actors.core.laws",
+        "epicycle.runner.engine.agenda",
+        "epicycle.runner.engine.director",
+        "epicycle.runner.engine.loop",
+        "epicycle.runner.engine.way",
+    ),
+    "record": (
+        "epicycle.runner.results.packing",
+        "epicycle.runner.results.samples",
+        "epicycle.runner.results.waiting",
+        "epicycle.runner.results.log",
+        "epicycle.runner.engine.batches",
+        "epicycle.runner.engine.statistic",
+        "epicycle.runner.engine.measurement",
+        "epicycle.runner.engine.listeners",
+    ),
+    "forms": ("epicycle.runner.engine.forms",),
+    # Pays where thousands of runs are to come.
+    "robots": (
+        "epicycle.actors.robotics.arrays",
+        "epicycle.actors.robotics.messages",
+        "epicycle.actors.robotics.world",
+        "epicycle.actors.robotics.monitors",
+        "epicycle.actors.robotics.estimator",
+        "epicycle.actors.robotics.controller",
+    ),
+}
+CORE_LIBRARIES = ("kernel", "record", "forms")  # the others are built on them
+CORE_MODULES = tuple(module for modules in LIBRARIES.values() for module in modules)
+FOLDER = "actors/built"
+MANIFEST = f"{FOLDER}/manifest.json"
 CHOICES = ("python", "compiled")
 
 
 def digests(root: Path) -> dict[str, str]:
-    """A digest of the files of each module of the core, by its name; ``root`` is the folder with the packages."""
+    """A digest of the sources of each library and of those that it is built on; ``root`` has the packages."""
     found = {}
-    for name in CORE_MODULES:
-        source = root.joinpath(*name.split(".")[1:])
-        files = [source.with_suffix(ending) for ending in (".py", ".pxd", ".pyx")]
-        content = b"".join(file.read_bytes() for file in files if file.exists())
-        found[name] = hashlib.sha256(content.replace(b"\r\n", b"\n")).hexdigest()
+    for library in LIBRARIES:
+        content = hashlib.sha256()
+        parts = dict.fromkeys((*CORE_LIBRARIES, library))
+        for name in (module for part in parts for module in LIBRARIES[part]):
+            source = root.joinpath(*name.split(".")[1:])
+            for file in (source.with_suffix(ending) for ending in (".py", ".pxd", ".pyx")):
+                if file.exists():
+                    content.update(f"{name}{file.suffix}".encode())
+                    content.update(file.read_bytes().replace(b"\r\n", b"\n"))
+        found[library] = content.hexdigest()
     return found
 
 
-def text_of(source: Path, name: str) -> str:
-    """The text of a class or function without its docstrings; native forms hold a digest of it."""
-    text = source.read_text(encoding="utf-8")
-    lines = text.splitlines()
-    (found,) = (node for node in ast.parse(text).body if getattr(node, "name", "") == name)
-    told = [
-        range(first.lineno, first.end_lineno + 1)
-        for node in ast.walk(found)
-        if isinstance(node, (ast.ClassDef, ast.FunctionDef)) and isinstance(first := node.body[0], ast.Expr)
-        if isinstance(first.value, ast.Constant) and first.end_lineno is not None
-    ]
-    return "\n".join(
-        lines[number - 1]
-        for number in range(found.lineno, (found.end_lineno or found.lineno) + 1)
-        if not any(number in each for each in told)
-    )
+class _Finder:
+    """Finds compiled modules in their libraries, and of all others the Python sources.
 
+    A compiled file beside a source is of an earlier build, and Python would prefer it.
+    """
 
-class _Sources:
-    """Finds the Python sources of the core's modules instead of the compiled ones."""
+    def __init__(self, compiled: dict[str, Path]) -> None:
+        self._compiled = compiled
 
-    def __init__(self, root: Path) -> None:
-        self._root = root
-
-    def find_spec(self, name: str, path: object = None, target: ModuleType | None = None) -> ModuleSpec | None:
-        if name not in CORE_MODULES:
+    def find_spec(
+        self, name: str, path: Sequence[str] | None = None, target: ModuleType | None = None
+    ) -> ModuleSpec | None:
+        if not name.startswith("epicycle."):
             return None
-        return spec_from_file_location(name, self._root.joinpath(*name.split(".")[1:]).with_suffix(".py"))
+        if (library := self._compiled.get(name)) is not None:
+            return spec_from_file_location(name, library, loader=ExtensionFileLoader(name, str(library)))
+        spec = PathFinder.find_spec(name, path)
+        if spec is not None and spec.origin is not None and isinstance(spec.loader, ExtensionFileLoader):
+            return spec_from_file_location(name, Path(spec.origin).with_name(f"{name.rpartition('.')[2]}.py"))
+        return spec
 
 
 def choose(wanted: str = "") -> tuple[str, str]:
@@ -113,29 +111,42 @@ def choose(wanted: str = "") -> tuple[str, str]:
             f"EPICYCLE_CORE={wanted} is unknown; the cores are {' and '.join(CHOICES)}", name="EPICYCLE_CORE"
         )
     if wanted == "python":
+        libraries: list[str] = []
         reason = "chosen by EPICYCLE_CORE"
     else:
-        reason = _missing(root)
-    if not reason:
-        return "compiled", ""
-    if wanted == "compiled":
+        libraries, reason = _usable(root)
+    if reason and wanted == "compiled":
         raise ImportError(f"EPICYCLE_CORE=compiled is not available: {reason}", name="EPICYCLE_CORE")
-    finder: Any = _Sources(root)
+    compiled = {module: library_file(root, library) for library in libraries for module in LIBRARIES[library]}
+    finder: Any = _Finder(compiled)
     sys.meta_path.insert(0, finder)
-    return "python", reason
+    return ("python", reason) if reason else ("compiled", "")
 
 
-def _missing(root: Path) -> str:
-    """Why the compiled core cannot be used; empty if it can."""
+def library_file(root: Path, library: str) -> Path:
+    """Where a compiled library is."""
+    return root / FOLDER / f"{library}{EXTENSION_SUFFIXES[0]}"
+
+
+def _usable(root: Path) -> tuple[list[str], str]:
+    """The libraries that can be used; without the core, none, and why."""
     try:
         built = json.loads((root / MANIFEST).read_bytes())
-    except (OSError, ValueError):
-        return "the core was not compiled at installation; reinstall Epicycle where a C compiler is available"
-    if built.get("python") != sys.implementation.cache_tag:
-        return f"the core was compiled for {built.get('python')}; reinstall Epicycle"
-    if built.get("modules") != digests(root):
-        return "the sources have changed since the core was compiled; reinstall Epicycle"
-    return ""
+        python, libraries = built["python"], dict(built["libraries"])
+    except (OSError, ValueError, TypeError, KeyError):
+        return [], f"the core is not compiled; {REMEDY}"
+    if python != sys.implementation.cache_tag:
+        return [], f"the core was compiled for {python}; {REMEDY}"
+    current = digests(root)
+    usable = [
+        library
+        for library in LIBRARIES
+        if libraries.get(library) == current[library] and library_file(root, library).exists()
+    ]
+    if not set(CORE_LIBRARIES).issubset(usable):
+        return [], f"the sources have changed since the core was compiled; {REMEDY}"
+    return usable, ""
 
 
+REMEDY = "'make core', or an installation with EPICYCLE_BUILD=all, compiles it where there is a C compiler"
 CORE, CORE_REASON = ("", "") if __name__ == "setup" else choose(os.environ.get("EPICYCLE_CORE", ""))

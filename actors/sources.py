@@ -25,7 +25,7 @@ from .core import (
 )
 from .distributions import Distribution
 from .generators import Generator
-from .triggered import times as _times  # by the name that the native form of Random uses
+from .triggered import times
 
 
 class _Ticking(Actor):
@@ -311,7 +311,7 @@ class Random(Actor):
 
     def fire(self) -> None:
         numbers: Any = self.random if self._numbers is None else self._numbers
-        for _ in range(_times(self.trigger)):
+        for _ in range(times(self.trigger)):
             self.output.send(self.distribution.draw(numbers))
 
 
@@ -342,5 +342,5 @@ class VaryingRandom(Random):
             said = {name: getattr(self._law, name) for name in declared_parameters(type(self._law))}
             self._law = type(self._law)(**{**said, **came})
         numbers: Any = self.random if self._numbers is None else self._numbers
-        for _ in range(_times(self.trigger)):
+        for _ in range(times(self.trigger)):
             self.output.send(self._law.draw(numbers))

@@ -4,7 +4,6 @@ import ast
 import json
 import os
 import re
-import runpy
 import shutil
 import subprocess
 import sys
@@ -17,9 +16,8 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
-import setuptools
 
-from epicycle.actors import CORE_MODULES
+from epicycle.actors.compiled import LIBRARIES
 from epicycle.runner.catalogue import TAKES
 
 ROOT = Path(__file__).parents[1]
@@ -227,13 +225,15 @@ def wheel(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Build the wheel from a copy, without a download and without leaving a build folder behind."""
     source = tmp_path_factory.mktemp("source")
     for folder in FOLDERS:
-        built_here = shutil.ignore_patterns("__pycache__", "*.so", "*.pyd", "compiled.json")
+        built_here = shutil.ignore_patterns("__pycache__", "*.so", "*.pyd", "built")
         shutil.copytree(ROOT / folder, source / folder, ignore=built_here)
     for name in ("pyproject.toml", "setup.py", "LICENSE", "README.md"):
         if (ROOT / name).is_file():
             shutil.copy(ROOT / name, source)
     target = tmp_path_factory.mktemp("wheel")
-    pip("wheel", "--no-deps", "--no-build-isolation", "--wheel-dir", target, source)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("EPICYCLE_BUILD", "all")
+        pip("wheel", "--no-deps", "--no-build-isolation", "--wheel-dir", target, source)
     (built,) = target.glob("*.whl")
     return built
 
@@ -389,27 +389,6 @@ def test_what_is_shared_is_imported_from_the_root(folder: str) -> None:
     assert [file.name for file in files if change.search(file.read_text(encoding="utf-8"))] == []
 
 
-def test_the_build_removes_what_was_compiled_of_modules_that_no_longer_are(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(setuptools, "setup", lambda **_: None)
-    script = runpy.run_path(str(ROOT / "setup.py"))
-    ending, core = sysconfig.get_config_var("EXT_SUFFIX"), Path(*CORE_MODULES[0].split(".")[1:])
-    kept = [f"{core}{ending}", f"{core.parent}/gone.cpython-399-nowhere.so", "actors/gone.py", f"elsewhere/own{ending}"]
-    stale = [f"{core.parent}/gone{ending}", f"actors/gone{ending}", f"runner/study/plan/gone{ending}"]
-    for name in (*kept, *stale):
-        (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
-        (tmp_path / name).write_text("")
-    monkeypatch.chdir(tmp_path)
-    folders = CONFIG["tool"]["setuptools"]["package-dir"]
-    build = script["BuildCore"](setuptools.Distribution({"packages": PACKAGES, "package_dir": folders}))
-    build.inplace = True
-    build.ensure_finalized()
-    build.remove_stale()
-    left = [path.relative_to(tmp_path).as_posix() for path in tmp_path.rglob("*") if path.is_file()]
-    assert sorted(left) == sorted(kept)
-
-
 @pytest.mark.skipif(shutil.which("make") is None, reason="there is no make")
 def test_make_clean_removes_all_that_is_compiled(tmp_path: Path) -> None:
     sources = [
@@ -419,7 +398,7 @@ def test_make_clean_removes_all_that_is_compiled(tmp_path: Path) -> None:
         "models/mm1.yaml",
         "tests/a.py",
     ]
-    made = ["actors/core/tag.cpython-311.so", "aspects/gone.pyd", "runner/engine/way.so", "actors/compiled.json"]
+    made = ["actors/core/tag.cpython-311.so", "aspects/gone.pyd", "runner/engine/way.so", "actors/built/manifest.json"]
     for name in (*sources, *made, "runner/__pycache__/cli.pyc", "build/core/tag.c"):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text("")
@@ -432,12 +411,11 @@ def test_make_clean_removes_all_that_is_compiled(tmp_path: Path) -> None:
 def test_wheel_holds_every_file_and_no_other(wheel: Path) -> None:
     with zipfile.ZipFile(wheel) as archive:
         found = [name for name in archive.namelist() if ".dist-info/" not in name]
-    core = {name for name in found if name.endswith((".so", ".pyd", "/compiled.json"))}
-    assert sorted(set(found) - core) == sorted(f"epicycle/{place_of(file).as_posix()}" for file in shipped_files())
+    core = {Path(name).name.partition(".")[0] for name in found if name.startswith("epicycle/actors/built/")}
+    rest = [name for name in found if not name.startswith("epicycle/actors/built/")]
+    assert sorted(rest) == sorted(f"epicycle/{place_of(file).as_posix()}" for file in shipped_files())
     # All of the compiled core or, where there is no compiler, nothing of it.
-    modules = {name.partition(".")[0].replace("/", ".") for name in core if not name.endswith(".json")}
-    assert modules in ({*CORE_MODULES}, set())
-    assert ("epicycle/actors/compiled.json" in core) == bool(modules)
+    assert core in ({*LIBRARIES, "manifest"}, set())
 
 
 @pytest.mark.slow

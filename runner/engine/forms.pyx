@@ -4,6 +4,7 @@
 A form fires in the place of its actor, and works on what the actor holds, so that nothing has to be brought back and
 forth: the actor can be looked at and copied at any time.  It is chosen where an actor is of exactly that class, its
 sends go straight into the log, nothing changes its parameters, and the run's own director fires it.
+``tests/engine/test_forms.py`` says of which sources these are the forms.
 """
 
 import os
@@ -11,17 +12,114 @@ import os
 from cpython.float cimport PyFloat_FromDouble
 
 from epicycle.actors cimport InputPort, Line, ParameterPort, Wake, nanoseconds_of, seconds_of
-from epicycle.runner.engine.agenda cimport Turn
+from epicycle.actors.core.laws cimport standard_exponential, standard_gamma, standard_normal
+from epicycle.actors.core.primitives cimport Words
+from epicycle.runner.engine.agenda cimport Form, Instant, Turn
 from epicycle.runner.engine.director cimport Director
-from epicycle.runner.engine.native cimport (
-    Drawing, Native, count_of, drawing_of, tokens_of,
-)
 from epicycle.runner.engine.way cimport Sender
 
 from epicycle.actors import (
-    Clock, Constant, Exponential, Gamma, Merge, PoissonClock, Queue, Random, Recorder, Server, TimeDelay,
+    Clock, Constant, Expression, Exponential, Gamma, Normal, PoissonClock, Random, Scale, Server, TimeDelay, Uniform,
 )
-from epicycle.runner.engine import computing
+from epicycle.actors.expression.floats import UNDECIDED
+
+
+cdef enum:
+    CONSTANT, EXPONENTIAL, GAMMA, NORMAL, UNIFORM
+
+
+cdef class Drawing:
+    """A law of numbers, with its parameters and the stream that it draws from."""
+
+    __slots__ = ("first", "law", "second", "stream")
+    cdef public int law
+    cdef public double first, second
+    cdef public Words stream
+
+    cdef double next(self) except? -1.0:
+        if self.law == EXPONENTIAL:
+            return self.first * standard_exponential(self.stream)
+        if self.law == GAMMA:
+            return self.second * standard_gamma(self.stream, self.first)
+        if self.law == NORMAL:
+            return self.first + self.second * standard_normal(self.stream)
+        if self.law == UNIFORM:
+            return self.first + (self.second - self.first) * ((self.stream.word() >> 11) * (0.5 / 4503599627370496.0))
+        return self.first
+
+
+cdef Drawing drawing_of(distribution, stream):
+    """What draws from a distribution; None if that is left to Python."""
+    cdef Drawing made = Drawing()
+    kind = type(distribution)
+    if kind is Constant:
+        made.law, made.first = CONSTANT, distribution.value
+    elif kind is Exponential:
+        made.law, made.first = EXPONENTIAL, distribution.mean
+    elif kind is Gamma:
+        made.law, made.first, made.second = GAMMA, distribution.shape, distribution.mean / distribution.shape
+    elif kind is Normal:
+        made.law, made.first, made.second = NORMAL, distribution.mean, distribution.standard_deviation
+    elif kind is Uniform:
+        made.law, made.first, made.second = UNIFORM, distribution.low, distribution.high
+    else:
+        return None
+    made.stream = stream
+    return made
+
+
+cdef class Native(Form):
+    """What the forms share: where an actor stands in the run, and who takes what it sends."""
+
+    cdef public object actor
+    cdef public Director director
+    cdef public Turn turn
+
+    cdef bint take(self) except -1:
+        """Get hold of what the actor holds; whether it can have a form."""
+        return True
+
+    cdef Sender sender(self, name):
+        emitter = self.actor.outputs[name].emitter
+        return emitter if type(emitter) is Sender else None
+
+    cdef InputPort input_port(self, name):
+        return self.actor.inputs[name]
+
+    cdef long long now(self):
+        return self.director.present.time
+
+    cdef Wake wake_at(self, long long time):
+        return self.director.wake_turn(self.turn, time)
+
+    cdef int keep(self, Line line, long long time, value) except -1:
+        """Let a value wait for its time; who fires it cannot call off, and so needs no wake-up that says so."""
+        cdef Instant instant = self.director.want_at(self.turn, time)
+        line.put(instant.time, instant.microstep, None, value)
+        return 0
+
+    cdef bint is_due(self, Line line):
+        cdef Instant now = self.director.present
+        return line.is_before(now.time, now.microstep)
+
+
+cdef inline list tokens_of(InputPort port):
+    """The tokens of the present tag."""
+    return port.shown
+
+
+cdef inline Py_ssize_t count_of(InputPort port):
+    """How many there are."""
+    return len(port.shown)
+
+
+cdef inline bint all_floats(list tokens):
+    """Whether all are floats and nothing else: whole numbers have arithmetic of their own."""
+    cdef Py_ssize_t place
+    for place in range(len(tokens)):
+        if type(tokens[place]) is not float:
+            return False
+    return True
 
 
 cdef class DelayForm(Native):
@@ -219,143 +317,81 @@ cdef class RandomForm(Native):
                 self.output.go(PyFloat_FromDouble(self.drawing.next()))
 
 
-cdef class MergeForm(Native):
-    __slots__ = ("actor", "director", "discards", "input", "output", "turn", "waiting")
+cdef class ScaleForm(Native):
+    __slots__ = ("actor", "director", "input", "number", "offset_number", "output", "turn")
     cdef public InputPort input
     cdef public Sender output
-    cdef public list waiting
-    cdef public bint discards
+    cdef public double number, offset_number
 
     cdef bint take(self) except -1:
         self.input, self.output = self.input_port("input"), self.sender("output")
-        self.waiting, self.discards = self.actor._waiting, self.actor.discard
-        return self.output is not None and not self.actor.whole_channel
+        self.number, self.offset_number = self.actor.factor, self.actor.offset
+        return self.output is not None
 
     cpdef fire(self):
         cdef list tokens = tokens_of(self.input)
         cdef Py_ssize_t place
-        first = None
+        if not all_floats(tokens):
+            self.actor.fire()
+            return
         for place in range(len(tokens)):
-            self.waiting[self.input.channels[place] if self.input.width > 1 else 0].append(tokens[place])
-        for queue in self.waiting:
-            if not queue:
-                continue
-            if first is None:
-                first = queue
-                self.output.go(queue.popleft())
-            if self.discards:
-                queue.clear()
-            elif queue:
-                self.wake_at(self.now())
-                return
+            self.output.go(PyFloat_FromDouble(self.number * <double>tokens[place] + self.offset_number))
 
 
-cdef class QueueForm(Native):
-    __slots__ = (
-        "actor", "capacity", "director", "input", "output", "persists", "rejected", "size", "trigger", "turn", "waiting",
-    )
-    cdef public InputPort input, trigger
-    cdef public Sender output, size, rejected
-    cdef public object waiting
-    cdef public long long capacity
-    cdef public bint persists
+cdef class ExpressionForm(Native):
+    __slots__ = ("actor", "director", "function", "holds", "inputs", "latest", "names", "output", "ports", "turn", "wants_number")
+    cdef public list ports, inputs, names  # ports, what they are called, and the names of the expression
+    cdef public Sender output
+    cdef public dict latest
+    cdef public object function
+    cdef public bint holds, wants_number
 
     cdef bint take(self) except -1:
         actor = self.actor
-        if actor.one_at_a_time:
-            return False
-        self.input, self.trigger, self.output = self.input_port("input"), self.input_port("trigger"), self.sender("output")
-        self.size, self.rejected = self.sender("size"), self.sender("rejected")
-        self.waiting, self.persists = actor._tokens, actor.persistent_trigger
-        self.capacity = 2**62 if actor.capacity is None else min(actor.capacity, 2**62)
-        return self.output is not None and self.size is not None and self.rejected is not None
+        self.ports, self.names = actor._latest._ports, list(actor.expression.names)
+        self.inputs = [port.name for port in self.ports]
+        self.output, self.latest, self.holds = self.sender("output"), actor._latest._tokens, actor.hold
+        self.function, self.wants_number = actor.expression.function, actor._kind in ("number", "any value")
+        is_whole = {"time", *self.inputs}.issuperset(self.names)
+        return self.output is not None and self.function is not None and is_whole
 
     cpdef fire(self):
-        cdef list tokens = tokens_of(self.input)
+        cdef InputPort port
+        cdef bint has_come = False
         cdef Py_ssize_t place
-        cdef long long triggers
-        for place in range(len(tokens)):
-            if <long long>len(self.waiting) >= self.capacity:
-                self.rejected.go(tokens[place])
-            else:
-                self.waiting.append(tokens[place])
-                self.size.go(len(self.waiting))
-        triggers = self.actor._triggers
-        triggers += count_of(self.trigger)
-        self.actor._triggers = triggers
-        while triggers and self.waiting:
-            triggers -= 1
-            self.actor._triggers = triggers
-            self.output.go(self.waiting.popleft())
-            self.size.go(len(self.waiting))
-        if not self.persists:
-            self.actor._triggers = 0
-
-
-cdef class RecorderForm(Native):
-    __slots__ = ("actor", "capacity", "director", "input", "turn")
-    cdef public InputPort input
-    cdef public object capacity
-
-    cdef bint take(self) except -1:
-        self.input = self.input_port("input")
-        self.capacity = self.actor.capacity
-        return True
-
-    cpdef fire(self):
-        cdef list tokens = tokens_of(self.input)
-        self.actor.seen += len(tokens)
-        if self.capacity == 0:
+        cdef list given = []
+        for port in self.ports:
+            if count_of(port) > 1:  # of which each has a round of its own
+                self.actor.fire()
+                return
+        if not self.holds:
+            self.latest.clear()
+        for place in range(len(self.ports)):
+            port = self.ports[place]
+            if count_of(port):
+                self.latest[self.inputs[place]] = tokens_of(port)[0]
+                has_come = True
+        if not has_come or len(self.latest) < len(self.ports):
             return
-        self.actor.tokens.extend(tokens)
-        self.actor.tags.extend([self.director.present.tag] * len(tokens))
-        if self.capacity is not None and len(self.actor.tokens) > self.capacity:
-            surplus = len(self.actor.tokens) - self.capacity
-            del self.actor.tokens[:surplus], self.actor.tags[:surplus]
+        for name in self.names:
+            given.append(PyFloat_FromDouble(seconds_of(self.now())) if name == "time" else self.latest[name])
+        try:
+            value = self.function(*given)
+        except UNDECIDED:
+            value = None
+        if value is None:
+            value = self.actor._value(dict(self.latest))
+        elif type(value) is not float or not self.wants_number:
+            value = self.actor._checked(value)
+        self.output.go(value)
 
 
-# What the forms are forms of, with digests of the sources: where one has changed, nothing is built.
-SOURCES = (
-    ("accumulation.py", "Counter", "c2dfe0cdd9e65d96"),
-    ("accumulation.py", "Integrator", "b7ff4d62fa85e9f9"),
-    ("arithmetic.py", "AddSubtract", "ab43489dd015746a"),
-    ("distributions.py", "Constant", "e6f123317132cd9d"),
-    ("distributions.py", "Gamma", "a02963690b8f422f"),
-    ("distributions.py", "Normal", "41b7f712051a423b"),
-    ("distributions.py", "Uniform", "6d1f653751253aab"),
-    ("flow.py", "Merge", "8660e6060412c03d"),
-    ("functions.py", "Expression", "626b064f18a71310"),
-    ("queues.py", "Queue", "f18d7dec94a8737f"),
-    ("sources.py", "Random", "56144986a1aa3492"),
-    ("core/authoring.py", "Latest", "b022c8dea367d216"),
-    ("core/authoring.py", "rounds", "bcf677d00b681776"),
-    ("core/laws.py", "gamma", "da1afffdbd29a311"),
-    ("core/laws.py", "normal", "c6bfa77a937cc231"),
-    ("core/laws.py", "uniform", "36b3b17c5a3d5e40"),
-    ("core/port_parameter.py", "ParameterPort", "8a9a3fc4f574c08e"),
-    ("core/elementary/sums.py", "total", "dc84358727c0bc10"),
-    ("distributions.py", "Exponential", "6237f8b673097710"),
-    ("queues.py", "Server", "40505ceac74b629d"),
-    ("sinks.py", "Recorder", "ad4d11e84ae6d26d"),
-    ("sources.py", "Clock", "72b20d3d884177d4"),
-    ("sources.py", "PoissonClock", "87a89c8375357743"),
-    ("sources.py", "_Ticking", "58ace3f1608226e9"),
-    ("arithmetic.py", "Scale", "922140efa4b006ed"),
-    ("timing.py", "TimeDelay", "e59a08ff7bcd6e9f"),
-    ("core/elementary/logarithm.py", "log", "25dc7d4323f94b34"),
-    ("core/laws.py", "exponential", "dd3e701d840f2744"),
-    ("core/tag.py", "to_nanoseconds", "92eec895841c04b6"),
-    ("core/tag.py", "to_seconds", "f6c6aae6371c52a3"),
-    ("core/authoring.py", "Pending", "faf6cabccebf5d58"),
-)
 FORMS = {
-    **computing.FORMS,
     Clock: ClockForm,
-    Merge: MergeForm,
+    Expression: ExpressionForm,
     PoissonClock: PoissonForm,
-    Queue: QueueForm,
     Random: RandomForm,
-    Recorder: RecorderForm,
+    Scale: ScaleForm,
     Server: ServerForm,
     TimeDelay: DelayForm,
 }

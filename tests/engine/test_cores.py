@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import os
-import re
 import runpy
 import subprocess
 import sys
 from collections.abc import Iterator
+from importlib.machinery import EXTENSION_SUFFIXES, PathFinder
 from pathlib import Path
 from typing import Any
 
@@ -22,12 +21,13 @@ from tests.engine.cores import ROOT, WAYS, Worker, differences, workers
 from tests.engine.networks import network
 
 MODULE = runpy.run_path(str(ROOT / "actors" / "compiled.py"), run_name="setup")
-CHANGED = "the sources have changed since the core was compiled; reinstall Epicycle"
-MISSING = "the core was not compiled at installation; reinstall Epicycle where a C compiler is available"
+REMEDY = "'make core', or an installation with EPICYCLE_BUILD=all, compiles it where there is a C compiler"
+CHANGED = f"the sources have changed since the core was compiled; {REMEDY}"
+MISSING = f"the core is not compiled; {REMEDY}"
 
 
 def is_there() -> bool:
-    return not MODULE["_missing"](ROOT)
+    return not MODULE["_usable"](ROOT)[1]
 
 
 @pytest.fixture(scope="module")
@@ -52,16 +52,6 @@ def test_a_difference_would_be_found(at: dict[str, Worker]) -> None:
         worker.ask([{"model": other if name == "python" else model, "way": "run"}])
     told = {name: worker.answers(1)[0] for name, worker in at.items()}
     assert told["python"] != told["compiled"] == told["compiled, without native forms"]
-
-
-def test_forms_are_of_the_actors_that_there_are() -> None:
-    """As ``setup.py`` checks before it builds them."""
-    forms = (ROOT / "runner/engine/forms.pyx").read_text(encoding="utf-8")
-    found = re.findall(r'"([\w/]+\.py)", "(\w+)", "(\w*)"', forms)
-    assert len(found) > 5
-    for file, name, digest in found:
-        text = MODULE["text_of"](ROOT / "actors" / file, name)
-        assert hashlib.sha256(text.encode()).hexdigest()[:16] == digest, name
 
 
 def run(*words: str, **environment: str) -> subprocess.CompletedProcess[str]:
@@ -94,13 +84,13 @@ def test_a_core_that_cannot_be_had() -> None:
     ("change", "reason"),
     [
         (lambda root: None, ""),
-        (lambda root: (root / "actors/compiled.json").unlink(), MISSING),
-        (lambda root: (root / "actors/compiled.json").write_text("{"), MISSING),
+        (lambda root: (root / MODULE["MANIFEST"]).unlink(), MISSING),
+        (lambda root: (root / MODULE["MANIFEST"]).write_text("{"), MISSING),
         (lambda root: (root / "actors/core/moment.py").write_text("changed"), CHANGED),
         (lambda root: (root / "actors/core/moment.pxd").unlink(), CHANGED),
         (
-            lambda root: (root / "actors/compiled.json").write_text('{"python": "cpython-27"}'),
-            "the core was compiled for cpython-27; reinstall Epicycle",
+            lambda root: (root / MODULE["MANIFEST"]).write_text('{"python": "cpython-27", "libraries": {}}'),
+            f"the core was compiled for cpython-27; {REMEDY}",
         ),
     ],
 )
@@ -111,10 +101,14 @@ def test_why_python_serves(tmp_path: Path, change: Any, reason: str) -> None:
         for ending in (".py", ".pxd", ".pyx"):
             if (ROOT / source).with_suffix(ending).exists():
                 (tmp_path / source).with_suffix(ending).write_bytes((ROOT / source).with_suffix(ending).read_bytes())
-    manifest = {"python": sys.implementation.cache_tag, "modules": MODULE["digests"](tmp_path)}
-    (tmp_path / "actors/compiled.json").write_text(json.dumps(manifest))
+    (tmp_path / MODULE["FOLDER"]).mkdir(parents=True)
+    manifest = {"python": sys.implementation.cache_tag, "libraries": MODULE["digests"](tmp_path)}
+    (tmp_path / MODULE["MANIFEST"]).write_text(json.dumps(manifest))
+    for library in MODULE["LIBRARIES"]:
+        MODULE["library_file"](tmp_path, library).write_text("")
     change(tmp_path)
-    assert MODULE["_missing"](tmp_path) == reason
+    usable, why = MODULE["_usable"](tmp_path)
+    assert (usable, why) == ([] if reason else [*MODULE["LIBRARIES"]], reason)
 
 
 def test_the_choice_of_this_process() -> None:
@@ -122,10 +116,14 @@ def test_the_choice_of_this_process() -> None:
     assert bool(CORE_REASON) == (CORE == "python")
 
 
-def test_what_a_form_is_a_form_of(tmp_path: Path) -> None:
-    """Docstrings do not count, whatever else stands first does."""
-    source = tmp_path / "one.py"
-    kind = 'class A:\n    """Doc."""\n    def fire(self):\n        self.send(1)\n'
-    source.write_text(f'{kind}\n\ndef f(x):\n    """Doc."""\n    return x\n')
-    assert MODULE["text_of"](source, "A") == "class A:\n    def fire(self):\n        self.send(1)"
-    assert MODULE["text_of"](source, "f") == "def f(x):\n    return x"
+def test_a_compiled_file_of_an_earlier_build_is_not_imported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Python itself would prefer it to the source beside it."""
+    package = tmp_path / "somewhere"
+    package.mkdir()
+    (package / "part.py").write_text("")
+    stale = package / f"part{EXTENSION_SUFFIXES[0]}"
+    stale.write_text("not even a library")
+    assert PathFinder.find_spec("epicycle.somewhere.part", [str(package)]).origin == str(stale)
+    (finder,) = (each for each in sys.meta_path if type(each).__module__ == "epicycle.actors.compiled")
+    assert finder.find_spec("epicycle.somewhere.part", [str(package)]).origin == str(package / "part.py")
+    assert finder.find_spec("elsewhere.part", [str(package)]) is None

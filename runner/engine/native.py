@@ -1,1 +1,0 @@
-"""The parts of native forms (``native.pyx``).  In Python there are none."""

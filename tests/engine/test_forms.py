@@ -1,0 +1,72 @@
+"""Native forms do what the actors do whose forms they are; see runner/engine/forms.pyx."""
+
+from __future__ import annotations
+
+import ast
+import hashlib
+from pathlib import Path
+
+import pytest
+
+from tests.engine.cores import ROOT
+
+# The sources of which the forms are forms, with digests.  Where one has changed, make the form do the same, check that
+# with `make cores`, and write the new digest here.
+SOURCES = (
+    ("arithmetic.py", "Scale", "922140efa4b006ed"),
+    ("core/authoring.py", "Latest", "b022c8dea367d216"),
+    ("core/authoring.py", "Pending", "faf6cabccebf5d58"),
+    ("core/authoring.py", "rounds", "bcf677d00b681776"),
+    ("core/elementary/logarithm.py", "log", "25dc7d4323f94b34"),
+    ("core/laws.py", "exponential", "dd3e701d840f2744"),
+    ("core/laws.py", "gamma", "da1afffdbd29a311"),
+    ("core/laws.py", "normal", "c6bfa77a937cc231"),
+    ("core/laws.py", "uniform", "36b3b17c5a3d5e40"),
+    ("core/port_parameter.py", "ParameterPort", "8a9a3fc4f574c08e"),
+    ("core/tag.py", "to_nanoseconds", "92eec895841c04b6"),
+    ("core/tag.py", "to_seconds", "f6c6aae6371c52a3"),
+    ("distributions.py", "Constant", "e6f123317132cd9d"),
+    ("distributions.py", "Exponential", "6237f8b673097710"),
+    ("distributions.py", "Gamma", "a02963690b8f422f"),
+    ("distributions.py", "Normal", "41b7f712051a423b"),
+    ("distributions.py", "Uniform", "6d1f653751253aab"),
+    ("functions.py", "Expression", "626b064f18a71310"),
+    ("queues.py", "Server", "40505ceac74b629d"),
+    ("sources.py", "Clock", "72b20d3d884177d4"),
+    ("sources.py", "PoissonClock", "87a89c8375357743"),
+    ("sources.py", "Random", "d6b83a46f3fb35c7"),
+    ("sources.py", "_Ticking", "58ace3f1608226e9"),
+    ("timing.py", "TimeDelay", "e59a08ff7bcd6e9f"),
+)
+
+
+def text_of(source: Path, name: str) -> str:
+    """The text of a class or function without its docstrings."""
+    lines = source.read_text(encoding="utf-8").splitlines()
+    (found,) = (node for node in ast.parse("\n".join(lines)).body if getattr(node, "name", "") == name)
+    told = [
+        range(first.lineno, first.end_lineno + 1)
+        for node in ast.walk(found)
+        if isinstance(node, (ast.ClassDef, ast.FunctionDef)) and isinstance(first := node.body[0], ast.Expr)
+        if isinstance(first.value, ast.Constant) and first.end_lineno is not None
+    ]
+    return "\n".join(
+        lines[number - 1]
+        for number in range(found.lineno, (found.end_lineno or found.lineno) + 1)
+        if not any(number in each for each in told)
+    )
+
+
+@pytest.mark.parametrize(("file", "name", "digest"), SOURCES)
+def test_a_form_is_of_the_source_that_there_is(file: str, name: str, digest: str) -> None:
+    text = text_of(ROOT / "actors" / file, name)
+    assert hashlib.sha256(text.encode()).hexdigest()[:16] == digest
+
+
+def test_what_a_form_is_a_form_of(tmp_path: Path) -> None:
+    """Docstrings do not count, whatever else stands first does."""
+    source = tmp_path / "one.py"
+    kind = 'class A:\n    """Doc."""\n    def fire(self):\n        self.send(1)\n'
+    source.write_text(f'{kind}\n\ndef f(x):\n    """Doc."""\n    return x\n')
+    assert text_of(source, "A") == "class A:\n    def fire(self):\n        self.send(1)"
+    assert text_of(source, "f") == "def f(x):\n    return x"
