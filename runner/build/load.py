@@ -28,13 +28,14 @@ from ..language import (
     settings_of,
     without,
 )
-from ..text import NORMAL, Limits, Problems
+from ..text import NORMAL, Limits, Problems, noting
 from ..text import Mapping as MappingNode
 from .acts import acts_of
 from .checks import check
 from .draft import Draft
 from .figures import figures_of
 from .model import DeclaredFigure, Model
+from .origin import Origin
 from .settle import Settler
 from .unfold import Known, TooLargeError, Unfolding
 from .untried import try_classes
@@ -67,7 +68,10 @@ def load_model(
     problems, limits = Problems(), Limits(max_actors)
     settings = [each for file in _several(overrides) for each in read_overrides(Path(file), problems)]
     settings += settings_of(set, problems)
-    with without_collection():
+    changes = [*map("without {}".format, without_aspects := list(without_aspects)), *(aspects := list(aspects))]
+    given = list(settings)
+    types = list(types)
+    with without_collection(), noting() as noted:
         # What the files declare.
         text, declared = read_model(str(name), problems)
         catalogue = installed().with_types(types)
@@ -92,6 +96,7 @@ def load_model(
         problems.raise_if_any()
         model.warnings = problems.warnings
         model.is_checked = True
+        model.origin = Origin(noted, given, changes, types)
         return model
 
 

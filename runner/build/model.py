@@ -38,6 +38,7 @@ from .checks import check
 from .composite_aspect import check_nesting, detours
 from .draft import Draft
 from .named import Port, director_of, raising
+from .origin import Origin
 from .scope import Composite, Scope
 from .settle import nanoseconds
 from .watch import Watching, checked_seed
@@ -97,6 +98,7 @@ class Model(Scope, Tabled):
         self.figures: dict[str, DeclaredFigure] = {}
         self.warnings: tuple[Problem, ...] = ()  # what is odd but not wrong
         self.is_checked = False  # since the last change
+        self.origin: Origin | None = None  # what it was made from, if that is all there is to it
         self._scopes: dict[str, Composite] = {}
         self._order: tuple[dict[str, int], Postings | None] | None = None  # worked out since then
         self.stop = stop
@@ -252,6 +254,7 @@ class Model(Scope, Tabled):
         if self.graph.is_frozen:
             self.draft = self.draft.copy()
         self.is_checked = False
+        self.origin = None
         self._order = None
         return self.draft
 

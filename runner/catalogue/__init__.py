@@ -1,5 +1,6 @@
 """What a model may name: types of actors, aspects and ports, kinds of metrics, and packaged files."""
 
+from .code import code_files, files_of_types
 from .figure import Figure, Mark, Shape, own_figures
 from .measure import (
     MSER5,
@@ -69,10 +70,12 @@ __all__ = [
     "Types",
     "as_written",
     "built_in",
+    "code_files",
     "conversion_problem",
     "describe",
     "doc_of",
     "figure_types",
+    "files_of_types",
     "find",
     "first_sentence",
     "installed",

@@ -17,12 +17,11 @@ from ..build import Model, load_model
 from ..catalogue import types_of_file
 from ..engine import Simulation
 from ..language import Setting, number_node
-from ..provenance import version_of
 from ..student import student_quantile
 from ..text import COMMAND_LINE, ModelError, Position, Problems
 from .proposals import SPREAD, Point, spread
 from .space import Interval, read_space
-from .tried import Tried
+from .tried import NUMBER, Tried
 
 if TYPE_CHECKING:
     import numpy as np
@@ -203,7 +202,7 @@ class _Runs:
         digest = self._results(model).digest
         about = {"model": model.name, "seed": self.seed, "digest": digest, "match": list(task.match)}
         about |= {"times": [times for _, times, _ in self.signals], "linear": task.linear}
-        self._tried = Tried({**about, "set": list(task.set), "version": version_of("epicycle")}, folder)
+        self._tried = Tried(model, about, [NUMBER], folder)
 
     def _load(self, settings: Sequence[Setting]) -> Model:
         task = self._task

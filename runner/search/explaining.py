@@ -12,11 +12,10 @@ from epicycle.actors import EpicycleError, to_seconds
 from ..build import Model
 from ..engine import Acts, Simulation
 from ..graph import Act, ActName, ModelGraph
-from ..provenance import version_of
 from ..results import Results, Verdict, canonical, plain
 from .minimal import minimal
 from .monitored import property_of
-from .tried import Tried
+from .tried import NUMBER, Tried
 
 
 @dataclass(frozen=True)
@@ -65,6 +64,10 @@ class Explanation:
         return [each.act.name for each in self.effects]
 
 
+_NONE = type(None)
+_SHAPE = [(bool, _NONE), (*NUMBER, _NONE)]  # of an outcome: whether the property holds, and its robustness
+
+
 class _Runs:
     """Runs of a model in which some acts happen and no others."""
 
@@ -74,7 +77,7 @@ class _Runs:
         self.seed = seed
         self.until = until
         self.number = 0
-        self.tried = Tried({})
+        self.tried = Tried(model, {}, _SHAPE)
 
     def results(self, exactly: Collection[ActName] | None, *, keep_log: bool = False) -> Results:
         """What comes of the run with these acts; with None, with all."""
@@ -137,7 +140,7 @@ def explain(
         "property": source,
         "digest": whole.digest,
     }
-    runs.tried = Tried({**about, "version": version_of("epicycle")}, folder)
+    runs.tried = Tried(model, about, _SHAPE, folder)
     acts = {act.name: act for act in whole.acts}
     # What comes after the break cannot have caused it, unless the property looks ahead.
     before = [name for name, act in acts.items() if verdict.time is None or to_seconds(act.time) <= verdict.time]

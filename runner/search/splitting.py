@@ -27,7 +27,7 @@ from ..provenance import version_of
 from ..shown import finite, short
 from ..student import student_quantile
 from ..tables import Table, Tabled
-from .tried import Tried
+from .tried import NUMBER, Tried
 
 SHARE = 0.2  # of the runs that should get from one level to the next: few levels, and yet many runs at each
 ENOUGH = 0.1  # of the runs from a level that break the property: it needs no further level
@@ -279,15 +279,15 @@ def rare(
         raise EpicycleError(f"an interval takes 2 runs and 2 repetitions or more, not {runs} and {repetitions}")
     about = {
         "model": model.name, "seed": seed, "until": until, "property": known[monitor], "guide": known[guide],
-        "runs": runs, "version": version_of("epicycle"),
+        "runs": runs,
         "digest": "" if folder is None else first.run(until=until).digest,
     }  # fmt: skip
-    tried = Tried(about, folder)
+    tried = Tried(model, about, [[NUMBER], NUMBER, (int,), (int,)], folder)
     trials = _Trials(model, monitor, guide, seed, until, runs)
     levels, tags_of_run, made, tags = tried.outcome("levels", lambda: [*trials.levels(), *trials.spent()])
 
     def repetition(key: str) -> tuple[list[float], int, int]:
-        shares, made, tags = tried.outcome(key, lambda: [trials.shares(levels, key), *trials.spent()])
+        shares, _, made, tags = tried.outcome(key, lambda: [trials.shares(levels, key), 0, *trials.spent()])
         return shares, made, tags
 
     found: list[list[float]] = []

@@ -29,13 +29,16 @@ _noted: ContextVar[Noted | None] = ContextVar("noted", default=None)
 
 @contextmanager
 def noting() -> Iterator[Noted]:
-    """What loading models reads, filled while it reads."""
-    found = Noted()
+    """What loading models reads, filled while it reads; whoever notes around it is told, too."""
+    found, outer = Noted(), _noted.get()
     token = _noted.set(found)
     try:
         yield found
     finally:
         _noted.reset(token)
+        if outer is not None:
+            outer.files |= found.files
+            outer.packages |= found.packages
 
 
 def note_file(path: Path, data: bytes) -> None:
