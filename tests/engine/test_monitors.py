@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import random  # noqa: TID251 (what to try, and not what a model draws)
 from pathlib import Path
 from typing import Any
 
@@ -97,8 +98,96 @@ def test_margins_that_are_linear_between_tokens() -> None:
     assert results.monitors["low"] == Verdict(False, -2.0, 3.0, {"a.output": 8})
 
 
-def test_what_is_sent_last_at_a_time_counts() -> None:
-    assert run([[0, 1], [2, 9], [2, 3]], "low: always a.output < 5").monitors["low"] == Verdict(True, 2.0)
+@pytest.mark.parametrize("between", ["hold", "linear"])
+def test_every_token_of_a_tag_counts(between: str) -> None:
+    sent = [[0, 1], [2, 9], [2, 3]]
+    found = run(sent, f"low: {{property: always after 2 s a.output < 5, between: {between}}}").monitors["low"]
+    assert (found.holds, found.robustness, found.time) == (False, -4.0, 2.0)
+    found = run(sent, f"high: {{property: eventually a.output > 5, between: {between}}}").monitors["high"]
+    assert found == Verdict(True, 4.0)
+
+
+@pytest.mark.parametrize(
+    ("source", "verdict"),
+    [
+        ("always from 2 s to 2 s a.output < 5", Verdict(False, -4.0, 2.0, {"a.output": 9})),
+        ("always after 2 s a.output < 5", Verdict(False, -4.0, 2.0, {"a.output": 9})),
+        ("eventually within 2 s a.output > 5", Verdict(True, 4.0)),
+        ("eventually (a.output > 5 for 0 s)", Verdict(False, -2.0, 6.0, {"a.output": 3})),  # the 3 is of that instant
+        ("eventually (a.output > 5 and eventually within 0 s a.output < 4)", Verdict(True, 1.0)),
+        (
+            "eventually (a.output < 4 and eventually within 0 s a.output > 5)",
+            Verdict(False, -2.0, 6.0, {"a.output": 3}),
+        ),
+        ("always a.output < 9.5 and (a.output < 5 until a.output == 9)", Verdict(True, 0.0)),
+        ("a.output < 5 until a.output == 3", Verdict(False, -2.0)),  # the 9 comes before the 3
+    ],
+)
+def test_operators_within_an_instant(source: str, verdict: Verdict) -> None:
+    assert run([[0, 1], [2, 9], [2, 3]], f"it: {source}").monitors["it"] == verdict
+
+
+class Both(Actor):
+    """Sends the numbers of each list at one of two ports, the first port first."""
+
+    is_source = True
+    x = OutputPort(object)
+    y = OutputPort(object)
+    later = Parameter(bool, False, doc="whether y sends a microstep after x")
+
+    def initialize(self) -> None:
+        self._steps = [(1, 1), (5, 5), (2, 2)]
+        self.wake_in(1.0)
+        self._held: Any = None
+
+    def fire(self) -> None:
+        if self._held is not None:
+            self.y.send(self._held)
+            self._held = None
+        elif self._steps:
+            one, other = self._steps.pop(0)
+            self.x.send(one)
+            self.x.send(one + 1)
+            if self.later:
+                self._held = other
+                self.wake_in(0.0)
+                return
+            self.y.send(other)
+            self.y.send(other + 1)
+        if self._steps:
+            self.wake_in(1.0)
+
+
+@pytest.mark.parametrize(
+    ("later", "verdict"),
+    [
+        (False, Verdict(True, 0.0)),  # the first of each, the second of each
+        (True, Verdict(False, -5.0, 1.0, {"p.x": 2, "p.y": 1})),  # at that microstep, y is still what it was
+    ],
+)
+def test_ports_are_compared_once_all_have_sent_what_they_send_at_a_tag(later: bool, verdict: Verdict) -> None:
+    built = Model("m", stop=10.0)
+    built.add(Both("p", later=later))
+    built.monitor("same", "always p.x == p.y")
+    assert Simulation(built).run().monitors["same"] == verdict
+
+
+@pytest.mark.parametrize("between", ["hold", "linear"])
+def test_always_is_broken_by_any_token_and_by_none(between: str) -> None:
+    for number in range(60):
+        draw = random.Random(f"tokens {number}")
+        sent = sorted([draw.randrange(4), draw.randrange(9)] for _ in range(draw.randrange(1, 9)))
+        draw.shuffle(sent)
+        sent.sort(key=lambda each: each[0])  # at one time, in any order
+        limit = draw.randrange(9)
+        monitors = (
+            f"low: {{property: always a.output <= {limit}, between: {between}}}\n"
+            f"  high: {{property: eventually a.output > {limit}, between: {between}}}"
+        )
+        found = run(sent, monitors).monitors
+        most = max(value for _, value in sent)
+        assert (found["low"].holds, found["low"].robustness) == (most <= limit, limit - most), sent
+        assert (found["high"].holds, found["high"].robustness) == (most > limit, most - limit), sent
 
 
 def test_a_condition_that_cannot_be_judged() -> None:
