@@ -6,11 +6,11 @@ from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
-from epicycle.actors import ParameterError, declared_parameters, did_you_mean
+from epicycle.actors import ParameterError, Quantity, UnitError, declared_parameters, did_you_mean, parse_unit
 from epicycle.aspects import Reading
 
 from ..graph import Monitor
-from ..temporal import Condition, PropertyError, Requirement, Sends, leaves, property_of
+from ..temporal import Condition, Property, PropertyError, Requirement, Sends, leaves, property_of
 from ..text import Position, Problems, Text, within
 from .draft import Draft
 from .looks import Looks
@@ -57,7 +57,36 @@ def monitor_of(
         return None
     looks = Looks(draft, Paths(draft), name, "", problems, called="monitor")
     readings = [_readings(looks, each, place) for each in leaves(found)]
-    return Monitor(name, requirement, found, readings) if len(problems) == before else None
+    size = _size(found, requirement.unit)
+    if isinstance(size, tuple):
+        problems.add(f"{what}: {size[0]}", places.get("unit", at), size[1])
+    return (
+        Monitor(name, requirement, found, readings, size)
+        if isinstance(size, float) and len(problems) == before
+        else None
+    )
+
+
+def _size(tree: Property, unit: str) -> float | tuple[str, str]:
+    """The size of the unit of a robustness, in what the margins are in; or why it does not fit, and what to do.
+
+    Where numbers have units, all counts in SI; elsewhere, the unit is that of what the ports send.
+    """
+    conditions = [each for each in leaves(tree) if isinstance(each, Condition)]
+    if not unit or not any(each.units for each in conditions):
+        return 1.0
+    try:
+        size = parse_unit(unit).factor
+    except UnitError as error:
+        return f"unit: {error}", "write the unit in which its robustness is to be given, such as m"
+    for condition in conditions:
+        for other in condition.compared:
+            try:
+                Quantity(1.0, other).to(unit)
+            except UnitError:
+                problem = f"its robustness cannot be given in {unit!r}: {condition.source!r} compares in {other!r}"
+                return problem, f"write 'unit: {other}', or, where units differ, a monitor for each, or no unit"
+    return size
 
 
 def _part(whole: Position, offset: int, length: int) -> Position:

@@ -144,7 +144,7 @@ class Monitoring:
     @property
     def most(self) -> float:
         """What its robustness is at most, by all that is settled; infinity if nothing is certain yet."""
-        return self._judge.most
+        return self.monitor.in_unit(self._judge.most)
 
     def add(self, port: str, tag: Moment, token: Any) -> None:
         """Take in what a port sends at a tag."""
@@ -217,8 +217,8 @@ class Monitoring:
             each.close(moment(end + 1))
         self._find(over=True)
         found, margin = self._finding, self._finding.robustness
-        if margin is not None and abs(margin) == TINY:
-            margin = 0.0
+        if margin is not None:
+            margin = 0.0 if abs(margin) == TINY else self.monitor.in_unit(margin)
         time = None if found.moment is None else to_seconds(time_of(found.moment))
         if found.holds is None:
             return Verdict(missing="the run was too short to tell")

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from epicycle.aspects import Reading
 
 from ..catalogue import Measure
-from ..temporal import Property, Requirement
+from ..temporal import TINY, Property, Requirement
 from ..text import Position
 from .model_graph import is_within
 
@@ -33,17 +33,25 @@ class Metric:
 
 @dataclass(frozen=True)
 class Monitor:
-    """A property that a run must have; ``readings`` are what each of its conditions reads: ports, and fields."""
+    """A property that a run must have; ``readings`` are what each of its conditions reads: ports, and fields.
+
+    ``size`` is that of the unit of its robustness, in what its margins are in.
+    """
 
     name: str
     requirement: Requirement
     tree: Property
     readings: list[list[Reading]]
+    size: float = 1.0
 
     @property
     def ports(self) -> list[str]:
         """The ports that it observes."""
         return list(dict.fromkeys(port for condition in self.readings for port, _ in condition))
+
+    def in_unit(self, margin: float) -> float:
+        """A margin in the unit of the robustness; one that stands for 0 stays as it is, with its sign."""
+        return margin if abs(margin) == TINY else margin / self.size
 
     @property
     def metrics(self) -> list[Metric]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import random  # noqa: TID251 (what to try, and not what a model draws)
 from pathlib import Path
 from typing import Any
@@ -202,6 +203,48 @@ def test_a_verdict_is_two_metrics() -> None:
     assert results.metrics == {"low": False, "low_robustness": -1.0}
     assert results.units == {"low": "1", "low_robustness": "m"}
     assert results.outcomes["low"].remarks == ["broken at 4 s, where a.output = 7"]
+
+
+@pytest.mark.parametrize(
+    ("source", "unit", "robustness"),
+    [
+        ("always a.output <= 420 deg", "deg", 420 - 7 * 180 / math.pi),
+        ("always a.output <= 420 deg", "rad", 420 * math.pi / 180 - 7),
+        ("always a.output <= 2 * 5 m", "cm", 300.0),
+        ("always a.output <= 6 m", "cm", -100.0),
+        ("always a.output <= 6", "cm", -1.0),  # of what the port sends
+        ("always within 3 s a.output <= 6", "ms", 3.0),
+        ("always a.output <= 7 km", "km", 6.993),
+        ("always a.output <= 7 m", "km", 0.0),
+    ],
+)
+def test_robustness_is_in_its_unit(source: str, unit: str, robustness: float) -> None:
+    built = model(RISING, f"it: {{property: {source}, unit: {unit}}}")
+    simulation = Simulation(built)
+    found = simulation.run()
+    verdict = found.monitors["it"]
+    assert verdict.robustness == pytest.approx(robustness, abs=1e-12)
+    assert found.metrics["it_robustness"] == verdict.robustness
+    assert found.units["it_robustness"] == unit
+    assert verdict.holds is (robustness >= 0.0)
+    assert simulation.robustness("it") == pytest.approx(robustness, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("source", "unit", "message"),
+    [
+        (
+            "always (a.output <= 60 deg and b.output < 3 m)",
+            "deg",
+            "monitor it: its robustness cannot be given in 'deg': 'b.output < 3 m' compares in 'm'",
+        ),
+        ("always a.output <= 60 deg", "degs", "monitor it: unit: unknown unit 'degs', did you mean 'deg/s'?"),
+    ],
+)
+def test_a_unit_that_does_not_fit(source: str, unit: str, message: str) -> None:
+    with pytest.raises(ModelError) as caught:
+        model(RISING, f"it: {{property: {source}, unit: {unit}}}")
+    assert [each.message for each in caught.value.problems] == [message]
 
 
 def test_an_infinite_robustness_is_no_metric() -> None:
