@@ -10,7 +10,7 @@ from epicycle.actors import EpicycleError, Moment, Way, to_seconds
 from epicycle.actors.expression import operand, value_at
 from epicycle.aspects import Reading
 
-from ..graph import Monitor
+from ..graph import Monitor, Part
 from ..results import Past, Verdict
 from ..temporal import (
     LINEAR,
@@ -101,8 +101,8 @@ class _Pulse:
         """The same as of a margin."""
 
 
-class Monitoring:
-    """Judges what the ports of a monitor send.
+class PartMonitoring:
+    """Judges what the ports of a part of a monitor send.
 
     A tag has as many samples as the port that sends most has tokens there: the first of each port, the second, and so
     on; a port that sends fewer stays at its last.
@@ -110,19 +110,20 @@ class Monitoring:
 
     __slots__ = (
         "_conditions", "_finding", "_is_late", "_judge", "_latest", "_listening", "_microstep", "_missing", "_moment",
-        "_past", "_sent", "_time", "_values", "monitor",
+        "_past", "_sent", "_time", "_values", "monitor", "part",
     )  # fmt: skip
 
-    def __init__(self, monitor: Monitor) -> None:
+    def __init__(self, monitor: Monitor, part: Part) -> None:
         self.monitor = monitor
-        self._judge = Judge(monitor.tree)
+        self.part = part
+        self._judge = Judge(part.tree)
         linear = monitor.requirement.between == LINEAR
         self._conditions: list[_Margin | _Pulse] = [
             _Margin(each, readings, source, linear) if isinstance(each, Condition) else _Pulse(source)
-            for each, readings, source in zip(leaves(monitor.tree), monitor.readings, self._judge.sources, strict=True)
+            for each, readings, source in zip(leaves(part.tree), part.readings, self._judge.sources, strict=True)
         ]
-        self._listening: dict[str, list[_Margin | _Pulse]] = {port: [] for port in monitor.ports}
-        for condition, readings in zip(self._conditions, monitor.readings, strict=True):
+        self._listening: dict[str, list[_Margin | _Pulse]] = {port: [] for port in part.ports}
+        for condition, readings in zip(self._conditions, part.readings, strict=True):
             for port in dict.fromkeys(port for port, _ in readings):
                 self._listening[port].append(condition)
         self._latest: dict[str, Any] = {}
@@ -132,7 +133,7 @@ class Monitoring:
         self._sent: dict[str, list[Any]] = {}  # at the present tag
         self._finding = Finding()
         self._missing = ""  # why it cannot be judged
-        self._is_late = looks_ahead(monitor.tree) or linear  # a break may be found out later than it happens
+        self._is_late = looks_ahead(part.tree) or linear  # a break may be found out later than it happens
         self._past: Past[tuple[int, dict[str, Any]]] = Past()
         self._values: dict[str, Any] = {}  # of its ports where it broke first
 
@@ -205,7 +206,7 @@ class Monitoring:
         return {".".join((port, *path)): value_at(known[port], path) for port, path in asked if port in known}
 
     def _asked(self) -> Iterable[list[Reading]]:
-        pairs = zip(leaves(self.monitor.tree), self.monitor.readings, strict=True)
+        pairs = zip(leaves(self.part.tree), self.part.readings, strict=True)
         return (readings for condition, readings in pairs if isinstance(condition, Condition))
 
     def verdict(self, end: int) -> Verdict:
@@ -225,12 +226,62 @@ class Monitoring:
         return Verdict(found.holds, margin, time, self._values)
 
 
+class Monitoring:
+    """A monitor in a run: what is judged of its parts, each by itself, together."""
+
+    __slots__ = ("monitor", "parts")
+
+    def __init__(self, monitor: Monitor) -> None:
+        self.monitor = monitor
+        self.parts = [PartMonitoring(monitor, part) for part in monitor.parts]
+
+    @property
+    def is_broken(self) -> bool:
+        """Whether it is certain that the run does not have the property."""
+        broken = [each.is_broken for each in self.parts]
+        return bool(broken) and (all(broken) if self.monitor.any else any(broken))
+
+    @property
+    def most(self) -> float:
+        """What its robustness is at most, by all that is settled; infinity if nothing is certain yet."""
+        each = (part.most for part in self.parts)
+        return max(each, default=math.inf) if self.monitor.any else min(each, default=math.inf)
+
+    def settle(self, upcoming: int) -> None:
+        """What was sent by now stands until a later time (ns)."""
+        for each in self.parts:
+            each.settle(upcoming)
+
+    def verdict(self, end: int) -> Verdict:
+        """What it comes to when the run ends at a time (ns); nothing more may be added."""
+        found = {each.part.of: each.verdict(end) for each in self.parts}
+        if len(found) == 1 and "" in found:
+            return found[""]
+        if not found:
+            return Verdict(missing="its pattern matches nothing in this model")
+        is_any = self.monitor.any
+        deciding = {of: each for of, each in found.items() if each.holds is is_any}
+        if not deciding:
+            for of, each in found.items():
+                if each.holds is None:
+                    return Verdict(missing=f"of {of}: {each.missing}")
+            deciding = found
+        margins = [each.robustness for each in deciding.values() if each.robustness is not None]
+        holds = next(iter(deciding.values())).holds
+        margin = max(margins) if is_any else min(margins)
+        if holds:
+            return Verdict(True, margin)
+        in_order = sorted(deciding, key=lambda of: math.inf if (time := found[of].time) is None else time)
+        shown = found[in_order[-1 if is_any else 0]]  # it is broken when the last is, or the first
+        return Verdict(False, margin, shown.time, shown.values, broken_by=() if is_any else tuple(in_order))
+
+
 class Listening(Way):
-    """Hands the tokens of a port to a monitor."""
+    """Hands the tokens of a port to a part of a monitor."""
 
     __slots__ = ("director", "monitoring", "port")
 
-    def __init__(self, monitoring: Monitoring, port: str, director: Director) -> None:
+    def __init__(self, monitoring: PartMonitoring, port: str, director: Director) -> None:
         self.monitoring = monitoring
         self.port = port
         self.director = director

@@ -313,3 +313,105 @@ def test_a_broken_monitor_is_an_exit_code_on_request(tmp_path: Path, capsys: pyt
     assert main(["run", str(file), "--json", "--check", "--until", "1"]) == 3  # as it is not late yet
     file.write_text(file.read_text(encoding="utf-8").replace("< 2", "< 9"), encoding="utf-8")
     assert main(["run", str(file), "--json", "--check"]) == 0
+
+
+def drones(monitors: str, count: int = 3) -> Model:
+    """Drones that send 1 at first, and 5 + their index after 3, 2, 1 s."""
+    return load(
+        f"""
+parameters: {{n: {count}}}
+actors:
+  drone: {{type: Steps, count: "${{n}}", values: "${{[[0, 1], [3 - index, 5 + index]]}}"}}
+run: {{stop: 5 s}}
+monitors:
+  {monitors}
+""",
+        types=[Steps],
+    )
+
+
+@pytest.mark.parametrize(
+    ("source", "verdict", "remark"),
+    [
+        ("for every drone[*], always drone[*].output < 8", Verdict(True, 1.0), ""),
+        (
+            "for every drone[*], always drone[*].output < 7",
+            Verdict(False, 0.0, 1.0, {"drone[2].output": 7}, broken_by=("drone[2]",)),
+            "broken by drone[2] at 1 s, where drone[2].output = 7",
+        ),
+        (
+            "'for every drone[*]: always drone[*].output < 3'",
+            Verdict(False, -4.0, 1.0, {"drone[2].output": 7}, broken_by=("drone[2]", "drone[1]", "drone[0]")),
+            "broken by drone[2] at 1 s, where drone[2].output = 7; then by drone[1] and drone[0]",
+        ),
+        ("for any drone[*], always drone[*].output < 6", Verdict(True, 1.0), ""),
+        (
+            "for any drone[*], always drone[*].output < 5",
+            Verdict(False, 0.0, 3.0, {"drone[0].output": 5}),
+            "broken at 3 s, where drone[0].output = 5",
+        ),
+        (
+            "for every drone[*], eventually within 9 s drone[*].output > 8",
+            Verdict(missing="of drone[0]: the run was too short to tell"),
+            "",
+        ),
+        ("for every drone[*].output, eventually drone[*].output > 4.5", Verdict(True, 0.5), ""),
+        ("for every drone[*], always drone[*].output <= drone[2].output + 4", Verdict(True, 4.0), ""),
+    ],
+)
+def test_a_monitor_of_every_one_or_any(source: str, verdict: Verdict, remark: str) -> None:
+    results = Simulation(drones(f"it: {source}")).run()
+    assert results.monitors["it"] == verdict
+    assert verdict.remark == remark
+    assert results.metrics["it"] is verdict.holds
+    assert results.monitors["it"].plain().get("broken_by", []) == list(verdict.broken_by)
+
+
+def test_many_that_broke_a_monitor() -> None:
+    broken_by = tuple(f"drone[{number}]" for number in range(9))
+    verdict = Verdict(False, -1.0, broken_by=broken_by)
+    assert verdict.remark == "broken by drone[0]; then by drone[1], drone[2], drone[3] and 5 others"
+
+
+def test_a_monitor_of_every_one_ends_a_run() -> None:
+    found = Simulation(drones("it: {property: 'for every drone[*], always drone[*].output < 7', stop: true}")).run()
+    assert (found.stopped, found.end) == ("monitor it", 1.0)
+
+
+def test_a_monitor_of_none() -> None:
+    found = Simulation(drones("it: for every drone[*], always drone[*].output < 7", count=0)).run()
+    assert found.monitors["it"] == Verdict(missing="its pattern matches nothing in this model")
+
+
+def test_a_monitor_of_every_one_forgets_what_is_removed() -> None:
+    built = drones("it: for every drone[*], always drone[*].output < 7")
+    built.forget("drone[2]")
+    assert Simulation(built).run().monitors["it"] == Verdict(True, 1.0)
+
+
+@pytest.mark.parametrize(
+    ("source", "message"),
+    [
+        ("for all drone[*], always drone[*].output < 7", "monitor it: 'for all' is not known here"),
+        ("for every", "monitor it: 'for every' names no pattern"),
+        ("for every drone[*]", "monitor it: 'for every' names no property"),
+        (
+            "for every drone[*], always drone[1].output < 7",
+            "monitor it: the property does not name drone[*], so it is the same for all",
+        ),
+        (
+            "for every drones[*], always drones[*].output < 7",
+            "monitor it: 'drones[*]' matches no actor, composite or output port, did you mean 'drone[*]'?",
+        ),
+        ("for every drone[, always drone[.output < 7", "monitor it: 'drone[' is not a pattern: "),
+        (
+            "for every drone[*], always drone[*].outptu < 7",
+            "monitor it: property: 'drone[0].outptu' names no output port, did you mean 'drone[0].output'?",
+        ),
+        ("for every drone[*], drone[*].output < 7", "monitor it: 'drone[0].output < 7' would only be judged at the"),
+    ],
+)
+def test_a_pattern_that_is_wrong(source: str, message: str) -> None:
+    with pytest.raises(ModelError) as caught:
+        drones(f"it: {source}")
+    assert [each.message[: len(message)] for each in caught.value.problems] == [message]
