@@ -291,8 +291,9 @@ class Model(Scope, Tabled):
         ]
         self.recorded = [port for port in self.recorded if not is_within(port, path)]
         self.stop_ports = [port for port in self.stop_ports if not is_within(port, path)]
-        gone = {each.name for each in self.monitors if any(is_within(port, path) for port in each.ports)}
-        self.monitors = [each for each in self.monitors if each.name not in gone]
+        left = [each.without(path) for each in self.monitors]
+        gone = {each.name for each, kept in zip(self.monitors, left, strict=True) if kept is None}
+        self.monitors = [each for each in left if each is not None]
         self.metrics = [metric.without(path) for metric in self.metrics if metric.monitor not in gone]
 
     # -- for people -----------------------------------------------------------------------------------------------

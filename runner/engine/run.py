@@ -101,9 +101,9 @@ class Run:
                 measuring = Measuring(self._measurements[metric.name], path, self.director)
                 found.setdefault(path, []).append(measuring)
         for monitor in self.model.monitors:
-            for path in monitor.ports:
-                listening = Listening(self._monitorings[monitor.name], path, self.director)
-                found.setdefault(path, []).append(listening)
+            for part in self._monitorings[monitor.name].parts:
+                for path in part.part.ports:
+                    found.setdefault(path, []).append(Listening(part, path, self.director))
         if any(monitor.requirement.stop for monitor in self.model.monitors):
             self.director.watch = self._stop_if_broken
         for path in self.model.stop_ports:

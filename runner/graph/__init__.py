@@ -6,7 +6,7 @@ from .digraph import find_loop, in_order
 from .model_graph import Detour, Hop, Modal, ModelGraph, PortNode, Wire, is_within
 from .ranks import Postings, Region, dependencies, firing_order, postings
 from .rules import LIKE, PTOLEMY, TIES, Like, Rules, Ties
-from .watched import Metric, Monitor, Watched
+from .watched import Metric, Monitor, Part, Watched
 from .woven import AspectModel, WovenAspect, check_processors, extent
 
 __all__ = [
@@ -24,6 +24,7 @@ __all__ = [
     "Modal",
     "ModelGraph",
     "Monitor",
+    "Part",
     "PortNode",
     "Postings",
     "Region",

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from epicycle.aspects import Reading
 
 from ..catalogue import Measure
-from ..temporal import Property, Requirement
+from ..temporal import TINY, Property, Requirement
 from ..text import Position
 from .model_graph import is_within
 
@@ -32,11 +32,10 @@ class Metric:
 
 
 @dataclass(frozen=True)
-class Monitor:
-    """A property that a run must have; ``readings`` are what each of its conditions reads: ports, and fields."""
+class Part:
+    """The property of one of several, whose path is ``of``; ``readings`` are the ports and fields of each condition."""
 
-    name: str
-    requirement: Requirement
+    of: str
     tree: Property
     readings: list[list[Reading]]
 
@@ -44,6 +43,34 @@ class Monitor:
     def ports(self) -> list[str]:
         """The ports that it observes."""
         return list(dict.fromkeys(port for condition in self.readings for port, _ in condition))
+
+
+@dataclass(frozen=True)
+class Monitor:
+    """A property that a run must have: that of every part, or of ``any``; most monitors have one.
+
+    ``size`` is that of the unit of its robustness, in what its margins are in.
+    """
+
+    name: str
+    requirement: Requirement
+    parts: list[Part]
+    any: bool = False
+    size: float = 1.0
+
+    @property
+    def ports(self) -> list[str]:
+        """The ports that it observes."""
+        return list(dict.fromkeys(port for part in self.parts for port in part.ports))
+
+    def without(self, path: str) -> Monitor | None:
+        """The monitor after the removal of a part of the model that it may have watched; None if nothing is left."""
+        parts = [each for each in self.parts if not any(is_within(port, path) for port in each.ports)]
+        return replace(self, parts=parts) if parts or not self.parts else None
+
+    def in_unit(self, margin: float) -> float:
+        """A margin in the unit of the robustness; one that stands for 0 stays as it is, with its sign."""
+        return margin if abs(margin) == TINY else margin / self.size
 
     @property
     def metrics(self) -> list[Metric]:

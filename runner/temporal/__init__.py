@@ -7,10 +7,12 @@ from .judge import Finding, Judge
 from .operators import Source
 from .property import Condition, Property, Sends, leaves, looks_ahead
 from .requirement import HOLD, LINEAR, Requirement, RequirementOptions
-from .signal import TINY, Line, Piece
+from .signal import TINY, Line, Piece, moment, time_of
+from .spread import Spread, spread_of
 from .syntax import WORDS, PropertyError, property_of
 
 __all__ = [
     "HOLD", "LINEAR", "TINY", "WORDS", "Condition", "Finding", "Judge", "Line", "Piece", "Property", "PropertyError",
-    "Requirement", "RequirementOptions", "Sends", "Source", "leaves", "looks_ahead", "property_of",
+    "Requirement", "RequirementOptions", "Sends", "Source", "Spread", "leaves", "looks_ahead", "moment", "property_of",
+    "spread_of", "time_of",
 ]  # fmt: skip

@@ -8,15 +8,15 @@ from typing import NamedTuple
 
 from .operators import Operator, Source, operator_of
 from .property import Junction, Not, Property, Quantified, leaves
-from .signal import Line, Piece, at, by_sign
+from .signal import Line, Piece, at, by_sign, moment
 
 
 class Finding(NamedTuple):
-    """Whether a property holds (None if that cannot be told), by how much, and when it broke first (ns)."""
+    """Whether a property holds (None if that cannot be told), by how much, and the moment at which it broke first."""
 
     holds: bool | None = None
     robustness: float | None = None
-    time: int | None = None
+    moment: int | None = None
 
 
 class Judge:
@@ -41,21 +41,21 @@ class Judge:
 class _Throughout:
     """``always``, or ``eventually`` if ``any``, at the beginning."""
 
-    __slots__ = ("_any", "_end", "_extreme", "_is_whole", "_known", "_of", "_start", "_time")
+    __slots__ = ("_any", "_end", "_extreme", "_is_whole", "_known", "_moment", "_of", "_start")
 
     def __init__(self, tree: Quantified, of: Operator) -> None:
         self._any = tree.any
         self._of = of
-        self._start = tree.start
-        self._end = tree.end
+        self._start = moment(tree.start)
+        self._end = None if tree.end is None else moment(tree.end + 1) - 1  # with all samples of that instant
         self._extreme = -math.inf if tree.any else math.inf
         self._known = -1
-        self._time: int | None = None  # when it was decided
+        self._moment: int | None = None  # when it was decided
         self._is_whole = False
 
     @property
     def most(self) -> float:
-        """See ``Judge``; a later time may still be the one that is awaited."""
+        """See ``Judge``; a later moment may still be the one that is awaited."""
         return math.inf if self._any and not self._is_whole else self._extreme
 
     def finding(self, over: bool) -> Finding:
@@ -65,20 +65,20 @@ class _Throughout:
             end = piece.end if self._end is None else min(piece.end, self._end)
             if piece.value is not None and start <= end:
                 self._add(start, end, piece.value)
-        is_decided = self._time is not None
+        is_decided = self._moment is not None
         self._is_whole = over if self._end is None else self._known >= self._end
         if not (is_decided or self._is_whole):
             return Finding()
         holds = self._any == is_decided
-        when = self._time if not self._any else self._known if self._end is None else self._end
+        when = self._moment if not self._any else self._known if self._end is None else self._end
         return Finding(holds, self._extreme, None if holds else when)
 
     def _add(self, start: int, end: int, value: float | Line) -> None:
         both = (self._extreme, at(value, start), at(value, end))
         self._extreme = max(both) if self._any else min(both)
-        if self._time is None:
+        if self._moment is None:
             deciding = (each.start for each in by_sign(start, end, value) if (at(value, each.start) > 0.0) == self._any)
-            self._time = next(deciding, None)
+            self._moment = next(deciding, None)
 
 
 class _Both:
@@ -104,8 +104,8 @@ class _Both:
         if not found:
             return Finding()
         margins = [each.robustness for each in found if each.robustness is not None]
-        times = [each.time for each in found if each.time is not None]
-        when = None if not times else max(times) if self._any else min(times)
+        moments = [each.moment for each in found if each.moment is not None]
+        when = None if not moments else max(moments) if self._any else min(moments)
         return Finding(found[0].holds, max(margins) if self._any else min(margins), when)
 
 

@@ -15,7 +15,7 @@ from collections.abc import Iterable, Iterator
 from typing import Protocol
 
 from .property import Junction, Not, Property, Quantified, Until
-from .signal import Line, Piece, Value, at, by_sign, earlier, extreme, negated, overlaid
+from .signal import Line, Piece, Value, at, by_sign, earlier, extreme, moment, negated, overlaid, time_of
 
 Found = list[Piece]
 
@@ -108,8 +108,8 @@ class Window:
         self._of = of
         self._start = start
         self._end = end
-        self._next = 0  # the time that its own signal has not come to yet
-        self._back: deque[Piece] = deque()  # the piece in which the window of that time begins, and all after it
+        self._next = 0  # the moment that its own signal has not come to yet
+        self._back: deque[Piece] = deque()  # the piece in which the window of that moment begins, and all after it
         self._front: deque[Piece] = deque()  # the same of the window's end
         self._ends: deque[tuple[int, float]] = deque()  # ends of pieces between them that may be its extreme
         self._last: int | None = None  # the end of the run, once it is known
@@ -120,21 +120,19 @@ class Window:
             self._put(piece)
         if over and self._last is None and self._back:
             self._last = self._back[-1].end
-            self._put(Piece(self._last + 1, self._last + self._end + 1, None))
+            self._put(Piece(self._last + 1, self._last + moment(self._end + 1), None))
         found: Found = []
         if not self._back:
             return found
-        known = self._back[-1].end - self._end
-        if self._last is not None:
-            known = self._last
+        known = self._ending_by(self._back[-1].end) if self._last is None else self._last
         while (now := self._next) <= known:
             self._slide(now)
-            until = min(self._back[0].end - self._start, self._front[0].end - self._end, known)
+            until = min(self._beginning_by(self._back[0].end), self._ending_by(self._front[0].end), known)
             if self._ends:
-                until = min(until, self._ends[0][0] - self._start)
-            is_cut = self._last is not None and now + self._end > self._last
+                until = min(until, self._beginning_by(self._ends[0][0]))
+            is_cut = self._last is not None and self._ends_at(now) > self._last
             if self._last is not None and not is_cut:
-                until = min(until, self._last - self._end)
+                until = min(until, self._ending_by(self._last))
             pieces = self._extreme(now, until)
             if is_cut:
                 pieces = [part for each in pieces for part in _deciding(*each, self._any)]
@@ -146,26 +144,43 @@ class Window:
         for pieces in (self._back, self._front):
             _append(pieces, piece)
 
+    def _begins_at(self, now: int) -> int:
+        """The first moment of the window of a moment: that itself, or where the instant begins ``start`` ns later."""
+        return moment(time_of(now) + self._start) if self._start else now
+
+    def _ends_at(self, now: int) -> int:
+        """The last moment of that window: the last of the instant ``end`` ns later."""
+        return moment(time_of(now) + self._end + 1) - 1
+
+    def _beginning_by(self, then: int) -> int:
+        """The last moment whose window begins by then."""
+        return moment(time_of(then) - self._start + 1) - 1 if self._start else then
+
+    def _ending_by(self, then: int) -> int:
+        """The last moment whose window ends by then."""
+        return moment(time_of(then + 1) - self._end) - 1
+
     def _slide(self, now: int) -> None:
-        """Let the window be that of a time."""
-        while self._back[0].end < now + self._start:
+        """Let the window be that of a moment."""
+        begin, end = self._begins_at(now), self._ends_at(now)
+        while self._back[0].end < begin:
             self._back.popleft()
-        while self._front[0].end < now + self._end:
+        while self._front[0].end < end:
             passed = self._front.popleft()
             self._enter(passed.end, passed.value)
             if isinstance(self._front[0].value, Line):
                 self._enter(self._front[0].start, self._front[0].value)
-        while self._ends and self._ends[0][0] < now + self._start:
+        while self._ends and self._ends[0][0] < begin:
             self._ends.popleft()
 
-    def _enter(self, time: int, of: Value) -> None:
+    def _enter(self, moment: int, of: Value) -> None:
         """An end of a piece comes into the window."""
         if of is None:
             return
-        value, ends = at(of, time), self._ends
+        value, ends = at(of, moment), self._ends
         while ends and (ends[-1][1] <= value if self._any else ends[-1][1] >= value):
             ends.pop()
-        ends.append((time, value))
+        ends.append((moment, value))
 
     def _extreme(self, start: int, end: int) -> Found:
         parts: list[float | Line] = [self._ends[0][1]] if self._ends else []
@@ -209,7 +224,7 @@ class Rest:
         pieces, self._pieces = self._pieces, []
         last = pieces[-1].end
         rest = -math.inf if self._any else math.inf
-        backwards: Found = [Piece(last + 1, last + self._start, rest)] if self._start else []
+        backwards: Found = [Piece(last + 1, last + moment(self._start), rest)] if self._start else []
         for start, end, value in reversed(pieces):
             if isinstance(value, Line):
                 is_falling = value.at(start) > value.at(end)
@@ -255,12 +270,13 @@ class Awaiting:
             return low
         # In a window that ends before the run does: what was awaited comes in it, and all is well until some time.
         found = Joining(False, Window(True, Source(right), self._start, self._end), Source(low)).take(True)
-        whole = [each for each in found if each.start <= last - self._end]
+        sure_until = last - moment(self._end)
+        whole = [each for each in found if each.start <= sure_until]
         if whole:
-            whole[-1] = whole[-1]._replace(end=min(whole[-1].end, last - self._end))
+            whole[-1] = whole[-1]._replace(end=min(whole[-1].end, sure_until))
         # In one that is cut, what comes after the run may be what was awaited.
         high = self._after(left, _until(left, right, math.inf), math.inf)
-        first = max(last - self._end + 1, 0)
+        first = max(sure_until + 1, 0)
         sure, lost = deque(_parts(low, True)), deque(_parts(high, False))
         cut = [Piece(start, end, other if one is None else one) for start, end, one, other in overlaid(sure, lost)]
         return whole + [each._replace(start=max(each.start, first)) for each in cut if each.end >= first]
@@ -272,7 +288,7 @@ class Awaiting:
         last = left[-1].end
         moved = [*earlier(awaited, self._start)]
         first = moved[-1].end + 1 if moved else 0
-        held = Window(False, Source([*left, Piece(last + 1, last + self._start, math.inf)]), 0, self._start - 1)
+        held = Window(False, Source([*left, Piece(last + 1, last + moment(self._start), math.inf)]), 0, self._start - 1)
         tail = [Piece(first, last, beyond)] if first <= last else []
         both = Joining(False, held, Source([*moved, *tail]))
         return [each for each in both.take(False) if each.start <= last]
@@ -287,7 +303,7 @@ def _parts(pieces: Found, positive: bool) -> Found:
 
 
 def _until(left: Found, right: Found, beyond: float) -> Found:
-    """``left until right`` from every time on, what is awaited coming, or not, right after the end."""
+    """``left until right`` from every moment on, what is awaited coming, or not, right after the end."""
     backwards: Found = []
     rest = beyond
     for start, end, one, other in reversed(list(overlaid(deque(left), deque(right)))):
@@ -309,7 +325,7 @@ def _until_on(start: int, end: int, left: float | Line, right: float | Line, res
     best = min(at(left, end), rest)
     if right_falls:
         return list(extreme(start, end, right, best, True))
-    low, high = start, end + 1  # the first time at which the right is above what the left was just before, if any
+    low, high = start, end + 1  # the first moment at which the right is above what the left was just before, if any
     while high - low > 1:
         middle = (low + high) // 2
         if at(right, middle) >= at(left, middle - 1):

@@ -33,6 +33,8 @@ class Condition:
     sides: PortFormula  # a list of what is compared, or of the one thing that is true or false
     operators: tuple[str, ...]
     difference: PortFormula | None = None  # of the sides, if there are two that may be numbers
+    units: tuple[str, ...] = ()  # of the numbers in it, which count in SI
+    compared: tuple[str, ...] = ()  # of the sides that are just a number with a unit
 
     @property
     def references(self) -> tuple[str, ...]:

@@ -30,6 +30,8 @@ class Requirement(Configurable):
         doc="the margins of comparisons between two tokens: they hold, or change linearly",
     )
     stop = Parameter(bool, False, doc="whether the run ends as soon as the property is broken")
-    unit = Parameter(str, "", doc="the unit of its robustness")
+    unit = Parameter(
+        str, "", doc="the unit of its robustness, which is converted to it where the property has numbers with units"
+    )
     doc = Parameter(str, "", doc="what it is")
     label = Parameter(str, "", doc="what it is called in figures and reports (default: its name)")

@@ -1,4 +1,7 @@
-"""Signals over time: pieces that follow each other without a gap, on whole nanoseconds.
+"""Signals over superdense time: pieces that follow each other without a gap.
+
+An instant is a whole nanosecond, and has ``MOMENTS`` moments, one for each sample; the last stands until the
+instant is over.  Moments are numbered through: ``moment(time, sample)``.
 
 A piece says what a signal is from its start to its end, both included: a number, a ``Line``, or None where there is
 nothing to judge.
@@ -11,7 +14,18 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from typing import NamedTuple
 
+MOMENTS = 2**32  # of an instant: more than it can have samples
 TINY = math.ulp(0.0)  # stands for zero on the side of the truth, so that no margin is 0
+
+
+def moment(time: int, sample: int = 0) -> int:
+    """The moment of a sample at a time (ns)."""
+    return time * MOMENTS + sample
+
+
+def time_of(moment: int) -> int:
+    """The time (ns) of a moment."""
+    return moment // MOMENTS
 
 
 class Line(NamedTuple):
@@ -23,8 +37,9 @@ class Line(NamedTuple):
     last: float
     zero: float
 
-    def at(self, time: int) -> float:
-        """Its value at a time between the two."""
+    def at(self, moment: int) -> float:
+        """Its value at a moment between the two."""
+        time = time_of(moment)
         if time == self.start:
             return self.first
         if time == self.end:
@@ -44,24 +59,28 @@ Value = float | Line | None
 
 
 class Piece(NamedTuple):
-    """What a signal is from one time to another (ns), both included."""
+    """What a signal is from one moment to another, both included."""
 
     start: int
     end: int
     value: Value
 
 
-def at(value: float | Line, time: int) -> float:
-    """A value at a time."""
-    return value.at(time) if isinstance(value, Line) else value
+def at(value: float | Line, moment: int) -> float:
+    """A value at a moment."""
+    return value.at(moment) if isinstance(value, Line) else value
 
 
 def earlier(pieces: Iterable[Piece], by: int) -> Iterator[Piece]:
-    """The signal some ns earlier, from 0 on."""
+    """For each moment, what the signal is where the instant some ns later begins; by 0 ns, the signal itself."""
+    if by == 0:
+        yield from pieces
+        return
     for start, end, value in pieces:
-        if end >= by:
+        first, last = max(time_of(start + MOMENTS - 1) - by, 0), time_of(end) - by
+        if first <= last:
             moved = value.earlier(by) if isinstance(value, Line) else value
-            yield Piece(max(start - by, 0), end - by, moved)
+            yield Piece(moment(first), moment(last + 1) - 1, moved)
 
 
 def negated(pieces: Iterable[Piece]) -> Iterator[Piece]:
@@ -76,8 +95,8 @@ def extreme(start: int, end: int, one: float | Line, other: float | Line, greate
         yield Piece(start, end, max(one, other) if greatest else min(one, other))
         return
 
-    def is_ours(time: int) -> bool:
-        return (at(one, time) >= at(other, time)) == greatest
+    def is_ours(moment: int) -> bool:
+        return (at(one, moment) >= at(other, moment)) == greatest
 
     ours = is_ours(start)
     turn = end + 1 if is_ours(end) == ours else _first(start, end, is_ours, not ours)
@@ -93,14 +112,14 @@ def by_sign(start: int, end: int, value: float | Line) -> Iterator[Piece]:
         line = value
         ours = line.at(start) > 0.0
         if (line.at(end) > 0.0) != ours:
-            turn = _first(start, end, lambda time: line.at(time) > 0.0, not ours)
+            turn = _first(start, end, lambda moment: line.at(moment) > 0.0, not ours)
     yield Piece(start, turn - 1, value)
     if turn <= end:
         yield Piece(turn, end, value)
 
 
 def _first(start: int, end: int, holds: Callable[[int], bool], wanted: bool) -> int:
-    """The first time after ``start`` at which something is as it is at ``end``; it changes once."""
+    """The first moment after ``start`` at which something is as it is at ``end``; it changes once."""
     while end - start > 1:
         middle = (start + end) // 2
         if holds(middle) == wanted:
@@ -111,7 +130,7 @@ def _first(start: int, end: int, holds: Callable[[int], bool], wanted: bool) -> 
 
 
 def overlaid(left: deque[Piece], right: deque[Piece]) -> Iterator[tuple[int, int, Value, Value]]:
-    """What two signals are, from one time to another; that is taken out of both."""
+    """What two signals are, from one moment to another; that is taken out of both."""
     while left and right:
         (start, first_end, one), (_, second_end, other) = left.popleft(), right.popleft()
         end = min(first_end, second_end)

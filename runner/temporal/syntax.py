@@ -229,24 +229,33 @@ class _Parser:
 def condition_of(source: str) -> Condition:
     """A condition over ports; numbers with units count in SI.  Raises ``ExpressionError``."""
     plain = _QUANTITY.sub(_in_si, source)
+    units = tuple(match[3] for match in _QUANTITY.finditer(source) if _is_quantity(match))
     whole = PortFormula(plain)  # the errors of an expression
     names = DOTTED.sub(lambda match: "_" * len(match[0]), plain)  # of which only the length matters here
     tree = ast.parse(names, mode="eval").body
     if not isinstance(tree, ast.Compare) or any(type(each) not in _SIGNS for each in tree.ops):
-        return Condition(source, whole, PortFormula(f"[{plain}]"), ())
+        return Condition(source, whole, PortFormula(f"[{plain}]"), (), units=units)
     parts = [tree.left, *tree.comparators]
     sides = [f"({plain[part.col_offset : part.end_col_offset]})" for part in parts]
     signs = tuple(_SIGNS[type(each)] for each in tree.ops)
     assert set(signs) <= set(OPERATORS)
     is_single = len(signs) == 1 and signs[0] in ("<", "<=", ">", ">=")
     difference = PortFormula(" - ".join(sides)) if is_single else None
-    return Condition(source, whole, PortFormula(f"[{', '.join(sides)}]"), signs, difference)
+    texts = (each.strip().removeprefix("-") for each in re.split("[<>=!]=?", source))
+    matches = (_QUANTITY.fullmatch(each.strip()) for each in texts)
+    compared = tuple(match[3] for match in matches if match is not None and _is_quantity(match))
+    return Condition(source, whole, PortFormula(f"[{', '.join(sides)}]"), signs, difference, units, compared)
+
+
+def _is_quantity(match: re.Match[str]) -> bool:
+    text, _, unit = match.groups()
+    return text is None and unit not in ("if", "else", "in", "is", "and", "or", "not", "for")
 
 
 def _in_si(match: re.Match[str]) -> str:
-    text, number, unit = match.groups()
-    if text is not None or unit in ("if", "else", "in", "is", "and", "or", "not", "for"):
+    if not _is_quantity(match):
         return match[0]
+    _, number, unit = match.groups()
     try:
         return repr(counted_in_si(Quantity(float(number), unit)))
     except EpicycleError as error:

@@ -1,4 +1,4 @@
-"""The definition of the operators, word by word: every time is looked at, one after the other."""
+"""The definition of the operators, word by word: every sample is looked at, one after the other."""
 
 from __future__ import annotations
 
@@ -6,28 +6,28 @@ import math
 import random  # noqa: TID251 (what to try, and not what a model draws)
 from collections.abc import Iterator
 
-from epicycle.runner.temporal import TINY, Line, Piece, Property, Sends
+from epicycle.runner.temporal import TINY, Line, Piece, Property, Sends, moment
 from epicycle.runner.temporal.property import Junction, Not, Quantified, Until
 
-Values = list[float | None]  # at 0 ns, 1 ns, ...
+Values = list[float | None]  # in the samples, in superdense order
 
 
-def robustness(tree: Property, signals: Iterator[Values]) -> Values:
-    """The robustness of a property at all times, for the signals of its conditions, in their order."""
+def robustness(tree: Property, signals: Iterator[Values], times: list[int]) -> Values:
+    """The robustness of a property in all samples, for the signals of its conditions; ``times`` (ns) of the samples."""
     match tree:
         case Not():
-            return [None if value is None else -value for value in robustness(tree.of, signals)]
+            return [None if value is None else -value for value in robustness(tree.of, signals, times)]
         case Junction():
-            left = robustness(tree.left, signals)
-            pairs = zip(left, robustness(tree.right, signals), strict=True)
+            left = robustness(tree.left, signals, times)
+            pairs = zip(left, robustness(tree.right, signals, times), strict=True)
             return [_joined(tree.any, one, other) for one, other in pairs]
         case Quantified():
-            of = robustness(tree.of, signals)
-            return [_quantified(tree, of, time) for time in range(len(of))]
+            of = robustness(tree.of, signals, times)
+            return [_quantified(tree, of, times, sample) for sample in range(len(of))]
         case Until():
-            left = [math.inf if value is None else value for value in robustness(tree.left, signals)]
-            right = [-math.inf if value is None else value for value in robustness(tree.right, signals)]
-            return [_until(tree, left, right, time) for time in range(len(left))]
+            left = [math.inf if value is None else value for value in robustness(tree.left, signals, times)]
+            right = [-math.inf if value is None else value for value in robustness(tree.right, signals, times)]
+            return [_until(tree, left, right, times, sample) for sample in range(len(left))]
         case _:
             return next(signals)
 
@@ -39,28 +39,29 @@ def _joined(any: bool, one: float | None, other: float | None) -> float | None:
     return known if known is not None and (known > 0) == any else None
 
 
-def _quantified(tree: Quantified, of: Values, time: int) -> float | None:
-    last = len(of) - 1
-    end = last if tree.end is None else min(time + tree.end, last)
-    seen = [value for value in of[time + tree.start : end + 1] if value is not None]
+def _within(tree: Quantified | Until, times: list[int], sample: int, end: int | None) -> range:
+    """The samples from this one on whose time is in its window."""
+    first, last = times[sample] + tree.start, times[-1] if end is None else times[sample] + end
+    found = [each for each in range(sample, len(times)) if first <= times[each] <= last]
+    return range(found[0], found[-1] + 1) if found else range(0)
+
+
+def _quantified(tree: Quantified, of: Values, times: list[int], sample: int) -> float | None:
+    seen = [value for each in _within(tree, times, sample, tree.end) if (value := of[each]) is not None]
     found = max(seen, default=-math.inf) if tree.any else min(seen, default=math.inf)
-    is_cut = tree.end is not None and time + tree.end > last
+    is_cut = tree.end is not None and times[sample] + tree.end > times[-1]
     return None if is_cut and (found > 0) != tree.any else found
 
 
-def _until(tree: Until, left: list[float], right: list[float], time: int) -> float | None:
-    last = len(left) - 1
+def _until(tree: Until, left: list[float], right: list[float], times: list[int], sample: int) -> float | None:
+    def awaited(end: int | None) -> float:
+        samples = _within(tree, times, sample, end)
+        return max((min([right[each], *left[sample:each]]) for each in samples), default=-math.inf)
 
-    def awaited(end: int) -> float:
-        times = range(time + tree.start, min(end, last) + 1)
-        return max((min([right[each], *left[time:each]]) for each in times), default=-math.inf)
-
-    if tree.end is None:
-        return awaited(last)
-    low = awaited(time + tree.end)
-    if time + tree.end <= last or low > 0:
+    low = awaited(tree.end)
+    if tree.end is None or times[sample] + tree.end <= times[-1] or low > 0:
         return low
-    high = max(awaited(last), min(left[time:]))  # as if it came right after the end
+    high = max(awaited(None), min(left[sample:]))  # as if it came right after the end
     return high if high < 0 else None
 
 
@@ -88,20 +89,32 @@ def random_property(draw: random.Random, depth: int, *, unbounded: bool = True) 
     return Until(inner(), inner(), start, end)
 
 
-def random_signal(draw: random.Random, last: int, *, lines: bool) -> list[Piece]:
-    """A signal from 0 ns to the last time."""
-    pieces, time = [], 0
+def random_times(draw: random.Random) -> list[int]:
+    """The times (ns) of samples, from 0 on without a gap: one at most of them, sometimes more."""
+    return [time for time in range(draw.randrange(1, 15)) for _ in range(draw.choice([1, 1, 1, 2, 3]))]
+
+
+def moments_of(times: list[int]) -> list[int]:
+    """The moments at which samples of these times begin, and that at which the last one ends."""
+    found = [moment(time, number - times.index(time)) for number, time in enumerate(times)]
+    return [*found, moment(times[-1] + 1)]
+
+
+def random_signal(draw: random.Random, times: list[int], *, lines: bool) -> list[Piece]:
+    """A signal in samples of these times."""
+    moments, last = moments_of(times), len(times) - 1
+    pieces, sample = [], 0
     if draw.random() < 0.4:
-        time = draw.randrange(1, last + 2)
-        pieces.append(Piece(0, time - 1, None))
-    while time <= last:
-        end = min(time + draw.choice([0, 0, 1, 2, 3, 5]), last)
+        sample = draw.randrange(1, last + 2)
+        pieces.append(Piece(0, moments[sample] - 1, None))
+    while sample <= last:
+        end = min(sample + draw.choice([0, 0, 1, 2, 3, 5]), last)
         value: float | Line = _value(draw)
-        if lines and end > time and draw.random() < 0.5:
-            start, stop = time - draw.randrange(2), end + draw.randrange(2)
+        if lines and times[end] > times[sample] and draw.random() < 0.5:
+            start, stop = times[sample] - draw.randrange(2), times[end] + draw.randrange(2)
             value = Line(start, _value(draw), stop, _value(draw), draw.choice([TINY, -TINY]))
-        pieces.append(Piece(time, end, value))
-        time = end + 1
+        pieces.append(Piece(moments[sample], moments[end + 1] - 1, value))
+        sample = end + 1
     return pieces
 
 
@@ -109,10 +122,10 @@ def _value(draw: random.Random) -> float:
     return float(draw.randrange(-3, 4)) or draw.choice([TINY, -TINY])
 
 
-def values_of(pieces: list[Piece], last: int) -> Values:
-    """A signal at all times."""
-    return [
-        each.value.at(time) if isinstance(each.value, Line) else each.value
-        for each in pieces
-        for time in range(each.start, min(each.end, last) + 1)
-    ]
+def values_of(pieces: list[Piece], times: list[int]) -> Values:
+    """A signal in all samples."""
+    found: Values = []
+    for each in moments_of(times)[:-1]:
+        value = next(piece.value for piece in pieces if piece.start <= each <= piece.end)
+        found.append(value.at(each) if isinstance(value, Line) else value)
+    return found

@@ -8,9 +8,14 @@ from typing import Any
 
 import pytest
 
-from epicycle.runner.temporal import Finding, Judge, Piece, Property, Sends, leaves
+from epicycle.runner.temporal import Finding, Judge, Piece, Property, Sends, leaves, moment
 from epicycle.runner.temporal.property import Junction, Not, Quantified, Until
-from tests.temporal.definition import random_property, random_signal, robustness, values_of
+from tests.temporal.definition import random_property, random_signal, random_times, robustness, values_of
+
+
+def step(start: int, end: int, value: float) -> Piece:
+    """A value from one time to another (ns)."""
+    return Piece(moment(start), moment(end + 1) - 1, value)
 
 
 def judged(tree: Property, signals: list[list[Piece]], draw: random.Random) -> Finding:
@@ -31,12 +36,12 @@ def judged(tree: Property, signals: list[list[Piece]], draw: random.Random) -> F
 
 def compare(seed: str, *, lines: bool) -> None:
     draw = random.Random(seed)
-    last = draw.randrange(14)
+    times = random_times(draw)
     tree = random_property(draw, draw.randrange(1, 4))
-    signals = [random_signal(draw, last, lines=lines) for _ in leaves(tree)]
-    wanted = robustness(tree, iter([values_of(each, last) for each in signals]))[0]
+    signals = [random_signal(draw, times, lines=lines) for _ in leaves(tree)]
+    wanted = robustness(tree, iter([values_of(each, times) for each in signals]), times)[0]
     found = judged(tree, signals, draw)
-    about = (seed, tree, signals)
+    about = (seed, tree, times, signals)
     assert found.holds == (None if wanted is None else wanted > 0), about
     if lines and wanted is not None:  # where lines cross, the last digit may be another one
         assert found.robustness == pytest.approx(wanted, abs=1e-9), about
@@ -105,27 +110,29 @@ def test_a_judge_agrees_with_rtamt() -> None:
         monitor.spec = written(tree, iter(names))
         monitor.parse()
         theirs = monitor.evaluate({"time": list(range(last + 1)), **signals})[0][1]
-        pieces = [[Piece(time, time, value) for time, value in enumerate(signal)] for signal in signals.values()]
+        pieces = [[step(time, time, value) for time, value in enumerate(signal)] for signal in signals.values()]
         assert judged(tree, pieces, draw).robustness == theirs, tree
 
 
 def test_when_a_property_broke() -> None:
     always = Quantified(False, Sends("a.b"))
-    signal = [Piece(0, 4, 1.0), Piece(5, 5, -2.0), Piece(6, 9, 1.0)]
-    assert judged(always, [signal], random.Random(1)) == Finding(False, -2.0, 5)
+    signal = [step(0, 4, 1.0), step(5, 5, -2.0), step(6, 9, 1.0)]
+    assert judged(always, [signal], random.Random(1)) == Finding(False, -2.0, moment(5))
     assert judged(Not(always), [signal], random.Random(1)) == Finding(True, 2.0, None)
     within = Quantified(True, Not(Sends("a.b")), 0, 3)
-    assert judged(within, [signal], random.Random(1)) == Finding(False, -1.0, 3)
+    assert judged(within, [signal], random.Random(1)) == Finding(False, -1.0, moment(4) - 1)
     both = Junction(False, always, Quantified(False, Sends("a.c"), 0, 2))
-    assert judged(both, [signal, [Piece(0, 1, 1.0), Piece(2, 9, -1.0)]], random.Random(1)) == Finding(False, -2.0, 2)
-    assert judged(within, [signal[:1]], random.Random(1)) == Finding(False, -1.0, 3)
-    assert judged(within, [[Piece(0, 2, 1.0)]], random.Random(1)) == Finding()  # too short to tell
+    assert judged(both, [signal, [step(0, 1, 1.0), step(2, 9, -1.0)]], random.Random(1)) == Finding(
+        False, -2.0, moment(2)
+    )
+    assert judged(within, [signal[:1]], random.Random(1)) == Finding(False, -1.0, moment(4) - 1)
+    assert judged(within, [[step(0, 2, 1.0)]], random.Random(1)) == Finding()  # too short to tell
 
 
 def test_a_break_is_known_at_once() -> None:
     judge = Judge(Quantified(False, Junction(True, Sends("a.b"), Quantified(True, Sends("a.c"), 0, 3))))
-    judge.sources[0].pieces += [Piece(0, 0, -1.0), Piece(1, 9, 1.0)]
-    judge.sources[1].pieces.append(Piece(0, 2, -5.0))
+    judge.sources[0].pieces += [step(0, 0, -1.0), step(1, 9, 1.0)]
+    judge.sources[1].pieces.append(step(0, 2, -5.0))
     assert judge.finding(False) == Finding()
-    judge.sources[1].pieces.append(Piece(3, 3, -4.0))
-    assert judge.finding(False) == Finding(False, -1.0, 0)
+    judge.sources[1].pieces.append(step(3, 3, -4.0))
+    assert judge.finding(False) == Finding(False, -1.0, moment(0))
