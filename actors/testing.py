@@ -13,9 +13,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-import simpy
-
-from .core import Actor, Streams, Tag, Wake, to_nanoseconds
+from .core import Actor, Environment, Streams, Tag, Wake, to_nanoseconds
 
 
 class Harness:
@@ -33,7 +31,7 @@ class Harness:
         self.tag = Tag(0, 0)
         self.seed = seed
         self.streams = Streams(seed)
-        self.environment = simpy.Environment()
+        self.environment = Environment()
         self.wakes: list[Wake] = []
         self.stopped: str | None = None
         self.sent: dict[str, list[tuple[float, Any]]] = {name: [] for name in actor.outputs}
@@ -87,7 +85,7 @@ class Harness:
             self.wakes = [wake for wake in self.wakes if not wake.cancelled]
             tags = [wake.tag for wake in self.wakes] + [Tag(time, 1) for time in coming]
             tag = min(tags, default=Tag(end + 1, 0))
-            if self.environment.peek() <= min(tag.time, end):
+            if self.environment.queue and self.environment.queue[0][0] <= min(tag.time, end):
                 self._resume()
             elif tag.time > end:
                 break
@@ -96,13 +94,12 @@ class Harness:
 
     def _resume(self) -> None:
         """Let SimPy's next event happen, which may resume a process."""
-        self.tag = max(self.tag, Tag(int(self.environment.peek()), 1))
+        self.tag = max(self.tag, Tag(self.environment.queue[0][0], 1))
         self.environment.step()
 
     def _fire(self, tag: Tag, tokens: Iterable[tuple[str, Any]]) -> None:
         self.tag = tag
-        if tag.time > self.environment.now:
-            self.environment.run(until=tag.time)
+        self.environment._now = max(tag.time, self.environment.time)
         for name, token in tokens:
             port = self.actor.inputs[name]
             each_channel = token if port.multi and isinstance(token, list) else [token]

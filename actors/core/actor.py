@@ -64,7 +64,7 @@ class Context(Protocol):
 
     @property
     def environment(self) -> Any:
-        """The SimPy environment; its time is in nanoseconds."""
+        """The SimPy environment; its clock and delays are in seconds."""
 
     def wake(self, actor: Actor, time: int) -> Wake:
         """Fire ``actor`` at ``time`` (ns)."""

@@ -62,7 +62,7 @@ class Process(Actor):
 
     @property
     def environment(self) -> Any:
-        """The SimPy environment, for resources, conditions and interrupts; its time is in nanoseconds."""
+        """The SimPy environment, for resources, conditions and interrupts; its clock and delays are in seconds."""
         return self.context.environment
 
     def wait(self, delay: float) -> Event:

@@ -1,6 +1,6 @@
 """The discrete-event director: which actor fires when.
 
-Order of events --------------- Events are ordered by tag, that is by time and then microstep.  Within a tag, tokens
+Order of events.  Events are ordered by tag, that is by time and then microstep.  Within a tag, tokens
 whose delay is over are put into their ports first, in the order in which they were sent; then actors fire by rank
 (``firing_order``: depth in the graph of connections without delay, then priority, ties in the order of declaration).  A
 firing sees all tokens that its actor gets at this tag, because every actor that can still send to it within the tag has
@@ -26,16 +26,27 @@ token; and tokens that an actor does not read do not stay in the port, unless it
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NoReturn
 
-from epicycle.actors import InputPort, Moment, Posts, Process, Ranks, Streams, Tag, Times, Wake, Way, new_wake
+from epicycle.actors import (
+    Environment,
+    InputPort,
+    Moment,
+    Posts,
+    Process,
+    Ranks,
+    Streams,
+    Tag,
+    Times,
+    Wake,
+    Way,
+    new_wake,
+)
 
 from ..text import NORMAL, Limits, describe
 from . import errors
 from .agenda import Delivery, Instant, Poster, Turn, new_instant
-from .environment import Environment
 from .errors import ActorError, Crowd, CrowdError, LoopError
 
 if TYPE_CHECKING:
@@ -60,7 +71,7 @@ class Director:
     def __init__(
         self, order: dict[str, int], seed: int, limits: Limits = NORMAL, postings: Postings | None = None
     ) -> None:
-        self._environment = Environment(initial_time=0)
+        self._environment = Environment()
         self._queue = self._environment.queue
         self._has_simpy = False  # whether anybody uses the environment
         self._time = 0  # SimPy's time until then
@@ -123,8 +134,7 @@ class Director:
         """The present tag, with its work if it is being handled."""
         if self.present is not None:
             return self.present
-        # SimPy's time need not be whole; a time between two nanoseconds belongs to the later one.
-        now, last = math.ceil(self._environment.now) if self._has_simpy else self._time, self._last
+        now, last = self._environment.time if self._has_simpy else self._time, self._last
         return new_instant(now, 1) if now > last.time else new_instant(last.time, last.microstep + 1)
 
     # -- requests of actors and aspects ---------------------------------------------------------------------------

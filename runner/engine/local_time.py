@@ -10,10 +10,9 @@ import heapq
 from collections import deque
 from typing import Any
 
-import simpy
-from simpy.events import NORMAL, Event, EventPriority
+from simpy.events import Event, EventPriority
 
-from epicycle.actors import Actor, Tag, Wake, Way
+from epicycle.actors import NEVER, Actor, Environment, Tag, Wake, Way
 
 from ..graph import Clock, is_within
 from .agenda import Delivery, Poster, Turn
@@ -57,30 +56,24 @@ class LocalDirector:
         self._director.later(self._clock.span(self._director.time, delay), way, token)
 
 
-class LocalEnvironment(simpy.Environment):
+class LocalEnvironment(Environment):
     """The run's SimPy environment in local time, for the processes inside: its events are the run's."""
 
-    def __init__(self, environment: simpy.Environment, clock: Clock) -> None:
+    def __init__(self, environment: Environment, clock: Clock) -> None:
         super().__init__()
         self._environment = environment
         self._clock = clock
 
     @property
-    def now(self) -> int | float:
+    def time(self) -> int:
         """The local time (ns)."""
-        now, clock = self._environment.now, self._clock
-        if clock.rate == 1:
-            return clock.start + now
-        # SimPy's time need not be whole.
-        return clock.local(int(now)) if float(now).is_integer() else clock.start + float(clock.rate) * now
+        return self._clock.local(self._environment.time)
 
-    def schedule(self, event: Event, priority: EventPriority = NORMAL, delay: int | float = 0) -> None:
+    def put(self, event: Event, priority: EventPriority, delay: int) -> None:
         """Let an event happen after ``delay`` ns of local time."""
-        now, clock = self._environment.now, self._clock
-        if clock.rate != 1:
-            whole = float(now).is_integer() and float(delay).is_integer()
-            delay = clock.span(int(now), int(delay)) if whole else delay / float(clock.rate)
-        self._environment.schedule(event, priority, delay)
+        if 0 < delay < NEVER:
+            delay = self._clock.span(self._environment.time, delay)
+        self._environment.put(event, priority, delay)
 
 
 class Passage(Actor):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
@@ -53,7 +52,7 @@ def handle_events(
             upcoming = times.first()
             if queue and queue[0][0] <= upcoming:
                 is_of_simpy = True
-                upcoming = math.ceil(min(queue[0][0], NEVER))
+                upcoming = min(queue[0][0], NEVER)
             if upcoming == never:
                 break
             if director._stop_after is not None and max(upcoming, director._last.time) > director._stop_after.time:

@@ -12,10 +12,9 @@ from collections.abc import Mapping
 from itertools import count
 from typing import TYPE_CHECKING, Any
 
-import simpy
-from simpy.events import NORMAL, Event, EventPriority
+from simpy.events import Event, EventPriority
 
-from epicycle.actors import Actor, Context, Tag, Wake, Way, new_wake
+from epicycle.actors import Actor, Context, Environment, Tag, Wake, Way, new_wake
 
 from .agenda import Delivery, Turn
 from .director import Director
@@ -159,29 +158,29 @@ class Refinement:
         self._is_beginning = False
 
 
-class _Environment(simpy.Environment):
+class _Environment(Environment):
     """The run's SimPy environment in the time of a refinement, for the processes inside."""
 
-    def __init__(self, refinement: Refinement, outer: Any) -> None:
+    def __init__(self, refinement: Refinement, outer: Environment) -> None:
         super().__init__()
         self._refinement = refinement
         self._outer = outer
 
     @property
-    def now(self) -> int | float:
+    def time(self) -> int:
         """The local time (ns)."""
         return self._refinement.time
 
-    def schedule(self, event: Event, priority: EventPriority = NORMAL, delay: int | float = 0) -> None:
-        """Schedule an event after ``delay`` ns of local time."""
+    def put(self, event: Event, priority: EventPriority, delay: int) -> None:
+        """Let an event happen after ``delay`` ns of local time."""
         if delay == 0 and self._refinement.is_active:
-            self._outer.schedule(event, priority, 0)
+            self.release(event, priority)
         else:
-            self._refinement.put_event(event, priority, self._refinement.time + round(delay))
+            self._refinement.put_event(event, priority, self._refinement.time + delay)
 
-    def release(self, event: Event, priority: Any) -> None:
-        """Schedule an event now."""
-        self._outer.schedule(event, priority, 0)
+    def release(self, event: Event, priority: EventPriority) -> None:
+        """Let an event happen now."""
+        self._outer.put(event, priority, 0)
 
 
 class Conductor(Actor):

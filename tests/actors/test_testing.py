@@ -91,7 +91,7 @@ class Patient(Process):
             token = yield self.read(self.input)
             yield self.wait(0.5)
             self.output.send(token)
-            yield self.environment.timeout(1_000_000_000)
+            yield self.environment.timeout(1)
             self.output.send(token)
 
 

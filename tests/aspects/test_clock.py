@@ -118,8 +118,8 @@ def test_a_composite_is_as_one_with_a_director_of_that_drift(gain: str, monkeypa
     def behaviour(self: Script) -> Generator[Any, Any, None]:
         while True:
             token = yield self.read(self.input)
-            yield self.wait(0.1) | self.environment.timeout(300_000_000)
-            yield self.environment.timeout(200_000_000)
+            yield self.wait(0.1) | self.environment.timeout(0.3)
+            yield self.environment.timeout(0.2)
             self.output.send((token, self.now, self.environment.now))
 
     monkeypatch.setattr(Script, "behaviour", behaviour)

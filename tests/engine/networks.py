@@ -89,7 +89,7 @@ class Patient(Process):
             token = yield self.read(self.input)
             yield self.wait(0.25)
             self.output.send(token)
-            yield self.environment.timeout(130_000_000)
+            yield self.environment.timeout(0.13)
             self.output.send(token)
 
 

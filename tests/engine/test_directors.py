@@ -47,7 +47,7 @@ class Nap(Process):
 
     is_source: ClassVar[bool] = True
     output: OutputPort[Any] = OutputPort(Any)
-    nap = Parameter(int, 10**9)
+    nap = Parameter(float, 1.0)
 
     def run(self) -> Generator[Any, Any, None]:
         desk = simpy.Resource(self.environment)
@@ -248,7 +248,7 @@ def test_delays_aspects_and_simpy_inside_go_by_local_time() -> None:
     aspects: {wait: {type: FixedWait, at: late.output, seconds: 1}}
 """
     simulation, _ = local(inside, "drift: 2, start: 10", until=1.75)
-    nap = [(t / 2, ((t + 10) * 10**9, (t + 10) * 10**9)) for t in (1, 2, 3)]
+    nap = [(t / 2, (t + 10.0, (t + 10) * 10**9)) for t in (1, 2, 3)]
     joined = [(time, delayed, napped) for time, _, ([delayed, napped],) in seen(simulation)]
     assert [(time, token) for time, _, tokens in joined for token in tokens] == nap
     # Sent at 0 s and 1 s, local 10 s and 12 s; half a second on the way and one more by the aspect, both local.

@@ -54,7 +54,7 @@ class Worker(Process):
     how = Parameter(str, "wait")
 
     def run(self) -> Generator[Any, Any, None]:
-        yield self.wait(1) if self.how == "wait" else self.environment.timeout(10**9)
+        yield self.wait(1) if self.how == "wait" else self.environment.timeout(1)
         self.output.send(1.0)
         if self.how == "fail":
             raise RuntimeError("no more work")

@@ -252,7 +252,7 @@ def test_processes_go_back_by_way_of_the_beginning(monkeypatch: pytest.MonkeyPat
             token = yield self.read(self.input)
             with resource.request() as request:
                 yield request
-                yield self.environment.timeout(round(self.random.random() * 1e9))
+                yield self.environment.timeout(self.random.random())
             self.output.send(token)
 
     monkeypatch.setattr(Script, "behaviour", staticmethod(behaviour))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gc
+import math
 from collections.abc import Callable, Generator
 from typing import Any
 
@@ -114,12 +115,12 @@ def test_simpy_resources_conditions_and_interrupts(behave: Callable[..., Results
                 yield environment.timeout(stay)
                 self.output.send(f"{name} leaves")
 
-        yield environment.process(customer("a", 10**9)) & environment.process(customer("b", 10**9))
+        yield environment.process(customer("a", 1)) & environment.process(customer("b", 1))
         self.output.send("both")
 
         def sleeper() -> Generator[Any, Any, None]:
             try:
-                yield environment.timeout(10**12)
+                yield environment.timeout(1000)
             except simpy.Interrupt as interrupt:
                 self.output.send(interrupt.cause)
 
@@ -142,7 +143,7 @@ def test_simpy_resources_conditions_and_interrupts(behave: Callable[..., Results
 
 def test_what_simpy_resumed_sends_at_the_first_open_microstep(behave: Callable[..., Results]) -> None:
     def behaviour(self: Script) -> Generator[Any, Any, None]:
-        yield self.environment.timeout(10**9)
+        yield self.environment.timeout(1)
         self.output.send("timeout")  # before the director has handled anything at 1 s
         yield self.wait(0)
         yield self.environment.timeout(0)
@@ -158,26 +159,152 @@ def simulate_with(behave: Callable[..., Results], behaviour: Behaviour) -> Any:
     return simulate(ALONE, until=5)
 
 
-def test_simpy_times_between_two_nanoseconds(behave: Callable[..., Results]) -> None:
+@pytest.mark.parametrize(
+    ("delay", "nanoseconds"),
+    [(1, 10**9), (0.1, 10**8), (1e-9, 1), (0.4e-9, 0), (0.5e-9, 0), (1.5e-9, 2), (1.6e-9, 2), (True, 10**9)],
+)
+def test_delays_are_rounded_to_nanoseconds(delay: float, nanoseconds: int, behave: Callable[..., Results]) -> None:
     def behaviour(self: Script) -> Generator[Any, Any, None]:
-        for _ in range(3):
-            yield self.environment.timeout(0.3)
-            self.output.send(self.environment.now)
-        yield self.wait(1)
-        self.output.send("end")
+        before = self.environment.now
+        yield self.environment.timeout(delay)
+        self.output.send(self.environment.now - before)
 
-    results = behave(behaviour)
-    assert [(row.tag.time, row.tag.microstep) for row in results.log.records] == [
-        (1, 1),
-        (1, 1),
-        (1, 1),
-        (10**9 + 1, 1),
-    ]
+    (record,) = behave(behaviour).log.records
+    assert (record.tag.time, record.value) == (nanoseconds, nanoseconds / 1e9)
+
+
+@pytest.mark.parametrize(
+    ("delay", "reason"),
+    [
+        (-1, "ValueError: Negative delay -1"),
+        (math.nan, "ValueError: nan is not a time"),
+        (1e12, "ValueError: 1e+12 s is out of range; the latest time is 4.61169e+09 s"),
+    ],
+)
+def test_what_is_no_delay(delay: float, reason: str, behave: Callable[..., Results]) -> None:
+    def behaviour(self: Script) -> Generator[Any, Any, None]:
+        yield self.wait(2)
+        yield self.environment.timeout(delay)
+
+    with pytest.raises(ActorError) as caught:
+        behave(behaviour)
+    assert str(caught.value).splitlines()[0] == f"a failed in run() at (2 s, 1): {reason}"
+
+
+def test_a_timeout_without_an_end_never_happens(behave: Callable[..., Results]) -> None:
+    def behaviour(self: Script) -> Generator[Any, Any, None]:
+        yield self.environment.timeout(3)
+        yield self.environment.timeout(math.inf) | self.environment.timeout(0.5)
+        self.output.send(self.environment.peek())
+        yield self.environment.timeout(math.inf)
+        self.output.send("never")
+
+    assert [(time, token) for time, _, _, token in sends(behave(behaviour))] == [(3.5, math.inf)]
+
+
+def test_time_is_let_pass_by_the_director_alone(behave: Callable[..., Results]) -> None:
+    def behaviour(self: Script) -> Generator[Any, Any, None]:
+        yield self.wait(1)
+        self.environment.run(until=5)
+
+    with pytest.raises(ActorError) as caught:
+        behave(behaviour)
+    assert str(caught.value).splitlines()[0] == (
+        "a failed in run() at (1 s, 1): RuntimeError: the director lets time pass: yield events, and give the model a "
+        "stop time instead of run()"
+    )
+
+
+def shop(environment: Any, say: Callable[[str], None]) -> Generator[Any, Any, None]:
+    """All that SimPy has, in one program."""
+    desk, machine = simpy.Resource(environment, 1), simpy.PreemptiveResource(environment, 1)
+    line, tank = simpy.PriorityResource(environment, 1), simpy.Container(environment, 10, init=0)
+    box, shelf = simpy.Store(environment, 1), simpy.FilterStore(environment)
+    heap = simpy.PriorityStore(environment)
+
+    def customer(number: int, patience: float) -> Generator[Any, Any, None]:
+        yield environment.timeout(0.25 * number)
+        with desk.request() as request:
+            found = yield request | environment.timeout(patience)
+            if request in found:
+                yield environment.timeout(0.7)
+            say(f"customer {number} {'served' if request in found else 'gone'} {environment.now:.9g}")
+
+    def job(name: str, start: float, priority: int) -> Generator[Any, Any, None]:
+        yield environment.timeout(start)
+        left = 2.5
+        while left > 0:
+            with machine.request(priority=priority) as request:
+                yield request
+                begun = environment.now
+                try:
+                    yield environment.timeout(left)
+                    left = 0.0
+                except simpy.Interrupt as interrupt:
+                    left -= environment.now - begun
+                    say(f"{name} preempted, in use since {interrupt.cause.usage_since:.9g}, {left:.9g} left")
+        say(f"{name} done {environment.now:.9g}")
+
+    def guest(number: int) -> Generator[Any, Any, None]:
+        with line.request(priority=-number) as request:
+            yield request
+            yield environment.timeout(0.125)
+            say(f"guest {number} {environment.now:.9g}")
+
+    def maker() -> Generator[Any, Any, None]:
+        for number in range(5):
+            yield environment.timeout(0.3)
+            yield box.put(number)
+            yield tank.put(2.5)
+            yield shelf.put(number)
+            yield heap.put(simpy.PriorityItem(-number, f"item {number}"))
+
+    def taker() -> Generator[Any, Any, None]:
+        yield tank.get(5)
+        say(f"tank {tank.level} {environment.now:.9g}")
+        odd = yield shelf.get(lambda each: each % 2 == 1)
+        first = yield box.get()
+        say(f"took {odd} and {first} {environment.now:.9g}")
+        second = yield box.get()
+        urgent = yield heap.get()
+        say(f"{second} {urgent.item} {environment.now:.9g}")
+
+    parts = [environment.process(customer(number, 0.6)) for number in range(4)]
+    parts += [environment.process(job("slow", 0, 1)), environment.process(job("urgent", 1.1, 0))]
+    parts += [environment.process(guest(number)) for number in range(3)]
+    parts += [environment.process(maker()), environment.process(taker())]
+    signal = environment.event()
+
+    def alarm() -> Generator[Any, Any, None]:
+        yield environment.timeout(0.9)
+        signal.succeed("now")
+
+    environment.process(alarm())
+    say(f"{(yield signal)} {environment.now:.9g}")
+    try:
+        failed = environment.event().fail(KeyError("k"))
+        yield failed
+    except KeyError as error:
+        say(f"{error!r} {environment.active_process is not None}")
+    yield environment.all_of(parts)
+    yield environment.any_of([environment.timeout(1, "a"), environment.timeout(2, "b")])
+    say(f"end {environment.now:.9g}")
+
+
+def test_a_program_does_what_it_does_in_simpy_alone(behave: Callable[..., Results]) -> None:
+    """All delays are multiples of a nanosecond, so that rounding changes no event."""
+    alone, inside = list[str](), list[str]()
+    environment = simpy.Environment()
+    environment.process(shop(environment, alone.append))
+    environment.run()
+    behave(lambda self: shop(self.environment, inside.append), until=60)
+    assert inside == alone
+    assert len(inside) > 15
 
 
 def test_stop_when_from_a_process_finishes_the_tag(behave: Callable[..., Results], monkeypatch: Any) -> None:
     def behaviour(self: Script) -> Generator[Any, Any, None]:
-        yield self.environment.timeout(10**9)
+        yield self.environment.timeout(1)
         self.output.send(1)
         yield self.wait(1)
         self.output.send(2)
@@ -214,7 +341,7 @@ def test_an_exception_in_a_process_names_its_actor(
         elif resumed_by == "read":
             yield self.read(self.input)
         elif resumed_by == "timeout":
-            yield self.environment.timeout(10**9)
+            yield self.environment.timeout(1)
         elif resumed_by == "subprocess":
             yield self.environment.process(inner(self))
         raise error
@@ -227,7 +354,7 @@ def test_an_exception_in_a_process_names_its_actor(
     simulation = Simulation(model)
     with pytest.raises(ActorError) as caught:
         simulation.run(until=3)
-    tag = {"start": "(0 s, 1)", "read": "(0 s, 1)", "subprocess": "(1e-09 s, 1)"}.get(resumed_by, "(1 s, 1)")
+    tag = {"start": "(0 s, 1)", "read": "(0 s, 1)", "subprocess": "(1 s, 1)"}.get(resumed_by, "(1 s, 1)")
     reason = "ValueError: bad luck" if isinstance(error, ValueError) else "FussyError: 1 and 2"
     first = str(caught.value).splitlines()[0]
     assert first == f"a failed in run() at {tag}: {reason}"
@@ -247,7 +374,7 @@ def test_an_exception_in_a_process_of_simpys_alone(monkeypatch: pytest.MonkeyPat
     with pytest.raises(ActorError) as caught:
         simulate("actors: {a: {type: Plan}}")
     message, at, line, carets = str(caught.value).splitlines()
-    assert message == "a SimPy process failed in its generator at (5e-09 s, 1): KeyError: 'lost'"
+    assert message == "a SimPy process failed in its generator at (5 s, 1): KeyError: 'lost'"
     assert at.startswith("   raised at ")
     assert line[carets.index("^") :] == 'raise KeyError("lost")'
 
@@ -262,7 +389,7 @@ def test_an_exception_in_a_callback_of_simpys(monkeypatch: pytest.MonkeyPatch) -
     with pytest.raises(ActorError) as caught:
         simulate("actors: {a: {type: Plan}}")
     told = str(caught.value).splitlines()[0]
-    assert told == "a SimPy process failed in its generator at (5e-09 s, 1): KeyError: 'lost'"
+    assert told == "a SimPy process failed in its generator at (5 s, 1): KeyError: 'lost'"
 
 
 def test_a_process_is_halted_in_the_step_in_which_what_it_waits_for_happens(behave: Callable[..., Results]) -> None:
@@ -307,7 +434,7 @@ def test_time_goes_on_from_a_tag_at_which_a_process_alone_sends_by_a_delay_of_0(
 ) -> None:
     # Nobody fires at the tag at which SimPy resumes the process: its next microstep still comes before any later time.
     def behaviour(actor: Script) -> Generator[Any, Any, None]:
-        yield actor.environment.timeout(500_000_000)
+        yield actor.environment.timeout(0.5)
         actor.output.send("x")
 
     monkeypatch.setattr(Script, "behaviour", staticmethod(behaviour))

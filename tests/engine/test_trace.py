@@ -31,7 +31,7 @@ class Worker(Script):
         while True:
             token = yield self.read(self.input)
             self.output.send(token)
-            yield self.environment.timeout(SECOND // 2)
+            yield self.environment.timeout(0.5)
             self.output.send(-token)
             yield self.wait(0.25)
 

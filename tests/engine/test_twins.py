@@ -134,28 +134,28 @@ class Shop(Process):
     output: OutputPort[Any] = OutputPort(Any)
 
     def run(self) -> Generator[Any, Any, None]:
-        environment, second = self.environment, 10**9
+        environment = self.environment
         machine = simpy.PreemptiveResource(environment)
         store = simpy.Store(environment, capacity=1)
         tank = simpy.Container(environment, init=0, capacity=10)
         begun = environment.now
 
         def say(what: str) -> None:
-            self.output.send((what, (environment.now - begun) / second))
+            self.output.send((what, environment.now - begun))
 
         def job(name: str, priority: int, start: int) -> Generator[Any, Any, None]:
-            yield environment.timeout(start * second)
-            left = 3 * second
+            yield environment.timeout(start)
+            left = 3.0
             while left:
                 with machine.request(priority=priority) as request:
                     yield request
                     since = environment.now
                     try:
                         yield environment.timeout(left)
-                        left = 0
+                        left = 0.0
                     except simpy.Interrupt as interrupt:
                         left -= environment.now - since
-                        say(f"{name} yields after {(environment.now - interrupt.cause.usage_since) / second:g}")
+                        say(f"{name} yields after {environment.now - interrupt.cause.usage_since:g}")
             say(f"{name} done")
             yield store.put(name)
 
@@ -166,7 +166,7 @@ class Shop(Process):
                 say(f"{name} stored")
 
         def watch(clerk: Any) -> Generator[Any, Any, None]:
-            yield tank.get(7) | environment.timeout(20 * second)
+            yield tank.get(7) | environment.timeout(20)
             say("enough")
             clerk.interrupt("go home")
 

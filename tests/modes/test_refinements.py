@@ -190,7 +190,7 @@ class Waiting(Process):
     def run(self) -> Generator[Any, Any, None]:
         number = 0
         while True:
-            yield self.environment.timeout(1_000_000_000)
+            yield self.environment.timeout(1)
             yield self.wait(0.5)
             self.output.send(number)
             number += 1

@@ -207,7 +207,7 @@ def test_a_process_begins_anew(monkeypatch: pytest.MonkeyPatch) -> None:
         try:
             while True:
                 yield self.read(self.input)
-                yield self.environment.timeout(0.25e9)  # which no aspect can hold up
+                yield self.environment.timeout(0.25)  # which no aspect can hold up
                 count += 1
                 self.output.send(count)
         finally:
