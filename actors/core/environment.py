@@ -28,7 +28,7 @@ class Environment(simpy.Environment):
     @property
     def time(self) -> int:
         """The present time (ns)."""
-        return self._now  # type: ignore[return-value]
+        return int(self._now)
 
     @property
     def queue(self) -> list[Any]:
@@ -45,7 +45,7 @@ class Environment(simpy.Environment):
 
     def peek(self) -> float:
         """The time of the next event (s); infinity if there is none."""
-        return to_seconds(self._queue[0][0]) if self._queue and self._queue[0][0] < NEVER else math.inf
+        return to_seconds(int(self._queue[0][0])) if self._queue and self._queue[0][0] < NEVER else math.inf
 
     def run(self, until: object = None) -> NoReturn:
         """Not for processes: the director lets time pass."""

@@ -178,7 +178,7 @@ class _Environment(Environment):
         else:
             self._refinement.put_event(event, priority, self._refinement.time + delay)
 
-    def release(self, event: Event, priority: EventPriority) -> None:
+    def release(self, event: Event, priority: Any) -> None:
         """Let an event happen now."""
         self._outer.put(event, priority, 0)
 
