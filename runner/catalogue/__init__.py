@@ -1,5 +1,6 @@
 """What a model may name: types of actors, aspects and ports, kinds of metrics, and packaged files."""
 
+from .code import code_of
 from .figure import Figure, Mark, Shape, own_figures
 from .measure import (
     MSER5,
@@ -69,6 +70,7 @@ __all__ = [
     "Types",
     "as_written",
     "built_in",
+    "code_of",
     "conversion_problem",
     "describe",
     "doc_of",
