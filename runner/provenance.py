@@ -5,13 +5,19 @@ from __future__ import annotations
 import os
 import platform
 import re
-import subprocess
 import sys
 from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 from typing import Any
 
+from epicycle.actors import open_regular
+
 PACKAGES = ("epicycle", "simpy", "numpy", "scipy", "numba", "filterpy", "networkx", "pyyaml", "pyarrow")
+
+_REVISION = re.compile(r"[0-9a-f]{40}|[0-9a-f]{64}")
+_REFERENCE = re.compile(r"refs(/(?!\.)[^/\s\x00\\]+)+")
+_REFERENCES = 5  # that may lead to each other
+_MOST = 2**24  # bytes of a file that are read
 
 
 def version_of(package: str) -> str | None:
@@ -37,14 +43,48 @@ def machine() -> dict[str, Any]:
 
 
 def git_revision(folder: Path) -> str | None:
-    """The revision of the repository that contains a folder, with a + for changes; None without a repository."""
+    """The revision of the repository that contains a folder; None without a repository, or if it cannot be read.
+
+    Its files are read as they are: git itself would run programs that the repository's configuration names, and the
+    folder may be somebody else's.  For the same reason, nothing says whether files have changed since; the digests of
+    all files that were read are in the manifest, too.
+    """
     try:
-        revision, changes = (
-            subprocess.run(
-                ["git", "-C", str(folder), *words], capture_output=True, text=True, check=True, timeout=10
-            ).stdout
-            for words in (("rev-parse", "HEAD"), ("status", "--porcelain", "--untracked-files=no"))
-        )
-    except (OSError, subprocess.SubprocessError):
-        return None
-    return revision.strip() + ("+" if changes.strip() else "")
+        for parent in (folder, *folder.parents):
+            if (found := parent / ".git").exists():
+                return _head_of(found)
+    except (OSError, ValueError):
+        pass
+    return None
+
+
+def _head_of(git: Path) -> str | None:
+    """The revision that is checked out; raises ``OSError`` and ``ValueError``."""
+    if git.is_file():  # of a worktree or a submodule, whose repository is elsewhere
+        git = git.parent / _line(git).removeprefix("gitdir: ")
+    common = git / "commondir"  # where the references of a worktree are
+    shared = git / _line(common) if common.exists() else git
+    name = _line(git / "HEAD")
+    for _ in range(_REFERENCES):
+        if _REVISION.fullmatch(name):
+            return name
+        name = name.removeprefix("ref: ")
+        if not _REFERENCE.fullmatch(name):
+            return None
+        for place in (git / name, shared / name):
+            if place.is_file():
+                name = _line(place)
+                break
+        else:
+            packed = re.search(rf"^([0-9a-f]+) {re.escape(name)}$", _text(shared / "packed-refs"), re.M)
+            name = "" if packed is None else packed[1]
+    return None
+
+
+def _line(path: Path) -> str:
+    return _text(path).strip()
+
+
+def _text(path: Path) -> str:
+    with open_regular(path) as file:
+        return file.read(_MOST).decode()

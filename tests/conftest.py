@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import signal
+import tempfile
 from collections import Counter
 from typing import Any
 
@@ -13,6 +15,10 @@ import hypothesis
 hypothesis.settings.register_profile("the same", derandomize=True, deadline=None)
 hypothesis.settings.load_profile("the same")
 
+
+# The key of seals is not the user's.
+_STATE = tempfile.TemporaryDirectory()
+os.environ["XDG_STATE_HOME"] = _STATE.name
 
 # Started in the background of a shell, everything ignores Ctrl-C, and what tests start inherits that.
 if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import hashlib
+import sys
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
-from epicycle.actors import read_regular
-
-from ..catalogue import files_of_types
+from ..catalogue import code_of
 from ..language import Setting
 from ..text import Noted, plain
 
@@ -25,7 +24,11 @@ class Origin:
 
     def facts(self) -> dict[str, Any]:
         """Everything that a run depends on beside its seed and Epicycle, as plain data without names of folders."""
-        code = {str(path): _digest(read_regular(path)) for path in files_of_types(self.types)}
+        modules = dict.fromkeys(
+            each.__module__ for each in self.types if each.__module__.partition(".")[0] != "epicycle"
+        )
+        files = (getattr(sys.modules.get(name), "__file__", None) for name in modules)
+        code = code_of(Path(file) for file in files if file is not None)
         return {
             "files": sorted(_by_name([*self.noted.files.items(), *code.items()])),
             "packages": sorted(self.noted.packages.items()),
@@ -37,7 +40,3 @@ class Origin:
 
 def _by_name(files: Iterable[tuple[str, str]]) -> set[tuple[str, str]]:
     return {(name.replace("\\", "/").rpartition("/")[2], digest) for name, digest in files}
-
-
-def _digest(data: bytes) -> str:
-    return hashlib.sha256(data).hexdigest()

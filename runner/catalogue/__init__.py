@@ -1,6 +1,6 @@
 """What a model may name: types of actors, aspects and ports, kinds of metrics, and packaged files."""
 
-from .code import code_files, files_of_types
+from .code import code_of
 from .figure import Figure, Mark, Shape, own_figures
 from .measure import (
     MSER5,
@@ -70,12 +70,11 @@ __all__ = [
     "Types",
     "as_written",
     "built_in",
-    "code_files",
+    "code_of",
     "conversion_problem",
     "describe",
     "doc_of",
     "figure_types",
-    "files_of_types",
     "find",
     "first_sentence",
     "installed",

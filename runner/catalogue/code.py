@@ -1,27 +1,38 @@
-"""The Python files of a user's types: results depend on them, and a results folder that was sent names them."""
+"""The Python files that run when types of the user's own are loaded."""
 
 from __future__ import annotations
 
+import hashlib
 import sys
 import sysconfig
 from collections.abc import Iterable
 from modulefinder import ModuleFinder
 from pathlib import Path
 
+from epicycle.actors import read_regular
 
-def code_files(file: Path) -> list[Path]:
-    """A Python file, and those beside it that it imports, directly or not.  None of them is run."""
-    file = file.resolve()
-    if file.parent in {Path(path).resolve() for path in sysconfig.get_paths().values()}:
-        return [file]  # beside an installed module there are unrelated ones
-    finder = ModuleFinder(path=[str(file.parent)])
-    finder.run_script(str(file))
-    found = (getattr(module, "__file__", None) for module in finder.modules.values())
-    return sorted({file, *(Path(name).resolve() for name in found if name is not None)})
+from .types import TypesError
 
 
-def files_of_types(types: Iterable[type]) -> list[Path]:
-    """The files of the code of types that are not Epicycle's own."""
-    names = dict.fromkeys(each.__module__ for each in types if each.__module__.partition(".")[0] != "epicycle")
-    files = (getattr(sys.modules.get(name), "__file__", None) for name in names)
-    return sorted({each for file in files if file is not None for each in code_files(Path(file))})
+def code_of(types: Iterable[Path]) -> dict[str, str]:
+    """SHA-256 of the files and of all modules of the user's own that they import, by their full paths; none is run.
+
+    Installed packages are known by their versions instead.
+    """
+    installed = {Path(path).resolve() for path in sysconfig.get_paths().values()}
+    own = [path for path in sys.path if Path(path).is_dir() and not _is_below(Path(path).resolve(), installed)]
+    found: dict[str, str] = {}
+    for each in types:
+        file = each.resolve()
+        finder = ModuleFinder(path=[str(file.parent), *own], excludes=["epicycle"])
+        try:
+            finder.run_script(str(file))
+            names = [str(file), *sorted(one.__file__ for one in finder.modules.values() if one.__file__ is not None)]  # type: ignore[attr-defined]
+            found |= {name: hashlib.sha256(read_regular(name)).hexdigest() for name in names}
+        except (OSError, SyntaxError, ValueError) as error:
+            raise TypesError(f"--types {each}: {getattr(error, 'strerror', None) or error}") from error
+    return found
+
+
+def _is_below(path: Path, folders: Iterable[Path]) -> bool:
+    return any(path.is_relative_to(folder) for folder in folders)

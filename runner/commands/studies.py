@@ -107,13 +107,13 @@ def study(options: argparse.Namespace) -> int:
     return _session(plan, options.out or Path("results") / found.name, options)
 
 
-@command("resume a study", FOLDER, *SESSION, imports=("study",))
+@command("resume a study", FOLDER, TYPES, *SESSION, imports=("study",))
 def resume(options: argparse.Namespace) -> int:
     """Make the runs that are missing from the results folder of a study."""
     from ..study import StoreError, plan_of_folder
 
     _check_session(options)
-    plan = plan_of_folder(options.folder)
+    plan = plan_of_folder(options.folder, map(Path, options.types))
     if plan.search is not None:
         told = shlex.join(plan.search["command"])
         raise StoreError(f"{options.folder} holds a search, which its own command continues\n   help: {told}")
@@ -254,6 +254,7 @@ def status(options: argparse.Namespace) -> int:
     FOLDER_OF_STUDY,
     option("run_key", metavar="RUN", help="the run's name in the column 'run', or the beginning of the name"),
     option("--out", metavar="DIR", type=Path, help="folder to write to (default: DIR/replays/RUN)"),
+    TYPES,
     imports=("build", "show", "study"),
 )
 def replay(options: argparse.Namespace) -> int:
@@ -265,7 +266,7 @@ def replay(options: argparse.Namespace) -> int:
     from ..text import Problems
 
     row = open_study(options.folder).find(options.run_key)
-    plan = plan_of_folder(options.folder)
+    plan = plan_of_folder(options.folder, map(Path, options.types))
     folder = options.out or options.folder / "replays" / row["run"][:12]
     model, results, error = again(plan, plan.condition(row["condition"]), row["seed"])
     errors = [] if error is None else [error]
@@ -293,6 +294,7 @@ def replay(options: argparse.Namespace) -> int:
     FOLDER_OF_STUDY,
     option("--out", metavar="DIR", type=Path, help="folder to write to (default: the results folder)"),
     option("--jobs", metavar="N", type=COUNT, help="runs to repeat at the same time (default: one per core)"),
+    TYPES,
     imports=("show.report", "study"),
 )
 def report(options: argparse.Namespace) -> int:
@@ -302,7 +304,7 @@ def report(options: argparse.Namespace) -> int:
     from ..show.report import write_report
     from ..study import available_cores, open_study
 
-    results, terminal = open_study(options.folder), console(stderr=True)
+    results, terminal = open_study(options.folder, types=options.types), console(stderr=True)
     folder, jobs = options.out or options.folder, options.jobs or available_cores()
     with Progress(console=terminal, transient=True, disable=not terminal.is_terminal) as bar:
         task = bar.add_task("repeating runs for their signals", total=None)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -101,10 +101,11 @@ def manifest_of(plan: Plan) -> dict[str, Any]:
     }
 
 
-def plan_of_folder(folder: Path) -> Plan:
+def plan_of_folder(folder: Path, types: Iterable[Path] = ()) -> Plan:
     """The plan of a results folder, whose runs are to be made or repeated.
 
-    Raises ``StoreError`` if its model or Epicycle has changed.
+    Code runs only if this user has made the folder on this machine, or if the files are named again in ``types``.
+    Raises ``StoreError`` if its model or Epicycle has changed, and ``CodeError``.
     """
     manifest = read_manifest(folder)
     before = Plan.of_manifest(manifest)
@@ -113,6 +114,9 @@ def plan_of_folder(folder: Path) -> Plan:
             f"{folder} was made with Epicycle {before.made_with}, but this is Epicycle {version}\n"
             f"   help: install that version, or repeat all runs: 'epicycle study {before.study.path} --out ANOTHER'"
         )
+    if named := tuple(types):
+        before = before.allowed(named)
+    before.check_allowed()
     plan = replace(Plan.made(before.study), search=before.search)
     if changed := sorted(name for name, digest in plan.sources.items() if before.sources.get(name) != digest):
         raise StoreError(

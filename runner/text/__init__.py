@@ -3,7 +3,7 @@
 from epicycle.actors import did_you_mean, nearest
 
 from .document import Entry, Mapping, Node, Scalar, Sequence, parse, plain, read
-from .files import COMMAND_LINE, Noted, data_file, note_file, note_package, noting
+from .files import COMMAND_LINE, Noted, data_file, note_package, noting
 from .limits import MAX_SEED, NORMAL, RAISE_IT, Limits
 from .patterns import (
     Comparisons,
@@ -65,7 +65,6 @@ __all__ = [
     "names_of",
     "nearest",
     "node_of",
-    "note_file",
     "note_package",
     "noting",
     "parse",

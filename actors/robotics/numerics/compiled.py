@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import hashlib
+import logging
 import os
+import pickle
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
 import numba
 import numpy as np
+from numba.core import caching as _caching
 from numpy.typing import NDArray
 
 from ...core import elementary
@@ -18,6 +21,8 @@ from ...core.elementary.in_numba import register
 
 config: Any = numba.config
 Array = NDArray[np.float64]  # the one array type of the kernels
+_LOGGER = logging.getLogger("epicycle")
+caching: Any = _caching
 Function = TypeVar("Function", bound=Callable[..., object])
 
 
@@ -53,19 +58,50 @@ def folder() -> Path:
 
 @contextmanager
 def cached() -> Iterator[None]:
-    """Kernels declared in this context are cached in the ``folder``."""
-    before = config.CACHE_DIR
-    config.CACHE_DIR = str(folder())
+    """Kernels declared in this context are cached in the ``folder``, with checksums."""
+    before = config.CACHE_DIR, caching.IndexDataCacheFile
+    config.CACHE_DIR, caching.IndexDataCacheFile = str(folder()), _Checked
     try:
         yield
     finally:
-        config.CACHE_DIR = before
+        config.CACHE_DIR, caching.IndexDataCacheFile = before
 
 
 def kernel(function: Function, counts: bool = True) -> Function:
     """Compile a pure function on arrays."""
     with cached():
         return _compiled(function, cache=True, _nrt=counts)
+
+
+_Kept: Any = caching.IndexDataCacheFile
+
+
+class _Checked(_Kept):  # type: ignore[misc]
+    """Compiled code on disk with its checksum; what is damaged is compiled again, and what cannot be kept is not."""
+
+    def load(self, key: object) -> Any:
+        """The code for a signature; None if there is none, or none that is whole."""
+        try:
+            if (found := super().load(key)) is None:
+                return None
+            digest, data = found
+            if digest == hashlib.sha256(data).digest():
+                return pickle.loads(data)
+            damage = "it does not match its checksum"
+        except Exception as error:  # unpickling bytes that were damaged may raise anything
+            damage = f"{type(error).__name__}: {error}"
+        _LOGGER.warning("compiled code in %s is damaged (%s) and is made again", self._index_path, damage)
+        with suppress(OSError):
+            self.flush()
+        return None
+
+    def save(self, key: object, data: object) -> None:
+        """Keep the code for a signature."""
+        written = self._dump(data)
+        try:
+            super().save(key, (hashlib.sha256(written).digest(), written))
+        except Exception as error:  # such as a full disk; the index may be damaged
+            _LOGGER.warning("compiled code cannot be kept in %s: %s", self._index_path, error)
 
 
 def inner(function: Function) -> Function:

@@ -136,7 +136,7 @@ def _extracts(
     found: dict[str, dict[RunKey, Any]] = {name: {} for name in wanted}
     try:
         if replays:
-            plan_of_folder(data.results.folder)  # which raises an error if the model has changed
+            plan_of_folder(data.results.folder, data.results.types)  # which raises an error if the model has changed
             for replay, extracts in repeat(data.plan, replays, jobs, lambda number: tell(number, len(replays))):
                 for name, extract in extracts.items():
                     found[name][replay.condition, replay.replication] = extract

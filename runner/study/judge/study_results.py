@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections import Counter
+from collections.abc import Iterable
 from dataclasses import asdict
 from itertools import combinations
 from pathlib import Path
@@ -41,11 +42,14 @@ class StudyResults(Tabled):
     >>> results.to_pandas().groupby("load")["mean_wait"].mean()
     """
 
-    def __init__(self, folder: str | Path) -> None:
+    def __init__(self, folder: str | Path, types: Iterable[str | Path] = ()) -> None:
         self.folder = Path(folder)
         self._store = Store(self.folder)
         self.manifest = self._store.manifest
         self.plan = Plan.of_manifest(self.manifest)
+        self.types = tuple(map(Path, types))  # whose code may run in place of that of the folder
+        if self.types:
+            self.plan = self.plan.allowed(self.types)
         self._frozen: tuple[pa.Table, int] | None = None
 
     def freeze(self) -> StudyResults:
@@ -311,6 +315,10 @@ def _with(table: pa.Table, name: str, values: Any) -> pa.Table:
     return table.set_column(table.schema.get_field_index(name), name, values)
 
 
-def open_study(folder: str | Path) -> StudyResults:
-    """The results of a study, which may still be running; raises ``StoreError``."""
-    return StudyResults(Path(folder))
+def open_study(folder: str | Path, types: Iterable[str | Path] = ()) -> StudyResults:
+    """The results of a study, which may still be running; raises ``StoreError``.
+
+    ``types`` are Python files to load the model with, in place of those that the folder names; the code of these runs
+    only if you have made the folder yourself on this machine, and they have not changed.
+    """
+    return StudyResults(Path(folder), types)

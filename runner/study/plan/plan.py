@@ -5,8 +5,9 @@ from __future__ import annotations
 import hashlib
 import json
 import logging
+import shlex
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from math import prod
 from pathlib import Path
 from typing import Any, TypedDict
@@ -15,9 +16,10 @@ from epicycle.actors import EpicycleError
 from epicycle.actors.expression import ExpressionError
 
 from ...build import Model, load_model
-from ...catalogue import types_of_file
+from ...catalogue import code_of, types_of_file
 from ...language import RESERVED, Dimension, Factor, Level, Study, StudyMetric, study_of_text
 from ...provenance import version_of
+from ...seal import has_seal, seal
 from ...text import ModelError, Noted, Problems, did_you_mean, noting, plain
 from .columns import Column, check_metric, columns_of
 
@@ -39,6 +41,10 @@ Sources = dict[str, str]  # SHA-256 by the name of a file, and versions by 'pack
 def epicycle_version() -> str:
     """The version that made results: another one may give different ones."""
     return version_of("epicycle") or "unknown"
+
+
+class CodeError(EpicycleError):
+    """A results folder whose types are code that the user has not chosen to run."""
 
 
 @dataclass(frozen=True)
@@ -71,6 +77,7 @@ class Plan:
     made_with: str  # the version of Epicycle
     files: Iterable[str] = ()  # all files read, by the names used to read them
     search: Search | None = None  # what chose the conditions, if they were not known from the start
+    denied: str = ""  # why the code of its types must not be run
 
     # -- making one -----------------------------------------------------------------------------------------------
 
@@ -160,11 +167,22 @@ class Plan:
         problems.raise_if_any()
         columns = {name: Column(**said) for name, said in manifest["columns"].items()}
         said_of = (manifest["sources"], extra, manifest["model"], columns, manifest["epicycle"])
-        return cls(study, metrics, *said_of, search=manifest.get("search"))
+        return cls(study, metrics, *said_of, search=manifest.get("search"), denied=_why_denied(manifest))
+
+    def allowed(self, types: Iterable[Path] = ()) -> Plan:
+        """The same with leave to run the code of its types, or of these files in their place."""
+        return replace(self, study=replace(self.study, types=tuple(types) or self.study.types), denied="")
+
+    def check_allowed(self) -> None:
+        """Raise ``CodeError`` if loading the model would run code that the user has not chosen."""
+        if self.denied:
+            raise CodeError(self.denied)
 
     def manifest(self) -> dict[str, Any]:
-        """The entries that ``of_manifest`` needs."""
+        """The entries that ``of_manifest`` needs; raises ``CodeError``."""
+        self.check_allowed()
         study = self.study
+        code = code_of(study.types)
         return {
             "epicycle": self.made_with,
             "study": study.name,
@@ -182,6 +200,7 @@ class Plan:
             "sources": self.sources,
             "level_sources": [{str(index): found for index, found in each.items()} for each in self.extra],
             **({} if self.search is None else {"search": self.search}),
+            **({"code": code, "seal": seal(code)} if code else {}),
         }
 
     # -- what it holds --------------------------------------------------------------------------------------------
@@ -260,7 +279,8 @@ class Plan:
         return files + [name for name, version in packages if all(found.get(name) != version for found in known)]
 
     def load(self, condition: Condition) -> Model:
-        """The model as it is in a condition; raises ``ModelError``."""
+        """The model as it is in a condition; raises ``ModelError`` and ``CodeError``."""
+        self.check_allowed()
         return _load(self.study, condition.level)
 
 
@@ -275,6 +295,25 @@ def index_of(place: Iterable[int], dimensions: Sequence[Dimension]) -> int:
     for dimension, level in zip(dimensions, place, strict=True):
         found = found * dimension.size + level
     return found
+
+
+def _why_denied(manifest: Mapping[str, Any]) -> str:
+    """Why the code that a manifest names must not be run; empty for what this user has run to make the folder."""
+    types, code = manifest["types"], manifest.get("code", {})
+    if not types:
+        return ""
+    option = " ".join(f"--types {shlex.quote(file)}" for file in types)
+    told = f"\n   help: if you trust {'it' if len(types) == 1 else 'them'}, add {option}; in Python, types=[...]"
+    if not (set(types) <= code.keys() and has_seal(code, manifest.get("seal"))):
+        files = ", ".join(types)
+        return f"the results were not made here by you, and loading their model would run the code of {files}{told}"
+    try:
+        now = code_of(map(Path, types))
+    except EpicycleError as error:
+        return f"the code of the results cannot be read: {error}{told}"
+    if changed := sorted(name for name in now.keys() | code.keys() if now.get(name) != code.get(name)):
+        return f"code has changed since the results were made, and is not run: {', '.join(changed)}{told}"
+    return ""
 
 
 def _together(study: Study, place: Iterable[int]) -> Level:
@@ -322,12 +361,16 @@ def _tried(study: Study, place: list[int], read: _Read, problems: Problems) -> S
     found = {f"package {name}": version for name, version in noted.packages.items()}
     for name, digest in [
         *noted.files.items(),
-        *((str(file), hashlib.sha256(file.read_bytes()).hexdigest()) for file in study.types),
+        *code_of(study.types).items(),
     ]:
         read.files[name] = None
         path = Path(name).resolve()
         # By names that stay the same when the study with its model, or Epicycle, is moved.
         shown = path.relative_to(home).as_posix() if path.is_relative_to(home) else path.name
+        for parent in path.parents:
+            if found.get(shown, digest) == digest:
+                break
+            shown = f"{parent.name}/{shown}"  # of two files that have the same name
         found[shown] = digest
         if path.suffix in (".yaml", ".yml"):
             read.texts[shown] = path.read_text(encoding="utf-8")

@@ -50,7 +50,12 @@ _SHAPE: dict[str, Any] = {
     "git": (None, str),
     "date": str,
 }
-_OF_SEARCH: dict[str, Any] = {"runs": range(1, MAX_REPLICATIONS + 1), "command": [str]}
+# Entries that not every folder has.
+_MORE: dict[str, Any] = {
+    "search": {"runs": range(1, MAX_REPLICATIONS + 1), "command": [str]},
+    "code": {str: str},
+    "seal": (None, str),
+}
 
 
 def _fits(value: Any, shape: Any) -> bool:
@@ -135,7 +140,7 @@ def read_manifest(folder: Path) -> dict[str, Any]:
         )
     if missing := [repr(name) for name in (*_SHAPE, "checksum") if name not in manifest]:
         raise damaged(f"is damaged: it has no {', '.join(missing)}")
-    shapes = _SHAPE | ({"search": _OF_SEARCH} if "search" in manifest else {})
+    shapes = _SHAPE | {name: shape for name, shape in _MORE.items() if name in manifest}
     if unlike := [repr(name) for name, shape in shapes.items() if not _fits(manifest[name], shape)]:
         raise damaged(f"is damaged: {', '.join(unlike)} cannot have been written like this")
     return manifest

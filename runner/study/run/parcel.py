@@ -13,15 +13,15 @@ import platform
 import threading
 import time
 import zlib
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import lru_cache
 from importlib import import_module
-from modulefinder import ModuleFinder
 from pathlib import Path
 from typing import Any
 
+from ...catalogue import code_of
 from ...provenance import version_of, versions
 from ...text import ModelError, noting
 from ..plan.plan import Plan
@@ -47,7 +47,7 @@ def pack(plan: Plan) -> bytes:
     Each file is listed under the names by which it may be requested: as it was read, and with links resolved.
     """
     files: dict[str, bytes] = {}
-    for name in (*plan.files, *_modules(plan.study.types)):
+    for name in (*plan.files, *code_of(plan.study.types)):
         path = Path(os.path.abspath(name))
         content = path.read_bytes()
         for each in (path, path.parent.resolve() / path.name, path.resolve()):
@@ -76,24 +76,13 @@ def unpack(parcel: bytes, root: Path) -> Plan:
         each.mkdir(parents=True, exist_ok=True)
     os.chdir(folder)
     types = [str(below(root, name)) for name in manifest["types"]]
-    return Plan.of_manifest(manifest | {"file": str(study), "types": types})
+    return Plan.of_manifest(manifest | {"file": str(study), "types": types}).allowed()
 
 
 def below(root: Path, name: str) -> Path:
     """The new place of a file that was below the root of a file system, or of a drive."""
     path = Path(name)
     return root.joinpath(path.drive.rstrip(":"), *path.parts[1:]) if path.anchor else root / path
-
-
-def _modules(types: Iterable[Path]) -> Iterator[str]:
-    """The Python files that types of the user's own import from beside their file."""
-    for file in types:
-        folder = file.resolve().parent
-        finder = ModuleFinder(path=[str(folder)])
-        finder.run_script(str(file.resolve()))
-        for module in finder.modules.values():
-            if (name := getattr(module, "__file__", None)) is not None:
-                yield name
 
 
 # -- who may take part ------------------------------------------------------------------------------------------------

@@ -33,7 +33,7 @@ class Runner:
     @classmethod
     def of_manifest(cls, manifest: Mapping[str, Any]) -> Runner:
         """That of a results folder."""
-        return cls(Plan.of_manifest(manifest))
+        return cls(Plan.of_manifest(manifest).allowed())
 
     def prepare(self, task: Task) -> None:
         """Load the model of the task's condition, unless it is loaded."""
@@ -147,7 +147,7 @@ class _Repeater:
     """Repeats runs of a plan."""
 
     def __init__(self, manifest: Mapping[str, Any]) -> None:
-        self._plan = Plan.of_manifest(manifest)
+        self._plan = Plan.of_manifest(manifest).allowed()
         self._model = lru_cache(1)(lambda index: self._plan.load(self._plan.condition(index)))
 
     def prepare(self, replay: Replay) -> None:

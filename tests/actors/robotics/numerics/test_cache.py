@@ -6,6 +6,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 import epicycle.actors
 
 SOURCES = Path(next(iter(epicycle.actors.__path__))) / "robotics" / "numerics"
@@ -17,15 +19,20 @@ def twice(number):
     return {factor} * number
 """
 USER = """
-from .compiled import kernel
+import numba
+from .compiled import cached, kernel, options
 from .inner import twice
 @kernel
 def twice_and(number):
     return twice(number) + 1.0
+with cached():
+    numba.cfunc("f8(f8)", cache=True, **options(_nrt=True))(lambda number: twice(number))
 """
 
 
-def test_a_kernel_is_compiled_anew_when_what_it_calls_has_changed(tmp_path: Path) -> None:
+@pytest.fixture
+def package(tmp_path: Path) -> Path:
+    """A package of a kernel and a function that it calls, compiled as ours are."""
     package = tmp_path / "numerics"
     package.mkdir()
     (package / "__init__.py").touch()
@@ -33,15 +40,51 @@ def test_a_kernel_is_compiled_anew_when_what_it_calls_has_changed(tmp_path: Path
     source = (SOURCES / "compiled.py").read_text("utf-8").replace("from ...core", "from epicycle.actors.core")
     (package / "compiled.py").write_text(source, "utf-8")
     (package / "user.py").write_text(USER)
+    (package / "inner.py").write_text(INNER.format(factor="2.0"))
+    return package
 
-    def result(factor: str) -> str:
-        (package / "inner.py").write_text(INNER.format(factor=factor))
-        command = [sys.executable, "-B", "-c", PROGRAM]
-        return subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=True).stdout.strip()
 
-    assert result("2.0") == "3.0"
-    assert len(list(package.glob("__pycache__/*/*/*.nbc"))) == 1
-    assert result("2.0") == "3.0"
-    assert len(list(package.glob("__pycache__/*/*/*.nbc"))) == 1  # the one that was there
-    assert result("3.0") == "4.0"
+def result(package: Path) -> tuple[str, str]:
+    """What a new process computes, and what it says."""
+    command = [sys.executable, "-B", "-c", PROGRAM]
+    done = subprocess.run(command, cwd=package.parent, capture_output=True, text=True, check=True)
+    return done.stdout.strip(), done.stderr.replace(f"{package}/", "")
+
+
+def test_a_kernel_is_compiled_anew_when_what_it_calls_has_changed(package: Path) -> None:
+    assert result(package) == ("3.0", "")
     assert len(list(package.glob("__pycache__/*/*/*.nbc"))) == 2
+    assert result(package) == ("3.0", "")
+    assert len(list(package.glob("__pycache__/*/*/*.nbc"))) == 2  # the one that was there
+    (package / "inner.py").write_text(INNER.format(factor="3.0"))
+    assert result(package) == ("4.0", "")
+    assert len(list(package.glob("__pycache__/*/*/*.nbc"))) == 4
+
+
+@pytest.mark.parametrize("ending", ["nbi", "nbc"])
+@pytest.mark.parametrize("of", ["twice_and", "lambda"])
+@pytest.mark.parametrize("damage", ["cut", "empty", "flipped"])
+def test_damaged_code_is_compiled_again_with_a_word(package: Path, ending: str, damage: str, of: str) -> None:
+    assert result(package) == ("3.0", "")
+    path = next(package.glob(f"__pycache__/*/*/*{of}*.{ending}"))
+    data = bytearray(path.read_bytes())
+    middle = len(data) // 2
+    if damage == "flipped":
+        data[middle] ^= 1
+    path.write_bytes(data[: {"cut": middle, "empty": 0}.get(damage, len(data))])
+    found, said = result(package)
+    assert found == "3.0"
+    if (ending, damage) != ("nbi", "flipped"):  # which leads to code that is not there
+        assert said.startswith("compiled code in __pycache__/")
+        assert said.endswith(" and is made again\n")
+        assert said.count("\n") == 1
+    assert result(package) == ("3.0", "")
+
+
+def test_code_that_cannot_be_kept_is_used(package: Path) -> None:
+    assert result(package) == ("3.0", "")
+    path = next(package.glob("__pycache__/*/*/*twice_and*.nbi"))
+    path.unlink()
+    path.mkdir()
+    found, said = result(package)
+    assert (found, "compiled code cannot be kept in __pycache__/" in said) == ("3.0", True)
