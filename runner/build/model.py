@@ -47,6 +47,9 @@ from .weave_all import arranged
 DeclaredFigure = tuple[str, dict[str, object], MappingNode]  # type, values, as written
 
 
+_SHOWN = ("unit", "to", "doc", "label")  # options of a metric that is computed from others
+
+
 class Model(Scope, Tabled):
     """A model graph that can be run, made by ``load_model`` or built in Python.
 
@@ -168,10 +171,22 @@ class Model(Scope, Tabled):
         """End the run, after the current tag, when one of these output ports sends something true."""
         self._watch(ports, lambda watching, text: watching.stop_when(text))
 
-    def metric(self, name: str, *, of: str | Port, take: TakeName = "last", **options: Unpack[MetricOptions]) -> None:
+    def metric(
+        self,
+        name: str,
+        *,
+        of: str | Port | Iterable[str | Port] = (),
+        take: TakeName = "last",
+        formula: str = "",
+        **options: Unpack[MetricOptions],
+    ) -> None:
         """A number in the results; docs/language.md lists what can be taken, and the options.
 
+        ``of`` is a port, a pattern, or several; or ``formula`` is an expression over metrics that are there (``from``
+        in a file), with no more than ``unit``, ``to``, ``doc`` and ``label``.
+
         >>> model.metric("in_queue", of="server.size", take="time_mean", initial=0, after="100 s", interval=0.95)
+        >>> model.metric("ratio", formula="delivered / sent")
         """
         position = call_site()
         problems = Problems()
@@ -182,8 +197,26 @@ class Model(Scope, Tabled):
         if problem := take_problem(name, take):
             problems.add(problem[0], position, problem[1])
         problems.raise_if_any()
-        values = {"take": take, **options}
-        self._watch([of], lambda watching, text: watching.metric(name, text, values, position))
+        ports = list(of) if isinstance(of, Iterable) and not isinstance(of, str) else [of]
+        if bool(ports) == bool(formula):
+            problems.add(f"metric {name}: give either 'of' or 'formula'", position)
+        if formula and (
+            wrong := [*(["take"] if take != "last" else []), *(each for each in options if each not in _SHOWN)]
+        ):
+            problems.add(f"metric {name}: {wrong[0]!r} cannot be used with 'formula'", position)
+        problems.raise_if_any()
+        with raising() as problems:
+            watching = Watching(self.draft, Values(problems), problems)
+            if formula:
+                watching.computed(
+                    name, Text(formula, within(Text(formula, position), formula)), dict(options), position
+                )
+                watching.check_formulas(each.name for each in self.metrics)
+            else:
+                texts = (each if isinstance(each, str) else each.path for each in ports)
+                of_ports = [Text(each, within(Text(each, position), each)) for each in texts]
+                watching.metric(name, of_ports, {"take": take, **options}, position)
+        self._add(watching.found)
 
     def monitor(self, name: str, property: str, **options: Unpack[RequirementOptions]) -> None:
         """A property that every run must have; docs/language.md describes how to write one.

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from graphlib import CycleError, TopologicalSorter
 from typing import Any
 
 from epicycle.actors import Parameter, ParameterError, accepts, declared_parameters, type_name
+from epicycle.actors.expression import ExpressionError, Formula
 
 from ..catalogue import Measure
 from ..graph import Metric, Watched
@@ -24,6 +26,7 @@ from ..text import (
     TooManyError,
     did_you_mean,
     plain,
+    within,
 )
 from .draft import Draft
 from .monitors import monitor_of
@@ -45,6 +48,7 @@ class Watching:
         self._outputs = PathIndex(outputs, self.graph.limits)
         self._recorded = set(recorded)
         self._watched = 0
+        self._formulas: dict[str, Text] = {}  # of metrics that are computed from others
 
     def read(self, text: ModelText, names: dict[str, object]) -> Watched:
         """Everything that the model file declares about it."""
@@ -66,6 +70,7 @@ class Watching:
             self._read_metric(metric, names)
         for monitor in text.monitors:
             self._read_monitor(monitor, names)
+        self.check_formulas()
         return self.found
 
     def _read_metric(self, text: MetricText, names: dict[str, object]) -> None:
@@ -78,7 +83,10 @@ class Watching:
                 values[key] = self.values.of(entry.value, names, f"metric {text.name}, {key}")
         places = {key: entry.value.position for key, entry in text.values.items()}
         if self.values.missing not in values.values():
-            self.metric(text.name, text.port, values, text.position, places)
+            if text.formula is None:
+                self.metric(text.name, text.ports, values, text.position, places)
+            else:
+                self.computed(text.name, text.formula, values, text.position, places)
 
     def _read_monitor(self, text: MonitorText, names: dict[str, object]) -> None:
         values: dict[str, object] = {}
@@ -109,7 +117,7 @@ class Watching:
     def metric(
         self,
         name: str,
-        of: Text,
+        of: Sequence[Text],
         options: Mapping[str, object],
         position: Position,
         places: Mapping[str, Position] | None = None,
@@ -119,7 +127,8 @@ class Watching:
         measure = self._measure(what, options, position, places or {})
         if measure is None:
             return
-        paths = self.select(of, what)
+        chosen = {path: each for each in reversed(of) for path in self.select(each, what)}
+        paths = self._outputs.in_order(chosen)
         self._watched += len(paths)
         limit = self.graph.limits.watched
         if self._watched > limit:
@@ -134,8 +143,54 @@ class Watching:
                     message = (
                         f"{what}: {path} sends {type_name(port.type)}, from which {measure.take!r} cannot be taken"
                     )
-                    self.problems.add(message, of.position, "name a port that sends numbers, or take 'count'")
+                    self.problems.add(message, chosen[path].position, "name a port that sends numbers, or take 'count'")
                     return
+
+    def computed(
+        self,
+        name: str,
+        source: Text,
+        options: Mapping[str, object],
+        position: Position,
+        places: Mapping[str, Position] | None = None,
+    ) -> None:
+        """Compute a number from other metrics; ``check_formulas`` says whether there are such."""
+        what = f"metric {name}"
+        measure = self._measure(what, options, position, places or {})
+        try:
+            formula = Formula(source.text)
+        except ExpressionError as error:
+            wrong = source.text[error.offset : error.offset + max(error.length, 1)]
+            self.problems.add(f"{what}: {error}", within(source, wrong) if wrong else source.position)
+            return
+        if not formula.names:
+            hint = "write an expression over others, such as 'delivered / sent'"
+            self.problems.add(f"{what}: {source.text!r} names no metric", source.position, hint)
+        elif measure is not None:
+            self._formulas[name] = source
+            self.found.metrics.append(Metric(name, [], measure, formula=formula))
+
+    def check_formulas(self, known: Iterable[str] = ()) -> None:
+        """Whether the metrics that others are computed from are there, and lead to none of these."""
+        own = {each.name: each for each in self.found.metrics}
+        names = [*known, *own]
+        sorter: TopologicalSorter[str] = TopologicalSorter()
+        for name, source in self._formulas.items():
+            formula = own[name].formula
+            assert formula is not None
+            sorter.add(name, *formula.names)
+            for each in formula.names:
+                if each not in names:
+                    near = did_you_mean(each, [other for other in names if other != name])
+                    hint = f"metrics of the model: {', '.join(other for other in names if other != name) or 'none'}"
+                    message = f"metric {name}: there is no metric {each!r}{near}"
+                    self.problems.add(message, within(source, each), hint)
+        try:
+            sorter.prepare()
+        except CycleError as error:
+            circle = error.args[1][::-1]
+            message = f"metric {circle[0]}: it is computed from itself: {' <- '.join(circle)}"
+            self.problems.add(message, self._formulas[circle[0]].position)
 
     def monitor(
         self, name: str, values: Mapping[str, object], position: Position, places: Mapping[str, Position] | None = None

@@ -10,6 +10,7 @@ from epicycle.actors import Configurable, Parameter, ParameterError, Quantity, U
 from epicycle.actors.expression import Formula, FormulaParameter
 
 MSER5 = "mser5"
+ACROSS = ("sum", "mean", "min", "max")  # ports
 TOKENS, TIME = "tokens", "time"  # over what something is taken
 
 
@@ -44,6 +45,7 @@ class MetricOptions(TypedDict, total=False):
     initial: object
     after: float | str
     interval: float | str
+    across: str
     unit: str
     to: str
     doc: str
@@ -125,6 +127,12 @@ class Measure(Configurable):
     interval: Parameter[float | None] = Parameter(
         float, None, unit="1", min=0.5, max=0.9999, doc="level of a confidence interval, by batch means"
     )
+    across: Parameter[str | None] = Parameter(
+        str,
+        None,
+        choices=ACROSS,
+        doc="how the numbers of several ports become one; without it, their tokens are taken together",
+    )
     unit = Parameter(str, "", doc="the unit of the tokens")
     to = Parameter(str, "", doc="the unit in which the metric is given (default: that of the tokens)")
     doc = Parameter(str, "", doc="what it is")
@@ -146,6 +154,8 @@ class Measure(Configurable):
             if getattr(self, option) is not None and option not in kind.options:
                 others = ", ".join(name for name, each in TAKES.items() if option in each.options)
                 yield option, f"{option!r} cannot be used with {self.take!r}", f"it can be used with {others}"
+        if self.across is not None and self.interval is not None:
+            yield "interval", "'interval' cannot be used with 'across'", "leave out one of the two"
         if kind.needs and getattr(self, kind.needs) is None:
             example = "p: 0.9" if kind.needs == "p" else "when: value > 0"
             yield "take", f"{self.take!r} needs {kind.needs!r}", f"for example, add '{example}'"

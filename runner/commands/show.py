@@ -71,7 +71,7 @@ def _metrics(model: Model) -> Iterator[dict[str, str]]:
     for each in model.metrics:
         if each.monitor:
             continue
-        takes, unit = f"{each.measure.take} of {', '.join(each.ports)}", "" if each.unit == "1" else each.unit
+        takes, unit = each.takes, "" if each.unit == "1" else each.unit
         yield {"metric": each.name, "takes": takes, "unit": unit, "what it is": each.measure.doc}
 
 

@@ -24,7 +24,7 @@ from .errors import ActorError
 from .forms import attach
 from .listeners import Measuring, Recording
 from .loop import handle_events
-from .measurement import Measurement
+from .measured import Measured, add_computed
 from .monitoring import Listening, Monitoring
 from .pace import Pace
 from .trace import Tracer, TracingDirector, TracingLog
@@ -74,7 +74,7 @@ class Run:
         self.log.crowd = self.director.crowd.add
         self.signals = {name: Signal(name) for name in model.recorded}
         self._units = {metric.name: metric.unit for metric in model.metrics}
-        self._measurements = {metric.name: Measurement(metric) for metric in model.metrics if not metric.monitor}
+        self._measurements = {metric.name: Measured(metric) for metric in model.metrics if metric.is_measured}
         self._monitorings = {monitor.name: Monitoring(monitor) for monitor in model.monitors}
         try:
             with without_collection():
@@ -97,8 +97,8 @@ class Run:
         for name, signal in self.signals.items():
             found.setdefault(name, []).append(Recording(signal.samples, self.director))
         for metric in self.model.metrics:
-            for path in metric.ports if not metric.monitor else ():
-                measuring = Measuring(self._measurements[metric.name], path, self.director)
+            for path in metric.ports if metric.is_measured else ():
+                measuring = Measuring(self._measurements[metric.name].at(path), path, self.director)
                 found.setdefault(path, []).append(measuring)
         for monitor in self.model.monitors:
             for part in self._monitorings[monitor.name].parts:
@@ -241,10 +241,11 @@ class Run:
         verdicts = {name: self.verdict(name, stopped) for name in self._monitorings}
         outcomes = {}  # of copies, because reading a measurement ends it
         for metric in self.model.metrics:
-            if (verdict := verdicts.get(metric.monitor)) is None:
+            if metric.is_measured:
                 outcomes[metric.name] = Copies().of(self._measurements[metric.name]).outcome(end)
-            else:
-                outcomes[metric.name] = verdict.outcome(metric.name == metric.monitor)
+            elif metric.monitor:
+                outcomes[metric.name] = verdicts[metric.monitor].outcome(metric.name == metric.monitor)
+        outcomes = add_computed(self.model.metrics, outcomes)
         return Results(
             model=self.model.name,
             seed=self.seed,

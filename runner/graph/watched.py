@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
+from epicycle.actors.expression import Formula
 from epicycle.aspects import Reading
 
 from ..catalogue import Measure
@@ -14,16 +15,30 @@ from .model_graph import is_within
 
 @dataclass(frozen=True)
 class Metric:
-    """A number computed from what some ports send together."""
+    """A number computed from what some ports send, or from other metrics."""
 
     name: str
     ports: list[str]
     measure: Measure
     monitor: str = ""  # the monitor whose verdict or robustness it is
+    formula: Formula | None = None  # over other metrics, if it is computed from these
 
     def without(self, path: str) -> Metric:
         """The metric after the removal of a part of the model that it may have watched."""
         return replace(self, ports=[port for port in self.ports if not is_within(port, path)])
+
+    @property
+    def is_measured(self) -> bool:
+        """Whether it is taken from tokens."""
+        return not self.monitor and self.formula is None
+
+    @property
+    def takes(self) -> str:
+        """What is taken from what, for people."""
+        if self.formula is not None:
+            return self.formula.source
+        across = f"{self.measure.across} of the " if self.measure.across else ""
+        return f"{across}{self.measure.take} of {', '.join(self.ports)}"
 
     @property
     def unit(self) -> str:

@@ -100,10 +100,11 @@ class ConnectionText:
 
 @dataclass(frozen=True)
 class MetricText:
-    """A number computed from what a port sends; ``values`` are those of a ``Measure``."""
+    """A number computed from what ports send, or from other metrics; ``values`` are those of a ``Measure``."""
 
     name: str
-    port: Text
+    ports: tuple[Text, ...]
+    formula: Text | None
     values: dict[str, Entry]
     position: Position
 

@@ -7,9 +7,9 @@ from typing import Any
 from epicycle.actors import Parameter, declared_parameters
 
 from ..catalogue import TAKES, Measure, take_problem
-from ..text import Entry, NodeReader
+from ..text import Entry, NodeReader, is_empty
 from .declarations import MetricText
-from .fields import AT, Construct, Key, about, named, node_as, ref, schema_of
+from .fields import AT, TEXTS, Construct, Key, about, named, node_as, one_or_more, ref, schema_of
 from .places import PATTERN_SCHEMA
 
 
@@ -21,33 +21,49 @@ def _of_metric(key: str, parameter: Parameter[Any]) -> Key:
 
 
 METRIC = Construct(
-    "A number computed from what a port sends.",
+    "A number computed from what ports send, or from other metrics.",
     {
         "of": Key(
-            node_as(PATTERN_SCHEMA),
-            "The output port (or a pattern for several).",
-            missing=("{what} has no port", "add 'of: actor.port'"),
+            node_as(one_or_more(PATTERN_SCHEMA)),
+            "The output port, a pattern for several, or a list of these.",
         ),
+        "from": Key(node_as(ref("text")), "An expression over other metrics of the model, such as 'delivered / sent'."),
         **{key: _of_metric(key, each) for key, each in declared_parameters(Measure).items()},
     },
     type="object",
-    required=["of"],
+    anyOf=[{"required": ["of"]}, {"required": ["from"]}],
 )
+_WITH_FORMULA = ("from", "unit", "to", "doc", "label")
 
 
 def _metric(reader: NodeReader, name: str, entry: Entry) -> MetricText | None:
-    """``name: {of: port, take: last, unit: s, doc: ...}``."""
-    entries = METRIC.entries(reader, entry.value, f"metric {name!r}")
+    """``name: {of: port, take: last, unit: s, doc: ...}``, or ``name: {from: delivered / sent, doc: ...}``."""
+    what = f"metric {name!r}"
+    entries = METRIC.entries(reader, entry.value, what)
     if entries is None:
         return None
-    said = METRIC.values(reader, entries, f"metric {name!r}", entry.key.position)
-    port = AT.read(reader, said["of"], "of") if "of" in said else None
+    said = METRIC.values(reader, entries, what, entry.key.position)
+    if "from" in said:
+        for key in entries:
+            if key not in _WITH_FORMULA:
+                message = f"{what}: {key!r} cannot be used with 'from'"
+                reader.problems.add(message, entries[key].key.position, f"it can have {', '.join(_WITH_FORMULA[1:])}")
+        formula = AT.read(reader, said["from"], "from")
+        values = {key: each for key, each in entries.items() if key in _WITH_FORMULA[1:]}
+        return None if formula is None else MetricText(name, (), formula, values, entry.key.position)
+    before = len(reader.problems)
+    ports = TEXTS.read(reader, said["of"], "of") if "of" in said else ()
+    if "of" not in entries or is_empty(entries["of"].value) or (not ports and len(reader.problems) == before):
+        hint = "add 'of: actor.port', or 'from: delivered / sent' over other metrics"
+        reader.problems.add(f"{what} has no port", entry.key.position, hint)
     take = reader.text(said["take"], "take") if "take" in said else "last"
     if take is not None and (problem := take_problem(name, take)):
         reader.problems.add(problem[0], entries["take"].value.position, problem[1])
-    if port is None or take not in TAKES:
+    if not ports or take not in TAKES:
         return None
-    return MetricText(name, port, {key: each for key, each in entries.items() if key != "of"}, entry.key.position)
+    return MetricText(
+        name, ports, None, {key: each for key, each in entries.items() if key != "of"}, entry.key.position
+    )
 
 
 METRICS = named(ref("metric"), _metric)

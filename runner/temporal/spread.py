@@ -35,7 +35,7 @@ def spread_of(source: str) -> Spread | None:
     quantifier, pattern, body = match[1], match[2], source[match.end() :]
     if quantifier not in (EVERY, ANY):
         at = match.start(1) if quantifier else 0
-        said = f"'for {quantifier}' is not known here" if quantifier else "'for' says neither every nor any"
+        said = f"'for {quantifier}' is not supported" if quantifier else "'for' says neither every nor any"
         raise PropertyError(said, at, len(quantifier or "for"), example)
     if not pattern or not body:
         raise PropertyError(f"'for {quantifier}' names {'no property' if pattern else 'no pattern'}", 0, 3, example)

@@ -392,7 +392,7 @@ def test_a_monitor_of_every_one_forgets_what_is_removed() -> None:
 @pytest.mark.parametrize(
     ("source", "message"),
     [
-        ("for all drone[*], always drone[*].output < 7", "monitor it: 'for all' is not known here"),
+        ("for all drone[*], always drone[*].output < 7", "monitor it: 'for all' is not supported"),
         ("for every", "monitor it: 'for every' names no pattern"),
         ("for every drone[*]", "monitor it: 'for every' names no property"),
         (
