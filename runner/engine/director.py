@@ -16,9 +16,9 @@ A token sent over a connection without delay arrives at the same tag; with delay
 at the next microstep.  A wake-up for the present time comes at the next microstep, one for the future at
 microstep 1.  The first tag of a run is (start, 1).
 
-SimPy has the events of processes and resources, at whole nanoseconds, too.  The director has its own agenda beside them:
-the earlier of the two goes first.  At one instant, all events of SimPy come first, and what processes send then is received at the
-first microstep that the director has not yet handled.
+SimPy has the events of processes and resources, at whole nanoseconds, too.  The director has its own agenda beside
+them: the earlier of the two goes first.  At one instant, all events of SimPy come first, and what processes send then
+is received at the first microstep that the director has not yet handled.
 
 Departures from Ptolemy II: a firing sees all tokens of its tag at once, where Ptolemy fires again for each further
 token; and tokens that an actor does not read do not stay in the port, unless it keeps them (``InputPort.keep``).
