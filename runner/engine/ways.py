@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Container
 from functools import partial
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import Any, TypeVar
 
 from epicycle.actors import (
     Actor,
@@ -42,9 +42,6 @@ from .parameters import VaryingParameter
 from .refinement import Refinement
 from .requests import Requests
 from .way import Call, Delayed, Deliver, Guarded, Screened, Sender, all_of
-
-if TYPE_CHECKING:
-    pass
 
 T = TypeVar("T")
 P = TypeVar("P", bound=JoinPoint)

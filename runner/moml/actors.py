@@ -262,8 +262,6 @@ def plain(value: Any) -> object:
         raise ValueError("a function cannot be written")
     if isinstance(value, str):
         return value.replace("${", "$${")
-    if callable(value):
-        raise ValueError("a function cannot be a value here")
     return value
 
 
