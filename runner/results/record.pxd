@@ -12,16 +12,18 @@ cdef class RecordHash:
     cdef public object _hash
     cdef char* buffer
     cdef Py_ssize_t used, end, room  # ``end`` is that of a record in the making
+    cdef uint64_t names
     cdef object when
     cdef long long time
     cdef long microstep
     cdef bint is_fixed
     cdef dict known
-    cpdef int add(self, bytes names, when, value) except -1
+    cpdef bytes add(self, bytes number, bytes names, when, value)
     cdef int need(self, Py_ssize_t more) except -1
     cdef int put_bytes(self, bytes data) except -1
     cdef void put_little(self, uint64_t number, int size) noexcept
     cdef void put_float(self, double number) noexcept
+    cdef void put_unsigned(self, uint64_t number) noexcept
     cdef int put_known(self, token) except -1
     cdef int put(self, token, int depth) except -1
     cdef int put_array(self, token) except -1

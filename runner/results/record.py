@@ -18,42 +18,54 @@ from .encoding import encoders, field_values
 T = TypeVar("T")
 
 _FULL = 65_536  # bytes that are hashed together
-_TAG = struct.Struct("<cqcq").pack
+_TAG = struct.Struct("<bq").pack
 _SIMPLE = frozenset({float, int, bool, type(None), str, np.float64})  # types whose tokens cannot change
 
 
 class RecordHash:
-    """SHA-256 over records in their canonical form.
+    """SHA-256 over records in the canonical form of docs/semantics.md.
 
     A token is often logged several times: by its sender, by channels that pass it on, by aspects on its way.  One that
     cannot change is encoded once.
     """
 
-    __slots__ = ("_buffer", "_hash", "_known", "_tag", "_when", "at_tag", "count")
+    __slots__ = ("_buffer", "_hash", "_known", "_names", "_tag", "_when", "at_tag", "count")
 
     def __init__(self) -> None:
         self.count = 0  # records
         self.at_tag = 0  # of these, at the last tag
         self._hash = hashlib.sha256()
         self._buffer = bytearray()  # still to be hashed
+        self._names = 0  # different names so far
         self._tag = b""  # of the last record
         self._when: When | None = None  # an object that represents it
         self._known: dict[int, tuple[Any, bytes]] = {}  # tokens that cannot change, with their bytes, by id
 
-    def add(self, names: bytes, when: When, value: Any) -> None:
-        """Append a record; raises an exception, and appends nothing, if the value cannot be encoded."""
+    def add(self, number: bytes, names: bytes, when: When, value: Any) -> bytes:
+        """Append a record; ``number`` is that of its names, empty if they are new.  Returns their number.
+
+        Raises an exception, and appends nothing, if the value cannot be encoded.
+        """
         cls = type(value)
         data = encoders[cls](value) if cls in _SIMPLE else self._encoded(value)
         if when is not self._when:
             self._when = when
-            tag = _TAG(b"i", when.time, b"i", when.microstep)
+            tag = _TAG(0, when.time) + unsigned(when.microstep)
             if tag != self._tag:
                 self._tag, self.at_tag = tag, 0
-        self._buffer += self._tag + names + data
+                self._buffer += tag
+        if not number:
+            self._names += 1
+            number = unsigned(self._names)
+            self._buffer += number + names
+        else:
+            self._buffer += number
+        self._buffer += data
         self.count += 1
         self.at_tag += 1
         if len(self._buffer) > _FULL:
             self._update()
+        return number
 
     def _encoded(self, token: Any) -> bytes:
         known = self._known.get(id(token))
@@ -73,6 +85,16 @@ class RecordHash:
         """The SHA-256 so far, as hexadecimal text."""
         self._update()
         return self._hash.hexdigest()
+
+
+def unsigned(number: int) -> bytes:
+    """A whole number as unsigned LEB128: seven bits a byte, the lowest first; the last byte is below 128."""
+    data = bytearray()
+    while number > 127:
+        data.append(number & 127 | 128)
+        number >>= 7
+    data.append(number)
+    return bytes(data)
 
 
 def is_fixed(token: Any) -> bool:

@@ -66,19 +66,20 @@ cdef class RecordHash:
     @property
     def content(self):
         written = PyBytes_FromStringAndSize(self.buffer, self.used)
-        return written, self.count, self.at_tag, self.time, self.microstep
+        return written, self.count, self.at_tag, self.names, self.time, self.microstep
 
     @content.setter
     def content(self, content):
-        written, self.count, self.at_tag, self.time, self.microstep = content
+        written, self.count, self.at_tag, self.names, self.time, self.microstep = content
         self.end = 0
         self.put_bytes(written)
         self.used = self.end
 
-    cpdef int add(self, bytes names, when, value) except -1:
+    cpdef bytes add(self, bytes number, bytes names, when, value):
         cdef long long time = self.time
         cdef long microstep = self.microstep
-        cdef bint is_later
+        cdef bint is_new = not number, is_later
+        cdef Py_ssize_t place
         if when is not self.when:
             if isinstance(when, Moment):
                 time, microstep = (<Moment>when).time, (<Moment>when).microstep
@@ -87,14 +88,20 @@ cdef class RecordHash:
         is_later = time != self.time or microstep != self.microstep
         self.end = self.used
         self.need(32)
-        self.put_little(b"i", 1)
-        self.put_little(<uint64_t>time, 8)
-        self.put_little(b"i", 1)
-        self.put_little(<uint64_t>microstep, 8)
-        self.put_bytes(names)
-        if type(value) is float:
+        if is_later:
+            self.put_little(0, 1)
+            self.put_little(<uint64_t>time, 8)
+            self.put_unsigned(microstep)
+        if is_new:
+            place = self.end
+            self.put_unsigned(self.names + 1)
+            number = PyBytes_FromStringAndSize(self.buffer + place, self.end - place)
+            self.put_bytes(names)
+        else:
+            self.put_bytes(number)
+        if isinstance(value, float):
             self.need(9)
-            self.put_float(value)
+            self.put_float(PyFloat_AS_DOUBLE(value))
         elif value is None or isinstance(value, int):
             self.put(value, 0)
         else:
@@ -102,11 +109,12 @@ cdef class RecordHash:
         # Nothing has failed: the record counts.
         self.used = self.end
         self.when, self.time, self.microstep = when, time, microstep
+        self.names += is_new
         self.count += 1
         self.at_tag = 1 if is_later else self.at_tag + 1
         if self.used > FULL:
             self.update()
-        return 0
+        return number
 
     cdef int update(self) except -1:
         self._hash.update(PyBytes_FromStringAndSize(self.buffer, self.used))
@@ -148,6 +156,12 @@ cdef class RecordHash:
         memcpy(&bits, &number, 8)
         self.put_little(b"f", 1)
         self.put_little(bits if number == number else NAN_BITS, 8)
+
+    cdef inline void put_unsigned(self, uint64_t number) noexcept:
+        while number > 127:
+            self.put_little(number & 127 | 128, 1)
+            number >>= 7
+        self.put_little(number, 1)
 
     cdef int put_known(self, token) except -1:
         """Append a token; its bytes are known if it was encoded before and cannot change."""

@@ -164,11 +164,10 @@ def digest_of(token: Any) -> str:
 
 def digest_of_bytes(*sent: tuple[str, bytes]) -> str:
     """The digest of sends of these actors, with these values."""
-    records = (
-        Record(Tag(0, 1), "send", actor, "output", None, "", None).encoded().removesuffix(canonical(None)) + value
-        for actor, value in sent
-    )
-    return hashlib.sha256(b"".join(records)).hexdigest()
+    data = canonical(0).replace(b"i", b"\0", 1) + b"\1"  # the tag
+    for number, (actor, value) in enumerate(sent, start=1):
+        data += bytes([number]) + b"".join(map(canonical, ("send", actor, "output", "", None))) + value
+    return hashlib.sha256(data).hexdigest()
 
 
 class Word(str):
