@@ -57,7 +57,7 @@ cpdef array_of(numbers):
 
 
 cpdef read_only(value):
-    made = numpy.PyArray_NewCopy(<numpy.ndarray>value, numpy.NPY_KEEPORDER) if is_plain(value) else array_of(value)
+    made = numpy.PyArray_NewCopy(<numpy.ndarray>value, numpy.NPY_CORDER) if is_plain(value) else array_of(value)
     numpy.PyArray_CLEARFLAGS(<numpy.ndarray>made, numpy.NPY_ARRAY_WRITEABLE)
     return made
 

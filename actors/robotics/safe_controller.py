@@ -13,6 +13,7 @@ from ..core.elementary import cos, sin
 from .arrays import Array, pair
 from .controller import RobustController
 from .messages import BodyState
+from .receiving import PLANE
 from .roaming import RoamingModel
 
 if TYPE_CHECKING:
@@ -46,6 +47,8 @@ class SafeController(RoamingModel, RobustController):
     as its controls say, then it never comes within ``safe_distance``: a retreat that was certain stays so.  Other
     robots are avoided by the plan alone.  Before there is a first retreat, the best one that there is decides.
     """
+
+    _of_target = PLANE  # the model of its motion is
 
     overrides = OutputPort(int, doc="number of controls so far that a retreat has changed")
 
