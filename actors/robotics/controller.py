@@ -173,7 +173,7 @@ class RobustController(TargetModel, Actor):
 
         d = self._dimensions
         for objective in (self.objective, *self.objectives.values()):
-            self._check_objective(objective)
+            objective.check_dimensions(d)
         self.solver.prepare()
         compile_kernels(d)
         # Kept, as executing an import takes 1 us each time.
@@ -204,10 +204,6 @@ class RobustController(TargetModel, Actor):
         self._target: Estimate | None = None
         self._tracks: Tracks | None = None
         self._infeasible = 0
-
-    def _check_objective(self, objective: Objective) -> None:
-        """Raise an error if the objective is not for this robot."""
-        objective.check_dimensions(self._dimensions)
 
     def fire(self) -> None:
         self._listen()
@@ -301,20 +297,24 @@ class RobustController(TargetModel, Actor):
     def _expected(self, now: float) -> tuple[Array, ...]:
         """Means (K, N, d) and covariances (K, N, d (d + 1) / 2) of all targets, sigma points of each (K M, d) and their
         weights."""
-        targets = [self._target] if self._target is not None else []
-        if self._tracks is not None:
-            targets.extend(self._tracks.estimates)
         each = [
             self._expected_target(
                 target.mean, target.covariance, self._noise[len(target.mean)], *self._model, now - target.time,
                 self._steps, self._dimensions,
             )
-            for target in targets
+            for target in self._targets()
         ]  # fmt: skip
         if len(each) < 2:
             return each[0] if each else self._nobody
         means, covariances, points, weights = zip(*each, strict=True)
         return np.concatenate(means), np.concatenate(covariances), np.concatenate(points), weights[0]
+
+    def _targets(self) -> list[Estimate]:
+        """The latest estimates of all targets."""
+        targets = [self._target] if self._target is not None else []
+        if self._tracks is not None:
+            targets.extend(self._tracks.estimates)
+        return targets
 
     def _flight(self) -> dict[str, Any]:
         """The limits that hold in space only, by their names in the problem."""
