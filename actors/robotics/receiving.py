@@ -8,7 +8,7 @@ from typing import Any, Protocol, TypeVar
 
 from ..core import EpicycleError, InputPort, Parameter, ParameterError
 from .arrays import Array
-from .messages import ANY, RANGE, RELATIVE_POSITION, Shape
+from .messages import ANY, RANGE, RELATIVE_POSITION, SOME, Shape
 
 PLANE, SPACE = (2,), (3,)
 EITHER = PLANE + SPACE
@@ -95,6 +95,6 @@ def _culprit(message: M, dimensions: Sequence[int]) -> tuple[str, Array, Shape]:
 
 def _fits(found: tuple[int, ...], expected: Shape) -> bool:
     return len(found) == len(expected) and all(
-        length == wanted or wanted == ANY or (isinstance(wanted, str) and length > 0)
+        wanted in (length, ANY) or (wanted == SOME and length > 0)
         for length, wanted in zip(found, expected, strict=True)
     )

@@ -21,7 +21,7 @@ class RoamingModel(Configurable):
     """
 
     target_speed = Parameter(float, 1.5, unit="m/s", min=1e-6, doc="largest speed of the target")
-    _unused = "position_noise", "velocity_noise"  # inherited parameters of the random walk of eq. (1)
+    _unused: tuple[str, ...] = "position_noise", "velocity_noise"  # inherited, of the random walk of eq. (1)
 
     turn_time = Parameter(float, 2.0, unit="s", min=1e-3, doc="time in which the target forgets its direction")
 
@@ -45,8 +45,9 @@ class RoamingModel(Configurable):
 class RoamingEstimator(RoamingModel, UnscentedEstimator):
     """The paper's filter with two changes, for a ``SafeController``; the process noise of eq. (1) is not used.
 
-    The target roams (``RoamingModel``).  By eq. (1), with the noise of Table II as it is read here (``velocity_noise``), the
-    deviation of its velocity grows by 2 m/s in a second; the estimate follows the noise across the line of sight, and may swing to the other side of it.
+    The target roams (``RoamingModel``).  By eq. (1), with the noise of Table II as it is read here
+    (``velocity_noise``), the deviation of its velocity grows by 2 m/s in a second; the estimate follows the noise
+    across the line of sight, and may swing to the other side of it.
 
     Measurements are fused in the frame of the true line of sight (``numerics.lines_of_sight``), which depends on where
     the target is; and a measurement that surprises the filter widens its estimate, as in a filter of Student's t.

@@ -44,9 +44,10 @@ class SafeController(RoamingModel, RobustController):
       control is mixed with that of the last retreat that was certain, or replaced by it.
 
     So if the estimate is right to ``confidence`` standard deviations whenever a retreat is found, and the robot moves
-    as its controls say, then it never comes within ``safe_distance``: a retreat that was certain stays so.  A
-    retreat is from all targets together, those of ``tracks`` included; one that becomes known later was not in an
-    earlier retreat.  Other robots are avoided by the plan alone.  Before there is a first retreat, the best one that there is decides.
+    as its controls say, then it never comes within ``safe_distance``: a retreat that was certain stays so.  A retreat
+    is from all targets that are known, those of ``tracks`` included; one that becomes known later was not in an earlier
+    retreat.  Other robots are avoided by the plan alone.  Before there is a first retreat, the best one that there is
+    decides.
     """
 
     _unused = "position_noise", "velocity_noise", "covariance_noise"

@@ -180,5 +180,6 @@ def test_noise_that_does_nothing_is_refused(actor: type, name: str) -> None:
     with pytest.raises(ParameterError) as caught:
         actor("a", **{name: False if name == "covariance_noise" else 0.1})
     assert str(caught.value).endswith(
-        f"it has no effect in {actor.__name__}, whose target roams; leave it out, and set 'target_speed' and 'turn_time'"
+        f"it has no effect in {actor.__name__}, whose target roams; leave it out, and set 'target_speed' "
+        "and 'turn_time'"
     )
