@@ -20,8 +20,9 @@ class RoamingModel(Configurable):
     speed stays bounded, while under eq. (1) its velocity is a random walk.
     """
 
-    target_speed = Parameter(float, 1.5, unit="m/s", min=1e-6, doc="largest speed of the target")
     _unused: tuple[str, ...] = "position_noise", "velocity_noise"  # inherited, of the random walk of eq. (1)
+
+    target_speed = Parameter(float, 1.5, unit="m/s", min=1e-6, doc="largest speed of the target")
 
     turn_time = Parameter(float, 2.0, unit="s", min=1e-3, doc="time in which the target forgets its direction")
 
