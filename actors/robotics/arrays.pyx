@@ -53,7 +53,7 @@ cpdef array_of(numbers):
             for place in range(size):
                 data[place] = PyFloat_AS_DOUBLE((<tuple>numbers)[place])
             return made
-    return np.array(numbers, FLOAT)
+    return np.array(numbers, FLOAT, order="C")
 
 
 cpdef read_only(value):
