@@ -35,9 +35,7 @@ LIBRARIES = {
         "epicycle.runner.engine.way",
     ),
     "record": (
-        "epicycle.runner.results.packing",
-        "epicycle.runner.results.samples",
-        "epicycle.runner.results.waiting",
+        "epicycle.runner.results.record",
         "epicycle.runner.results.log",
         "epicycle.runner.engine.batches",
         "epicycle.runner.engine.statistic",

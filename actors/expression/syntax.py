@@ -137,6 +137,8 @@ def _objection(node: ast.AST) -> str | None:
             return f"there is no function '{name}'{guess} known functions: {', '.join(sorted(FUNCTIONS))}"
         case ast.Call():
             return "only a function can be called, by its name"
+        case ast.Tuple(elts=parts) if any(isinstance(part, ast.Slice) for part in parts):
+            return "a slice stands alone between [ and ]: of a list of lists, write rows[0:1][0]"
         case ast.Dict() if None in node.keys:
             return f"'**' before a value is not allowed in an expression: {_ALLOWED}"
         case ast.comprehension() if node.is_async or targets(node) is None:

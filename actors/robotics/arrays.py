@@ -21,8 +21,8 @@ _FLOAT = np.dtype(np.float64)  # NumPy searches for it at each call if the type 
 
 
 def read_only(value: ArrayLike) -> Array:
-    """A read-only copy."""
-    array = np.array(value, _FLOAT)
+    """A read-only copy, contiguous as kernels need it."""
+    array = np.array(value, _FLOAT, order="C")
     array.setflags(False)  # type: ignore[call-arg]  # write=False takes as long as the copy
     return array
 

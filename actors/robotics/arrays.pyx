@@ -53,11 +53,11 @@ cpdef array_of(numbers):
             for place in range(size):
                 data[place] = PyFloat_AS_DOUBLE((<tuple>numbers)[place])
             return made
-    return np.array(numbers, FLOAT)
+    return np.array(numbers, FLOAT, order="C")
 
 
 cpdef read_only(value):
-    made = numpy.PyArray_NewCopy(<numpy.ndarray>value, numpy.NPY_KEEPORDER) if is_plain(value) else array_of(value)
+    made = numpy.PyArray_NewCopy(<numpy.ndarray>value, numpy.NPY_CORDER) if is_plain(value) else array_of(value)
     numpy.PyArray_CLEARFLAGS(<numpy.ndarray>made, numpy.NPY_ARRAY_WRITEABLE)
     return made
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from operator import itemgetter
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -23,6 +24,7 @@ from .arrays import Array, array_of, finite, floats, joined, read_only, stacked
 from .estimator import TargetModel
 from .messages import BodyState, Estimate, Plan, Tracks, enclosing
 from .planning import Barrier, Objective, ReachGoal, Solver
+from .receiving import EITHER, latest, received
 
 if TYPE_CHECKING:
     from .numerics.horizon import HorizonProblem
@@ -106,6 +108,7 @@ class RobustController(TargetModel, Actor):
     """
 
     _dimensions = 2
+    _of_target: Sequence[int] = EITHER  # the dimensions of the estimates that it takes
 
     trigger = InputPort(object, doc="plan now")
     state = InputPort(BodyState, triggers=False, doc="where the robot is")
@@ -169,6 +172,8 @@ class RobustController(TargetModel, Actor):
         from .numerics.warm_up import compile_kernels
 
         d = self._dimensions
+        for objective in (self.objective, *self.objectives.values()):
+            objective.check_dimensions(d)
         self.solver.prepare()
         compile_kernels(d)
         # Kept, as executing an import takes 1 us each time.
@@ -183,7 +188,8 @@ class RobustController(TargetModel, Actor):
             self.tube_initial - ahead * self.tube_growth * tau, self.tube_growth * tau, np.arange(1.0, self._steps + 1)
         )
         self._room = self.period, self._radius, self.tube_growth, self.safe_distance, self.margin
-        self._model = self.process_noise, self.covariance_noise, self.kappa, self.period
+        self._noise = {2 * d: self.process_noise(d) for d in EITHER}  # by the length of a mean
+        self._model = self.covariance_noise, self.kappa, self.period
         # Means (K, N, d), covariances (K, N, d (d + 1) / 2), sigma points (M, d) at step N and their weights, without a
         # target.
         no_means, no_covariances = (np.empty((0, self._steps, columns)) for columns in (d, d * (d + 1) // 2))
@@ -203,8 +209,8 @@ class RobustController(TargetModel, Actor):
         self._listen()
         if not self.trigger.present:
             return
-        own = self.state.value if self.state.present else None
-        if own is None or not own.finite or len(own.position) != self._dimensions:
+        own = latest(self.state, (self._dimensions,)) if self.state.present else None
+        if own is None or not own.finite:
             self._applied = np.zeros(self._dimensions)
             self._standing = self._nothing
             self.control.send(np.zeros(self._dimensions))
@@ -223,10 +229,10 @@ class RobustController(TargetModel, Actor):
 
     def _listen(self) -> None:
         """Store the latest estimate and plans, also those that come between triggers or are overtaken by others."""
-        for plan in self.peer_plans.tokens:
+        for plan in received(self.peer_plans):
             if plan.robot != self._name and plan.finite:
                 self._peers.hear(plan)
-        for estimate in self.estimate.tokens:
+        for estimate in received(self.estimate, self._of_target):
             if estimate.finite and (self._target is None or estimate.time >= self._target.time):
                 self._target = estimate
         for role in self.role.tokens:
@@ -237,7 +243,7 @@ class RobustController(TargetModel, Actor):
                     f"'objectives' has: {roles}"
                 )
             self._objective = self.objectives[role]
-        for tracks in self.tracks.tokens:
+        for tracks in received(self.tracks, self._of_target):
             if tracks.finite and (self._tracks is None or tracks.time >= self._tracks.time):
                 self._tracks = tracks
 
@@ -291,19 +297,24 @@ class RobustController(TargetModel, Actor):
     def _expected(self, now: float) -> tuple[Array, ...]:
         """Means (K, N, d) and covariances (K, N, d (d + 1) / 2) of all targets, sigma points of each (K M, d) and their
         weights."""
-        targets = [self._target] if self._target is not None else []
-        if self._tracks is not None:
-            targets.extend(self._tracks.estimates)
         each = [
             self._expected_target(
-                target.mean, target.covariance, *self._model, now - target.time, self._steps, self._dimensions
+                target.mean, target.covariance, self._noise[len(target.mean)], *self._model, now - target.time,
+                self._steps, self._dimensions,
             )
-            for target in targets
-        ]
+            for target in self._targets()
+        ]  # fmt: skip
         if len(each) < 2:
             return each[0] if each else self._nobody
         means, covariances, points, weights = zip(*each, strict=True)
         return np.concatenate(means), np.concatenate(covariances), np.concatenate(points), weights[0]
+
+    def _targets(self) -> list[Estimate]:
+        """The latest estimates of all targets."""
+        targets = [self._target] if self._target is not None else []
+        if self._tracks is not None:
+            targets.extend(self._tracks.estimates)
+        return targets
 
     def _flight(self) -> dict[str, Any]:
         """The limits that hold in space only, by their names in the problem."""

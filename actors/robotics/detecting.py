@@ -10,6 +10,7 @@ from ..core import Actor, InputPort, OutputPort, Parameter
 from ..core.elementary import cos, hypot, sin
 from .arrays import pair
 from .messages import RANGE, RELATIVE_POSITION, BodyState, Detections, enclosing
+from .receiving import PLANE, by_channel, latest
 
 
 class MultiTargetSensor(Actor):
@@ -53,10 +54,10 @@ class MultiTargetSensor(Actor):
         drawn = [(self._chance(), self._noise(), self._noise()) for _ in range(self.targets.width)]
         if not self.robot.present:
             return
-        robot = self.robot.value
+        robot = latest(self.robot, PLANE)
         x, y = pair(robot.position)
         seen: list[tuple[float, ...]] = []
-        for (chance, *errors), states in zip(drawn, self.targets.by_channel(), strict=True):
+        for (chance, *errors), states in zip(drawn, by_channel(self.targets, PLANE), strict=True):
             for state in list(states)[-1:]:
                 tx, ty = pair(state.position)
                 dx, dy = tx - x, ty - y
@@ -65,7 +66,7 @@ class MultiTargetSensor(Actor):
                     seen.append(self._measured(dx, dy, distance, self.along * errors[0], self.across * errors[1]))
         for _ in range(self._false.poisson(self.clutter) if self.clutter > 0.0 else 0):
             seen.append(self._clutter())
-        believed = self.location.value.position if self.location.present else robot.position
+        believed = latest(self.location, PLANE).position if self.location.present else robot.position
         values = np.array(sorted(seen)) if seen else np.empty((0, 1 if self.kind == RANGE else 2))
         self.detections.send(
             Detections(

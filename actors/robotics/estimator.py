@@ -13,6 +13,7 @@ import numpy as np
 from ..core import Actor, Configurable, InputPort, OutputPort, Parameter, array_parameter, to_nanoseconds, to_seconds
 from .arrays import Array, array_of, floats, stacked
 from .messages import RANGE, RELATIVE_POSITION, Estimate, Measurement
+from .receiving import received
 
 EXPECTED, PREDICTED = "expected", "predicted"
 _NOTHING = 0.0, 0.0
@@ -32,10 +33,9 @@ class TargetModel(Configurable):
     )
     kappa = Parameter(float, 0.0, unit="1", min=0, doc="spread of the 9 sigma points; with 0, the centre has no weight")
 
-    @property
-    def process_noise(self) -> Array:
-        """The covariance (4, 4) that the state (x, y, vx, vy) gains in one period."""
-        return np.diag([self.position_noise] * 2 + [self.velocity_noise] * 2)
+    def process_noise(self, dimensions: int = 2) -> Array:
+        """The covariance (2 d, 2 d) that the state, (x, y, vx, vy) in the plane, gains in one period."""
+        return np.diag([self.position_noise] * dimensions + [self.velocity_noise] * dimensions)
 
 
 @dataclass(slots=True)
@@ -89,7 +89,7 @@ class _Estimator(TargetModel, Actor):
 
         compile_kernels()
         self._kinds = {RANGE: float(ukf.RANGE), RELATIVE_POSITION: float(ukf.RELATIVE_POSITION)}
-        self._process_noise = self.process_noise
+        self._process_noise = self.process_noise()
         self._waiting: list[Measurement] = []  # for the next trigger
         self._too_late = 0
         self._steps: list[
@@ -110,7 +110,7 @@ class _Estimator(TargetModel, Actor):
 
     def _take(self, earliest: int) -> None:
         """Keep new measurements for the next trigger, unless they are older than ``earliest``."""
-        come = [*self._waiting, *(each for each in self.measurements.tokens if each.finite)]
+        come = [*self._waiting, *(each for each in received(self.measurements) if each.finite)]
         self._waiting = [each for each in come if to_nanoseconds(each.time) >= earliest]
         if len(self._waiting) < len(come):
             self._too_late += len(come) - len(self._waiting)

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import TypeAlias
 
 from numpy.typing import ArrayLike
 
@@ -24,6 +25,8 @@ _set = object.__setattr__  # in a frozen token; each has its own __init__, as th
 
 
 SHAPES = (2,), (3,)  # of a vector
+Shape: TypeAlias = tuple[int | str, ...]  # of an array; a text is a length that may vary
+ANY, SOME = "n", "n > 0"
 
 
 def is_time(seconds: float) -> bool:
@@ -43,6 +46,10 @@ class BodyState:
         _set(self, "position", read_only(position))
         _set(self, "velocity", read_only(velocity))
         _set(self, "time", time)
+
+    def shapes(self, dimensions: int) -> tuple[tuple[str, Array, Shape], ...]:
+        """Each array with its name, and the shape that it should have."""
+        return ("position", self.position, (dimensions,)), ("velocity", self.velocity, (dimensions,))
 
     @property
     def finite(self) -> bool:
@@ -73,6 +80,11 @@ class Measurement:
         _set(self, "along", along)
         _set(self, "across", across)
         _set(self, "time", time)
+
+    def shapes(self, dimensions: int) -> tuple[tuple[str, Array, Shape], ...]:
+        """Each array with its name, and the shape that it should have."""
+        length = 1 if self.kind == RANGE else dimensions
+        return ("observer", self.observer, (dimensions,)), ("value", self.value, (length,))
 
     @property
     def finite(self) -> bool:
@@ -119,11 +131,17 @@ class Detections:
         _set(self, "max_range", max_range)
         _set(self, "time", time)
 
+    def shapes(self, dimensions: int) -> tuple[tuple[str, Array, Shape], ...]:
+        """Each array with its name, and the shape that it should have."""
+        length = 1 if self.kind == RANGE else dimensions
+        return ("observer", self.observer, (dimensions,)), ("values", self.values, (ANY, length))
+
     @property
     def finite(self) -> bool:
         """Whether it can be fused: finite values of the shape for its kind, and numbers that describe a sensor."""
         return (
-            self.values.ndim == 2
+            self.observer.shape == (2,)
+            and self.values.ndim == 2
             and self.values.shape[1] == (1 if self.kind == RANGE else 2)
             and is_time(self.time)
             and finite(self.values)
@@ -157,11 +175,16 @@ class Estimate:
         _set(self, "time", time)
         _set(self, "sources", sources)
 
+    def shapes(self, dimensions: int) -> tuple[tuple[str, Array, Shape], ...]:
+        """Each array with its name, and the shape that it should have."""
+        size = 2 * dimensions
+        return ("mean", self.mean, (size,)), ("covariance", self.covariance, (size, size))
+
     @property
     def finite(self) -> bool:
         """Whether it has as many numbers as it should, and every one is finite."""
-        size = len(self.mean)
-        shaped = size in (4, 6) and self.covariance.shape == (size, size)
+        size = self.mean.size
+        shaped = size in (4, 6) and self.mean.shape == (size,) and self.covariance.shape == (size, size)
         return shaped and is_time(self.time) and finite(self.mean) and finite(self.covariance)
 
 
@@ -177,6 +200,14 @@ class Tracks:
         _set(self, "numbers", numbers)
         _set(self, "estimates", estimates)
         _set(self, "time", time)
+
+    def shapes(self, dimensions: int) -> tuple[tuple[str, Array, Shape], ...]:
+        """Each array with its name, and the shape that it should have."""
+        return tuple(
+            (f"estimates[{place}].{name}", array, shape)
+            for place, estimate in enumerate(self.estimates)
+            for name, array, shape in estimate.shapes(dimensions)
+        )
 
     @property
     def finite(self) -> bool:
@@ -198,6 +229,11 @@ class Plan:
         _set(self, "time", time)
         _set(self, "state", state)
         _set(self, "controls", read_only(controls))
+
+    def shapes(self, dimensions: int) -> tuple[tuple[str, Array, Shape], ...]:
+        """Each array with its name, and the shape that it should have."""
+        state = tuple((f"state.{name}", array, shape) for name, array, shape in self.state.shapes(dimensions))
+        return (*state, ("controls", self.controls, (SOME, dimensions)))
 
     @property
     def finite(self) -> bool:

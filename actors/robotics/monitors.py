@@ -5,10 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterable
 from itertools import combinations
 
-from ..core import Actor, InputPort, OutputPort, Parameter, array_parameter
+from ..core import Actor, InputPort, OutputPort, Parameter
 from ..core.elementary import distance
-from .arrays import Pair, floats, pair
+from .arrays import floats
 from .messages import BodyState
+from .receiving import PlaceParameter, by_channel, latest, received
 
 
 class GoalMonitor(Actor):
@@ -20,25 +21,26 @@ class GoalMonitor(Actor):
     path_length = OutputPort(float, doc="length of the path so far in metres, at every state")
     distance = OutputPort(float, doc="distance to the goal in metres, at every state")
 
-    goal = array_parameter((2,), (0.0, 0.0), unit="m", doc="where the body should arrive")
+    goal = PlaceParameter((0.0, 0.0), doc="where the body should arrive; without a height, on the ground")
     tolerance = Parameter(float, 0.5, unit="m", min=0, doc="distance from the goal that counts as arrived")
 
     def initialize(self) -> None:
-        self._last: Pair | None = None
+        self._last: tuple[float, ...] | None = None
         self._length = 0.0
         self._has_arrived = False
 
     def fire(self) -> None:
-        position = pair(self.state.value.position)
+        state = latest(self.state)
+        position = floats(state.position)
         if self._last is not None:
-            self._length += distance(position, self._last)
+            self._length += _apart(position, self._last)
         self._last = position
-        left = distance(position, pair(self.goal))
+        left = _apart(position, floats(self.goal))
         self.path_length.send(self._length)
         self.distance.send(left)
         if left <= self.tolerance and not self._has_arrived:
             self._has_arrived = True
-            self.time.send(self.state.value.time)
+            self.time.send(state.time)
             self.arrived.send(True)
 
 
@@ -89,7 +91,7 @@ class DistanceMonitor(_DistanceBetween):
     distance = OutputPort(float, doc="distance between them in metres")
 
     def fire(self) -> None:
-        self._tell(self.distance, (self.a.tokens, self.b.tokens))
+        self._tell(self.distance, (received(self.a), received(self.b)))
 
 
 class SeparationMonitor(_DistanceBetween):
@@ -102,7 +104,7 @@ class SeparationMonitor(_DistanceBetween):
     distance = OutputPort(float, doc="smallest distance between two of them in metres")
 
     def fire(self) -> None:
-        self._tell(self.distance, self.bodies.by_channel())
+        self._tell(self.distance, by_channel(self.bodies))
 
 
 class ClearanceMonitor(Actor):
@@ -117,5 +119,5 @@ class ClearanceMonitor(Actor):
 
     def fire(self) -> None:
         if self.body.present and self.others.present:
-            here = pair(self.body.value.position)
-            self.distance.send(min(distance(here, pair(state.position)) for state in self.others.tokens))
+            here = floats(latest(self.body).position)
+            self.distance.send(min(_apart(here, floats(state.position)) for state in received(self.others)))

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ..core import Configurable, MappingParameter, Parameter, ParameterError, array_parameter
+from ..core import Configurable, MappingParameter, Parameter, ParameterError
 from .arrays import Array
+from .receiving import PlaceParameter
 
 if TYPE_CHECKING:
     from .numerics.barrier import Solution
@@ -20,8 +21,17 @@ TARGET = "target"
 LN2 = 0.6931471805599453
 
 
+def in_space(place: Array, dimensions: int) -> Array:
+    """A place (.., 2) or (.., 3), with a height of 0 added if it has none and there are three dimensions."""
+    missing = dimensions - place.shape[-1]
+    return np.concatenate((place, np.zeros((*place.shape[:-1], missing))), axis=-1) if missing > 0 else place
+
+
 class Objective(Configurable):
     """Base of the objectives: fills in the objective's fields of a horizon problem."""
+
+    def check_dimensions(self, dimensions: int) -> None:
+        """Raise ``ParameterError`` if it is not for a robot with so many dimensions."""
 
     def pose(self, problem: HorizonProblem, points: Array, weights: Array, peers: Sequence[str] = ()) -> HorizonProblem:
         """The problem with this objective.
@@ -33,13 +43,24 @@ class Objective(Configurable):
         raise NotImplementedError
 
 
-class ReachGoal(Objective):
-    """Eq. (2): the sum of the squared distances to a goal over the horizon."""
+def _check_height(name: str, place: Array, dimensions: int) -> None:
+    if len(place) > dimensions:
+        raise ParameterError(f"{name} has a height, and the robot does not fly; expected 2 numbers")
 
-    goal = array_parameter((2,), (0.0, 0.0), unit="m", doc="where to go")
+
+class ReachGoal(Objective):
+    """Eq. (2): the sum of the squared distances to a goal over the horizon.
+
+    In space, a goal without a height is on the ground.
+    """
+
+    goal = PlaceParameter((0.0, 0.0), doc="where to go; with the height last for a robot that flies")
+
+    def check_dimensions(self, dimensions: int) -> None:
+        _check_height("'goal'", self.goal, dimensions)
 
     def pose(self, problem: HorizonProblem, points: Array, weights: Array, peers: Sequence[str] = ()) -> HorizonProblem:
-        return problem.to_reach(self.goal)
+        return problem.to_reach(in_space(self.goal, len(problem.position)))
 
 
 class _Weights(MappingParameter):
@@ -65,7 +86,10 @@ class StayNear(Objective):
     """
 
     to = _Weights(doc="weights by the names of robots, as in their plans, or 'target'")
-    offset = array_parameter((2,), (0.0, 0.0), unit="m", doc="where to be, as seen from that place")
+    offset = PlaceParameter((0.0, 0.0), doc="where to be, as seen from that place")
+
+    def check_dimensions(self, dimensions: int) -> None:
+        _check_height("'offset'", self.offset, dimensions)
 
     def pose(self, problem: HorizonProblem, points: Array, weights: Array, peers: Sequence[str] = ()) -> HorizonProblem:
         from .numerics.definitions import station
@@ -75,7 +99,7 @@ class StayNear(Objective):
         if not near:
             return problem.to_reach(problem.position)
         places, shares = np.stack([known[name] for name in near]), np.array([self.to[name] for name in near])
-        return problem.to_reach(station(places, shares) + self.offset)
+        return problem.to_reach(station(places, shares) + in_space(self.offset, len(problem.position)))
 
 
 class Inform(Objective):

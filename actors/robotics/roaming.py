@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from functools import lru_cache
 
-from ..core import Configurable, Parameter
+from ..core import Configurable, Parameter, ParameterError
 from ..core.elementary import exp
+from ..core.parameter import declared_parameters
 from .arrays import Array
 from .estimator import State, UnscentedEstimator
 from .messages import Measurement
@@ -19,8 +20,21 @@ class RoamingModel(Configurable):
     speed stays bounded, while under eq. (1) its velocity is a random walk.
     """
 
+    _unused: tuple[str, ...] = "position_noise", "velocity_noise"  # inherited, of the random walk of eq. (1)
+
     target_speed = Parameter(float, 1.5, unit="m/s", min=1e-6, doc="largest speed of the target")
+
     turn_time = Parameter(float, 2.0, unit="s", min=1e-3, doc="time in which the target forgets its direction")
+
+    def check(self) -> None:
+        """Refuse inherited parameters that would do nothing."""
+        for name in self._unused:
+            if getattr(self, name) != declared_parameters(type(self))[name].default:
+                raise ParameterError(
+                    f"it has no effect in {type(self).__name__}, whose target roams; leave it out, and set "
+                    "'target_speed' and 'turn_time'",
+                    (name,),
+                )
 
     def roaming(self, elapsed: float) -> tuple[Array, Array]:
         """The transition (4, 4) of the state (x, y, vx, vy) over a time, and the covariance (4, 4) that it gains."""
@@ -32,8 +46,9 @@ class RoamingModel(Configurable):
 class RoamingEstimator(RoamingModel, UnscentedEstimator):
     """The paper's filter with two changes, for a ``SafeController``; the process noise of eq. (1) is not used.
 
-    The target roams (``RoamingModel``).  By eq. (1), with the noise of Table II, the deviation of its velocity grows by
-    2 m/s in a second; the estimate follows the noise across the line of sight, and may swing to the other side of it.
+    The target roams (``RoamingModel``).  By eq. (1), with the noise of Table II as it is read here
+    (``velocity_noise``), the deviation of its velocity grows by 2 m/s in a second; the estimate follows the noise
+    across the line of sight, and may swing to the other side of it.
 
     Measurements are fused in the frame of the true line of sight (``numerics.lines_of_sight``), which depends on where
     the target is; and a measurement that surprises the filter widens its estimate, as in a filter of Student's t.

@@ -13,6 +13,7 @@ from ..core.elementary import cos, sin
 from .arrays import Array, pair
 from .controller import RobustController
 from .messages import BodyState
+from .receiving import PLANE
 from .roaming import RoamingModel
 
 if TYPE_CHECKING:
@@ -26,7 +27,7 @@ class _Retreat(NamedTuple):
     """A retreat that was certain to keep the safe distance."""
 
     direction: Array  # (2,), of unit length
-    reach: float  # m, the target's largest coordinate along it
+    reach: float  # m, the targets' largest coordinate along it
     time: float  # s, when that was so
 
 
@@ -43,9 +44,14 @@ class SafeController(RoamingModel, RobustController):
       control is mixed with that of the last retreat that was certain, or replaced by it.
 
     So if the estimate is right to ``confidence`` standard deviations whenever a retreat is found, and the robot moves
-    as its controls say, then it never comes within ``safe_distance``: a retreat that was certain stays so.  Other
-    robots are avoided by the plan alone.  Before there is a first retreat, the best one that there is decides.
+    as its controls say, then it never comes within ``safe_distance``: a retreat that was certain stays so.  A retreat
+    is from all targets that are known, those of ``tracks`` included; one that becomes known later was not in an earlier
+    retreat.  Other robots are avoided by the plan alone.  Before there is a first retreat, the best one that there is
+    decides.
     """
+
+    _unused = "position_noise", "velocity_noise", "covariance_noise"
+    _of_target = PLANE  # the model of its motion is
 
     overrides = OutputPort(int, doc="number of controls so far that a retreat has changed")
 
@@ -58,7 +64,7 @@ class SafeController(RoamingModel, RobustController):
         super().initialize()
         compile_retreats()
         self._expected_target: Callable[..., tuple[Array, Array, Array, Array]] = self._predicted
-        self._propagate, self._predict = reachability.propagate, ukf.predict
+        self._propagate, self._predict, self._sigma_points = reachability.propagate, ukf.predict, ukf.sigma_points
         self._reaches, self._kept, self._best = retreat.reaches, retreat.kept_distance, retreat.best_retreat
         turn = 2.0 * math.pi / _DIRECTIONS
         self._directions = np.array([(cos(i * turn), sin(i * turn)) for i in range(_DIRECTIONS)])
@@ -70,19 +76,20 @@ class SafeController(RoamingModel, RobustController):
         self, mean: Array, covariance: Array, noise: Array, is_widened: bool, kappa: float, period: float,
         elapsed: float, steps: int, dimensions: int,
     ) -> tuple[Array, Array, Array, Array]:  # fmt: skip
-        """``reachability.expected_target`` for a target that roams; without sigma points, which only eq. (5) needs."""
+        """``reachability.expected_target`` for a target that roams."""
         mean, covariance = mean.copy(), covariance.copy()  # kernels would be compiled again for read-only arrays
         if elapsed > 0.0:
             mean, covariance = self._predict(mean, covariance, *self.roaming(elapsed))
         means, covariances = self._propagate(mean, covariance, *self.roaming(period), steps, dimensions)
-        return means[np.newaxis], covariances[np.newaxis], np.empty((0, 2)), np.empty(0)
+        points, weights = self._sigma_points(*self._predict(mean, covariance, *self.roaming(steps * period)), kappa)
+        return means[np.newaxis], covariances[np.newaxis], points[:, :2].copy(), weights
 
     def _problem(self, own: BodyState) -> tuple[HorizonProblem, Array]:
         problem, starts = super()._problem(own)
         return problem._replace(margin=self.confidence), starts
 
     def _send(self, own: BodyState, problem: HorizonProblem, controls: Array) -> None:
-        if self._target is not None:
+        if self._targets():
             first = self._safe(own.time, problem, controls[0])
             if first is not controls[0] and (first != controls[0]).any():
                 controls = controls.copy()
@@ -95,10 +102,12 @@ class SafeController(RoamingModel, RobustController):
 
     def _safe(self, now: float, problem: HorizonProblem, planned: Array) -> Array:
         """The control to send in place of the planned one: itself, if it leaves a retreat."""
-        target, start, last = self._target, (problem.position, problem.velocity), self._retreat
-        assert target is not None
-        estimate = target.mean.copy(), target.covariance.copy(), max(now - target.time, 0.0)
-        reaches = self._reaches(self._directions, *estimate, self.confidence, self.target_speed)
+        start, last = (problem.position, problem.velocity), self._retreat
+        reaches = np.full(_DIRECTIONS, -math.inf)  # of the target that reaches farthest in each direction
+        for target in self._targets():
+            estimate = target.mean.copy(), target.covariance.copy(), max(now - target.time, 0.0)
+            reach = self._reaches(self._directions, *estimate, self.confidence, self.target_speed)
+            reaches = np.maximum(reaches, reach)
         for share in _SHARES if last is not None else _SHARES[:1]:
             control = planned if last is None else share * planned + (1.0 - share) * self._away(last)
             kept, row = self._best(self._directions, reaches, *start, control, *self._limits)
@@ -106,8 +115,8 @@ class SafeController(RoamingModel, RobustController):
                 self._retreat = _Retreat(self._directions[row], float(reaches[row]), now)
                 return control
             if last is not None:
-                reach = last.reach + self.target_speed * (now - last.time)
-                if self._kept(*pair(last.direction), reach, *start, control, *self._limits) >= self.safe_distance:
+                moved = last.reach + self.target_speed * (now - last.time)
+                if self._kept(*pair(last.direction), moved, *start, control, *self._limits) >= self.safe_distance:
                     return control
         if last is not None:
             return self._away(last)

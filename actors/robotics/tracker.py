@@ -13,6 +13,7 @@ from ..core import Actor, InputPort, OutputPort, Parameter, to_nanoseconds, to_s
 from .arrays import Array
 from .estimator import EXPECTED, PREDICTED, TargetModel
 from .messages import RANGE, Detections, Estimate, Tracks
+from .receiving import PLANE, received
 
 _LIKELY = 0.5  # probability from which a track counts as in range, or a detection as new; share of expected detections
 
@@ -140,7 +141,7 @@ class JPDATracker(TargetModel, Actor):
         self._kinds = {True: float(ukf.RANGE), False: float(ukf.RELATIVE_POSITION)}
         self._predict, self._fuse = association.predict_tracks, association.fuse_scan
         self._begin, self._duplicates = association.new_track, association.duplicates
-        self._noise = self.process_noise
+        self._noise = self.process_noise()
         self._averaged = self.noise_direction == EXPECTED
         self._waiting: list[Detections] = []  # for the next trigger
         self._too_late = self._rough = 0
@@ -172,7 +173,7 @@ class JPDATracker(TargetModel, Actor):
 
     def _take(self, earliest: int) -> None:
         """Keep new scans for the next trigger, unless they are older than ``earliest``."""
-        come = [*self._waiting, *(each for each in self.detections.tokens if each.finite)]
+        come = [*self._waiting, *(each for each in received(self.detections, PLANE) if each.finite)]
         self._waiting = [each for each in come if to_nanoseconds(each.time) >= earliest]
         if len(self._waiting) < len(come):
             self._too_late += len(come) - len(self._waiting)

@@ -6,6 +6,7 @@ import numpy as np
 
 from ..core import Actor, InputPort, OutputPort, Parameter
 from .messages import BodyState, Tracks
+from .receiving import PLANE, by_channel, latest
 
 
 class TrackingError(Actor):
@@ -33,8 +34,8 @@ class TrackingError(Actor):
     def fire(self) -> None:
         if not self.tracks.present:
             return
-        there = [states[-1].position for states in map(list, self.bodies.by_channel()) if states]
-        found = [estimate.mean[:2] for estimate in self.tracks.value.estimates]
+        there = [states[-1].position for states in by_channel(self.bodies, PLANE) if states]
+        found = [estimate.mean[:2] for estimate in latest(self.tracks, PLANE).estimates]
         truth, tracks = (np.array(each).reshape((len(each), 2)) for each in (there, found))
         total, error, missed, false = self._gospa(truth, tracks, self.cutoff)
         self.gospa.send(total)

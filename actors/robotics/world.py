@@ -11,6 +11,7 @@ from ..core import Actor, EpicycleError, InputPort, OutputPort, Parameter, array
 from ..core.elementary import cos, hypot, sin
 from .arrays import all_finite, floats, pair
 from .messages import RANGE, RELATIVE_POSITION, BodyState, Measurement, Plan, enclosing
+from .receiving import latest
 from .sight import is_hidden
 
 
@@ -181,11 +182,11 @@ class Sensor(Actor):
         error_along, error_across, error_upright = self._draw(), self._draw(), self._draw_upright()
         if not (self.robot.present and self.target.present):
             return
-        robot = self.robot.value
+        robot = latest(self.robot)
         position = robot.position
-        believed = self.location.value.position if self.location.present else position
+        believed = latest(self.location).position if self.location.present else position
         # Floats: arithmetic on arrays of two takes ten times as long.
-        there, here = floats(self.target.value.position), floats(position)
+        there, here = floats(latest(self.target).position), floats(position)
         flies = len(here) > 2
         dx, dy, dz = there[0] - here[0], there[1] - here[1], 0.0
         distance = level = hypot(dx, dy)

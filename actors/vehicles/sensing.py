@@ -10,6 +10,7 @@ import numpy as np
 from ..core import Actor, InputPort, OutputPort, Parameter, ParameterError, PortError, array_parameter
 from ..core.elementary import atan2, cos, hypot, sin
 from ..robotics import BodyState
+from ..robotics.receiving import PLANE, by_channel, latest
 from .pose import Pose
 
 _TURN: Final = 2.0 * math.pi
@@ -46,7 +47,7 @@ class RangeBearingSensor(Actor):
 
     def fire(self) -> None:
         if self.target.present:
-            self._seen = self.target.value.position.tolist()
+            self._seen = latest(self.target, PLANE).position.tolist()
         for pose in self.pose.tokens:
             errors = self._draw(), self._draw()
             if self._seen is None:
@@ -106,7 +107,7 @@ class RangeScanner(Actor):
         self._angles = [first + number * step for number in range(count)]
 
     def fire(self) -> None:
-        for channel, tokens in enumerate(self.bodies.by_channel()):
+        for channel, tokens in enumerate(by_channel(self.bodies, PLANE)):
             if tokens:
                 x, y = tokens[-1].position.tolist()
                 self._bodies[channel] = x, y

@@ -1,2 +1,2 @@
 from epicycle.runner.results.log cimport EventLog, Writer
-from epicycle.runner.results.samples cimport Samples
+from epicycle.runner.results.record cimport Samples

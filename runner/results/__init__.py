@@ -5,8 +5,8 @@ from .encoding import TokenError, canonical, cell, leaves, plain
 from .log import EventLog, LogError, Names, Record, Writer
 from .log_file import LogFile, check_log_path, write_log
 from .outcome import Interval, Outcome
+from .record import Past, Samples
 from .results import STOP_TIME, Results
-from .samples import Past, Samples
 from .signal import Signal, SignalError
 from .verdict import Verdict
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -13,16 +12,13 @@ from epicycle.actors import EpicycleError, Tag, When, new_tag, to_seconds
 from ..shown import short
 from ..tables import pandas_module
 from .encoding import canonical, plain
-from .packing import TAKES_NUMBERS, Sheet, stamp
-from .samples import Past
-from .waiting import LARGE, WaitingTokens
+from .record import Past, RecordHash
 
 if TYPE_CHECKING:
     import pandas
 
 COLUMNS = ("time", "microstep", "event", "actor", "port", "channel", "aspect", "value")
-_MANY = 1_000  # records that are hashed together at the end of a tag
-_MOST = 10_000
+_MANY = 10_000  # records at one tag
 
 
 Names = tuple[str, str, str, "int | None", str]  # event, actor, port, channel, aspect
@@ -45,10 +41,10 @@ class Record:
     value: Any
 
     def encoded(self, *, microstep: bool = True) -> bytes:
-        """The record in the canonical form that the digest uses; without the microstep if ``microstep`` is false."""
-        names = map(canonical, (self.event, self.actor, self.port, self.aspect, self.channel))
-        tag = self.tag if microstep else Tag(self.tag.time, 0)
-        return stamp(tag) + b"".join(names) + canonical(self.value)
+        """The record by itself in canonical bytes; without the microstep if ``microstep`` is false."""
+        tag = (self.tag.time, self.tag.microstep if microstep else 0)
+        names = (self.event, self.actor, self.port, self.aspect, self.channel)
+        return b"".join(map(canonical, (*tag, *names, self.value)))
 
     def __str__(self) -> str:
         channel = "" if self.channel is None else f"[{self.channel}]"
@@ -73,27 +69,21 @@ class Record:
 class Writer:
     """Appends records with the same names to a log; each needs only a tag and a value."""
 
-    __slots__ = ("_head", "_keep", "log", "names")
+    __slots__ = ("_keep", "_names", "_number", "log", "names")
 
     def __init__(self, log: EventLog, names: Names, keep: Callable[[Record], None] | None) -> None:
         event, actor, port, channel, aspect = self.names = names
         self.log = log
-        self._head = b"".join(map(canonical, (event, actor, port, aspect, channel)))
+        self._names = b"".join(map(canonical, (event, actor, port, aspect, channel)))
+        self._number = b""  # of these names; none before the first record
         self._keep = keep
 
     def write(self, when: When, value: Any) -> None:
         """Append a record; raises an exception if the value cannot be logged."""
-        log = self.log
-        sheet = log.sheet
-        if when is not log.when:
-            log.turn_to(when)
-        if not (TAKES_NUMBERS and sheet.add(self._head, value)):
-            kept = log.tokens[type(value)](value)
-            sheet.keep(self._head, kept)
-            if type(kept) is bytes and len(kept) > LARGE:
-                log.hash_records()
-        if sheet.size > _MOST:  # nearly all at one tag
-            log.hash_many(f"{self.names[1]}.{self.names[2]}")
+        hashed = self.log.hash
+        self._number = hashed.add(self._number, self._names, when, value)
+        if hashed.at_tag > _MANY:
+            self.log.report(when, f"{self.names[1]}.{self.names[2]}")
         if self._keep is not None:
             self._keep(Record(_tag(when), *self.names, value))
 
@@ -108,9 +98,7 @@ class EventLog:
     With ``log_to``, it passes these on instead.
     """
 
-    __slots__ = (
-        "_hash", "_hashed", "_keeps", "_log_to", "_writers", "crowd", "records", "sheet", "tokens", "when",
-    )  # fmt: skip
+    __slots__ = ("_keeps", "_log_to", "_writers", "crowd", "hash", "records")
 
     def __init__(
         self,
@@ -121,11 +109,7 @@ class EventLog:
         self._log_to = log_to
         self._keeps = keeps
         self._writers: dict[Names, Writer] = {}
-        self._hash = hashlib.sha256()
-        self.sheet = Sheet()  # bytes to be hashed, many records at a time
-        self.tokens = WaitingTokens()
-        self._hashed = 0  # records
-        self.when: When | None = None  # tag of the last record
+        self.hash = RecordHash()
         self.crowd: Callable[[Tag, str, int], None] | None = None  # counts many records at one tag
 
     def add(self, tag: Tag, event: str, actor: str, port: str, channel: int | None, aspect: str, value: Any) -> None:
@@ -145,30 +129,16 @@ class EventLog:
         """A new writer."""
         return Writer(self, names, keep)
 
-    def turn_to(self, when: When) -> None:
-        """The following records have this tag."""
-        self.when = when
-        self.sheet.turn_to(when)
-        if self.sheet.size > _MANY:
-            self.hash_records()
-
-    def hash_many(self, port: str) -> None:
-        """Handle very many records at one tag, the last of them sent by a port just now."""
-        if self.crowd is not None and self.when is not None:
-            self.crowd(_tag(self.when), port, _MOST)
-        self.hash_records()
-
-    def hash_records(self) -> None:
-        """Encode the waiting records."""
-        size = self.sheet.size
-        self._hash.update(self.sheet.taken(canonical))
-        self._hashed += size
-        self.tokens.forget()
+    def report(self, when: When, port: str) -> None:
+        """Report very many records at one tag, the last of them sent by a port just now."""
+        number, self.hash.at_tag = self.hash.at_tag, 0
+        if self.crowd is not None:
+            self.crowd(_tag(when), port, number)
 
     @property
     def count(self) -> int:
         """The number of records."""
-        return self._hashed + self.sheet.size
+        return self.hash.count
 
     def to_pandas(self) -> pandas.DataFrame:
         """A row for each record, with the columns of a log file; raises ``LogError`` if the records were not kept."""
@@ -181,5 +151,4 @@ class EventLog:
     @property
     def digest(self) -> str:
         """SHA-256 over all records so far, as hexadecimal text."""
-        self.hash_records()
-        return self._hash.hexdigest()
+        return self.hash.hexdigest()

@@ -14,7 +14,7 @@ from epicycle.actors import EpicycleError, Tag, counted, did_you_mean, to_second
 from ..shown import short
 from ..tables import Table, Tabled, pandas_module
 from .encoding import field_names, leaves
-from .samples import Samples
+from .record import Samples
 
 if TYPE_CHECKING:
     import pandas

@@ -24,7 +24,7 @@ class Tried:
 
     They are kept in a file of the ``folder`` whose name depends on all that the outcomes depend on; without a folder,
     in memory alone.  Of a model that a program made or changed, nobody can say whether it is the same: then everything
-    is tried anew.  ``shape`` is that of an outcome: a tuple of types, a list of shapes, or of one for all items.
+    is tried again.  ``shape`` is that of an outcome: a tuple of types, a list of shapes, or of one for all items.
     """
 
     def __init__(self, model: Model, about: Mapping[str, Any], shape: Any, folder: Path | None = None) -> None:

@@ -29,7 +29,7 @@ _noted: ContextVar[Noted | None] = ContextVar("noted", default=None)
 
 @contextmanager
 def noting() -> Iterator[Noted]:
-    """What loading models reads, filled while it reads; whoever notes around it is told, too."""
+    """What loading models reads, filled while it reads; a caller that notes gets it, too."""
     found, outer = Noted(), _noted.get()
     token = _noted.set(found)
     try:

@@ -97,20 +97,25 @@ def table() -> str:
     return hashed(*({name: value for name, value in row.items() if "wall" not in name} for row in rows))
 
 
-def tutorial(path: Path) -> str:
-    """What a tutorial prints, but for the time it takes."""
+def printed(path: Path) -> list[str]:
+    """The lines that a tutorial prints, without the time it takes."""
     reader, modules = Reader(), set(sys.modules)
     with tempfile.TemporaryDirectory() as folder, pytest.MonkeyPatch.context() as here:
         here.chdir(folder)
         here.syspath_prepend(folder)
         try:
-            lines = [line for _, _, printed in reader.outputs(blocks(path)) for line in printed.splitlines()]
+            lines = [line for _, _, told in reader.outputs(blocks(path)) for line in told.splitlines()]
         finally:
             reader.close()
     for name in set(sys.modules) - modules:
         if str(getattr(sys.modules[name], "__file__", "")).startswith(folder):
             del sys.modules[name]
-    return hashed(*(line for line in lines if not line.startswith("wall time")))
+    return [line for line in lines if not line.startswith("wall time")]
+
+
+def tutorials() -> dict[str, Path]:
+    """Those that do not start other programs, by the names of their parts."""
+    return {f"tutorial {path.stem}": path for path in TUTORIALS if path.stem != "09_many_machines"}
 
 
 def parts() -> dict[str, Callable[[], str]]:
@@ -125,8 +130,7 @@ def parts() -> dict[str, Callable[[], str]]:
         for name in sorted(packaged_disturbances())
     }
     found["study waiting_time"] = table
-    alone = [path for path in TUTORIALS if path.stem != "09_many_machines"]  # which starts other programs
-    found |= {f"tutorial {path.stem}": lambda path=path: tutorial(path) for path in alone}  # type: ignore[misc]
+    found |= {name: lambda path=path: hashed(*printed(path)) for name, path in tutorials().items()}  # type: ignore[misc]
     return found
 
 

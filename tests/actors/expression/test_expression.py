@@ -199,6 +199,7 @@ FUNCTION_LIST = ", ".join(sorted(FUNCTIONS))
             "robot['sped']",
         ),
         ("n[0]", "n[0]: a number has no elements", "n[0]"),
+        ("starts[0:1, 0]", "a slice stands alone between [ and ]: of a list of lists, write rows[0:1][0]", "0:1, 0"),
         ("n[1:]", "only a list or a text can be sliced, not a number", "n[1:]"),
         ("starts[x:]", "a slice needs whole numbers, not a number", "starts[x:]"),
         ("starts[::0]", "starts[::0]: slice step cannot be zero", "starts[::0]"),

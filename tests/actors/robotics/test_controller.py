@@ -323,8 +323,6 @@ def test_what_is_not_finite_is_ignored_and_the_last_good_stays(bad: float) -> No
         Plan("b", 0.1, state(bad), np.zeros((11, 2))),
         Plan("b", 0.1, state(), np.full((11, 2), bad)),
         Plan("b", bad, state(), np.zeros((11, 2))),
-        Plan("b", 0.1, state(), np.zeros((0, 2))),
-        Plan("b", 0.1, state(), np.zeros(2)),
     ]
     harness.fire(0.1, trigger=1, state=state(time=0.1), estimate=estimate(bad), peer_plans=worse)
     problem = recorder.records[1][0]

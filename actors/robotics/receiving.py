@@ -1,0 +1,100 @@
+"""How messages enter an actor: the shapes of their arrays are checked here, so that kernels, which do not check them,
+never read or write beyond an array."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Protocol, TypeVar
+
+from ..core import EpicycleError, InputPort, Parameter, ParameterError
+from .arrays import Array
+from .messages import ANY, RANGE, RELATIVE_POSITION, SOME, Shape
+
+PLANE, SPACE = (2,), (3,)
+EITHER = PLANE + SPACE
+_WHERE = {2: "in the plane", 3: "in space"}
+_KINDS = RANGE, RELATIVE_POSITION
+
+
+class MessageError(EpicycleError):
+    """A message has arrays of shapes that its receiver cannot use."""
+
+
+class PlaceParameter(Parameter[Any]):
+    """A place in the plane or in space: an array of two or three numbers, the height last."""
+
+    def __init__(self, default: tuple[float, ...], *, doc: str) -> None:
+        super().__init__(float, default, unit="m", shape=(None,), doc=doc)
+
+    def convert(self, value: object) -> Any:
+        place = super().convert(value)
+        if place is not None and len(place) not in EITHER:
+            raise ParameterError(f"it has {len(place)} numbers; expected 2, or 3 with the height last")
+        return place
+
+
+class Message(Protocol):
+    """What has arrays whose shapes depend on the number of dimensions."""
+
+    def shapes(self, dimensions: int) -> tuple[tuple[str, Array, Shape], ...]:
+        """Each array with its name, and the shape that it should have."""
+        ...
+
+
+M = TypeVar("M", bound=Message)
+
+
+def received(port: InputPort[M], dimensions: Sequence[int] = EITHER) -> tuple[M, ...]:
+    """The tokens of a port, each with arrays for one of the ``dimensions``; raises ``MessageError`` if one has not."""
+    tokens = port.tokens
+    for token in tokens:
+        _check(port, token, dimensions)
+    return tokens
+
+
+def by_channel(port: InputPort[M], dimensions: Sequence[int] = EITHER) -> list[list[M]]:
+    """The same, a list for each channel."""
+    received(port, dimensions)
+    return port.by_channel()
+
+
+def latest(port: InputPort[M], dimensions: Sequence[int] = EITHER) -> M:
+    """The same, the last of them."""
+    return received(port, dimensions)[-1]
+
+
+def _check(port: InputPort[M], message: M, dimensions: Sequence[int]) -> None:
+    for each in dimensions:
+        for _, array, shape in message.shapes(each):
+            if array.shape != shape and not _fits(array.shape, shape):
+                break
+        else:
+            kind = getattr(message, "kind", RANGE)
+            if kind not in _KINDS:
+                raise MessageError(
+                    f"{port.path} got {type(message).__name__} of the kind {kind!r}; expected {' or '.join(_KINDS)}"
+                )
+            return
+    name, array, _ = _culprit(message, dimensions)
+    expected = " or ".join(
+        f"({', '.join(map(str, shape))}{',' * (len(shape) == 1)}) {_WHERE[each]}"
+        for each in dimensions
+        for other, _, shape in message.shapes(each)
+        if other == name
+    )
+    raise MessageError(
+        f"{port.path} got {type(message).__name__} with {name!r} of shape {array.shape}; expected {expected}"
+    )
+
+
+def _culprit(message: M, dimensions: Sequence[int]) -> tuple[str, Array, Shape]:
+    """The array that does not fit, judged by the dimensions in which most of the arrays do."""
+    wrong = [[each for each in message.shapes(d) if not _fits(each[1].shape, each[2])] for d in dimensions]
+    return min(wrong, key=len)[0]
+
+
+def _fits(found: tuple[int, ...], expected: Shape) -> bool:
+    return len(found) == len(expected) and all(
+        wanted in (length, ANY) or (wanted == SOME and length > 0)
+        for length, wanted in zip(found, expected, strict=True)
+    )

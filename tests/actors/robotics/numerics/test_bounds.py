@@ -1,0 +1,30 @@
+"""Every kernel as plain Python on NumPy's arrays, which raise an error where compiled code would corrupt memory."""
+
+import os
+import subprocess
+import sys
+
+SCRIPT = """
+import numpy as np
+from epicycle.actors import BodyState, Estimate, FlyingController, Inform, RobustController
+from epicycle.actors.robotics.numerics import warm_up
+from epicycle.actors.testing import Harness
+
+np.seterr(all="ignore")  # kernels give inf and NaN without a word
+for dimensions in (2, 3):
+    warm_up.compile_kernels(dimensions)
+warm_up.compile_tracking()
+warm_up.compile_retreats()
+for controller, d in ((RobustController, 2), (FlyingController, 3)):
+    for size in (4, 6):
+        harness = Harness(controller("main.a", objective=Inform()))
+        own = BodyState((30.0, 0.0, 5.0)[:d], np.zeros(d), 0.3)
+        harness.fire(0.3, trigger=0, state=own, estimate=Estimate(np.zeros(size), np.eye(size), 0.0))
+        assert np.isfinite(harness.last("control")).all()
+"""
+
+
+def test_no_kernel_leaves_its_arrays() -> None:
+    environment = {**os.environ, "NUMBA_DISABLE_JIT": "1"}
+    done = subprocess.run([sys.executable, "-c", SCRIPT], env=environment, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
