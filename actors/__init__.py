@@ -107,11 +107,11 @@ __all__ = [
     "Uniform", "UnitError", "UnscentedEstimator", "Variable", "VaryingRandom", "Vehicle", "VonMises", "WaitingLine",
     "WaitingTime", "Wake", "Way", "WaypointFollower", "WaypointMotion", "When", "abridged", "accepts",
     "array_parameter", "bounds_text", "brief", "convert", "counted", "counted_in_si", "cut", "declared_parameters",
-    "declared_ports", "did_you_mean", "digits", "elementary", "has_own_ports", "irregular", "is_alone", "is_too_deep",
-    "nearest", "new_tag", "new_wake", "normal_quantile", "normal_share", "on_entry", "on_exit", "open_regular",
-    "parse_unit", "paths", "plain", "present", "random_stream", "read_regular", "read_table", "readable", "rounds",
-    "shaped", "shortened", "texts_parameter", "to_nanoseconds", "to_seconds", "token_type", "transition", "type_name",
-    "unknown_parameter", "variants", "visible", "visible_character", "visible_lines",
+    "declared_ports", "did_you_mean", "digits", "elementary", "has_own_ports", "in_si", "irregular", "is_alone",
+    "is_too_deep", "nearest", "new_tag", "new_wake", "normal_quantile", "normal_share", "on_entry", "on_exit",
+    "open_regular", "parse_unit", "paths", "plain", "present", "random_stream", "read_regular", "read_table",
+    "readable", "rounds", "shaped", "shortened", "texts_parameter", "to_nanoseconds", "to_seconds", "token_type",
+    "transition", "type_name", "unknown_parameter", "variants", "visible", "visible_character", "visible_lines",
 ]  # fmt: skip
 
 

@@ -61,7 +61,8 @@ def _parameters(model: Model) -> Iterator[dict[str, str]]:
         said = model.declared[name]
         kinds = {bool: "true or false", str: "text", int: "number", float: "number", list: "list", tuple: "list"}
         kind = f"one of {', '.join(said.choices)}" if said.choices else kinds.get(type(value), "any value")
-        kind += bounds_text(said.min, None, said.max, lambda bound: f"{bound:g}")
+        low, high = said.bounds()
+        kind += bounds_text(low, None, high, lambda bound: f"{bound:g}")
         unit = "" if said.unit == "1" else said.unit
         told = in_words(value) if isinstance(value, (bool, float)) else short(value)
         yield {"parameter": name, "type": kind, "unit": unit, "value": told, "what it is": said.doc}

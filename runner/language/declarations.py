@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from epicycle.actors import UnitError, convert
 from epicycle.aspects import FiringTime
 
 from ..text import Entry, Node, Position, Text
@@ -17,12 +18,19 @@ class ParameterText:
     position: Position
     value: Node | None = None
     unit: str = ""
-    min: float | None = None
-    max: float | None = None
+    min: float | str | None = None  # as written: a text has a unit of its own
+    max: float | str | None = None
     choices: tuple[str, ...] = ()
     doc: str = ""
     spoilt: bool = False  # the declaration is wrong, which has been reported: values are not checked against it
     given: tuple[str, ...] = ("value",)  # the keys of the declaration, which change those of an inherited one
+
+    def bounds(self) -> tuple[float | None, float | None]:
+        """The least and the greatest value, in its unit; raises ``UnitError``."""
+        low, high = (None if each is None else convert(each, self.unit or "1") for each in (self.min, self.max))
+        if low is not None and high is not None and low > high:
+            raise UnitError("min is greater than max")
+        return low, high
 
 
 @dataclass(frozen=True)

@@ -14,6 +14,8 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import replace
 
+from epicycle.actors import UnitError
+
 from ..text import NORMAL, RAISE_IT, Limits, Position, Problems, Text, did_you_mean
 from .declarations import CompositeText, ConnectionText, PartText, PointcutText, PortText
 
@@ -104,7 +106,13 @@ class _Heir:
         for name, parameter in text.parameters.items():
             old = base.parameters.get(name)
             given = {key: getattr(parameter, key) for key in parameter.given}
-            parameters[name] = parameter if old is None else replace(old, position=parameter.position, **given)
+            found = parameter if old is None else replace(old, position=parameter.position, **given)
+            try:
+                found.bounds()
+            except UnitError as error:
+                self._problem(f"parameter {name!r}: {error}", parameter.position)
+                found = replace(found, spoilt=True)
+            parameters[name] = found
         kept = [each for old in base.connections for each in self._kept(old, removed)]
         result = replace(
             text,

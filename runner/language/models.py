@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 from keyword import iskeyword, kwlist
 
-from epicycle.actors import Actor, UnitError, parse_unit
+from epicycle.actors import Actor, UnitError, in_si, parse_unit
 from epicycle.actors.expression import CONSTANTS, FUNCTIONS
 from epicycle.aspects import Aspect
 
@@ -32,6 +32,7 @@ from .fields import (
     COMPUTED_FLAG,
     LABEL,
     NAMED,
+    QUANTITY_SCHEMA,
     TEXT,
     TEXTS,
     Construct,
@@ -113,14 +114,31 @@ def _choices(reader: NodeReader, node: Node, what: str) -> tuple[str, ...]:
     return found
 
 
+_FREE_NUMBER = number(float)
+
+
+def _bound(reader: NodeReader, node: Node, what: str) -> float | str | None:
+    """A number, or a text with a unit, which is converted once the parameter's own is known."""
+    value = node.value if isinstance(node, Scalar) else None
+    try:
+        if isinstance(value, str) and in_si(value) is not None:
+            return value
+    except UnitError as error:
+        reader.problems.add(f"{what}: {error}", node.position)
+        return None
+    found: float | None = _FREE_NUMBER.read(reader, node, what)
+    return found
+
+
+_BOUND = Shape(QUANTITY_SCHEMA, _bound)
 _OF_PARAMETER = "{key} of {what}"
 PARAMETER = Construct(
     "",
     {
         "value": Key(node_as({}), "The default; without one, a value must be given."),
         "unit": Key(Shape(ref("text"), _unit), "The unit of numbers, such as m/s; 1 for a pure number.", "{what}"),
-        "min": Key(number(float), "The smallest value.", _OF_PARAMETER),
-        "max": Key(number(float), "The largest value.", _OF_PARAMETER),
+        "min": Key(_BOUND, "The smallest value, in its unit or with one of its own.", _OF_PARAMETER),
+        "max": Key(_BOUND, "The largest value, in its unit or with one of its own.", _OF_PARAMETER),
         "choices": Key(Shape(one_or_more(LABEL), _choices), "The texts to choose from.", "{what}"),
         "doc": Key(TEXT, "What it is.", _OF_PARAMETER),
     },
@@ -140,11 +158,15 @@ def _parameter(reader: NodeReader, name: str, entry: Entry) -> ParameterText:
     entries = PARAMETER.entries(reader, entry.value, what) or {}
     before = len(reader.problems)
     said = PARAMETER.values(reader, entries, what, entry.key.position)
-    low, high = said.get("min"), said.get("max")
-    if low is not None and high is not None and low > high:
-        reader.problems.add(f"{what}: min is greater than max", entries["min"].value.position)
-    is_spoilt = len(reader.problems) > before
-    return ParameterText(name, entry.key.position, **said, spoilt=is_spoilt, given=tuple(entries))
+    found = ParameterText(name, entry.key.position, **said, given=tuple(entries))
+    is_known = found.unit or not {type(found.min), type(found.max)} & {str}  # otherwise it may be inherited
+    if len(reader.problems) == before and is_known:
+        try:
+            found.bounds()
+        except UnitError as error:
+            at = next(key for key in ("min", "max") if key in entries)
+            reader.problems.add(f"{what}: {error}", entries[at].value.position)
+    return replace(found, spoilt=len(reader.problems) > before)
 
 
 _NO_PARAMETERS = {"index", *CONSTANTS, *FUNCTIONS}

@@ -122,7 +122,8 @@ class Values:
         """The conversion of a value, or of each one in a list, to what the parameter holds."""
         if parameter.choices:
             return Parameter(str, choices=parameter.choices).convert
-        bounds: dict[str, Any] = {"min": parameter.min, "max": parameter.max}
+        low, high = parameter.bounds()
+        bounds: dict[str, Any] = {"min": low, "max": high}
         if parameter.unit:
             number, unit = Parameter(float, unit=parameter.unit, **bounds), parameter.unit
             return number.convert if unit == "1" else lambda value: _quantity(number.convert(value), unit)
@@ -130,7 +131,7 @@ class Values:
             return Parameter(bool).convert
         if isinstance(default, int):
             return Parameter(int, unit="1", **bounds).convert
-        if isinstance(default, float) or parameter.min is not None or parameter.max is not None:
+        if isinstance(default, float) or low is not None or high is not None:
             return Parameter(float, unit="1", **bounds).convert
         return _as_it_is
 
