@@ -102,6 +102,7 @@ class ODE(Actor):
         _same_names("resets", self.resets, "crossing", self.crossings)
         for crossing, reset in self.resets.items():
             _same_names(f"resets: {crossing}", reset, "state", self._states)
+        self.event_outputs = tuple(self.crossings)
         _same_names("held", self.held, "input", [name for name in self.inputs if name != "trigger"])
 
     def own_ports(self) -> dict[str, InputPort[Any] | OutputPort[Any]]:

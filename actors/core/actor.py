@@ -30,7 +30,7 @@ actors, copies of those in the model, and a snapshot of a run has copies of thes
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from types import MappingProxyType
 from typing import Any, ClassVar, Protocol, Self, cast
 from weakref import WeakKeyDictionary
@@ -110,6 +110,9 @@ class Actor(Configurable):
     # Whether the actor drives itself with wake-ups; if not, an instance without any input never fires.  The default is
     # true for classes without inputs other than parameters; a class with inputs that starts by itself sets True.
     is_source: ClassVar[bool] = cast(bool, _SourceByPorts())
+
+    # Outputs of which every token says that something has happened, whatever its value.
+    event_outputs: Collection[str] = ()
 
     @property
     def is_endless(self) -> bool:

@@ -1,12 +1,12 @@
 """The discrete-event director: which actor fires when.
 
-Order of events.  Events are ordered by tag, that is by time and then microstep.  Within a tag, tokens
-whose delay is over are put into their ports first, in the order in which they were sent; then actors fire by rank
-(``firing_order``: depth in the graph of connections without delay, then priority, ties in the order of declaration).  A
-firing sees all tokens that its actor gets at this tag, because every actor that can still send to it within the tag has
-a lower rank.  An actor therefore fires once per tag; the exception is one with an output that does not depend on an
-input at once (``depends_on``), which may have to send before that input has arrived: its tokens are taken in a separate
-firing, at the rank of the input.
+Events are ordered by tag, that is by time and then microstep. Within a tag, tokens whose delay is over are put into
+their ports first, in the order in which they were sent; then actors fire by rank (``firing_order``: depth in the graph
+of connections without delay, then priority, ties in the order of declaration). A firing sees all tokens that its actor
+gets at this tag, because every actor that can still send to it within the tag has a lower rank. An actor therefore
+fires once per tag; the exception is one with an output that does not depend on an input at once (``depends_on``),
+which may have to send before that input has arrived: its tokens are taken in a separate firing, at the rank of the
+input.
 
 Where ties are posted (``postings``), actors of equal depth and priority fire in the order in which they were to have a
 turn first: by requesting a wake-up, or by the arrival of a token.  Then an actor takes all tokens that wait for it, in

@@ -107,12 +107,14 @@ class Run:
         if any(monitor.requirement.stop for monitor in self.model.monitors):
             self.director.watch = self._stop_if_broken
         for path in self.model.stop_ports:
-            found.setdefault(path, []).append(partial(self._ask_to_stop, path))
+            sources = self.model.graph.source_of(path)
+            is_event = all(port.name in port.actor.event_outputs for port in sources)
+            found.setdefault(path, []).append(partial(self._ask_to_stop, path, is_event))
         return found
 
-    def _ask_to_stop(self, path: str, token: Any) -> None:
+    def _ask_to_stop(self, path: str, is_event: bool, token: Any) -> None:
         try:
-            if token:
+            if is_event or token:
                 self.director.stop("stop_when")
         except ValueError as error:  # arrays are neither true nor false
             raise ActorError("stop_when", self.director.tag, f"asking {path}", describe(error)) from error

@@ -374,7 +374,10 @@ RUN = Construct(
     "When a run ends, and what it records.",
     {
         "stop": Key(node_as(computed("number", 0.0, unit="s")), "Time at which a run ends, such as 30 s."),
-        "stop_when": Key(PATTERNS, "Output ports that end the run when they send true or a number other than 0."),
+        "stop_when": Key(
+            PATTERNS,
+            "Output ports that end the run: at true, at a number other than 0, at any crossing of an `ODE`.",
+        ),
         "seed": Key(node_as(computed("integer", 0, MAX_SEED)), "Seed of all random streams."),
         "record": Key(PATTERNS, "Output ports whose tokens are recorded, as patterns."),
     },

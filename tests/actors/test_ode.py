@@ -413,3 +413,21 @@ def test_the_solution_does_not_depend_on_when_it_is_looked_at(method: str) -> No
     _, watched, _ = feed(actor, {"trigger": ticks(0.3, 30.0)}, until=30.0)
     assert watched["zero"] == alone["zero"] != []
     assert watched["v"][-1] == alone["v"][-1]
+
+
+def test_a_run_ends_at_the_first_crossing() -> None:
+    text = """
+model: m
+actors:
+  ball:
+    type: ODE
+    initial: {height: 10, speed: 0}
+    derivatives: {height: speed, speed: -9.81}
+    crossings: {bounce: height}
+    directions: {bounce: falling}
+    resets: {bounce: {speed: -0.8 * speed}}
+run: {stop: 20 s, stop_when: ball.bounce}
+"""
+    results = Simulation(load(text)).run()
+    assert results.stopped == "stop_when"
+    assert results.end == pytest.approx(math.sqrt(2 * 10 / 9.81), abs=1e-6)
