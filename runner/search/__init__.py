@@ -1,7 +1,7 @@
 """Searches over runs: one that breaks a property, what breaks it there, how probable that is, and what is best."""
 
 from .calibrating import Calibration, Fitted, Match, Task, calibrate
-from .explaining import Effect, Explanation, Step, explain
+from .explaining import INTERRUPT, RUNS, Effect, Explanation, Step, explain
 from .falsifying import MAX_RUNS, Asked, Findings, Run, falsify
 from .faults import FaultSpace
 from .minimal import minimal
@@ -13,8 +13,10 @@ from .tried import Tried
 
 __all__ = [
     "AD_HOC",
+    "INTERRUPT",
     "MAX_POINTS",
     "MAX_RUNS",
+    "RUNS",
     "Asked",
     "Calibration",
     "Effect",
