@@ -18,7 +18,7 @@ from ..build import Model
 from ..graph import Act
 from ..provenance import version_of
 from ..results import Verdict
-from ..search import INTERRUPT, RUNS, Effect, Explanation, monitor_named
+from ..search import INTERRUPT, RUNS, Effect, Explanation, monitors_named
 from ..search import explain as search
 from ..shown import finite, short
 from ..tables import Table, Tabled
@@ -51,8 +51,12 @@ class Explained(Tabled):
         broken = f"{found.monitor} ({found.source}) is broken" + _at(found.verdict_of_set)
         if not found.effects:
             if found.others:
-                return f"{broken} without any act of {_either(found.only)}: other aspects or the model itself break it."
-            return f"{broken} without any act of an aspect: the model breaks it by itself."
+                said = [
+                    f"{broken} without any act of {_either(found.only)}: other aspects or the model itself break it."
+                ]
+            else:
+                said = [f"{broken} without any act of an aspect: the model breaks it by itself."]
+            return " ".join([*said, *self._also()])
         if _at(found.verdict) != _at(found.verdict_of_set):
             broken += f" (in the whole run{_at(found.verdict)})"
         number = len(found.effects)
@@ -66,7 +70,11 @@ class Explained(Tabled):
         ]
         if found.others:
             said.append(f"The acts of other aspects ({len(found.others):,}) happened as well.")
-        return " ".join(said)
+        return " ".join([*said, *self._also()])
+
+    def _also(self) -> list[str]:
+        also = self.explanation.also
+        return [f"Also broken in the whole run: {', '.join(also)}."] if also else []
 
     def _minimal(self, number: int) -> str:
         found = self.explanation
@@ -144,7 +152,7 @@ class Explained(Tabled):
 
 def explain(
     model: Model | str | Path,
-    monitor: str,
+    monitor: str | None = None,
     *,
     seed: int | None = None,
     until: float | str | None = None,
@@ -156,6 +164,7 @@ def explain(
 ) -> Explained:
     """Find a smallest set of acts of aspects that breaks a monitor in a run, or a property that is given as a text.
 
+    Without ``monitor``, the monitor of the model is explained that is broken first.
     ``set``, ``disturb`` and the other options of ``load`` change the model first.  ``only`` names the aspects whose
     acts are looked at; those of others happen as in the whole run.  At most ``runs`` sets are tried; after that, or an
     interrupt, the smallest set so far is told, which may not be minimal.  Each run that was made is noted in the folder
@@ -179,7 +188,7 @@ def explain(
 
 def explained(
     made: Model,
-    monitor: str,
+    monitor: str | None,
     seed: int,
     until: float | None,
     command: Sequence[str],
@@ -191,9 +200,9 @@ def explained(
     flag: str = "--monitor",
 ) -> Explained:
     """The same for a model that may be changed, and was made by a command."""
-    monitor = monitor_named(made, monitor, flag=flag)
+    monitors = monitors_named(made, monitor, flag=flag)
     folder = None if out is None else Path(out)
-    found = search(made, monitor, seed=seed, until=until, limit=limit, only=only, folder=folder, tell=progress)
+    found = search(made, monitors, seed=seed, until=until, limit=limit, only=only, folder=folder, tell=progress)
     return Explained(found, made, until, command)
 
 

@@ -16,7 +16,7 @@ from .past_run import as_before
     *CHANGES,
     SEED,
     UNTIL,
-    searching.monitor("always clearance.distance >= 2 m"),
+    searching.monitor("always clearance.distance >= 2 m", default="the one of the model's that is broken first"),
     option(
         "--runs",
         type=COUNT,

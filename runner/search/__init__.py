@@ -5,7 +5,7 @@ from .explaining import INTERRUPT, RUNS, Effect, Explanation, Step, explain
 from .falsifying import MAX_RUNS, Asked, Findings, Run, falsify
 from .faults import FaultSpace
 from .minimal import minimal
-from .monitored import AD_HOC, monitor_named
+from .monitored import AD_HOC, monitor_named, monitors_named
 from .optimising import MAX_POINTS, Goal, Optimum, Outcome, Tested, optimise
 from .space import Interval
 from .splitting import RareEvent, rare
@@ -40,6 +40,7 @@ __all__ = [
     "falsify",
     "minimal",
     "monitor_named",
+    "monitors_named",
     "optimise",
     "rare",
 ]

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Collection, Iterable
+import math
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -81,6 +82,7 @@ class Explanation:
     ended: str = ""
     only: tuple[str, ...] = ()
     others: frozenset[ActName] = frozenset()
+    also: tuple[str, ...] = ()  # other monitors that are broken in the whole run
 
     @property
     def names(self) -> list[ActName]:
@@ -95,9 +97,9 @@ class _LimitError(Exception):
 class _Runs:
     """Runs of a model in which some acts happen and, of those that are looked at, no others."""
 
-    def __init__(self, model: Model, monitor: str, seed: int | None, until: float | None, limit: int) -> None:
+    def __init__(self, model: Model, seed: int | None, until: float | None, limit: int) -> None:
         self.model = model
-        self.monitor = monitor
+        self.monitor = ""
         self.seed = seed
         self.until = until
         self.limit = limit
@@ -164,7 +166,7 @@ class _Runs:
 
 def explain(
     model: Model,
-    monitor: str,
+    monitors: Sequence[str],
     *,
     seed: int | None = None,
     until: float | None = None,
@@ -173,24 +175,19 @@ def explain(
     folder: Path | None = None,
     tell: Callable[[int, int], None] | None = None,
 ) -> Explanation:
-    """Find a smallest set of acts that breaks a monitor of a model in a run.
+    """Find a smallest set of acts that breaks the monitor of a model that is broken first in a run.
 
     With ``only``, of the acts of these aspects; those of others happen as in the whole run.  At most ``limit`` sets are
     tried.  After that, or an interrupt, the smallest set so far is told.  In a ``folder``, every run is noted, and a
     search that ended continues there.  ``tell`` is called with how many sets were tried, and how many acts the smallest
     one has.  Raises ``EpicycleError`` if the run does not break it.
     """
-    source = property_of(model, monitor)
+    sources = {monitor: property_of(model, monitor) for monitor in monitors}
     chosen = _chosen(model, only)
-    runs = _Runs(model, monitor, seed, until, limit)
+    runs = _Runs(model, seed, until, limit)
     whole = runs.results(model.exactly)
-    verdict = whole.monitors[monitor]
-    if verdict.holds is not False:
-        state = "holds" if verdict.holds else "cannot be judged"
-        reason = f" ({verdict.missing})" if verdict.missing else ""
-        raise EpicycleError(
-            f"monitor {monitor} {state} in this run of {model.name}{reason}: there is nothing to explain"
-        )
+    monitor, *also = _broken(model.name, {each: whole.monitors[each] for each in monitors})
+    runs.monitor, verdict, source = monitor, whole.monitors[monitor], sources[monitor]
     about = {
         "model": model.name,
         "seed": whole.seed,
@@ -258,7 +255,24 @@ def explain(
         ended,
         tuple(sorted(chosen)),
         runs.others,
+        tuple(also),
     )
+
+
+def _broken(model: str, verdicts: Mapping[str, Verdict]) -> list[str]:
+    """The monitors that are broken, in the order in which they are; raises ``EpicycleError`` if none is."""
+    times = {
+        name: math.inf if each.time is None else each.time for name, each in verdicts.items() if each.holds is False
+    }
+    if times:
+        return sorted(times, key=lambda name: times[name])
+    states = []
+    for name, verdict in verdicts.items():
+        reason = f" ({verdict.missing})" if verdict.missing else ""
+        states.append(
+            f"monitor {name} {'holds' if verdict.holds else 'cannot be judged'} in this run of {model}{reason}"
+        )
+    raise EpicycleError(f"{', and '.join(states)}: there is nothing to explain")
 
 
 def _chosen(model: Model, only: Collection[str]) -> frozenset[str]:

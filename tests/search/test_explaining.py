@@ -206,8 +206,8 @@ def test_an_act_that_is_another_in_the_whole_run_is_told(twice: Path) -> None:
         "2 acts of 17 suffice: behind dropped a token of relay.output at double.input at 9 s; loss dropped a token of "
         "clock.output at relay.input at 10 s. With these alone, alive (always after 1 s eventually within 2.5 s sends "
         "double.output) is broken at 8 s (in the whole run at 7 s). Without any single one of them, it holds. One act "
-        "is not the same in the whole run, which takes another course: behind at double.input, token 10: at 12 s, another "
-        "token."
+        "is not the same in the whole run, which takes another course: behind at double.input, token 10: at 12 s, "
+        "another token."
     )
     assert "in the whole run" in str(found).split("\n\n")[1].splitlines()[0]
 

@@ -50,6 +50,7 @@ _SHAPE: dict[str, Any] = {
     "git": (None, str),
     "date": str,
 }
+_CHANGED: dict[str, Any] = {"aspects": [str], "without": [str], "stop": (None, int, float)}
 _OF_SEARCH: dict[str, Any] = {"runs": range(1, MAX_REPLICATIONS + 1), "command": [str]}
 
 
@@ -135,7 +136,8 @@ def read_manifest(folder: Path) -> dict[str, Any]:
         )
     if missing := [repr(name) for name in (*_SHAPE, "checksum") if name not in manifest]:
         raise damaged(f"is damaged: it has no {', '.join(missing)}")
-    shapes = _SHAPE | ({"search": _OF_SEARCH} if "search" in manifest else {})
+    some = {"search": _OF_SEARCH, "changed": _CHANGED}
+    shapes = _SHAPE | {name: shape for name, shape in some.items() if name in manifest}
     if unlike := [repr(name) for name, shape in shapes.items() if not _fits(manifest[name], shape)]:
         raise damaged(f"is damaged: {', '.join(unlike)} cannot have been written like this")
     return manifest
