@@ -272,7 +272,7 @@ def _broken(model: str, verdicts: Mapping[str, Verdict]) -> list[str]:
         states.append(
             f"monitor {name} {'holds' if verdict.holds else 'cannot be judged'} in this run of {model}{reason}"
         )
-    raise EpicycleError(f"{', and '.join(states)}: there is nothing to explain")
+    raise EpicycleError(f"{' and '.join(states)}: there is nothing to explain")
 
 
 def _chosen(model: Model, only: Collection[str]) -> frozenset[str]:

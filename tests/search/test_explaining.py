@@ -114,6 +114,23 @@ def test_what_is_said_and_written(model: Path, tmp_path: Path) -> None:
     assert "robustness without it" in str(found)
 
 
+def test_the_monitor_that_is_broken_first_by_default(model: Path, tmp_path: Path) -> None:
+    found = epicycle.explain(model, seed=broken_seed(model))
+    verdicts = epicycle.run(model, seed=broken_seed(model)).monitors
+    times = {name: each.time for name, each in verdicts.items() if each.holds is False and each.time is not None}
+    first, *others = sorted(times, key=lambda name: times[name])
+    assert found.explanation.monitor == first
+    assert found.explanation.also == tuple(others)
+    assert others
+    assert found.sentence.endswith(f" Also broken in the whole run: {', '.join(others)}.")
+    with pytest.raises(EpicycleError) as raised:
+        epicycle.explain(model, set={"loss": 0})
+    assert str(raised.value) == (
+        "monitor heard holds in this run of relay and monitor alive holds in this run of relay: there is nothing to "
+        "explain"
+    )
+
+
 def test_a_model_that_breaks_by_itself(model: Path) -> None:
     found = epicycle.explain(model, "always double.output < 10", seed=1)
     assert found.explanation.effects == []
