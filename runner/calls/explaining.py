@@ -167,9 +167,9 @@ def explain(
     Without ``monitor``, the monitor of the model is explained that is broken first.
     ``set``, ``disturb`` and the other options of ``load`` change the model first.  ``only`` names the aspects whose
     acts are looked at; those of others happen as in the whole run.  At most ``runs`` sets are tried; after that, or an
-    interrupt, the smallest set so far is told, which may not be minimal.  Each run that was made is noted in the folder
-    ``out``, if there is one, where a search that ended continues.  ``progress`` is called with the number of sets that
-    were tried, and of acts in the smallest one.  Raises ``EpicycleError`` if the run does not break the property.
+    interrupt, the answer is the smallest set so far, which may not be minimal.  Each run that was made is noted in the
+    folder ``out``, if there is one, where a search that ended continues.  ``progress`` is called with the number of
+    sets that were tried, and of acts in the smallest one.  Raises ``EpicycleError`` if the run does not break the property.
 
     >>> epicycle.explain("collision_avoidance", "always clearance.distance >= 4 m", seed=3, set={"disturbance": 0.5})
     """

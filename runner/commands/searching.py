@@ -33,7 +33,7 @@ Found = TypeVar("Found", bound=Answer)
 
 
 def monitor(example: str, *, default: str = "") -> Option:
-    """The monitor that a search is about; without a ``default``, which is told, it must be given."""
+    """The monitor that a search is about; without a ``default``, it must be given."""
     text = f"a monitor of the model, or a property such as '{example}'" + (f" (default: {default})" if default else "")
     return option("--monitor", metavar="NAME or PROPERTY", required=not default, help=text)
 

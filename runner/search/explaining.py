@@ -20,7 +20,7 @@ from .minimal import minimal
 from .monitored import property_of
 from .tried import Tried
 
-RUNS = 500  # that a search makes at most, unless it is told otherwise
+RUNS = 500  # that a search makes at most by default
 LIMIT, INTERRUPT = "limit", "interrupt"  # what ended a search too soon
 
 
@@ -178,7 +178,7 @@ def explain(
     """Find a smallest set of acts that breaks the monitor of a model that is broken first in a run.
 
     With ``only``, of the acts of these aspects; those of others happen as in the whole run.  At most ``limit`` sets are
-    tried.  After that, or an interrupt, the smallest set so far is told.  In a ``folder``, every run is noted, and a
+    tried.  After that, or an interrupt, the smallest set so far is the answer.  In a ``folder``, every run is noted; a
     search that ended continues there.  ``tell`` is called with how many sets were tried, and how many acts the smallest
     one has.  Raises ``EpicycleError`` if the run does not break it.
     """
@@ -232,7 +232,7 @@ def explain(
         if fewer.monitors[monitor].holds is False:
             best, with_set = acting, fewer
     there = {act.name: act for act in with_set.acts if act.name in best}
-    # An act that is not noted in the run of the set is told as it was.
+    # An act that is not noted in the run of the set is reported as it was.
     there |= {name: acts[name] for name in runs.order if name in best and name not in there}
     steps = []
     if there and not ended:

@@ -187,8 +187,8 @@ def test_all_monitors_of_the_model_by_default(capsys: pytest.CaptureFixture[str]
     )
     calm = epicycle.falsify("both.yaml", set={"n": 1}, runs=2, out="calm", jobs=1)
     assert calm.sentence.startswith(
-        "No run broke away (always far.output > 0.0001) or low (always far.output < 4.3), which does not prove that they "
-        "always hold. "
+        "No run broke away (always far.output > 0.0001) or low (always far.output < 4.3), which does not prove that "
+        "they always hold. "
     )
     assert calm.facts()["monitor"] is None
 
