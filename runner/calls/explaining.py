@@ -169,7 +169,8 @@ def explain(
     acts are looked at; those of others happen as in the whole run.  At most ``runs`` sets are tried; after that, or an
     interrupt, the answer is the smallest set so far, which may not be minimal.  Each run that was made is noted in the
     folder ``out``, if there is one, where a search that ended continues.  ``progress`` is called with the number of
-    sets that were tried, and of acts in the smallest one.  Raises ``EpicycleError`` if the run does not break the property.
+    sets that were tried, and of acts in the smallest one.  Raises ``EpicycleError`` if the run does not break the
+    property.
 
     >>> epicycle.explain("collision_avoidance", "always clearance.distance >= 4 m", seed=3, set={"disturbance": 0.5})
     """
