@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from .calibrating import Calibrated, calibrate, calibrated
-    from .comparing import Comparison, Difference, compare
+    from .comparing import Away, Comparison, Difference, compare, compared
     from .disturbing import Disturbed, disturb
     from .estimating import RareEvent, rare
     from .explaining import Explained, explain, explained
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from .viewing import Page, recorded, view
 
 __all__ = [
+    "Away",
     "Calibrated",
     "Changes",
     "Comparison",
@@ -41,6 +42,7 @@ __all__ = [
     "calibrate",
     "calibrated",
     "compare",
+    "compared",
     "disturb",
     "draw",
     "explain",
@@ -65,7 +67,7 @@ __all__ = [
 
 _HOMES = {
     "calibrating": ("Calibrated", "calibrate", "calibrated"),
-    "comparing": ("Comparison", "Difference", "compare"),
+    "comparing": ("Away", "Comparison", "Difference", "compare", "compared"),
     "disturbing": ("Disturbed", "disturb"),
     "estimating": ("RareEvent", "rare"),
     "explaining": ("Explained", "explain", "explained"),

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import nullcontext
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,9 +14,19 @@ from epicycle.actors import EpicycleError, counted
 
 from ..bars import SOON, bar
 from ..build import Model
+from ..catalogue import types_of_file
 from ..engine import ActorError, LoopError, Simulation
-from ..results import Results
-from ..study import Estimate, holm, mean, paired_difference, with_interval
+from ..results import EventLog, Results
+from ..study import (
+    DONE,
+    Estimate,
+    Processes,
+    WorkerError,
+    holm,
+    mean,
+    paired_difference,
+    with_interval,
+)
 from ..tables import Table, Tabled, pandas_module
 from ..text import did_you_mean
 from .running import Changes, loaded, seconds
@@ -127,13 +138,15 @@ def compare(
     replications: int = 10,
     seed: int | None = None,
     until: float | str | None = None,
+    jobs: int = 1,
     progress: bool = True,
 ) -> Comparison:
     """Run variants of a model with the same seeds, and compare their metrics in pairs of runs.
 
     A variant is a set of changes as ``load`` takes them, or another model; a list names disturbances, where ``none`` is
     the unchanged model.  Seeds count up from ``seed`` (default: the model's).  Runs that fail are reported and left
-    out.
+    out.  With several ``jobs``, that many processes make runs, and ``runs`` have neither signals nor figures; the
+    numbers are the same.
 
     >>> epicycle.compare("collision_avoidance", ["none", "wifi_burst"], replications=20)
     >>> epicycle.compare("mm1", {"slow": {}, "fast": {"set": {"mean_service": 0.8}}})
@@ -145,16 +158,132 @@ def compare(
     if replications < 1:
         raise EpicycleError(f"replications: {replications} is not a whole number of at least 1")
     models = {name: each if isinstance(each, Model) else loaded(model, each) for name, each in variants.items()}
+    if jobs == 1:
+        return compared(models, replications, seed, until, progress=progress)
+    if jobs < 1:
+        raise EpicycleError(f"jobs: {jobs} is not a whole number of at least 1")
+    changes: dict[str, Changes] = {}
+    for name, each in variants.items():
+        if isinstance(model, Model) or isinstance(each, Model) or each.get("types"):
+            raise EpicycleError(
+                f"variant {name} cannot be made in other processes, which do not know the models and classes of this "
+                "program\n   help: leave out jobs"
+            )
+        changes[name] = each
+    away = Away(str(model), changes, jobs)
+    return compared(models, replications, seed, until, away=away, progress=progress)
+
+
+@dataclass(frozen=True)
+class Away:
+    """How other processes load the variants: the model, its changes, and the files with their own types."""
+
+    model: str
+    variants: Mapping[str, Changes]
+    jobs: int
+    types: Sequence[Path] = ()
+
+
+def compared(
+    models: Mapping[str, Model],
+    replications: int,
+    seed: int | None,
+    until: float | str | None,
+    *,
+    away: Away | None = None,
+    progress: bool = True,
+) -> Comparison:
+    """The same for models that were loaded, here or in other processes."""
+    if len(models) < 2:
+        raise EpicycleError("a comparison needs at least two variants")
     first, stop = next(iter(models.values())), seconds("until", until)
     seeds = range(start := first.seed if seed is None else seed, start + replications)
     units = {metric.name: metric.unit for each in models.values() for metric in each.metrics}
     found = Comparison(first.name, seeds, units, {name: {} for name in models})
+    asked = [(name, number) for number in seeds for name in models]
+    outcomes = _made(models, asked, stop) if away is None else _made_away(away, asked, stop)
     with bar(first.name, after=SOON) if progress else nullcontext() as show:
-        for done, (number, name) in enumerate((number, name) for number in seeds for name in models):
+        for done, (name, number) in enumerate(asked):
             if show is not None:
-                show(done, len(seeds) * len(models), f"seed {number}, {name}")
-            try:
-                found.runs[name][number] = Simulation(models[name], seed=number).run(until=stop)
-            except (ActorError, LoopError) as error:
-                found.failures[name, number] = error
+                show(done, len(asked), f"seed {number}, {name}")
+            outcome = next(outcomes)
+            if isinstance(outcome, Results):
+                found.runs[name][number] = outcome
+            else:
+                found.failures[name, number] = outcome
     return found
+
+
+_Asked = tuple[str, int]  # a variant and a seed
+
+
+def _outcome(model: Model, seed: int, until: float | None) -> Results | EpicycleError:
+    try:
+        return Simulation(model, seed=seed).run(until=until)
+    except (ActorError, LoopError) as error:
+        return error
+
+
+def _made(
+    models: Mapping[str, Model], asked: Sequence[_Asked], until: float | None
+) -> Iterator[Results | EpicycleError]:
+    for name, seed in asked:
+        yield _outcome(models[name], seed, until)
+
+
+def _made_away(away: Away, asked: Sequence[_Asked], until: float | None) -> Iterator[Results | EpicycleError]:
+    """The outcomes of runs in other processes, in the order in which they are asked for."""
+    with ThreadPoolExecutor(away.jobs) as threads, Processes(_Bench, away, until) as processes:
+        for what, outcome in threads.map(processes.make, asked):
+            if what != DONE:
+                raise WorkerError("a process that was making runs died; is there enough memory?")
+            yield outcome
+
+
+class _Bench:
+    """Makes runs of the variants in a process."""
+
+    def __init__(self, away: Away, until: float | None) -> None:
+        self._away = away
+        self._until = until
+        self._types = [each for file in away.types for each in types_of_file(file)]
+        self._models: dict[str, Model] = {}
+
+    def prepare(self, asked: _Asked) -> None:
+        """Load the variant, unless it is there."""
+        name, _ = asked
+        if name not in self._models:
+            changes = self._away.variants[name]
+            model = loaded(self._away.model, {**changes, "types": self._types} if self._types else changes)
+            model.recorded = []
+            self._models[name] = model
+
+    def make(self, asked: _Asked) -> Results | EpicycleError:
+        """The outcome of a run, without what may be large, or cannot leave this process."""
+        name, seed = asked
+        outcome = _outcome(self._models[name], seed, self._until)
+        if isinstance(outcome, EpicycleError):
+            return outcome
+        log = _Summary(outcome.events, outcome.digest)
+        return replace(outcome, log=log, signals={}, figures={}, parameters=dict(outcome.parameters))
+
+
+class _Summary(EventLog):
+    """What is known of the event log of a run in another process."""
+
+    def __init__(self, count: int, digest: str) -> None:
+        super().__init__()
+        self._known = count, digest
+
+    def __reduce__(self) -> tuple[type[_Summary], tuple[int, str]]:
+        return _Summary, self._known
+
+    @property
+    def count(self) -> int:
+        """The number of records."""
+        return self._known[0]
+
+    @property
+    def digest(self) -> str:
+        """SHA-256 over all records."""
+        return self._known[1]

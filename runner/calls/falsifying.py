@@ -6,7 +6,7 @@ import json
 import re
 import shlex
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -14,8 +14,6 @@ from typing import Any
 from epicycle.actors import EpicycleError, abridged, counted
 
 from ..bars import bar
-from ..build import load_model
-from ..catalogue import types_of_file
 from ..engine import Acts, Simulation
 from ..graph import ActName
 from ..language import EXACTLY, Setting, split_number
@@ -27,7 +25,7 @@ from ..shown import finite, short
 from ..study import OK, StudyResults, open_study
 from ..tables import Table, Tabled
 from ..text import Node, Scalar, plain
-from .running import as_command
+from .running import Changes, as_command, seconds
 from .studying import as_settings
 
 SHOWN = 5  # runs in the table
@@ -63,11 +61,9 @@ class Falsified(Tabled):
         """Make a run once more, for the verdict and the acts in it."""
         asked = self._asked
         self.command = self.command_of(run)
-        types = [each for file in asked.types for each in types_of_file(file)]
-        settings: list[str | Setting] = [*asked.set, *run.level.settings]
-        model = load_model(asked.model, set=settings, disturb=asked.disturb, types=types)
-        name = self.findings.monitor
-        if name not in {each.name for each in model.monitors}:
+        model = asked.load(run.level.settings)
+        name = run.broken[0]
+        if asked.monitor is not None and name not in {each.name for each in model.monitors}:
             model.monitor(name, asked.monitor)
         results = Simulation(model, seed=run.seed, acts=Acts(model.exactly)).run()
         if results.digest != run.digest:
@@ -77,13 +73,15 @@ class Falsified(Tabled):
             )
         self.verdict = results.monitors[name]
         if results.acts:
-            self.explain = ["epicycle", "explain", *self.command[2:], "--monitor", asked.monitor]
+            self.explain = ["epicycle", "explain", *self.command[2:], "--monitor", asked.monitor or name]
 
     def command_of(self, run: Run) -> list[str]:
         """The command that makes one of the runs again."""
         asked = self._asked
         own = [f"{path}={value}" for path, value in _settings(run)]
-        command = as_command(asked.model, run.seed, None, {"set": [*asked.set, *own], "disturb": asked.disturb})
+        changes: Changes = {"set": [*asked.set, *own], "disturb": asked.disturb}
+        changes |= {"aspects": asked.aspects, "without_aspects": asked.without}
+        command = as_command(asked.model, run.seed, asked.until, changes)
         return command + [word for file in asked.types for word in ("--types", str(file))]
 
     @property
@@ -95,9 +93,11 @@ class Falsified(Tabled):
     def sentence(self) -> str:
         """What came of the search, in words."""
         found = self.findings
-        what = f"{found.monitor} ({found.source})"
+        names = self.broken.broken if self.broken is not None else tuple(found.monitors)
+        what = _list([f"{name} ({found.monitors[name]})" for name in names], "or" if self.broken is None else "and")
         if self.broken is None:
-            told = f"No run broke {what}, which does not prove that it always holds."
+            always = "it always holds" if len(names) == 1 else "they always hold"
+            told = f"No run broke {what}, which does not prove that {always}."
         else:
             remark = "" if self.verdict is None else self.verdict.remark
             told = f"Run {self.broken.number}, with {_said(self.broken)}, breaks {what}{remark and ': '}{remark}."
@@ -124,10 +124,14 @@ class Falsified(Tabled):
     def facts(self) -> dict[str, Any]:
         """Everything that was found, for programs."""
         found = self.findings
+        names = self.broken.broken if self.broken is not None else tuple(found.monitors)
+        monitor = names[0] if self.broken is not None or len(names) == 1 else None
         return {
             "model": found.model,
-            "monitor": found.monitor,
-            "property": found.source,
+            "monitor": monitor,
+            "property": None if monitor is None else found.monitors[monitor],
+            "monitors": found.monitors,
+            "broken": [] if self.broken is None else list(self.broken.broken),
             "found": self.broken is not None,
             "run": None if self.broken is None else _facts(self.broken),
             "verdict": None if self.verdict is None else finite(asdict(self.verdict)),
@@ -163,7 +167,7 @@ class Falsified(Tabled):
 
 def falsify(
     model: str | Path,
-    monitor: str,
+    monitor: str | None = None,
     *,
     vary: Iterable[str] | Mapping[str, object] = (),
     acts: int = 0,
@@ -174,16 +178,20 @@ def falsify(
     run_timeout: float | None = None,
     set: Iterable[str] | Mapping[str, object] = (),
     disturb: str | Path | Iterable[str | Path] = (),
+    aspects: Iterable[str] = (),
+    without_aspects: Iterable[str] = (),
+    until: float | str | None = None,
     types: Iterable[str | Path] = (),
     progress: bool = True,
 ) -> Falsified:
     """Look for a run that breaks a monitor of a model, or a property that is given as a text.
 
-    What is in ``vary`` is searched: ``{"load": "0.5..0.9", "policy": ["fifo", "lifo"]}``.  Run number n has the seed
-    ``seed + n - 1``.  With ``acts``, all runs have the same seed, and sets of at most so many single acts of aspects
-    (losses, delays, failures) are searched, of those that happen in the run of that seed.  All runs are kept in a
-    folder (default: results/MODEL/falsification), where a search that was killed continues.  That nothing is found does
-    not show that the property holds.
+    Without ``monitor``, a run that breaks any of the model's is looked for.  What is in ``vary`` is searched:
+    ``{"load": "0.5..0.9", "policy": ["fifo", "lifo"]}``.  Run number n has the seed ``seed + n - 1``.  With ``acts``,
+    all runs have the same seed, and sets of at most so many single acts of aspects (losses, delays, failures) are
+    searched, of those that happen in the run of that seed.  All runs are kept in a folder (default:
+    results/MODEL/falsification), where a search that was killed continues.  That nothing is found does not show that
+    the property holds.
 
     >>> epicycle.falsify("mm1", "always server.size < 40", vary={"load": "0.5..0.9"}, runs=100).sentence
     """
@@ -199,6 +207,9 @@ def falsify(
         tuple(map(str, given)),
         tuple(map(Path, types)),
         acts=acts,
+        aspects=tuple(aspects),
+        without=tuple(without_aspects),
+        until=seconds("until", until),
     )
     return falsified(asked, out, jobs=jobs, timeout=run_timeout, progress=progress)
 
@@ -221,6 +232,11 @@ def falsified(
                 show(float(runs), float(asked.runs), f"{runs:,} runs{known}")
 
         return Falsified(search(asked, folder, jobs=jobs, timeout=timeout, tell=tell), asked, folder)
+
+
+def _list(texts: Sequence[str], last: str) -> str:
+    """Texts as a list in a sentence."""
+    return f" {last} ".join([", ".join(texts[:-1]), texts[-1]] if len(texts) > 1 else texts)
 
 
 def as_ranges(said: Mapping[str, object]) -> Iterator[str]:

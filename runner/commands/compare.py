@@ -13,6 +13,7 @@ from .options import (
     DISTURB,
     DONE,
     FAILED,
+    JOBS,
     SEED,
     UNTIL,
     check_path,
@@ -36,12 +37,15 @@ if TYPE_CHECKING:
         "may be repeated",
     ),
     several(
-        "--vary", metavar="PATH=VALUE", help="add a variant with this parameter, such as load=0.9; may be repeated"
+        "--vary",
+        metavar="PATH=VALUE,...",
+        help="add a variant with this parameter, such as load=0.9, or several: load=0.9,servers=2; may be repeated",
     ),
     *(each for each in CHANGES if each is not DISTURB),
     option("--replications", type=COUNT, metavar="N", default=10, help="runs of each variant (default: 10)"),
     SEED,
     UNTIL,
+    JOBS,
     option("--json", action="store_true", help="print one JSON object instead of the table"),
     option(
         "-o",
@@ -58,28 +62,37 @@ def compare(options: argparse.Namespace) -> int:
     method.  A single variant is compared with the unchanged model."""
     from dataclasses import asdict
 
-    from ..calls import compare, load, recorded, seconds
+    from ..calls import Away, compared, load, recorded, seconds
+    from ..language import parse_settings
     from ..shown import finite
+    from ..study import available_cores
+    from ..text import Problems
 
     common: Changes = {
         "set": options.set,
         "overrides": options.overrides,
         "aspects": options.aspect,
         "without_aspects": options.without,
-        "types": own_types(options),
     }
     if options.max_actors is not None:
         common["max_actors"] = options.max_actors
     variants: dict[str, Changes] = {
         name: common if name == "none" else {**common, "disturb": name} for name in options.disturb
     }
-    variants |= {each: {**common, "set": [*options.set, each]} for each in options.vary}
+    problems = Problems()
+    varied = {each: parse_settings(each, problems, "--vary") for each in options.vary}
+    problems.raise_if_any()
+    variants |= {each: {**common, "set": [*options.set, *settings]} for each, settings in varied.items()}
     if len(variants) == 1:
         variants = {"none": common, **variants}
     if options.out is not None:
         check_path("--out", options.out)
-    models = {name: load(options.model, **changes) for name, changes in variants.items()}
-    found = compare(options.model, models, replications=options.replications, seed=options.seed, until=options.until)
+    types = own_types(options)
+    changed: dict[str, Changes] = {name: {**changes, "types": types} for name, changes in variants.items()}
+    models = {name: load(options.model, **changes) for name, changes in changed.items()}
+    jobs = min(options.jobs or available_cores(), len(models) * options.replications)
+    away = None if jobs == 1 else Away(options.model, variants, jobs, [Path(file) for file in options.types])
+    found = compared(models, options.replications, options.seed, options.until, away=away)
     if options.json:
         told = {"model": found.model, "seeds": list(found.seeds), "units": found.units}
         tell_json(finite({**told, "differences": [asdict(each) for each in found.differences()]}))

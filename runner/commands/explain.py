@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from . import searching
-from .options import CHANGES, DONE, SEED, UNTIL, command, load, option
+from .options import CHANGES, COUNT, DONE, INTERRUPTED, SEED, UNTIL, command, load, option, several
 from .past_run import as_before
 
 
@@ -16,7 +16,17 @@ from .past_run import as_before
     *CHANGES,
     SEED,
     UNTIL,
-    searching.monitor("always clearance.distance >= 2 m"),
+    searching.monitor("always clearance.distance >= 2 m", default="the one of the model's that is broken first"),
+    option(
+        "--runs",
+        type=COUNT,
+        metavar="N",
+        default=500,
+        help="number of sets of acts that are tried at most (default: 500)",
+    ),
+    several(
+        "--only", metavar="ASPECT", help="look at the acts of this aspect; those of others happen; may be repeated"
+    ),
     searching.out("MODEL/explanation"),
     option("--no-page", action="store_true", help="write no page with both runs"),
     searching.JSON,
@@ -25,12 +35,14 @@ from .past_run import as_before
 def explain(options: argparse.Namespace) -> int:
     """Find a smallest set of acts of aspects (single losses, delays, failures) that breaks a property in a run.
 
-    With these acts and no others the property is broken; without any single one of them it holds.  The folder gets a
-    disturbance with just these acts, the facts as JSON, and a page that shows both runs.  Each run that was tried is
-    noted there, so that an interrupted search continues.
+    With these acts and no others the property is broken; without any single one of them it holds.  A search that comes
+    to its limit of runs, or is interrupted, tells the smallest set so far.  The folder gets a disturbance with just
+    these acts, the facts as JSON, and a page that shows both runs.  Each run that was tried is noted there, so that the
+    same command, or one with more runs, continues.
     """
     from ..bars import bar
     from ..calls import Changes, Explained, as_command, explained, seconds
+    from ..search import INTERRUPT
 
     if Path(options.model).is_dir():
         as_before(options)
@@ -47,8 +59,19 @@ def explain(options: argparse.Namespace) -> int:
 
             def report(runs: int, acts: int) -> None:
                 if show is not None:
-                    show(float(runs), None, f"{runs} runs, {acts} acts")
+                    words = f"{runs:,} of at most {options.runs:,} runs, smallest set: {acts:,} acts"
+                    show(float(runs), float(options.runs), words)
 
-            return explained(made, options.monitor, seed, until, given, folder, report)
+            return explained(
+                made, options.monitor, seed, until, given, folder, report, limit=options.runs, only=options.only
+            )
 
-    return searching.answer(options, search, lambda found: found.save(folder, page=not options.no_page), lambda _: DONE)
+    def is_interrupted(found: Explained) -> bool:
+        return found.explanation.ended == INTERRUPT
+
+    return searching.answer(
+        options,
+        search,
+        lambda found: found.save(folder, page=not options.no_page and not is_interrupted(found)),
+        lambda found: INTERRUPTED if is_interrupted(found) else DONE,
+    )

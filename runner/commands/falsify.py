@@ -6,7 +6,7 @@ import argparse
 from pathlib import Path
 
 from . import searching
-from .options import BROKEN, DISTURB, DONE, FAILED, command, option, whole
+from .options import ASPECTS, BROKEN, DISTURB, DONE, FAILED, UNTIL, command, option, whole
 
 
 def runs(text: str) -> int:
@@ -19,7 +19,7 @@ def runs(text: str) -> int:
 @command(
     "look for a run that breaks a property",
     option("model", metavar="MODEL", help="a path to a YAML file, or the name of a packaged model"),
-    searching.monitor("always clearance.distance >= 2 m"),
+    searching.monitor("always clearance.distance >= 2 m", default="all of the model's"),
     searching.VARY,
     option(
         "--acts",
@@ -30,6 +30,8 @@ def runs(text: str) -> int:
     ),
     searching.SET,
     DISTURB,
+    *ASPECTS,
+    UNTIL,
     option("--runs", type=runs, metavar="N", default=500, help="number of runs at most (default: 500)"),
     searching.seed_of_search("seed of the search and of its first run; each run has the next (default: 0)", 0),
     searching.out("MODEL/falsification"),
@@ -45,7 +47,7 @@ def falsify(options: argparse.Namespace) -> int:
     broken, which does not show that the property holds, and with 1 if some of these runs failed.  The folder is that of
     a study; an interrupted search continues there.
     """
-    from ..calls import Falsified, falsified
+    from ..calls import Falsified, falsified, seconds
     from ..search import Asked
 
     asked = Asked(
@@ -59,6 +61,9 @@ def falsify(options: argparse.Namespace) -> int:
         tuple(map(Path, options.types)),
         tuple(options.given),
         options.acts,
+        tuple(options.aspect),
+        tuple(options.without),
+        seconds("--until", options.until),
     )
 
     def code(found: Falsified) -> int:

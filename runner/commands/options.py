@@ -114,8 +114,15 @@ TYPES = several(
 DISTURB = several(
     "--disturb",
     metavar="NAME or FILE",
-    help="add the aspects of a packaged disturbance or of a YAML file; may be repeated; "
-    "--aspect and --without are applied after it",
+    help="add the aspects of a packaged disturbance or of a YAML file; may be repeated",
+)
+ASPECTS = (
+    several(
+        "--aspect",
+        metavar="NAME=TYPE,KEY=VALUE,...",
+        help="add an aspect, or replace the one with that name, after --disturb; may be repeated",
+    ),
+    several("--without", metavar="NAME", help="remove an aspect, after --disturb; may be repeated"),
 )
 CHANGES = (  # to a model
     several(
@@ -129,12 +136,7 @@ CHANGES = (  # to a model
         help="set parameters from a YAML file of lines such as 'observer[*].sensor.max_range: 5 m'; --set wins",
     ),
     DISTURB,
-    several(
-        "--aspect",
-        metavar="NAME=TYPE,KEY=VALUE,...",
-        help="add an aspect, or replace the one with that name; may be repeated",
-    ),
-    several("--without", metavar="NAME", help="remove an aspect; may be repeated"),
+    *ASPECTS,
     option(
         "--max-actors",
         metavar="N",

@@ -32,10 +32,10 @@ class Answer(Protocol):
 Found = TypeVar("Found", bound=Answer)
 
 
-def monitor(example: str) -> Option:
-    """The monitor that a search is about."""
-    text = f"a monitor of the model, or a property such as '{example}'"
-    return option("--monitor", metavar="NAME or PROPERTY", required=True, help=text)
+def monitor(example: str, *, default: str = "") -> Option:
+    """The monitor that a search is about; without a ``default``, it must be given."""
+    text = f"a monitor of the model, or a property such as '{example}'" + (f" (default: {default})" if default else "")
+    return option("--monitor", metavar="NAME or PROPERTY", required=not default, help=text)
 
 
 def seed_of_search(text: str, default: int | None = None) -> Option:

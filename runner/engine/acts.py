@@ -8,6 +8,7 @@ token goes on at once.
 from __future__ import annotations
 
 import copy
+import hashlib
 from collections.abc import Callable, Container
 from dataclasses import replace
 from typing import Any
@@ -16,6 +17,7 @@ from epicycle.actors import Streams, Tag, Way
 from epicycle.aspects import AspectContext
 
 from ..graph import Act, ActName
+from ..results import canonical
 from .way import Guarded
 
 
@@ -37,9 +39,10 @@ class Acts:
         number = self._passed[aspect, place] = self._passed.get((aspect, place), 0) + 1
         return ActName(aspect, place, number)
 
-    def note(self, name: ActName, source: str, time: int, *events: str) -> None:
+    def note(self, name: ActName, source: str, time: int, token: Any, *events: str) -> None:
         """An act has happened, or left something in the event log."""
-        before = self._noted.get(name, Act(name, source, time, ()))
+        if (before := self._noted.get(name)) is None:
+            before = Act(name, source, time, hashlib.sha256(canonical(token)).hexdigest()[:16], ())
         self._noted[name] = replace(before, events=(*before.events, *events))
 
 
@@ -58,7 +61,7 @@ class Named(Way):
         point.random  # noqa: B018 (or a copy would have a stream of its own)
         if self.acts.exactly is None or name in self.acts.exactly:
             passing = _Passing(token, point._forward)
-            context = _Noting(point._context, self.acts, name, point.source)
+            context = _Noting(point._context, self.acts, name, point.source, token)
             self._act(token, context, passing, point.enter, point.counts)
             if not passing.is_untouched:  # so far there may be nothing in the log
                 context.note_it()
@@ -136,14 +139,15 @@ class _Context:
 class _Noting(_Context):
     """Notes what is done to a token under its name."""
 
-    def __init__(self, context: AspectContext, acts: Acts, name: ActName, source: str) -> None:
+    def __init__(self, context: AspectContext, acts: Acts, name: ActName, source: str, token: Any) -> None:
         super().__init__(context)
         self._acts = acts
         self._name = name
         self._source = source
+        self._token = token
 
     def note_it(self, *events: str) -> None:
-        self._acts.note(self._name, self._source, self._context.tag.time, *events)
+        self._acts.note(self._name, self._source, self._context.tag.time, self._token, *events)
 
     def note(self, aspect: str, owner: str, port: str, event: str, token: Any) -> None:
         self.note_it(event)

@@ -19,9 +19,13 @@ class ActName(NamedTuple):
 
 @dataclass(frozen=True)
 class Act:
-    """An act as it happened: the port that the token comes from, the time (ns), and its entry in the event log."""
+    """An act as it happened: the port that the token comes from, the time (ns), and its entry in the event log.
+
+    ``token`` is a digest of what the aspect met, by which acts of one name in two runs are told apart.
+    """
 
     name: ActName
     source: str
     time: int
+    token: str
     events: tuple[str, ...]

@@ -42,7 +42,17 @@ from .inheritance import inherit
 from .places import connection
 from .sampling import MORRIS, SOBOL, Design
 from .schema import CONSTRUCTS, json_schema, schema_text
-from .settings import Setting, Settings, change_aspect, parse_setting, read_overrides, settings_in, settings_of, without
+from .settings import (
+    Setting,
+    Settings,
+    change_aspect,
+    parse_setting,
+    parse_settings,
+    read_overrides,
+    settings_in,
+    settings_of,
+    without,
+)
 from .study import MAX_REPLICATIONS, MAX_STUDY_SEED, RESERVED, Study, is_study, read_study, study_of_text
 from .study_metric import ASPECTS, NUMBERS, SIGNALS, StudyMetric, asks_for_none
 from .usage import check_usage
@@ -108,6 +118,7 @@ __all__ = [
     "number_node",
     "only_acts",
     "parse_setting",
+    "parse_settings",
     "read_library",
     "read_model",
     "read_overrides",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from collections.abc import Mapping as AnyMapping
 from dataclasses import dataclass, replace
@@ -131,6 +132,30 @@ def settings_of(given: Iterable[str | Setting] | AnyMapping[str, object], proble
     node = node_of(given, call_site())
     assert isinstance(node, Mapping)
     return settings_in(node, problems)
+
+
+_ASSIGNED = r"[A-Za-z_][\w.*\[\]]*\s*=(?!=)"  # the beginning of a setting
+_BEGUN = re.compile(rf"\s*{_ASSIGNED}")
+_NUMBER_AND_MORE = re.compile(rf"[^=]*=\s*[-+]?\.?\d\S*(?:\s[^\"']*)?\s{_ASSIGNED}")
+
+
+def parse_settings(text: str, problems: Problems, flag: str) -> list[Setting]:
+    """``path=value,path=value,...``; a comma in brackets or quotes, or before anything else, belongs to the value."""
+    parts: list[str] = []
+    for start, end in split(text, ","):
+        part = text[start:end]
+        if parts and (_BEGUN.match(part) is None or parts[-1].count('"') % 2 or parts[-1].count("'") % 2):
+            parts[-1] += f",{part}"
+        else:
+            parts.append(part)
+    found = []
+    for part in map(str.strip, parts):
+        if _NUMBER_AND_MORE.match(part):
+            message = f"{part!r} sets more than one parameter without a comma between them"
+            problems.add(message, _in_option(f"{flag} {text}", len(flag) + 1), "write load=0.9,servers=2")
+        else:
+            found.append(parse_setting(part, problems, flag))
+    return [setting for setting in found if setting is not None]
 
 
 def is_pattern(path: str, position: Position, problems: Problems) -> bool:

@@ -84,6 +84,9 @@ class Study:
     questions: Questions = field(default_factory=Questions)
     changes: tuple[str, ...] = ()  # --set, as given
     types: tuple[Path, ...] = ()
+    aspects: tuple[str, ...] = ()  # --aspect
+    without_aspects: tuple[str, ...] = ()  # --without
+    stop: float | None = None  # s, instead of the model's
 
     @property
     def factors(self) -> dict[str, str]:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+import hashlib
+import math
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from epicycle.actors import EpicycleError, to_seconds
+from epicycle.actors import EpicycleError, did_you_mean, to_seconds
 
 from ..build import Model
 from ..engine import Acts, Simulation
@@ -17,14 +19,31 @@ from .minimal import minimal
 from .monitored import property_of
 from .tried import NUMBER, Tried
 
+RUNS = 500  # that a search makes at most by default
+LIMIT, INTERRUPT = "limit", "interrupt"  # what ended a search too soon
+
 
 @dataclass(frozen=True)
 class Effect:
-    """What one act of a smallest set does: the robustness of the property without it, and with it alone."""
+    """What one act of a smallest set does: the robustness of the property without it, and with it alone.
+
+    ``act`` is the act in the run of the set, ``whole`` the one of that name in the whole run.  They may differ, because
+    acts are counted, and the run takes another course without the others.
+    """
 
     act: Act
-    without: float | None
-    alone: float | None
+    whole: Act
+    without: float | None = None
+    alone: float | None = None
+
+    @property
+    def has_moved(self) -> bool:
+        """Whether the act of that name is another one in the whole run."""
+        return (self.act.time, self.act.source, self.act.token) != (
+            self.whole.time,
+            self.whole.source,
+            self.whole.token,
+        )
 
 
 @dataclass(frozen=True)
@@ -43,7 +62,8 @@ class Explanation:
 
     With these acts and no others it is broken, and without any single one of them it holds: ``effects``, in the order
     in which they happen.  There are none if it is broken without any act.  ``steps`` lead from the first act to a port
-    that the property asks for.
+    that the property asks for.  If the search was ended before that, by ``LIMIT`` or ``INTERRUPT``, the set breaks the
+    property, but need not be minimal.  With ``only``, acts of other aspects, the ``others``, happen in all runs.
     """
 
     model: str
@@ -53,10 +73,15 @@ class Explanation:
     verdict: Verdict  # of the run as it was
     verdict_of_set: Verdict
     verdict_of_none: Verdict
-    acts: int  # of the run up to when it broke
+    acts: int  # that may be in the set: those of the run up to when it broke
     effects: list[Effect]
     steps: list[Step] = field(default_factory=list)
-    runs: int = 0
+    runs: int = 0  # that were made now
+    limit: int = RUNS
+    ended: str = ""
+    only: tuple[str, ...] = ()
+    others: frozenset[ActName] = frozenset()
+    also: tuple[str, ...] = ()  # other monitors that are broken in the whole run
 
     @property
     def names(self) -> list[ActName]:
@@ -65,96 +90,157 @@ class Explanation:
 
 
 _NONE = type(None)
-_SHAPE = [(bool, _NONE), (*NUMBER, _NONE)]  # of an outcome: whether the property holds, and its robustness
+_SHAPE = [(bool, _NONE), (*NUMBER, _NONE), [(int,)]]  # of an outcome
+
+
+class _LimitError(Exception):
+    """There are as many runs as a search may make."""
 
 
 class _Runs:
-    """Runs of a model in which some acts happen and no others."""
+    """Runs of a model in which some acts happen and, of those that are looked at, no others."""
 
-    def __init__(self, model: Model, monitor: str, seed: int | None, until: float | None) -> None:
+    def __init__(self, model: Model, seed: int | None, until: float | None, limit: int) -> None:
         self.model = model
-        self.monitor = monitor
+        self.monitor = ""
         self.seed = seed
         self.until = until
+        self.limit = limit
         self.number = 0
         self.tried = Tried(model, {}, _SHAPE)
+        self.others: frozenset[ActName] = frozenset()  # which happen in all runs
+        self.order: list[ActName] = []  # of the acts by name, to which the outcomes refer
+        self.best: frozenset[ActName] | None = None  # the smallest set so far
+        self.looks_ahead = False
+        self._asked: dict[frozenset[ActName], list[Any]] = {}
 
     def results(self, exactly: Collection[ActName] | None, *, keep_log: bool = False) -> Results:
         """What comes of the run with these acts; with None, with all."""
         self.number += 1
-        simulation = Simulation(self.model, seed=self.seed, acts=Acts(exactly), keep_log=keep_log)
-        return simulation.run(until=self.until)
+        acts = Acts(None if exactly is None else self.others.union(exactly))
+        return Simulation(self.model, seed=self.seed, acts=acts, keep_log=keep_log).run(until=self.until)
 
-    def _outcome(self, names: Collection[ActName]) -> list[Any]:
+    def _outcome(self, names: frozenset[ActName]) -> list[Any]:
+        """Whether the property holds, its robustness, and if it is broken the places of acts that are not to blame."""
+
         def found() -> list[Any]:
-            verdict = self.results(names).monitors[self.monitor]
-            return [verdict.holds, verdict.robustness]
+            results = self.results(names)
+            verdict = results.monitors[self.monitor]
+            if verdict.holds is not False:
+                return [verdict.holds, verdict.robustness, []]
+            acting = {act.name for act in self.up_to(verdict, results.acts)}
+            idle = [place for place, name in enumerate(self.order) if name in names and name not in acting]
+            return [verdict.holds, verdict.robustness, idle]
 
-        outcome: list[Any] = self.tried.outcome("; ".join(map(str, sorted(names))), found)
-        return outcome
+        if names not in self._asked:
+            # A digest, as there may be thousands of names.
+            key = hashlib.sha256("; ".join(map(str, sorted(names))).encode()).hexdigest()[:32]
+            self._asked[names] = self.tried.outcome(key, found)
+        return self._asked[names]
 
-    def breaks(self, names: Collection[ActName]) -> bool:
-        """Whether the property is broken with these acts."""
-        return self._outcome(names)[0] is False
+    def breaks(self, names: frozenset[ActName]) -> bool:
+        """Whether the property is broken with these acts; raises ``_LimitError``."""
+        # Runs that are known count too, so that a search that was killed comes to the same.
+        if names not in self._asked and len(self._asked) >= self.limit:
+            raise _LimitError
+        is_broken = self._outcome(names)[0] is False
+        if is_broken and (self.best is None or len(names) < len(self.best)):
+            self.best = names
+        return is_broken
 
-    def robustness(self, names: Collection[ActName]) -> float | None:
-        """Its robustness with these acts."""
-        margin: float | None = self._outcome(names)[1]
-        return margin
+    def up_to(self, verdict: Verdict, acts: Iterable[Act]) -> list[Act]:
+        """The acts that may have broken a property: not later ones, unless it looks ahead."""
+        return [act for act in acts if self.looks_ahead or verdict.time is None or to_seconds(act.time) <= verdict.time]
+
+    def active(self, names: frozenset[ActName]) -> frozenset[ActName]:
+        """The acts of a set that breaks the property which happen, and before it is broken."""
+        return names.difference(self.order[place] for place in self._outcome(names)[2])
+
+    def effect(self, names: frozenset[ActName], name: ActName) -> tuple[float | None, float | None]:
+        """The robustness without an act of a set, and with it alone."""
+        without, alone = (self._outcome(each)[1] for each in (names - {name}, frozenset([name])))
+        return without, alone
+
+    @property
+    def asked(self) -> int:
+        """How many sets were tried, now or before."""
+        return len(self._asked)
 
 
 def explain(
     model: Model,
-    monitor: str,
+    monitors: Sequence[str],
     *,
     seed: int | None = None,
     until: float | None = None,
+    limit: int = RUNS,
+    only: Collection[str] = (),
     folder: Path | None = None,
     tell: Callable[[int, int], None] | None = None,
 ) -> Explanation:
-    """Find a smallest set of acts that breaks a monitor of a model in a run.
+    """Find a smallest set of acts that breaks the monitor of a model that is broken first in a run.
 
-    In a ``folder``, every run is noted, and a search that was killed continues there.  ``tell`` is called with how many
-    runs were made, and how many acts the last one had.  Raises ``EpicycleError`` if the run does not break it.
+    With ``only``, of the acts of these aspects; those of others happen as in the whole run.  At most ``limit`` sets are
+    tried.  After that, or an interrupt, the smallest set so far is the answer.  In a ``folder``, every run is noted; a
+    search that ended continues there.  ``tell`` is called with how many sets were tried, and how many acts the smallest
+    one has.  Raises ``EpicycleError`` if the run does not break it.
     """
-    source = property_of(model, monitor)
-    runs = _Runs(model, monitor, seed, until)
+    sources = {monitor: property_of(model, monitor) for monitor in monitors}
+    chosen = _chosen(model, only)
+    runs = _Runs(model, seed, until, limit)
     whole = runs.results(model.exactly)
-    verdict = whole.monitors[monitor]
-    if verdict.holds is not False:
-        state = "holds" if verdict.holds else "cannot be judged"
-        reason = f" ({verdict.missing})" if verdict.missing else ""
-        raise EpicycleError(
-            f"monitor {monitor} {state} in this run of {model.name}{reason}: there is nothing to explain"
-        )
-
-    def breaks(names: frozenset[ActName]) -> bool:
-        if tell is not None:
-            tell(runs.number, len(names))
-        return runs.breaks(names)
-
+    monitor, *also = _broken(model.name, {each: whole.monitors[each] for each in monitors})
+    runs.monitor, verdict, source = monitor, whole.monitors[monitor], sources[monitor]
     about = {
         "model": model.name,
         "seed": whole.seed,
         "until": until,
         "property": source,
         "digest": whole.digest,
+        "only": sorted(chosen),
     }
     runs.tried = Tried(model, about, _SHAPE, folder)
     acts = {act.name: act for act in whole.acts}
-    # What comes after the break cannot have caused it, unless the property looks ahead.
-    before = [name for name, act in acts.items() if verdict.time is None or to_seconds(act.time) <= verdict.time]
-    candidates = before if len(before) == len(acts) or runs.breaks(before) else list(acts)
-    names = [] if runs.breaks(()) else minimal(candidates, breaks)
-    with_set, with_none = runs.results(names, keep_log=True), runs.results((), keep_log=True)
-    effects = [
-        Effect(acts[name], runs.robustness([each for each in names if each != name]), runs.robustness([name]))
-        for name in names
-    ]
-    ports = next(each.ports for each in model.monitors if each.name == monitor)
+    mine = [name for name in acts if not chosen or name.aspect in chosen]
+    runs.order, runs.others = sorted(mine), frozenset(acts).difference(mine)
+
+    def breaks(names: frozenset[ActName]) -> bool:
+        found = runs.breaks(names)
+        if tell is not None:
+            tell(runs.asked, len(mine) if runs.best is None else len(runs.best))
+        return found
+
+    none: frozenset[ActName] = frozenset()
+    before = [act.name for act in runs.up_to(verdict, whole.acts) if act.name not in runs.others]
+    candidates, ended, effects = mine, "", dict[ActName, tuple[float | None, float | None]]()
+    try:
+        if not breaks(none):
+            candidates = before
+            if not breaks(frozenset(before)):
+                candidates, runs.looks_ahead = mine, True
+                if not breaks(frozenset(mine)):
+                    raise EpicycleError(
+                        f"monitor {monitor} holds where all {len(mine):,} acts of this run happen and no others: what "
+                        "broke it left nothing in the event log"
+                    )
+            names = frozenset(minimal(candidates, breaks, runs.active))
+            effects = {name: runs.effect(names, name) for name in names}
+    except (_LimitError, KeyboardInterrupt) as end:
+        ended = LIMIT if isinstance(end, _LimitError) else INTERRUPT
+    best = frozenset(mine) if runs.best is None else runs.best
+    with_set, with_none = runs.results(best, keep_log=True), runs.results(none)
+    if ended:  # perhaps before the acts were left out that are not to blame
+        acting = best.intersection(act.name for act in runs.up_to(with_set.monitors[monitor], with_set.acts))
+        fewer = runs.results(acting, keep_log=True)
+        if fewer.monitors[monitor].holds is False:
+            best, with_set = acting, fewer
+    there = {act.name: act for act in with_set.acts if act.name in best}
+    # An act that is not noted in the run of the set is reported as it was.
+    there |= {name: acts[name] for name in runs.order if name in best and name not in there}
     steps = []
-    if names:
-        rest = runs.results(names[1:], keep_log=True)
+    if there and not ended:
+        ports = next(each.ports for each in model.monitors if each.name == monitor)
+        rest = runs.results(best - {next(iter(there))}, keep_log=True)
         steps = _steps(model.graph, ports, with_set, rest)
     return Explanation(
         model.name,
@@ -165,10 +251,43 @@ def explain(
         with_set.monitors[monitor],
         with_none.monitors[monitor],
         len(candidates),
-        effects,
+        [Effect(act, acts[name], *effects.get(name, ())) for name, act in there.items()],
         steps,
         runs.number,
+        limit,
+        ended,
+        tuple(sorted(chosen)),
+        runs.others,
+        tuple(also),
     )
+
+
+def _broken(model: str, verdicts: Mapping[str, Verdict]) -> list[str]:
+    """The monitors that are broken, in the order in which they are; raises ``EpicycleError`` if none is."""
+    times = {
+        name: math.inf if each.time is None else each.time for name, each in verdicts.items() if each.holds is False
+    }
+    if times:
+        return sorted(times, key=lambda name: times[name])
+    states = []
+    for name, verdict in verdicts.items():
+        reason = f" ({verdict.missing})" if verdict.missing else ""
+        states.append(
+            f"monitor {name} {'holds' if verdict.holds else 'cannot be judged'} in this run of {model}{reason}"
+        )
+    raise EpicycleError(f"{' and '.join(states)}: there is nothing to explain")
+
+
+def _chosen(model: Model, only: Collection[str]) -> frozenset[str]:
+    """The aspects whose acts are looked at, where not all are; raises ``EpicycleError``."""
+    known = [woven.name for woven in model.aspects]
+    for name in only:
+        if name not in known:
+            raise EpicycleError(
+                f"{model.name} has no aspect {name!r}{did_you_mean(name, known)}\n"
+                f"   help: its aspects: {', '.join(known) or 'none'}"
+            )
+    return frozenset(only)
 
 
 def _steps(graph: ModelGraph, ports: Collection[str], ours: Results, theirs: Results) -> list[Step]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,12 +13,12 @@ from epicycle.actors import EpicycleError
 from ..build import Model, load_model
 from ..catalogue import types_of_file
 from ..engine import Acts, Simulation
-from ..language import Level, study_of_text
+from ..language import Level, Setting, study_of_text
 from ..study import OK, Search, Trials, available_cores, open_trials
 from ..text import Problems
 from .faults import FaultSpace
 from .growing import Growing, place_of, text_of
-from .monitored import AD_HOC, monitor_named, property_of
+from .monitored import AD_HOC, monitors_named, property_of
 from .proposals import BATCH, SPREAD, Point, is_guided, proposals
 from .space import Interval, Space, read_space
 
@@ -29,10 +29,10 @@ MAX_POINTS = 150_000  # numbers in the text of a study, which is read with limit
 
 @dataclass(frozen=True)
 class Asked:
-    """What is to be searched: the words of the command, and as many runs at most."""
+    """What is to be searched: the words of the command, and as many runs at most; no ``monitor`` means all."""
 
     model: str
-    monitor: str
+    monitor: str | None = None
     vary: Sequence[str] = ()
     runs: int = 500
     seed: int = 0
@@ -41,11 +41,31 @@ class Asked:
     types: Sequence[Path] = ()
     command: Sequence[str] = ()
     acts: int = 0  # the largest number of acts of aspects in a run; 0: all that happen
+    aspects: Sequence[str] = ()
+    without: Sequence[str] = ()
+    until: float | None = None  # s
+
+    def load(self, settings: Sequence[Setting] = ()) -> Model:
+        """The model, with further settings."""
+        model = load_model(
+            self.model,
+            set=[*self.set, *settings],
+            disturb=self.disturb,
+            aspects=self.aspects,
+            without_aspects=self.without,
+            types=[each for file in self.types for each in types_of_file(file)],
+        )
+        if self.until is not None:
+            model.stop = self.until
+        return model
 
 
 @dataclass(frozen=True)
 class Run:
-    """A run of a search: its number from 1, what was set, its seed, and what came of it."""
+    """A run of a search: its number from 1, what was set, its seed, and what came of it.
+
+    Of several monitors, ``broken`` are those that do not hold, and ``robustness`` is the least.
+    """
 
     number: int
     level: Level
@@ -56,6 +76,7 @@ class Run:
     error: str | None
     digest: str | None
     key: str
+    broken: tuple[str, ...] = ()
 
 
 @dataclass
@@ -63,8 +84,7 @@ class Findings:
     """What a search has found: all its runs, in order, and the first that is broken."""
 
     model: str
-    monitor: str
-    source: str  # its property
+    monitors: dict[str, str]  # the property of each
     space: Space | FaultSpace
     guided: bool
     runs: list[Run] = field(default_factory=list)
@@ -132,11 +152,10 @@ class _Searching:
         self._asked = asked
         if not 0 < asked.runs <= MAX_RUNS:
             raise EpicycleError(f"runs {asked.runs:,}: expected a whole number from 1 to {MAX_RUNS:,}")
-        types = [each for file in asked.types for each in types_of_file(file)]
-        model = load_model(asked.model, set=asked.set, disturb=asked.disturb, types=types)
-        self._monitor = monitor_named(model, asked.monitor, flag="--monitor" if asked.command else "")
-        source = property_of(model, self._monitor)
-        metrics = self._monitor, f"{self._monitor}_robustness"
+        model = asked.load()
+        names = monitors_named(model, asked.monitor, flag="--monitor" if asked.command else "")
+        monitors = {name: property_of(model, name) for name in names}
+        metrics = [metric for name in names for metric in (name, f"{name}_robustness")]
         problems = Problems()
         space = read_space(asked.vary, model, metrics, asked.set, problems)
         problems.raise_if_any()
@@ -147,11 +166,16 @@ class _Searching:
                 f"{asked.runs:,} runs are too many for one folder, where {searched.content} may take {most:,} values "
                 f"each\n   help: search with --runs {most} and several seeds, in a folder each"
             )
-        keys = self._keys(model.name)
-        study = study_of_text(text_of(keys, []), FILE, asked.set, asked.types)
+        keys = self._keys(model.name, metrics)
+        study = replace(
+            study_of_text(text_of(keys, []), FILE, asked.set, asked.types),
+            aspects=tuple(asked.aspects),
+            without_aspects=tuple(asked.without),
+            stop=asked.until,
+        )
         self.growing = Growing(study, keys, searched, Search(runs=asked.runs, command=list(asked.command)))
         guided = is_guided() and any(isinstance(axis, Interval) for axis in space.axes)
-        self.findings = Findings(model.name, self._monitor, source, searched, guided)
+        self.findings = Findings(model.name, monitors, searched, guided)
         self._proposals = (
             searched.proposals(asked.seed)
             if isinstance(searched, FaultSpace)
@@ -196,21 +220,30 @@ class _Searching:
         numbers = [(order.index(place_of(level)), step * (start + at)) for at, level in enumerate(levels)]
         rows = made.made(self.growing.plan(list(distinct.values())), numbers, tell)
         for at, (level, row) in enumerate(zip(levels, rows, strict=True), start=1):
-            holds = row[found.monitor]
-            margin = row[f"{found.monitor}_robustness"]
-            known = None if holds is None else bool(holds)
-            ended = (row["status"], known, margin, row["error"], row["digest"], row["run"])
+            states = [row[name] for name in found.monitors]
+            margins = [row[f"{name}_robustness"] for name in found.monitors]
+            broken = tuple(
+                name for name, state in zip(found.monitors, states, strict=True) if state is not None and not state
+            )
+            holds = False if broken else None if None in states else True
+            margin = min((each for each in margins if each is not None), key=_least, default=None)
+            ended = (row["status"], holds, margin, row["error"], row["digest"], row["run"], broken)
             found.add(Run(start + at, level, row["seed"], *ended))
         self._latest = [each.robustness for each in found.runs[start:]]
 
-    def _keys(self, model: str) -> dict[str, Any]:
+    def _keys(self, model: str, metrics: list[str]) -> dict[str, Any]:
         """What the file of the study says beside the points."""
         asked = self._asked
         keys: dict[str, Any] = {"study": f"falsify_{model}", "model": asked.model}
         if asked.disturb:
             keys["disturb"] = {"given": list(asked.disturb)}
         keys["seed"] = asked.seed
-        if self._monitor == AD_HOC:
+        if AD_HOC in metrics and asked.monitor is not None:
             keys["monitors"] = {AD_HOC: asked.monitor}
-        keys["metrics"] = [self._monitor, f"{self._monitor}_robustness"]
+        keys["metrics"] = metrics
         return keys
+
+
+def _least(margin: float) -> float:
+    """The order of robustness: what is not a number is no break."""
+    return math.inf if math.isnan(margin) else margin

@@ -11,7 +11,7 @@ from .plan.columns import Column
 from .plan.plan import Plan, Search
 from .run.backlog import OK
 from .run.manifest import StoreError
-from .run.processes import WorkerError
+from .run.processes import DONE, Processes, WorkerError
 from .run.pulse import progress
 from .run.runner import Replay, ReplayError, again, repeat
 from .run.store import WriteError, is_running, replace_file
@@ -20,6 +20,7 @@ from .trials import Trials, open_trials
 
 __all__ = [
     "CONFIRMED",
+    "DONE",
     "NOT_REPRODUCED",
     "OK",
     "REPRODUCED",
@@ -30,6 +31,7 @@ __all__ = [
     "Finding",
     "Judgement",
     "Plan",
+    "Processes",
     "Recommendation",
     "Replay",
     "ReplayError",

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 import epicycle
+from epicycle.actors import EpicycleError
 from epicycle.runner.cli import main
 
 MODEL = """\
@@ -101,6 +102,41 @@ ticks   period=1 s  5           -4                    0.5       2
     assert found["differences"][0]["p"] is None
 
 
+def test_a_variant_may_have_several_parameters(capsys: pytest.CaptureFixture[str]) -> None:
+    words = ("compare", "m.yaml", "--vary", "period=1 s, share=0.25", "--replications", "1", "--json")
+    found = json.loads(printed(capsys, *words))
+    assert [(each["variant"], each["metric"]["value"]) for each in found["differences"]] == [
+        ("none", 9),
+        ("period=1 s, share=0.25", 5),
+    ]
+
+
+@pytest.mark.parametrize("text", ["period=1 s share=0.25", "period=0.5 share=0.25"])
+def test_parameters_without_a_comma_are_told(text: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["compare", "m.yaml", "--vary", text]) == 2
+    assert capsys.readouterr().err == (
+        f"command line:1:8: error: {text!r} sets more than one parameter without a comma between them\n"
+        f"    1 | --vary {text}\n      |        {'^' * len(text)}\n   help: write load=0.9,servers=2\n"
+    )
+
+
+def test_the_same_in_several_processes(capsys: pytest.CaptureFixture[str]) -> None:
+    words = ("compare", "mm1", "--vary", "load=0.5", "--vary", "load=0.6", "--replications", "3", "--until", "500")
+    for more in ((), ("--json",)):
+        one, two = (printed(capsys, *words, *more, "--jobs", jobs) for jobs in ("1", "2"))
+        assert one == two
+    changes: Any = {"a": {"set": {"load": 0.5}}, "b": {"set": {"load": 0.6}}}
+    here, there = (epicycle.compare("mm1", changes, replications=2, until=500, jobs=jobs) for jobs in (1, 2))
+    assert here.rows() == there.rows()
+    for name, runs in here.runs.items():
+        for seed, results in runs.items():
+            assert (results.digest, results.events) == (there.runs[name][seed].digest, there.runs[name][seed].events)
+    with pytest.raises(EpicycleError, match="variant a cannot be made in other processes"):
+        epicycle.compare("mm1", {"a": epicycle.load("mm1"), "b": {}}, jobs=2)
+    with pytest.raises(EpicycleError, match="jobs: 0 is not a whole number of at least 1"):
+        epicycle.compare("mm1", changes, jobs=0)
+
+
 def test_what_cannot_be_compared_is_told(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["compare", "m.yaml"]) == 2
     assert capsys.readouterr().err == "error: a comparison needs at least two variants\n"
@@ -114,8 +150,11 @@ def test_runs_that_fail_are_told(capsys: pytest.CaptureFixture[str]) -> None:
     Path("m.yaml").write_text(
         "".join(line for line in text.splitlines(True) if "loud" not in line and "mode:" not in line)
     )
-    assert main(["compare", "m.yaml", "--vary", "share=0", "--replications", "1"]) == 1
+    words = ["compare", "m.yaml", "--vary", "share=0", "--replications", "1", "--jobs"]
+    assert main([*words, "2"]) == 1
     printed = capsys.readouterr()
+    assert main([*words, "1"]) == 1
+    assert capsys.readouterr() == printed
     assert printed.out.startswith("m: none, share=0; seed 0; 1 run failed\n")
     assert printed.err == (
         "error: share=0, seed 0: inverse failed in fire() at (0 s, 1): '1 / x': 1 / x divides by zero, with x = 0.0\n"

@@ -15,6 +15,7 @@ from epicycle.runner.build import load_model
 from epicycle.runner.cli import main
 from epicycle.runner.engine import Acts, Simulation
 from epicycle.runner.graph import ActName
+from epicycle.runner.search import explaining
 
 # A relay sends what it gets once a second; it must not be silent for longer than two and a half.
 TEXT = """
@@ -113,6 +114,23 @@ def test_what_is_said_and_written(model: Path, tmp_path: Path) -> None:
     assert "robustness without it" in str(found)
 
 
+def test_the_monitor_that_is_broken_first_by_default(model: Path, tmp_path: Path) -> None:
+    found = epicycle.explain(model, seed=broken_seed(model))
+    verdicts = epicycle.run(model, seed=broken_seed(model)).monitors
+    times = {name: each.time for name, each in verdicts.items() if each.holds is False and each.time is not None}
+    first, *others = sorted(times, key=lambda name: times[name])
+    assert found.explanation.monitor == first
+    assert found.explanation.also == tuple(others)
+    assert others
+    assert found.sentence.endswith(f" Also broken in the whole run: {', '.join(others)}.")
+    with pytest.raises(EpicycleError) as raised:
+        epicycle.explain(model, set={"loss": 0})
+    assert str(raised.value) == (
+        "monitor heard holds in this run of relay and monitor alive holds in this run of relay: there is nothing to "
+        "explain"
+    )
+
+
 def test_a_model_that_breaks_by_itself(model: Path) -> None:
     found = epicycle.explain(model, "always double.output < 10", seed=1)
     assert found.explanation.effects == []
@@ -170,6 +188,171 @@ def test_the_command(model: Path, tmp_path: Path, capsys: pytest.CaptureFixture[
     assert json.loads(capsys.readouterr().out)["effects"] == facts["effects"]
     assert main(["explain", str(model), "--monitor", "alive2"]) == 2
     assert "did you mean 'alive'?" in capsys.readouterr().err
+
+
+# -- one run, and not two ---------------------------------------------------------------------------------------------
+
+
+@pytest.fixture
+def twice(tmp_path: Path) -> Path:
+    """What is lost before the relay shifts the numbers of what is lost behind it."""
+    file = tmp_path / "twice.yaml"
+    behind = '  behind: {type: PacketLoss, probability: "${loss}", at: double.input}\n  noise:'
+    file.write_text(TEXT.replace("  noise:", behind), encoding="utf-8")
+    return file
+
+
+def test_all_times_are_those_of_the_run_of_the_set(twice: Path) -> None:
+    made, moved, elsewhere = load_model(twice), 0, 0
+    for seed in range(12):
+        found = epicycle.explain(twice, "alive", seed=seed).explanation
+        results = Simulation(made, seed=seed, acts=Acts(frozenset(found.names))).run()
+        assert [effect.act for effect in found.effects] == results.acts
+        assert found.verdict_of_set == results.monitors["alive"]
+        whole = {act.name: act for act in Simulation(made, seed=seed, acts=Acts()).run().acts}
+        assert [effect.whole for effect in found.effects] == [whole[name] for name in found.names]
+        moved += any(effect.has_moved for effect in found.effects)
+        elsewhere += found.verdict.time != found.verdict_of_set.time
+    assert moved
+    assert elsewhere
+
+
+def test_an_act_that_is_another_in_the_whole_run_is_told(twice: Path) -> None:
+    found = epicycle.explain(twice, "alive", seed=3)
+    assert found.sentence == (
+        "2 acts of 17 suffice: behind dropped a token of relay.output at double.input at 9 s; loss dropped a token of "
+        "clock.output at relay.input at 10 s. With these alone, alive (always after 1 s eventually within 2.5 s sends "
+        "double.output) is broken at 8 s (in the whole run at 7 s). Without any single one of them, it holds. One act "
+        "is not the same in the whole run, which takes another course: behind at double.input, token 10: at 12 s, "
+        "another token."
+    )
+    assert "in the whole run" in str(found).split("\n\n")[1].splitlines()[0]
+
+
+# -- a search that ends too soon --------------------------------------------------------------------------------------
+
+# Only many delays together make the last token late; there are some 400 acts.
+LATE = """
+model: late
+actors:
+  clock: {type: Clock, period: 100 ms}
+  relay: {type: Scale, factor: 1}
+  sums: {type: Accumulator}
+  sink: {type: Recorder}
+connections:
+  - clock.output -> relay.input
+  - relay.output -> sums.input
+  - sums.output -> sink.input
+aspects:
+  loss: {type: PacketLoss, probability: 0.5, at: relay.input}
+  slow: {type: Latency, delay: 10 ms, jitter: 50 ms, at: sums.input}
+run: {stop: 20 s}
+monitors:
+  enough: eventually within 20 s sums.output >= 12000
+"""
+
+
+@pytest.fixture
+def late(tmp_path: Path) -> Path:
+    file = tmp_path / "late.yaml"
+    file.write_text(LATE, encoding="utf-8")
+    return file
+
+
+def breaks(file: Path, found: epicycle.Explained) -> bool:
+    """Whether what was told breaks the property, by the disturbance that is written."""
+    folder = file.parent / "check"
+    written = found.save(folder, page=False)
+    again = epicycle.run(file, seed=found.explanation.seed, disturb=written[0])
+    assert again.monitors[found.explanation.monitor] == found.explanation.verdict_of_set
+    return again.monitors[found.explanation.monitor].holds is False
+
+
+def test_a_limit_of_runs(late: Path, tmp_path: Path) -> None:
+    told: list[tuple[int, int]] = []
+
+    def tell(runs: int, acts: int) -> None:
+        told.append((runs, acts))
+
+    found = epicycle.explain(late, "enough", seed=1, runs=40, out=tmp_path / "out", progress=tell)
+    assert [runs for runs, _ in told] == sorted(runs for runs, _ in told)
+    assert told[-1][0] == 40
+    assert [acts for _, acts in told] == sorted((acts for _, acts in told), reverse=True)
+    assert "The search ended at its limit of 40 runs: the set may not be minimal." in found.sentence
+    assert breaks(late, found)
+    # The same again, and further with more runs, from what is noted.
+    again = epicycle.explain(late, "enough", seed=1, runs=40, out=tmp_path / "out")
+    assert again.explanation.names == found.explanation.names
+    assert again.explanation.runs < 10
+    more = epicycle.explain(late, "enough", seed=1, runs=60, out=tmp_path / "out")
+    assert len(more.explanation.names) <= len(found.explanation.names)
+    assert more.explanation.runs < 30
+    with pytest.raises(EpicycleError, match="runs: 0 is not a whole number of at least 1"):
+        epicycle.explain(late, "enough", runs=0)
+
+
+def test_an_interrupt_tells_the_smallest_set_so_far(late: Path) -> None:
+    def tell(runs: int, acts: int) -> None:
+        if runs == 12:
+            raise KeyboardInterrupt
+
+    found = epicycle.explain(late, "enough", seed=1, progress=tell)
+    assert "The search was interrupted: the set may not be minimal." in found.sentence
+    assert breaks(late, found)
+
+
+def test_an_interrupted_command(
+    late: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(explaining, "minimal", interrupted)
+    words = ["explain", str(late), "--seed", "1", "--monitor", "enough", "--out", str(tmp_path / "out")]
+    assert main(words) == 130
+    printed = capsys.readouterr()
+    assert "The search was interrupted: the set may not be minimal." in printed.out
+    assert [line for line in printed.out.splitlines() if line.startswith("wrote")] == [
+        f"wrote {tmp_path / 'out' / 'explanation.yaml'}",
+        f"wrote {tmp_path / 'out' / 'explanation.json'}",
+    ]
+    assert printed.err == ""
+
+
+def interrupted(*_: object) -> list[ActName]:
+    raise KeyboardInterrupt
+
+
+def test_what_is_noted_is_short(late: Path, tmp_path: Path) -> None:
+    """A line for each run, and no names."""
+    epicycle.explain(late, "enough", seed=1, runs=60, out=tmp_path)
+    lines = next(tmp_path.glob("tried-*.jsonl")).read_text(encoding="utf-8").splitlines()
+    assert len(lines) >= 50
+    assert sum(map(len, lines)) < 60 * 150
+
+
+def test_the_acts_of_one_aspect(late: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "out"
+    words = ["explain", str(late), "--seed", "1", "--monitor", "enough", "--only", "slow", "--out", str(out)]
+    assert main([*words, "--no-page"]) == 0
+    assert capsys.readouterr().out.splitlines()[0] == (
+        "enough (eventually within 20 s sums.output >= 12000) is broken at 20 s without any act of slow: other aspects "
+        "or the model itself break it."
+    )
+    assert main([*words[:-3], "loss", "--out", str(out), "--runs", "30", "--no-page"]) == 0
+    said = capsys.readouterr().out.splitlines()[0]
+    facts = json.loads((out / "explanation.json").read_text(encoding="utf-8"))
+    assert facts["only"] == ["loss"]
+    assert {each["act"]["name"][0] for each in facts["effects"]} == {"loss"}
+    assert {each[0] for each in facts["others"]} == {"slow"}
+    assert said.endswith(f"The acts of other aspects ({len(facts['others'])}) happened as well.")
+    again = epicycle.run(late, seed=1, disturb=out / "explanation.yaml")
+    assert again.monitors["enough"].holds is False
+    assert again.aspects["loss"]["dropped"] == len(facts["effects"])
+    assert main([*words[:-3], "los"]) == 2
+    assert capsys.readouterr().err == (
+        "error: late has no aspect 'los', did you mean 'loss'?\n   help: its aspects: loss, slow\n"
+    )
+
+
+# -- the paper --------------------------------------------------------------------------------------------------------
 
 
 def test_a_chosen_set_in_the_paper() -> None:

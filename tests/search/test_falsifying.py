@@ -167,6 +167,64 @@ def test_runs_that_fail_or_cannot_be_judged_are_told(capsys: pytest.CaptureFixtu
     assert late.sentence.endswith("Tried: 2 runs, seeds 0 to 1. In 2 runs the property could not be judged.")
 
 
+# -- all monitors, and changes of the model ----------------------------------------------------------------------------
+
+BOTH = "  low: always far.output < 4.3\n"
+
+
+def test_all_monitors_of_the_model_by_default(capsys: pytest.CaptureFixture[str]) -> None:
+    Path("both.yaml").write_text(TEXT + BOTH, encoding="utf-8")
+    words = ["falsify", "both.yaml", "--vary", "y=0 m..1 m", "--out", "out", "--jobs", "1"]
+    assert main([*words, "--json"]) == 3
+    facts = json.loads(capsys.readouterr().out)
+    assert facts["monitors"] == {"away": "always far.output > 0.0001", "low": "always far.output < 4.3"}
+    assert (facts["monitor"], facts["property"], facts["broken"]) == ("low", "always far.output < 4.3", ["low"])
+    names = epicycle.open_study("out").table().column_names
+    assert names[-7:-3] == ["away", "away_robustness", "low", "low_robustness"]
+    assert main(words) == 3
+    assert capsys.readouterr().out.startswith(
+        "Run 1, with y=0.47529 m and seed 0, breaks low (always far.output < 4.3): "
+    )
+    calm = epicycle.falsify("both.yaml", set={"n": 1}, runs=2, out="calm", jobs=1)
+    assert calm.sentence.startswith(
+        "No run broke away (always far.output > 0.0001) or low (always far.output < 4.3), which does not prove that "
+        "they always hold. "
+    )
+    assert calm.facts()["monitor"] is None
+
+
+def test_a_model_without_monitors(capsys: pytest.CaptureFixture[str]) -> None:
+    for name, more in (("falsify", ["--jobs", "1"]), ("explain", [])):
+        assert main([name, "mm1", "--out", "out", *more]) == 2
+        assert capsys.readouterr().err == (
+            "error: mm1 has no monitor\n   help: say what is to hold, such as --monitor 'always server.size < 40'\n"
+        )
+
+
+def test_aspects_and_a_stop_time_as_run_has_them(capsys: pytest.CaptureFixture[str]) -> None:
+    aspects = "aspects:\n  rounds: {type: Noise, deviation: 0.5, at: noise.output}\n"
+    Path("far.yaml").write_text(TEXT + aspects, encoding="utf-8")
+    loss = "lost=PacketLoss,probability=0.5,at=sink.input"
+    changes = ["--aspect", loss, "--without", "rounds", "--until", "8 s"]
+    few = ["--monitor", "eventually within 5 s sends far.output", "--runs", "2", "--out", "out"]
+    assert main(["falsify", "far.yaml", *few, *changes, "--jobs", "1"]) == 0
+    capsys.readouterr()
+    table = epicycle.open_study("out").table().to_pylist()
+    for row in table:
+        again = epicycle.run("far.yaml", seed=row["seed"], aspects=[loss], without_aspects=["rounds"], until="8 s")
+        assert again.digest == row["digest"]
+        assert main(["replay", "out", row["run"]]) == 0
+        assert capsys.readouterr().out.endswith(": the same\n")
+    # The commands that it tells make the same run, too.
+    found = epicycle.falsify(
+        "far.yaml", "always far.output < 4.3", aspects=[loss], without_aspects=["rounds"], until=8, out="broken", jobs=1
+    )
+    assert found.broken is not None
+    assert found.command[3:] == ["--aspect", loss, "--without", "rounds", "--seed", "0", "--until", "8"]
+    # Other changes are another search.
+    assert main(["falsify", "far.yaml", *few, *changes[:-2], "--jobs", "1"]) in (0, 2)
+
+
 # -- what it leaves ---------------------------------------------------------------------------------------------------
 
 

@@ -33,3 +33,15 @@ def test_three_of_a_thousand_are_found_in_few_tries() -> None:
 
     assert minimal(range(1_000), breaks) == [17, 400, 999]
     assert tried < 250
+
+
+@pytest.mark.parametrize("seed", range(50))
+def test_what_is_said_to_be_idle_is_not_believed(seed: int) -> None:
+    draw = random.Random(seed)
+    needed = frozenset(draw.sample(range(60), draw.randrange(1, 8)))
+    some = draw.choice([0.3, 0.9])
+
+    def active(part: frozenset[int]) -> frozenset[int]:
+        return frozenset(each for each in sorted(part) if draw.random() < some)
+
+    assert minimal(range(60), lambda part: needed <= part, active) == sorted(needed)

@@ -143,6 +143,9 @@ class Plan:
             manifest["seed"],
             None if (lender := manifest.get("lender")) is None else (lender[0], lender[1]),
         )
+        if changed := manifest.get("changed"):
+            aspects, without = tuple(changed["aspects"]), tuple(changed["without"])
+            study = replace(study, aspects=aspects, without_aspects=without, stop=changed["stop"])
         try:
             said = {(metric.name, metric.source): metric for metric in study.metrics or ()}
             metrics = [said.get(each) or StudyMetric(*each) for each in manifest["metrics"].items()]
@@ -201,6 +204,7 @@ class Plan:
             "level_sources": [{str(index): found for index, found in each.items()} for each in self.extra],
             **({} if self.search is None else {"search": self.search}),
             **({"code": code, "seal": seal(code)} if code else {}),
+            **({"changed": changed} if (changed := _changed(study)) else {}),
         }
 
     # -- what it holds --------------------------------------------------------------------------------------------
@@ -249,6 +253,7 @@ class Plan:
                 for metric in self.metrics
             ],
             **({"monitors": [[name, text.text] for name, text in watched.items()]} if watched else {}),
+            **({"changed": changed} if (changed := _changed(self.study)) else {}),
         }
         return Condition(index, level, _hash(identity))
 
@@ -326,9 +331,25 @@ def _together(study: Study, place: Iterable[int]) -> Level:
     )
 
 
+def _changed(study: Study) -> dict[str, Any]:
+    """What else is changed in all runs, if anything is."""
+    if not (study.aspects or study.without_aspects or study.stop is not None):
+        return {}
+    return {"aspects": list(study.aspects), "without": list(study.without_aspects), "stop": study.stop}
+
+
 def _load(study: Study, level: Level) -> Model:
     types = [each for file in study.types for each in types_of_file(file)]
-    model = load_model(study.model, set=level.settings, disturb=level.disturb, types=types)
+    model = load_model(
+        study.model,
+        set=level.settings,
+        disturb=level.disturb,
+        aspects=study.aspects,
+        without_aspects=study.without_aspects,
+        types=types,
+    )
+    if study.stop is not None:
+        model.stop = study.stop
     problems = Problems()
     for name, text in study.monitors.items():
         try:

@@ -53,6 +53,7 @@ _SHAPE: dict[str, Any] = {
 # Entries that not every folder has.
 _MORE: dict[str, Any] = {
     "search": {"runs": range(1, MAX_REPLICATIONS + 1), "command": [str]},
+    "changed": {"aspects": [str], "without": [str], "stop": (None, int, float)},
     "code": {str: str},
     "seal": (None, str),
 }
