@@ -246,7 +246,7 @@ def test_types_that_no_parameter_can_have(kind: Any) -> None:
     with pytest.raises(TypeError) as raised:
         Parameter(kind, None)
     assert str(raised.value) == (
-        f"a parameter cannot have the type {name}: take float, int, bool, str, Path, object or a Configurable class; for "
-        "a list of numbers Parameter(float, shape=(None,)), for an array array_parameter((None,)), for texts "
+        f"a parameter cannot have the type {name}: take float, int, bool, str, Path, object or a Configurable class; "
+        "for a list of numbers Parameter(float, shape=(None,)), for an array array_parameter((None,)), for texts "
         "texts_parameter(), for any list or mapping Parameter(object)"
     )
