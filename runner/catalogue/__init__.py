@@ -12,6 +12,7 @@ from .measure import (
     TakeName,
     conversion_problem,
     take_problem,
+    unit_before,
 )
 from .packaged import (
     find,
@@ -95,6 +96,7 @@ __all__ = [
     "token_types",
     "topic_order",
     "types_of_file",
+    "unit_before",
     "unreadable",
     "with_offered",
 ]

@@ -145,7 +145,7 @@ class Measure(Configurable):
     @property
     def own_unit(self) -> str:
         """Its unit before conversion."""
-        return self.kind.unit or self.unit
+        return self.kind.unit or unit_before(self.unit, self.to)
 
     def misfits(self) -> Iterator[tuple[str, str, str]]:
         """Options that do not fit: the option, what is wrong, and what to do."""
@@ -181,6 +181,11 @@ def take_problem(metric: str, take: str) -> tuple[str, str] | None:
     if take in TAKES:
         return None
     return f"metric {metric!r} cannot take {take!r}{did_you_mean(take, TAKES)}", f"valid: {', '.join(TAKES)}"
+
+
+def unit_before(unit: str, to: str) -> str:
+    """The unit of a number before it is converted: one without a unit is a pure number if it is to become one."""
+    return unit or ("1" if to in ("1", "%") else "")
 
 
 def conversion_problem(unit: str, to: str) -> tuple[str, str] | None:

@@ -171,3 +171,14 @@ def test_studies_and_listings_have_them(tmp_path: Path, capsys: pytest.CaptureFi
     from epicycle.runner.study import StudyResults
 
     assert list(StudyResults(tmp_path / "out").to_pandas()["ratio"]) == [6 / 17] * 2
+
+
+def test_a_ratio_is_given_in_percent() -> None:
+    made = model(
+        "first: {of: 'drone[0].output', take: last, to: '%'}\n"
+        "  second: {of: 'drone[1].output', take: last}\n"
+        "  ratio: {from: first / second, to: '%'}"
+    )
+    results = Simulation(made).run()
+    assert results.metrics == {"first": 1000.0, "second": 20, "ratio": 5000.0}
+    assert results.units == {"first": "%", "second": "", "ratio": "%"}

@@ -14,6 +14,7 @@ import numpy as np
 
 from epicycle.actors import shortened, to_nanoseconds
 
+from ...build import Model
 from ...catalogue import Figure
 from ...graph import ModelGraph
 from ...html import Html, tag
@@ -94,7 +95,7 @@ def _run(recording: Recording, name: str, pack: Pack) -> dict[str, Any]:
         "end": to_nanoseconds(results.end),
         "stopped": results.stopped,
         "digest": results.digest,
-        "settings": [f"{key} = {short(value)}" for key, value in results.parameters.items()][:40],
+        "settings": [_setting(model, *each) for each in results.parameters.items()][:40],
         "metrics": _metrics(recording),
         "monitors": [_monitor(recording, name, each) for name, each in results.monitors.items()],
         "firings": recording.firings,
@@ -122,6 +123,12 @@ def _run(recording: Recording, name: str, pack: Pack) -> dict[str, Any]:
         ],
         "marks": [each for figure in figures for each in _marks(recording, results, figure, pack)],
     }
+
+
+def _setting(model: Model, name: str, value: object) -> str:
+    """A parameter of the model with its value, in the unit in which it is declared."""
+    unit = model.declared[name].unit if name in model.declared else ""
+    return f"{name} = {short(value)}" + ("" if unit in ("", "1") else f" {unit}")
 
 
 def _metrics(recording: Recording) -> list[list[str]]:

@@ -10,7 +10,7 @@ from epicycle.actors import EpicycleError, Quantity, declared_parameters, did_yo
 from epicycle.actors.expression import operand
 
 from ...build import Model
-from ...catalogue import conversion_problem
+from ...catalogue import conversion_problem, unit_before
 from ...engine import Results
 from ...language import ASPECTS, NUMBERS, SIGNALS, Dimension, StudyMetric, asks_for_none, split_number
 from ...text import Problems, inside, select
@@ -63,7 +63,7 @@ def check_metric(metric: StudyMetric, models: Sequence[Model], problems: Problem
             metric.places.get("unit"),
             "leave 'unit' out; 'to: ...' converts",
         )
-    elif found := conversion_problem(own or metric.unit, metric.to):
+    elif found := conversion_problem(unit_before(own or metric.unit, metric.to), metric.to):
         problems.add(f"metric {metric.name}: {found[0]}", metric.places.get("to"), *([found[1]] if found[1] else []))
 
 
@@ -93,7 +93,7 @@ def value_of(metric: StudyMetric, results: Results) -> float | None:
         return None
     if not isinstance(value, (bool, int, float)):
         raise EpicycleError(f"metric {metric.name} is not a number: {value!r}")
-    unit = results.units.get(metric.source.strip()) or metric.unit
+    unit = unit_before(results.units.get(metric.source.strip()) or metric.unit, metric.to)
     return Quantity(float(value), unit).to(metric.to) if metric.to else float(value)
 
 
