@@ -16,6 +16,7 @@ import runpy
 import shutil
 import sys
 from pathlib import Path
+from typing import Any
 
 from setuptools import Extension, setup
 from setuptools.command.build_ext import build_ext
@@ -34,6 +35,21 @@ OPTIMISED: dict[str, list[str]] = {name: [] for name in core["LIBRARIES"]}
 if sys.platform != "win32":
     FLAGS += ["-g0", "-ffp-contract=off", "-fno-fast-math", "-Wno-unused-function"]
     OPTIMISED = {name: ["-O2" if name == "kernel" else "-O1"] for name in OPTIMISED}  # -O2 takes twice the time
+
+
+def _signature(name: str, initializer: Any) -> str:
+    """What shows a class in C with the parameters of its initializer, as in ``help``."""
+    arguments = initializer.args
+    plain = ast.arguments(
+        *([ast.arg(each.arg) for each in part] for part in (arguments.posonlyargs, arguments.args[1:])),
+        vararg=arguments.vararg and ast.arg(arguments.vararg.arg),
+        kwonlyargs=[ast.arg(each.arg) for each in arguments.kwonlyargs],
+        kw_defaults=arguments.kw_defaults,
+        kwarg=arguments.kwarg and ast.arg(arguments.kwarg.arg),
+        defaults=arguments.defaults,
+    )
+    owner = "__import__('epicycle.actors.compiled', fromlist=['_']).OwnSignature"
+    return f"__signature__ = {owner}(__name__, {name!r}, {f'lambda {ast.unparse(plain)}: None'!r})"
 
 
 def for_cython(source: Path) -> str:
@@ -67,8 +83,11 @@ def for_cython(source: Path) -> str:
             bases = [each for each in bases if each != "Generic"]
             head = f"class {node.name}({', '.join(bases)}):" if bases else f"class {node.name}:"
             put(node.lineno, node.lineno, head)
-            if generic:
-                lines[node.body[0].end_lineno - 1] += f"; __class_getitem__ = {OF_TYPES}"
+            added = [f"__class_getitem__ = {OF_TYPES}"] if generic else []
+            added += [_signature(node.name, each) for each in node.body if getattr(each, "name", "") == "__init__"]
+            if added and ast.get_docstring(node) is not None and node.body[0].end_lineno is not None:
+                # In the blank line after the docstring, which would be lost with anything behind it.
+                lines[node.body[0].end_lineno] = " " * node.body[0].col_offset + "; ".join(added)
     return "\n".join(lines) + "\n"
 
 
@@ -117,7 +136,14 @@ class BuildCore(build_ext):
 
             if [int(each) for each in cython.split(".")[:2]] >= [3, 3]:
                 raise RuntimeError(f"Cython {cython} adds 0 and -0.0 wrongly: install a version below 3.3")
-            options = {"language_level": 3, "annotation_typing": False, "auto_pickle": False, "binding": False}
+            options = {
+                "language_level": 3,
+                "annotation_typing": False,
+                "auto_pickle": False,
+                "binding": False,
+                "embedsignature": True,
+                "embedsignature.format": "clinic",
+            }
             modules = [module for library in WANTED for module in core["LIBRARIES"][library]]
             pairs = zip(modules, copied(modules), strict=True)
             made = [Extension(name, [str(path)]) for name, path in pairs]

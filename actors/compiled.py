@@ -98,6 +98,21 @@ class _Finder:
         return spec
 
 
+class OwnSignature:
+    """The ``__signature__`` of a class in C, for ``help``: a function's, as text.  Subclasses have their own."""
+
+    def __init__(self, module: str, name: str, text: str) -> None:
+        self._owner = (module, name)
+        self._text = text
+
+    def __get__(self, instance: object, owner: type) -> Any:
+        if (owner.__module__, owner.__name__) != self._owner:
+            raise AttributeError("__signature__")
+        from inspect import signature
+
+        return signature(eval(self._text, vars(sys.modules[owner.__module__])))
+
+
 def choose(wanted: str = "") -> tuple[str, str]:
     """Which core the process runs, and the reason if it is Python.
 

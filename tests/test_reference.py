@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import os
+import re
 import subprocess
 import sys
+from importlib import import_module
+from inspect import getdoc
 from pathlib import Path
 
 import pytest
@@ -12,7 +15,13 @@ import pytest
 from tests.constructors import stubs
 
 ROOT = Path(__file__).parents[1]
-FILES = ("models/schema.json", "docs/reference.md", "actors/constructors.pyi", "aspects/constructors.pyi")
+FILES = (
+    "models/schema.json",
+    "docs/reference.md",
+    "actors/constructors.pyi",
+    "aspects/constructors.pyi",
+    "docs/api.md",
+)
 
 
 def texts() -> dict[str, str]:
@@ -24,7 +33,20 @@ def texts() -> dict[str, str]:
 
     own, figures, of_studies = built_in(), own_figures(), own_study_figures()
     schema = schema_text(json_schema(own, figures, of_studies))
-    return dict(zip(FILES, (schema, markdown(own, figures, of_studies), *stubs().values()), strict=True))
+    return dict(zip(FILES, (schema, markdown(own, figures, of_studies), *stubs().values(), api()), strict=True))
+
+
+def api() -> str:
+    """The page of the Python API: its names are written by hand, what they are is said by their docstrings."""
+    from epicycle.runner.catalogue import first_sentence
+
+    def line(found: re.Match[str]) -> str:
+        module, _, name = found[1].rpartition(".")
+        said = first_sentence(getdoc(getattr(import_module(module), name)) or "").replace("``", "`")
+        return f"- `{found[1]}`: {said}."
+
+    page = (ROOT / "docs" / "api.md").read_text(encoding="utf-8")
+    return re.sub(r"^- `(epicycle[.\w]+)`.*$", line, page, flags=re.M)
 
 
 @pytest.fixture(scope="module")

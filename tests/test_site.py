@@ -82,7 +82,7 @@ def test_links_to_places_in_documents_hold() -> None:
 
 def test_the_page_of_the_python_api_has_all_that_is_offered() -> None:
     page = (ROOT / "docs" / "api.md").read_text(encoding="utf-8")
-    shown = re.findall(r"^::: epicycle\.(?:runner\.|actors\.)?(?:calls\.)?(\w+)$", page, re.M)
+    shown = re.findall(r"^- `epicycle\.(?:runner\.|actors\.)?(?:calls\.)?(\w+)`", page, re.M)
     assert {*epicycle.__all__, *epicycle.runner.__all__} <= set(shown)
     assert len(shown) == len(set(shown))
 

@@ -68,8 +68,10 @@ def as_page(document: str) -> str:
     return linked(re.sub(r"\]\(docs/", "](", document))
 
 
-def on_page_markdown(markdown: str, **_: Any) -> str:
-    """Adapt the links of a page."""
+def on_page_markdown(markdown: str, *, page: Any, **_: Any) -> str:
+    """Adapt the links of a page, and let mkdocstrings fill in that of the Python API."""
+    if page.file.src_uri == "api.md":
+        markdown = re.sub(r"^- `(epicycle[.\w]+)`.*$", r"::: \1\n", markdown, flags=re.M)
     return linked(markdown)
 
 

@@ -201,11 +201,11 @@ def _print_reference(
 
     ``others`` are the types of the other kind, ``also`` further names that could have been meant.
     """
-    from dataclasses import asdict
+    from dataclasses import asdict, replace
 
     from epicycle.actors import EpicycleError
 
-    from ..catalogue import load_all
+    from ..catalogue import describe, load_all, parts_of
     from ..show import described, detail, overview, parts_described
     from ..text import did_you_mean
 
@@ -219,7 +219,14 @@ def _print_reference(
         else:
             console().print(overview(references))
         return DONE
-    if name not in types:
+    loaded, _ = ({}, []) if name in types or name in others else load_all(types)
+    of_bases = parts_of(loaded.values())
+    kinds = {base.__name__: known for base, known in of_bases.items() if name in known}
+    variants = [each for known in of_bases.values() for each in known]
+    if kinds:
+        ((base, known),) = kinds.items()
+        reference, parts = replace(describe(name, known[name]), kind=base.lower()), parts_described([known[name]])
+    elif name not in types:
         if name in others:
             other = "aspect" if kind == "actor" else "actor"
             raise EpicycleError(
@@ -227,12 +234,13 @@ def _print_reference(
             )
         what = f"{kind} type or packaged model" if also else f"{kind} type"
         raise EpicycleError(
-            f"there is no {what} {name!r}{did_you_mean(name, [*types, *also])}\n"
+            f"there is no {what} {name!r}{did_you_mean(name, [*types, *also, *variants])}\n"
             f"   help: 'epicycle {kind}s' lists them\n"
             f"   help: for your own types, add '--types FILE.py'"
         )
-    (reference,) = described({name: types[name]})
-    parts = parts_described([types[name]])
+    else:
+        (reference,) = described({name: types[name]})
+        parts = parts_described([types[name]])
     if as_json:
         tell_json({**asdict(reference), "parts": {k: [asdict(each) for each in v] for k, v in parts.items()}}, indent=2)
     else:

@@ -22,7 +22,8 @@ if TYPE_CHECKING:
 def show(options: argparse.Namespace) -> int:
     """Show the parameters of a model with their types, units, values and docs, the files that it reads, its metrics
     and monitors, recorded ports, figures and aspects, and the packaged disturbances that fit it."""
-    from ..text import noting
+    from ..shown import in_time
+    from ..text import folded, noting
 
     with noting() as noted:
         model = load(options)
@@ -31,7 +32,9 @@ def show(options: argparse.Namespace) -> int:
         "metrics": list(_metrics(model)),
         "monitors": list(_monitors(model)),
         "figures": [{"figure": name, "type": kind} for name, (kind, *_) in model.figures.items()],
-        "aspects": [{"aspect": each.name, "type": each.kind, "at": ", ".join(each.places)} for each in model.aspects],
+        "aspects": [
+            {"aspect": each.name, "type": each.kind, "at": ", ".join(folded(each.places))} for each in model.aspects
+        ],
         "disturbances": [{"disturbance": name, "what it is": doc} for name, doc in _disturbances(options)],
     }
     about: dict[str, Any] = {"model": model.name, "doc": model.doc, "extent": model.extent, "stop": model.stop}
@@ -40,14 +43,14 @@ def show(options: argparse.Namespace) -> int:
         tell_json({**about, **found}, indent=2)
         return DONE
     tell(f"{model.name}: {model.doc}" if model.doc else model.name)
-    tell(f"{model.extent}" + ("" if model.stop is None else f", stops at {model.stop:g} s"))
+    tell(f"{model.extent}" + ("" if model.stop is None else f", stops at {in_time(model.stop)}"))
     for rows in filter(None, found.values()):
         tell("")
         head = list(rows[0])
         console().print(columns(head, ([str(row[key]) for key in head] for row in rows), whole=(head[0], "unit")))
     for what in ("records", "reads"):
         if about[what]:
-            tell(f"\n{what}: {', '.join(about[what])}")
+            tell(f"\n{what}: {', '.join(folded(about[what]))}")
     return DONE
 
 

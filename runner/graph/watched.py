@@ -9,7 +9,7 @@ from epicycle.aspects import Reading
 
 from ..catalogue import Measure
 from ..temporal import TINY, Property, Requirement
-from ..text import Position
+from ..text import Position, folded
 from .model_graph import is_within
 
 
@@ -38,7 +38,7 @@ class Metric:
         if self.formula is not None:
             return self.formula.source
         across = f"{self.measure.across} of the " if self.measure.across else ""
-        return f"{across}{self.measure.take} of {', '.join(self.ports)}"
+        return f"{across}{self.measure.take} of {', '.join(folded(self.ports))}"
 
     @property
     def unit(self) -> str:

@@ -71,11 +71,19 @@ def overview(references: Sequence[TypeReference]) -> Group:
     return Group(*blocks[1:])
 
 
+_FEW = 4  # parts of a kind that are described with a type that takes them
+
+
 def detail(reference: TypeReference, parts: Mapping[str, Sequence[TypeReference]]) -> Group:
     """Everything declared by one type, and by the parts that its parameters take."""
     head = Text.assemble((reference.name, "bold"), f"  {reference.kind}, {reference.group}")
     blocks: list[RenderableType] = [head, *_about(reference)]
     for base, known in parts.items():
+        if len(known) > _FEW:
+            names = ", ".join(each.name for each in known)
+            told = f": one of {names}; 'epicycle actors NAME' describes one"
+            blocks += [Text(""), Text.assemble((base, "bold"), told)]
+            continue
         for each in known:
             blocks += [Text(""), Text.assemble((each.name, "bold"), f"  {base.lower()}")]
             blocks.append(Padding(Group(*_about(each)), (0, 0, 0, 2)))

@@ -47,6 +47,14 @@ def in_general(path: str) -> str:
     return _INDEX.sub("[*]", path)
 
 
+def folded(paths: Iterable[str]) -> list[str]:
+    """Paths for people: those of replicas as one, such as ``robot[*].delivered (20)``, with their number."""
+    groups: dict[str, list[str]] = {}
+    for path in paths:
+        groups.setdefault(in_general(path), []).append(path)
+    return [each[0] if len(each) == 1 else f"{general} ({len(each)})" for general, each in groups.items()]
+
+
 def names_asked(pattern: str) -> list[str]:
     """The segments of a pattern that a path must have: ``s[3]``, ``s[*]`` or ``s``."""
     return [segment for segment in pattern.split(".") if not segment.startswith("*")]

@@ -203,3 +203,27 @@ def test_help_needs_nothing_heavy() -> None:
     script = f"import sys, epicycle.runner.cli as c; c.parser(); print({heavy} & {{*sys.modules}})"
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert done.stdout == "set()\n"
+
+
+def test_many_parts_are_named_only(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["actors", "Pool"]) == 0
+    told = capsys.readouterr().out
+    assert len(told.splitlines()) < 80
+    assert " ".join(told.split()).endswith(
+        "Distribution: one of Bernoulli, Binomial, Cauchy, ChiSquare, Choice, Constant, Exponential, Gamma, LogNormal, "
+        "NegativeBinomial, Normal, Poisson, RandomInteger, StudentT, Triangular, Uniform, VonMises; 'epicycle actors "
+        "NAME' describes one"
+    )
+    assert main(["actors", "Exponential"]) == 0
+    assert capsys.readouterr().out.splitlines()[0] == "Exponential  distribution, distributions"
+    assert main(["actors", "Exponentail"]) == 2
+    assert capsys.readouterr().err.splitlines()[0] == (
+        "error: there is no actor type 'Exponentail', did you mean 'Exponential'?"
+    )
+
+
+def test_replicas_are_shown_as_one(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["show", "warehouse"]) == 0
+    told = " ".join(capsys.readouterr().out.split())
+    assert "orders rate of robot[*].delivered (20) 1/h" in told
+    assert "stops at 6 h" in told

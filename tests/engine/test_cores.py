@@ -127,3 +127,26 @@ def test_a_compiled_file_of_an_earlier_build_is_not_imported(tmp_path: Path, mon
     (finder,) = (each for each in sys.meta_path if type(each).__module__ == "epicycle.actors.compiled")
     assert finder.find_spec("epicycle.somewhere.part", [str(package)]).origin == str(package / "part.py")
     assert finder.find_spec("elsewhere.part", [str(package)]) is None
+
+
+@pytest.mark.parametrize("core", ["python", "compiled"])
+def test_help_shows_what_a_class_takes(core: str) -> None:
+    if core == "compiled" and not is_there():
+        pytest.skip("the core is not compiled here")
+    program = (
+        "import inspect; from epicycle.actors import InputPort, Parameter\n"
+        "class Own(Parameter):\n"
+        "    def __init__(self, a, b=1): pass\n"
+        "for each in (InputPort, Parameter): print(*inspect.signature(each).parameters, each.__doc__.splitlines()[0])\n"
+        "print(inspect.signature(Own))\n"
+    )
+    words = [sys.executable, "-c", program]
+    told = subprocess.run(
+        words, env={**os.environ, "EPICYCLE_CORE": core}, capture_output=True, text=True, check=True
+    ).stdout
+    declared = "A declared parameter: on an instance it reads as its value, on the class as itself."
+    assert told.splitlines() == [
+        "type shape multi required triggers keep ptolemy doc A port where tokens arrive: of any type if none is given.",
+        f"type default unit min above max choices renamed shape optional ptolemy doc {declared}",
+        "(a, b=1)",
+    ]
