@@ -147,6 +147,7 @@ def _add_undecodable(data: bytes, offset: int, name: str, problems: Problems) ->
 _LINE_BREAK = re.compile("\r\n|[\n\r\x85\u2028\u2029]")
 _CONTROL = re.compile("[^\t\n\r\x20-\x7e]")  # of an ASCII text
 _UNPRINTABLE = "[^\t\n\r\x20-\x7e\x85\xa0-\ud7ff\ue000-\ufefe\uff00-\ufffd\U00010000-\U0010ffff]"
+_BEGINNING = 50_000  # characters of a broken text that are read again by the slow parser, in a second at most
 _INDEXED = re.compile(r"\w\[(?:\d+|\*)\]")
 _ARROW = re.compile(r"\s*[-=]>")
 _PROPERTIES = re.compile(r"(?:[&!]\S*[ \t]+)+")
@@ -207,7 +208,8 @@ class _Builder:
             for event in yaml.parse(self._text, Loader=_LOADER):
                 self._take(event)
         except yaml.MarkedYAMLError as error:
-            self._add_syntax(error)
+            if not self._is_too_deep():
+                self._add_syntax(error)
             return None
         except yaml.YAMLError as error:
             self._problems.add(f"{self._name}: broken YAML: {error}")
@@ -219,6 +221,19 @@ class _Builder:
             self._problems.add(f"{self._name} is empty")
             return None
         return root
+
+    def _is_too_deep(self) -> bool:
+        """Report nesting that libyaml itself refuses, which newer versions do before they give us any event."""
+        depth = 0
+        try:
+            for event in yaml.parse(self._text[:_BEGINNING], Loader=yaml.SafeLoader):
+                depth += isinstance(event, CollectionStartEvent) - isinstance(event, CollectionEndEvent)
+                if depth > MAX_DEPTH:
+                    self._problems.add(f"nested deeper than {MAX_DEPTH} levels", self._span(event))
+                    return True
+        except yaml.YAMLError:
+            pass
+        return False
 
     def _take(self, event: Event) -> None:
         if isinstance(event, ScalarEvent):

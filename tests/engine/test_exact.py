@@ -1,18 +1,15 @@
-"""Small parts of the engine, exactly: quantiles by weight, sizes of tokens, cells of tables, long signals in short."""
+"""Small parts of the engine, exactly: quantiles by weight, cells of tables, long signals in short."""
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import pytest
 
-from epicycle.actors.compiled import CORE
 from epicycle.runner.engine import Results
 from epicycle.runner.engine.statistic import Quantile, Spread, TimeQuantile
-from epicycle.runner.results import waiting
 from epicycle.runner.results.encoding import cell
 from tests.engine.engine_parts import simulate
 
@@ -45,50 +42,6 @@ def test_spread(sample: bool, deviation: float) -> None:
     one = Spread(sample=sample)
     one.add(3.0, 1)
     assert one.value == (None if sample else 0.0)
-
-
-@dataclass(frozen=True)
-class Fixed:
-    """Cannot change."""
-
-    x: float
-    names: tuple[str, ...]
-
-
-@dataclass
-class Loose:
-    """Can."""
-
-    x: float
-
-
-READ_ONLY = np.arange(4.0)
-READ_ONLY.setflags(write=False)
-
-
-of_python = pytest.mark.skipif(CORE == "compiled", reason="in C the bytes of tokens are made at once")
-
-
-@of_python
-@pytest.mark.parametrize(
-    ("token", "size"),
-    [
-        (1.5, 8), (True, 8), (None, 8), (7, 8), (2**63 - 1, 8), (-(2**63), 8), ("text", 4), ((1.0, 2.0, "ab"), 18),
-        (READ_ONLY, 32), (Fixed(1.0, ("a", "bcd")), 12),
-    ],
-)  # fmt: skip
-def test_sizes_of_tokens_that_can_wait(token: Any, size: int) -> None:
-    assert waiting.weight(token) == size
-
-
-@of_python
-@pytest.mark.parametrize(
-    "token",
-    [2**63, -(2**63) - 1, [1], {"a": 1}, np.arange(2.0), READ_ONLY[1:], Loose(1.0), (1, [2]), object()],
-    ids=lambda token: type(token).__name__,
-)
-def test_tokens_that_cannot_wait(token: Any) -> None:
-    assert waiting.weight(token) > waiting.LARGE
 
 
 @pytest.mark.parametrize(
