@@ -80,7 +80,7 @@ class ArqReceiver(_ArqReceiver):
 
 class ArqSender(_ArqSender):
     """The sending end of an automatic repeat request: keeps frames until they are acknowledged, and repeats them."""
-    def __init__(self, path: str, *, window: _Whole = ..., timeout: _Number, spacing: _Number = ..., repeat: Literal['all', 'one'] = ...) -> None: ...
+    def __init__(self, path: str, *, window: _Whole = ..., timeout: _Number, spacing: _Number = ..., repeat: Literal['all', 'one'] = ..., tries: _Whole | None = ..., lifetime: _Number | None = ...) -> None: ...
 
 class Barrier(_Barrier):
     """The paper's choice: an interior-point barrier method with Newton steps, compiled."""

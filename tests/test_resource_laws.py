@@ -385,6 +385,15 @@ def test_arq_delivers_as_much_as_the_formulas_say(
     assert_about(results_of(text, tmp_path), "throughput", truth, 0.06)
 
 
+def test_arq_with_a_limit_abandons_what_fails_as_often(tmp_path: Path) -> None:
+    text = ARQ.format(window=1, timeout="9 s, tries: 2", repeat="all", stop="40000 s")
+    text += "  abandoned: {of: sender.abandoned, take: rate, after: 100 s, interval: 0.99}\n"
+    results = results_of(text, tmp_path)
+    time = 0.8 * 7 + 0.16 * (9 + 7) + 0.04 * 18  # of a token
+    assert_about(results, "throughput", 0.96 / time, 0.06)
+    assert_about(results, "abandoned", 0.04 / time, 0.25)
+
+
 def test_selective_repeat_sends_nothing_twice_that_has_arrived(tmp_path: Path) -> None:
     # A window that is never closed: (1 - p).
     text = ARQ.format(window=200, timeout="7.001 s", repeat="one", stop="15000 s")

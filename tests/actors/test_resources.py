@@ -370,7 +370,7 @@ actors:
   entity: {type: SetFields, draw: {size: {type: Exponential, mean: 400}}, set: {port: token % 2, key: token}}
   switch: {type: NetworkSwitch, rate: 1 kbit/s, size: size, port: port, buffer: 800 bit}
   link: {type: Link, count: 2, rate: 1 kbit/s, size: size, delay: 10 ms, loss: 0.1}
-  sender: {type: ArqSender, window: 4, timeout: 5 s}
+  sender: {type: ArqSender, window: 4, timeout: 5 s, tries: 2, lifetime: 20 s}
   wire: {type: Link, rate: 1 bit/s, delay: 1 s, loss: 0.2}
   receiver: {type: ArqReceiver}
   batch: {type: Batch, number: 3, after: 4 s}
