@@ -181,7 +181,7 @@ class JPDATracker(TargetModel, Actor):
     # --- numbers ----------------------------------------------------------------------------------------
 
     def _number_of(self, record: _Record) -> int:
-        """The number of a track, which it gets when it is told for the first time."""
+        """The number of a track, which it gets when it is first sent."""
         if record.origin not in self._numbers:
             self._given += 1
             self._numbers[record.origin] = self._given
