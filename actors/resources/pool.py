@@ -307,7 +307,7 @@ class Pools(_Pools):
         for name, amount in amounts.items():
             if amount > self._present[name] and not self.inputs[f"{name}_capacity"].width:
                 have = counted(self._present[name], "unit")
-                raise EpicycleError(f"{brief(token)} requests {amount} of {have} of {name} and would wait for ever")
+                raise EpicycleError(f"{brief(token)} requests {amount:g} of {have} of {name} and would wait for ever")
         return tuple(amounts.values())
 
     def _tell_in_use(self) -> None:
