@@ -30,7 +30,7 @@ from .passing import BooleanSelect as _BooleanSelect, Changes as _Changes, Commu
 from .queues import Queue as _Queue, Server as _Server, SharedQueue as _SharedQueue
 from .replay import Replay as _Replay
 from .resources.line import WaitingLine as _WaitingLine
-from .resources.pool import Pool as _Pool
+from .resources.pool import Pool as _Pool, Pools as _Pools
 from .resources.stations import Machine as _Machine, Station as _Station
 from .robotics.controller import FlyingController as _FlyingController, RobustController as _RobustController
 from .robotics.detecting import MultiTargetSensor as _MultiTargetSensor
@@ -80,7 +80,7 @@ class ArqReceiver(_ArqReceiver):
 
 class ArqSender(_ArqSender):
     """The sending end of an automatic repeat request: keeps frames until they are acknowledged, and repeats them."""
-    def __init__(self, path: str, *, window: _Whole = ..., timeout: _Number, spacing: _Number = ..., repeat: Literal['all', 'one'] = ...) -> None: ...
+    def __init__(self, path: str, *, window: _Whole = ..., timeout: _Number, spacing: _Number = ..., repeat: Literal['all', 'one'] = ..., tries: _Whole | None = ..., lifetime: _Number | None = ...) -> None: ...
 
 class Barrier(_Barrier):
     """The paper's choice: an interior-point barrier method with Newton steps, compiled."""
@@ -404,7 +404,11 @@ class PoissonClock(_PoissonClock):
 
 class Pool(_Pool):
     """Units of a resource: a token at `acquire` requests some and comes back from `granted` when it has them; a token at `release` returns them."""
-    def __init__(self, path: str, *, capacity: _Whole = ..., amount: str | float | Formula = ..., preemptive: bool = ..., key: str | float | Formula | None = ..., discipline: Literal['fifo', 'lifo', 'random'] = ..., order: str | float | Formula = ..., room: _Number | None = ..., balking: str | float | Formula | None = ..., patience: Distribution | abc.Mapping[str, object] | None = ...) -> None: ...
+    def __init__(self, path: str, *, capacity: _Whole = ..., amount: str | float | Formula = ..., preemptive: bool = ..., key: str | float | Formula | None = ..., discipline: Literal['fifo', 'lifo', 'random'] = ..., order: str | float | Formula = ..., room: _Number | None = ..., balking: str | float | Formula | None = ..., patience: _Number | str | float | Formula | Distribution | abc.Mapping[str, object] | None = ...) -> None: ...
+
+class Pools(_Pools):
+    """Several pools from which a token acquires units at once or not at all, and to which it releases them at once."""
+    def __init__(self, path: str, *, capacity: abc.Mapping[str, _Whole], amount: abc.Mapping[str, str | float | Formula] | None = ..., preemptive: bool = ..., key: str | float | Formula | None = ..., discipline: Literal['fifo', 'lifo', 'random'] = ..., order: str | float | Formula = ..., room: _Number | None = ..., balking: str | float | Formula | None = ..., patience: _Number | str | float | Formula | Distribution | abc.Mapping[str, object] | None = ...) -> None: ...
 
 class Previous(_Previous):
     """Sends for each token the one before it; for the first one `initial`, or nothing if that is left out."""
@@ -648,7 +652,7 @@ class VonMises(_VonMises):
 
 class WaitingLine(_WaitingLine):
     """A queue in any order from which each trigger takes a token, sent on the same channel of the output."""
-    def __init__(self, path: str, *, size: str | float | Formula = ..., credits: _Whole = ..., persistent_trigger: bool = ..., discipline: Literal['fifo', 'lifo', 'random'] = ..., order: str | float | Formula = ..., room: _Number | None = ..., balking: str | float | Formula | None = ..., patience: Distribution | abc.Mapping[str, object] | None = ...) -> None: ...
+    def __init__(self, path: str, *, size: str | float | Formula = ..., credits: _Whole = ..., persistent_trigger: bool = ..., discipline: Literal['fifo', 'lifo', 'random'] = ..., order: str | float | Formula = ..., room: _Number | None = ..., balking: str | float | Formula | None = ..., patience: _Number | str | float | Formula | Distribution | abc.Mapping[str, object] | None = ...) -> None: ...
 
 class WaitingTime(_WaitingTime):
     """Sends how long each token of `waiter` has waited for a token of `waited_for`; tokens of one tag wait for 0 s."""

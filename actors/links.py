@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from bisect import insort
 from collections import deque
+from dataclasses import dataclass
 from typing import Any
 
 from .core import (
@@ -187,6 +188,20 @@ class NetworkSwitch(_Transmitting):
         self._tell_waiting()
 
 
+@dataclass(slots=True)
+class _Outgoing:
+    """A token that an ARQ sender has not got rid of."""
+
+    token: Any
+    end: Wake | None  # of its lifetime
+    timeouts: int = 0
+
+    @property
+    def is_dead(self) -> bool:
+        """Whether its lifetime ends now."""
+        return self.end is not None and self.end.due
+
+
 class ArqSender(Actor):
     """The sending end of an automatic repeat request: keeps frames until they are acknowledged, and repeats them.
 
@@ -197,13 +212,21 @@ class ArqSender(Actor):
     through a lossy ``Link`` to an ``ArqReceiver``, whose acknowledgements return by another.  The output does not
     depend on ``ack`` within the same tag.
 
-    Sources: Bertsekas and Gallager, Data Networks, 2.4; Tanenbaum, Computer Networks, 3.4.
+    With a limit of ``tries`` or a ``lifetime``, the sender abandons tokens; each may have arrived all the same.  The
+    frames then have a third field, the ``oldest`` number that may still come, and the receiver waits for none before
+    it.  If no frame is due when a token is abandoned, ``{oldest}`` is sent alone, once; should it be lost, the receiver
+    learns of it from the next frame.  With ``repeat: all``, a timeout counts as a try of the oldest frame alone,
+    because the others are discarded for its sake.
+
+    Sources: Bertsekas and Gallager, Data Networks, 2.4; Tanenbaum, Computer Networks, 3.4; RFC 3758 (partial
+    reliability).
     """
 
     input = InputPort(doc="tokens to deliver")
     ack = InputPort(int, doc="numbers of frames that have arrived")
-    output: OutputPort[Any] = OutputPort(dict, depends_on=(), doc="frames: {number, data}")
+    output: OutputPort[Any] = OutputPort(dict, depends_on=(), doc="frames: {number, data} or {number, data, oldest}")
     acknowledged = OutputPort(depends_on=(), doc="the tokens that are known to have arrived")
+    abandoned = OutputPort(depends_on=(), doc="the tokens that were given up")
     repeated = OutputPort(int, depends_on=(), doc="the number of each frame that is sent again")
     waiting = OutputPort(
         int, depends_on=(), doc="number of tokens that wait for the window to move, whenever it changes"
@@ -219,15 +242,22 @@ class ArqSender(Actor):
     repeat = Parameter(
         str, "all", choices=("all", "one"), doc="what is sent again: all outstanding frames, or those that are late"
     )
+    tries: Parameter[int | None] = Parameter(
+        int, None, min=1, doc="number of timeouts after which a token is abandoned; unlimited if left out"
+    )
+    lifetime: Parameter[float | None] = Parameter(
+        float, None, unit="s", above=0, doc="age at which a token is abandoned, sent or not; unlimited if left out"
+    )
 
     def initialize(self) -> None:
-        self._queue: deque[Any] = deque()
+        self._queue: deque[_Outgoing] = deque()
         self._acks: list[int] = []
-        self._out: dict[int, Any] = {}  # tokens by number, the oldest first
+        self._out: dict[int, _Outgoing] = {}  # by number, the oldest first
         self._late: dict[int, Wake] = {}  # of sent frames: when they are late
         self._ahead: list[int] = []  # frames to be sent, the oldest first
         self._next = 0  # number
         self._sent = -1  # of the latest frame sent for the first time
+        self._is_told = True  # whether the receiver was told of all that was abandoned
         self._free = 0  # when (ns) the next may be sent
         self._wake: Wake | None = None
         self._count = 0
@@ -239,7 +269,8 @@ class ArqSender(Actor):
             self._acknowledge()
             self._open()
             self._send()
-        self._queue.extend(self.input.tokens)
+        for token in self.input.tokens:
+            self._queue.append(_Outgoing(token, None if self.lifetime is None else self.wake_in(self.lifetime)))
         self._acks.extend(self.ack.tokens)
         if self.input.present or self.ack.present:
             self._ask(self.context.time)
@@ -253,26 +284,55 @@ class ArqSender(Actor):
 
     def _find_late(self) -> None:
         late = [number for number, wake in self._late.items() if wake.due]
+        for number in late:
+            if self.repeat == "one" or number == self._oldest:
+                self._out[number].timeouts += 1
         for number in list(self._late) if late and self.repeat == "all" else late:
             self._late.pop(number).cancel()
             insort(self._ahead, number)
-        if late:
+        if self._abandon():
+            self._open()
             self._send()
+        elif late:
+            self._send()
+
+    def _abandon(self) -> bool:
+        """Give up the tokens that have reached a limit; returns whether there are any."""
+        over = [number for number, each in self._out.items() if each.is_dead or each.timeouts == self.tries]
+        for number in over:
+            self.abandoned.send(self._taken_out(number))
+            self._is_told = False
+        count = len(self._queue)
+        while self._queue and self._queue[0].is_dead:
+            self.abandoned.send(self._queue.popleft().token)
+        return bool(over) or len(self._queue) < count
 
     def _acknowledge(self) -> None:
         for number in self._acks:
             is_meant = number.__ge__ if self.repeat == "all" else number.__eq__
             for each in [each for each in self._out if is_meant(each)]:
-                self.acknowledged.send(self._out.pop(each))
-                if each in self._late:
-                    self._late.pop(each).cancel()
-                else:
-                    self._ahead.remove(each)
+                self.acknowledged.send(self._taken_out(each))
         self._acks = []
+
+    def _taken_out(self, number: int) -> Any:
+        """Forget a frame; returns its token."""
+        if number in self._late:
+            self._late.pop(number).cancel()
+        else:
+            self._ahead.remove(number)
+        frame = self._out.pop(number)
+        if frame.end is not None:
+            frame.end.cancel()
+        return frame.token
+
+    @property
+    def _oldest(self) -> int:
+        """The lowest number that may still be sent."""
+        return next(iter(self._out), self._next)
 
     def _open(self) -> None:
         """Let in as many as the window has room for."""
-        while self._queue and self._next - next(iter(self._out), self._next) < self.window:
+        while self._queue and self._next - self._oldest < self.window:
             self._out[self._next] = self._queue.popleft()
             self._ahead.append(self._next)
             self._next += 1
@@ -281,15 +341,20 @@ class ArqSender(Actor):
             self.waiting.send(self._count)
 
     def _send(self) -> None:
-        while self._ahead and self._free <= self.context.time:
+        limit = {} if self.tries is None and self.lifetime is None else {"oldest": self._oldest}
+        while (self._ahead or not self._is_told) and self._free <= self.context.time:
+            self._free = self.context.time + to_nanoseconds(self.spacing)
+            self._is_told = True
+            if not self._ahead:
+                self.output.send(limit)
+                break
             number = self._ahead.pop(0)
             self._late[number] = self.wake_in(self.timeout)
-            self._free = self.context.time + to_nanoseconds(self.spacing)
-            self.output.send({"number": number, "data": self._out[number]})
+            self.output.send({"number": number, "data": self._out[number].token, **limit})
             if number <= self._sent:
                 self.repeated.send(number)
             self._sent = max(self._sent, number)
-        if self._ahead:
+        if self._ahead or not self._is_told:
             self._ask(self._free)
 
 
@@ -297,10 +362,11 @@ class ArqReceiver(Actor):
     """The receiving end of an automatic repeat request: passes on the tokens of an ``ArqSender``, once and in order.
 
     With ``repeat: all``, a frame that is not the next one is discarded, and the last one in order is acknowledged; with
-    ``one``, it is kept until its turn, and each frame is acknowledged separately.  Sources: see ``ArqSender``.
+    ``one``, it is kept until its turn, and each frame is acknowledged separately.  A frame may name the ``oldest``
+    number that may still come: then it waits for none before that.  Sources: see ``ArqSender``.
     """
 
-    input: InputPort[Any] = InputPort(dict, doc="frames: {number, data}")
+    input: InputPort[Any] = InputPort(dict, doc="frames: {number, data}, also with oldest; or {oldest}")
     output = OutputPort(doc="their data, in order")
     ack = OutputPort(int, doc="acknowledgements for the sender: numbers of frames")
 
@@ -312,15 +378,34 @@ class ArqReceiver(Actor):
 
     def fire(self) -> None:
         for frame in self.input.tokens:
-            number, data = field_of(frame, "number"), field_of(frame, "data")
-            if isinstance(number, bool) or not isinstance(number, int):
-                raise EpicycleError(f"the number of a frame is {number!r}, expected 0, 1, 2, ...")
+            if "oldest" in frame:
+                self._skip_to(_number_of(frame, "oldest"))
+                if "number" not in frame:
+                    continue
+            number, data = _number_of(frame, "number"), field_of(frame, "data")
             if number == self._expected or (number > self._expected and self.repeat == "one"):
                 self._kept[number] = data
-            while self._expected in self._kept:
-                self.output.send(self._kept.pop(self._expected))
-                self._expected += 1
+            self._deliver()
             if self.repeat == "one":
                 self.ack.send(number)
             elif self._expected:
                 self.ack.send(self._expected - 1)
+
+    def _skip_to(self, oldest: int) -> None:
+        for number in sorted(each for each in self._kept if each < oldest):
+            self.output.send(self._kept.pop(number))
+        self._expected = max(self._expected, oldest)
+        self._deliver()
+
+    def _deliver(self) -> None:
+        while self._expected in self._kept:
+            self.output.send(self._kept.pop(self._expected))
+            self._expected += 1
+
+
+def _number_of(frame: Any, field: str) -> int:
+    number = field_of(frame, field)
+    if isinstance(number, bool) or not isinstance(number, int):
+        which = "number" if field == "number" else "oldest number"
+        raise EpicycleError(f"the {which} of a frame is {number!r}, expected 0, 1, 2, ...")
+    return number

@@ -95,7 +95,7 @@ class Harness:
     def _resume(self) -> None:
         """Let SimPy's next event happen, which may resume a process."""
         self.tag = max(self.tag, Tag(self.environment.queue[0][0], 1))
-        self.environment.step()
+        self.environment.happen()
 
     def _fire(self, tag: Tag, tokens: Iterable[tuple[str, Any]]) -> None:
         self.tag = tag

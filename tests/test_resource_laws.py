@@ -100,6 +100,55 @@ def test_those_who_do_not_wait(more: str, joins: object, leaves: object, tmp_pat
     assert_about(results, "served", sum(min(n, 3) * p for n, p in enumerate(chances)), 0.05)
 
 
+def test_patience_that_a_token_brings_is_that_of_palm(tmp_path: Path) -> None:
+    text = POOL.format(more=", patience: patience").replace(
+        "  crew:", "  customer: {type: SetFields, draw: {patience: {type: Exponential, mean: 2 s}}}\n  crew:"
+    )
+    text = text.replace("customers.output -> crew.acquire", "customers.output -> customer.input")
+    text = text.replace("connections:", "connections:\n  - customer.output -> crew.acquire")
+    chances = birth_and_death([2.5] * 60, [min(n, 3) + max(n - 3, 0) / 2 for n in range(1, 61)])
+    results = results_of(text, tmp_path)
+    assert_about(results, "waiting", sum(max(n - 3, 0) * p for n, p in enumerate(chances)), 0.15)
+    assert_about(results, "served", sum(min(n, 3) * p for n, p in enumerate(chances)), 0.05)
+
+
+LOSSES = """
+actors:
+  comes: {type: PoissonClock, mean_interval: 0.4 s, fire_at_start: false}
+  patient: {type: SetFields, draw: {lies: {type: Bernoulli, probability: 0.5}}, set: {number: token}}
+  ward:
+    type: Pools
+    capacity: {doctor: 3, room: 2}
+    amount: {doctor: 1, room: 1 if lies else 0}
+    room: 0
+    key: number
+  work: {type: Server, servers: null, distribution: {type: Exponential, mean: 1 s}}
+connections:
+  - comes.output -> patient.input
+  - patient.output -> ward.acquire
+  - ward.granted -> work.input
+  - work.output -> ward.release
+run: {stop: 10000 s, seed: 4}
+metrics:
+  doctors: {of: ward.doctor_in_use, take: time_mean, initial: 0, after: 200 s, interval: 0.99}
+  rooms: {of: ward.room_in_use, take: time_mean, initial: 0, after: 200 s, interval: 0.99}
+"""
+
+
+def test_several_pools_at_once_lose_what_kelly_says(tmp_path: Path) -> None:
+    """A loss network: independent Poisson numbers of either class, given that they fit (Kelly 1991)."""
+    weights = {
+        (sitting, lying): 1.25 ** (sitting + lying) / math.factorial(sitting) / math.factorial(lying)
+        for sitting in range(4)
+        for lying in range(3)
+        if sitting + lying <= 3
+    }
+    whole = sum(weights.values())
+    results = results_of(LOSSES, tmp_path)
+    assert_about(results, "doctors", sum((one + two) * weight for (one, two), weight in weights.items()) / whole, 0.05)
+    assert_about(results, "rooms", sum(two * weight for (_, two), weight in weights.items()) / whole, 0.05)
+
+
 CLASSES = """
 actors:
   urgent: {{type: PoissonClock, mean_interval: 4 s, values: [0], fire_at_start: false}}
@@ -334,6 +383,15 @@ def test_arq_delivers_as_much_as_the_formulas_say(
 ) -> None:
     text = ARQ.format(window=window, timeout=timeout, repeat=repeat, stop="15000 s")
     assert_about(results_of(text, tmp_path), "throughput", truth, 0.06)
+
+
+def test_arq_with_a_limit_abandons_what_fails_as_often(tmp_path: Path) -> None:
+    text = ARQ.format(window=1, timeout="9 s, tries: 2", repeat="all", stop="40000 s")
+    text += "  abandoned: {of: sender.abandoned, take: rate, after: 100 s, interval: 0.99}\n"
+    results = results_of(text, tmp_path)
+    time = 0.8 * 7 + 0.16 * (9 + 7) + 0.04 * 18  # of a token
+    assert_about(results, "throughput", 0.96 / time, 0.06)
+    assert_about(results, "abandoned", 0.04 / time, 0.25)
 
 
 def test_selective_repeat_sends_nothing_twice_that_has_arrived(tmp_path: Path) -> None:

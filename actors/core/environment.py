@@ -4,13 +4,15 @@ from __future__ import annotations
 
 import math
 from heapq import heappush
-from typing import Any, NoReturn
+from typing import Any, Final, NoReturn
 
 import simpy
 from simpy.events import NORMAL, Event, EventPriority
 
 from .order import NEVER
 from .tag import to_nanoseconds, to_seconds
+
+_DIRECTED: Final = "the director lets time pass: yield events, and give the model a stop time instead of {}()"
 
 
 class Environment(simpy.Environment):
@@ -47,6 +49,14 @@ class Environment(simpy.Environment):
         """The time of the next event (s); infinity if there is none."""
         return to_seconds(int(self._queue[0][0])) if self._queue and self._queue[0][0] < NEVER else math.inf
 
+    def happen(self) -> None:
+        """Engine: let the next event happen."""
+        super().step()
+
+    def step(self) -> NoReturn:
+        """Not for processes: the director lets time pass."""
+        raise RuntimeError(_DIRECTED.format("step"))
+
     def run(self, until: object = None) -> NoReturn:
         """Not for processes: the director lets time pass."""
-        raise RuntimeError("the director lets time pass: yield events, and give the model a stop time instead of run()")
+        raise RuntimeError(_DIRECTED.format("run"))

@@ -23,7 +23,11 @@ from .ports import InputPort
 
 
 class Process(Actor):
-    """Base of actors written as a generator ``run()``."""
+    """Base of actors written as a generator ``run()``.
+
+    All times are in seconds.  A delay is rounded to the nearest nanosecond (of two, the even one), so one up to half
+    a nanosecond is 0; a timeout of infinity never ends.
+    """
 
     is_source: ClassVar[bool] = True
 

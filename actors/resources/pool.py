@@ -1,15 +1,185 @@
-"""Pool: units of a resource that actors acquire and release."""
+"""Pool and Pools: units of one or several resources that actors acquire and release."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, ClassVar
 
-from ..core import EpicycleError, InputPort, OutputPort, Parameter, PortError, PortParameter, brief, counted
-from ..expression import FormulaParameter, number_of_token, of_token
+from ..core import (
+    EpicycleError,
+    InputPort,
+    MappingParameter,
+    OutputPort,
+    Parameter,
+    ParameterError,
+    PortError,
+    PortParameter,
+    brief,
+    counted,
+    did_you_mean,
+)
+from ..expression import Formula, FormulaParameter, number_of_token, of_token
 from .waiting import Waiter, WaitingActor, check_channels
 
 
-class Pool(WaitingActor):
+class _Pools(WaitingActor):
+    """The common part: requests for units of some kinds, in one waiting line."""
+
+    entrance: ClassVar[str] = "acquire"
+
+    acquire = InputPort(multi=True, doc="requests units")
+    release = InputPort(multi=True, doc="returns units, or withdraws a request")
+    granted = OutputPort(multi=True, depends_on=(), doc="each request when it gets its units")
+    preempted = OutputPort(multi=True, depends_on=(), doc="each request that lost its units and waits again")
+    rejected = OutputPort(multi=True, depends_on=(), doc="requests that found no room")
+    balked = OutputPort(multi=True, depends_on=(), doc="requests that did not join the line")
+    reneged = OutputPort(multi=True, depends_on=(), doc="requests that lost their patience")
+    waiting = OutputPort(int, depends_on=(), doc="number of waiting requests, whenever it changes")
+
+    preemptive = Parameter(bool, False, doc="whether requests with a lower 'order' take units from others")
+    key: Parameter[Any] = FormulaParameter(
+        None, doc="a release and its request have this value in common: an expression over their fields, and token"
+    )
+
+    def initialize(self) -> None:
+        super().initialize()
+        for name in ("granted", "preempted", "rejected", "balked", "reneged"):
+            check_channels(self, "acquire", name)
+        if self.release.width not in (1, self.acquire.width):
+            raise PortError(
+                f"{self.acquire.path} has {counted(self.acquire.width, 'channel')} and {self.release.path} has "
+                f"{self.release.width}; give it 1 channel, or as many, because units are released on the channel of "
+                "their request"
+            )
+        self._held: list[Waiter] = []  # in the order in which they were granted
+        self._in_use = [0] * len(self._capacities())  # by kind
+        self._has_begun_anew = False
+
+    def restart(self) -> None:
+        super().restart()
+        self._has_begun_anew = True  # and may return what it does not know
+
+    def fire(self) -> None:
+        self._send()
+        self._renege()
+        for channel, tokens in enumerate(self.release.by_channel()):
+            for token in tokens:
+                self._return(token, channel)
+        newcomers = [
+            self._request(token, channel)
+            for channel, tokens in enumerate(self.acquire.by_channel())
+            for token in tokens
+        ]
+        self._join(newcomers, self._serve)
+        self._tell_in_use()
+        self._tell_count("waiting", len(self._waiting))
+
+    # To be defined by a subclass.
+
+    def _capacities(self) -> Sequence[int]:
+        """The present number of units of each kind."""
+        raise NotImplementedError
+
+    def _amounts(self, token: Any, channel: int) -> tuple[int, ...]:
+        """How many of each kind a token requests."""
+        raise NotImplementedError
+
+    def _tell_in_use(self) -> None:
+        """Tell how many units are held."""
+        raise NotImplementedError
+
+    # Requests
+
+    def _request(self, token: Any, channel: int) -> Waiter:
+        amounts = self._amounts(token, channel)
+        waiter = self._waiter(token, channel, 1.0)
+        waiter.amounts = amounts
+        return waiter
+
+    def _amount(self, formula: Formula, token: Any, channel: int, least: int) -> int:
+        amount = number_of_token(formula, "an amount", token, time=self.now, channel=channel)
+        if amount != int(amount) or amount < least:
+            raise EpicycleError(f"{formula} gives {amount:g}, but an amount must be a whole number >= {least}")
+        return int(amount)
+
+    def _return(self, token: Any, channel: int) -> None:
+        wanted = None if self.key is None else of_token(self.key, token)
+
+        def is_meant(request: Waiter) -> bool:
+            if self.release.width == self.acquire.width and request.channel != channel:
+                return False
+            return self.key is None or bool(of_token(self.key, request.token) == wanted)
+
+        held = next(filter(is_meant, self._held), None)
+        if held is not None:
+            self._give_back(held)
+            return
+        waiting = min(filter(is_meant, self._waiting), key=lambda each: each.number, default=None)
+        if waiting is not None:
+            self._waiting.remove(waiting)
+        elif not self._has_begun_anew:
+            what = "" if self.key is None else f" with the key {wanted!r}"
+            raise EpicycleError(
+                f"{self.release.path} got {brief(token)} on channel {channel}, which has no request{what}"
+            )
+
+    def _serve(self) -> None:
+        """Grant requests that have none ahead of them at any of their kinds while there are units."""
+        capacities = self._capacities()
+        if self.preemptive:
+            excess = [used - there for used, there in zip(self._in_use, capacities, strict=True)]
+            self._take_back(self._last_of(self._held, excess)[0])
+        claimed = [False] * len(capacities)  # kinds for which a request waits
+        place = 0
+        while place < len(self._waiting) and not all(claimed):
+            request = self._waiting[place]
+            if not any(each and amount for each, amount in zip(claimed, request.amounts, strict=True)):
+                losers = self._losers_to(request, capacities)
+                if losers is not None:
+                    self._take_back(losers)  # which wait behind it
+                    self._waiting.remove(request)
+                    self._hold(request)
+                    continue
+            claimed = [each or amount > 0 for each, amount in zip(claimed, request.amounts, strict=True)]
+            place += 1
+
+    def _losers_to(self, request: Waiter, capacities: Sequence[int]) -> list[Waiter] | None:
+        """Those that have to give up their units for a request; None if that is not enough."""
+        lacking = [
+            amount + used - there if amount else 0
+            for amount, used, there in zip(request.amounts, self._in_use, capacities, strict=True)
+        ]
+        later = [each for each in self._held if each.order > request.order] if self.preemptive else []
+        losers, is_enough = self._last_of(later, lacking)
+        return losers if is_enough else None
+
+    def _last_of(self, holders: list[Waiter], lacking: list[int]) -> tuple[list[Waiter], bool]:
+        """The last requests that together hold what is lacking of each kind, and whether they do."""
+        found: list[Waiter] = []
+        if max(lacking) > 0:
+            for each in sorted(holders, key=lambda each: each.key, reverse=True):
+                if any(amount and lack > 0 for amount, lack in zip(each.amounts, lacking, strict=True)):
+                    found.append(each)
+                    lacking = [lack - amount for lack, amount in zip(lacking, each.amounts, strict=True)]
+        return found, max(lacking) <= 0
+
+    def _take_back(self, losers: list[Waiter]) -> None:
+        for each in losers:
+            self._give_back(each)
+            self._waiting.add(each)
+            self._tell_of("preempted", each)
+
+    def _hold(self, request: Waiter) -> None:
+        self._held.append(request)
+        self._in_use = [used + amount for used, amount in zip(self._in_use, request.amounts, strict=True)]
+        self._tell_of("granted", request)
+
+    def _give_back(self, request: Waiter) -> None:
+        self._held.remove(request)
+        self._in_use = [used - amount for used, amount in zip(self._in_use, request.amounts, strict=True)]
+
+
+class Pool(_Pools):
     """Units of a resource: a token at ``acquire`` requests some and comes back from ``granted`` when it has them; a
     token at ``release`` returns them.  Each connection is a requester, which requests, is answered and releases on the
     same channel.
@@ -36,124 +206,110 @@ class Pool(WaitingActor):
     Introduction to Simulation Using SIMAN (seize and release); Ptolemy: ``ResourcePool``.
     """
 
-    entrance: ClassVar[str] = "acquire"
-
-    acquire = InputPort(multi=True, doc="requests units")
-    release = InputPort(multi=True, doc="returns units, or withdraws a request")
-    granted = OutputPort(multi=True, depends_on=(), doc="each request when it gets its units")
-    preempted = OutputPort(multi=True, depends_on=(), doc="each request that lost its units and waits again")
-    rejected = OutputPort(multi=True, depends_on=(), doc="requests that found no room")
-    balked = OutputPort(multi=True, depends_on=(), doc="requests that did not join the line")
-    reneged = OutputPort(multi=True, depends_on=(), doc="requests that lost their patience")
     in_use = OutputPort(int, depends_on=(), doc="number of units held, whenever it changes")
-    waiting = OutputPort(int, depends_on=(), doc="number of waiting requests, whenever it changes")
 
     capacity = PortParameter(int, 1, min=0, doc="number of units")
     amount = FormulaParameter(
         "1", doc="number of units requested: an expression over the token's fields, token, time, channel"
     )
-    preemptive = Parameter(bool, False, doc="whether requests with a lower 'order' take units from others")
-    key: Parameter[Any] = FormulaParameter(
-        None, doc="a release and its request have this value in common: an expression over their fields, and token"
-    )
 
-    def initialize(self) -> None:
-        super().initialize()
-        for name in ("granted", "preempted", "rejected", "balked", "reneged"):
-            check_channels(self, "acquire", name)
-        if self.release.width not in (1, self.acquire.width):
-            raise PortError(
-                f"{self.acquire.path} has {counted(self.acquire.width, 'channel')} and {self.release.path} has "
-                f"{self.release.width}; give it 1 channel, or as many, because units are released on the channel of "
-                "their request"
-            )
-        self._held: list[Waiter] = []  # in the order in which they were granted
-        self._in_use = 0
-        self._has_begun_anew = False
+    def _capacities(self) -> Sequence[int]:
+        return (self.capacity,)
 
-    def restart(self) -> None:
-        super().restart()
-        self._has_begun_anew = True  # and may return what it does not know
-
-    def fire(self) -> None:
-        self._send()
-        self._renege()
-        for channel, tokens in enumerate(self.release.by_channel()):
-            for token in tokens:
-                self._return(token, channel)
-        newcomers = [
-            self._request(token, channel)
-            for channel, tokens in enumerate(self.acquire.by_channel())
-            for token in tokens
-        ]
-        self._join(newcomers, self._serve)
-        self._tell_count("in_use", self._in_use)
-        self._tell_count("waiting", len(self._waiting))
-
-    def _request(self, token: Any, channel: int) -> Waiter:
-        amount = number_of_token(self.amount, "an amount", token, time=self.now, channel=channel)
-        if amount != int(amount) or amount < 1:
-            raise EpicycleError(f"{self.amount} gives {amount:g}, but an amount must be a whole number >= 1")
+    def _amounts(self, token: Any, channel: int) -> tuple[int, ...]:
+        amount = self._amount(self.amount, token, channel, least=1)
         if amount > self.capacity and not self.inputs["capacity"].width:
             have = counted(self.capacity, "unit")
             raise EpicycleError(f"{brief(token)} requests {amount:g} of {have} and would wait for ever")
-        waiter = self._waiter(token, channel, 1.0)
-        waiter.amount = int(amount)
-        return waiter
+        return (amount,)
 
-    def _return(self, token: Any, channel: int) -> None:
-        wanted = None if self.key is None else of_token(self.key, token)
+    def _tell_in_use(self) -> None:
+        self._tell_count("in_use", self._in_use[0])
 
-        def is_meant(request: Waiter) -> bool:
-            if self.release.width == self.acquire.width and request.channel != channel:
-                return False
-            return self.key is None or bool(of_token(self.key, request.token) == wanted)
 
-        held = next(filter(is_meant, self._held), None)
-        if held is not None:
-            self._held.remove(held)
-            self._in_use -= held.amount
-            return
-        waiting = min(filter(is_meant, self._waiting), key=lambda each: each.number, default=None)
-        if waiting is not None:
-            self._waiting.remove(waiting)
-        elif not self._has_begun_anew:
-            what = "" if self.key is None else f" with the key {wanted!r}"
-            raise EpicycleError(
-                f"{self.release.path} got {brief(token)} on channel {channel}, which has no request{what}"
+class Pools(_Pools):
+    """Several pools from which a token acquires units at once or not at all, and to which it releases them at once.
+
+        actors:
+          ward:
+            type: Pools
+            capacity: {doctor: 3, room: 4}
+            amount: {doctor: 2 if urgent else 1, room: 1}
+            key: number  # a release gives back what the same patient has
+            patience: 2 h
+        connections:
+          - patient.output -> ward.acquire
+          - ward.granted -> treatment.input
+          - treatment.output -> ward.release
+
+    A request holds nothing while it waits, so requests cannot block each other for ever.  It stands in the queue of
+    every pool from which it needs units, and gets all of them when they are free and none is ahead of it in any of
+    these queues; one that needs nothing of what those ahead wait for overtakes them.  A request that reneges or is
+    withdrawn leaves all queues, and one that is preempted loses all its units.
+
+    Each pool has two ports of its own: the input ``doctor_capacity`` takes its number of units, for shifts, and the
+    output ``doctor_in_use`` tells how many are held.  All else is as in a ``Pool``.  Sources: Kelly, Loss Networks;
+    salabim's ``request`` of several resources.
+    """
+
+    capacity: Parameter[dict[str, int]] = MappingParameter(Parameter(int, min=0), doc="number of units of each pool")
+    amount: Parameter[dict[str, Formula] | None] = MappingParameter(
+        FormulaParameter(),
+        None,
+        doc="number of units requested from pools, 0 from those left out: expressions over the token's fields, token, "
+        "time, channel; a unit from each pool if left out",
+    )
+
+    def own_ports(self) -> dict[str, InputPort[Any] | OutputPort[Any]]:
+        ports: dict[str, InputPort[Any] | OutputPort[Any]] = {}
+        for name in self.capacity:
+            ports[f"{name}_capacity"] = InputPort(int, required=False, doc="number of units of the pool from then on")
+            ports[f"{name}_in_use"] = OutputPort(int, depends_on=(), doc="number of units held, whenever it changes")
+        return ports
+
+    def check(self) -> None:
+        super().check()
+        if not self.capacity:
+            raise ParameterError(
+                "capacity: there is no pool; name at least one, as in {doctor: 3, room: 4}", ("capacity",)
             )
+        for name in self.amount or ():
+            if name not in self.capacity:
+                near = did_you_mean(name, self.capacity) or ";"
+                raise ParameterError(
+                    f"amount: there is no pool {name!r}{near} valid names: {', '.join(self.capacity)}",
+                    ("amount", name),
+                    of_key=True,
+                )
 
-    def _serve(self) -> None:
-        """Grant requests while there are units."""
-        if self.preemptive:
-            self._take_back(self._last_of(self._held, self._in_use - self.capacity)[0])
-        while len(self._waiting):
-            first = self._waiting.first
-            lacking = first.amount - (self.capacity - self._in_use)
-            if lacking > 0:
-                later = [each for each in self._held if each.order > first.order] if self.preemptive else []
-                losers, missing = self._last_of(later, lacking)
-                if missing > 0:
-                    return
-                self._take_back(losers)
-            self._waiting.remove(first)
-            self._held.append(first)
-            self._in_use += first.amount
-            self._tell_of("granted", first)
+    def initialize(self) -> None:
+        self._present = dict(self.capacity)
+        super().initialize()
 
-    def _last_of(self, holders: list[Waiter], amount: int) -> tuple[list[Waiter], int]:
-        """The last requests that together hold a number of units, and how many are still missing."""
-        found: list[Waiter] = []
-        for each in sorted(holders, key=lambda each: each.key, reverse=True):
-            if amount <= 0:
-                break
-            found.append(each)
-            amount -= each.amount
-        return found, amount
+    def fire(self) -> None:
+        for name in self.capacity:
+            port = self.inputs[f"{name}_capacity"]
+            for units in port.tokens:
+                if units < 0:
+                    raise EpicycleError(f"{port.path} got {units}, but a number of units must be >= 0")
+                self._present[name] = units
+        super().fire()
 
-    def _take_back(self, losers: list[Waiter]) -> None:
-        for each in losers:
-            self._held.remove(each)
-            self._in_use -= each.amount
-            self._waiting.add(each)
-            self._tell_of("preempted", each)
+    def _capacities(self) -> Sequence[int]:
+        return tuple(self._present.values())
+
+    def _amounts(self, token: Any, channel: int) -> tuple[int, ...]:
+        amounts = dict.fromkeys(self.capacity, 1 if self.amount is None else 0)
+        for name, formula in (self.amount or {}).items():
+            amounts[name] = self._amount(formula, token, channel, least=0)
+        if not any(amounts.values()):
+            raise EpicycleError(f"{brief(token)} requests nothing from any of {', '.join(amounts)}")
+        for name, amount in amounts.items():
+            if amount > self._present[name] and not self.inputs[f"{name}_capacity"].width:
+                have = counted(self._present[name], "unit")
+                raise EpicycleError(f"{brief(token)} requests {amount:g} of {have} of {name} and would wait for ever")
+        return tuple(amounts.values())
+
+    def _tell_in_use(self) -> None:
+        for name, used in zip(self.capacity, self._in_use, strict=True):
+            self._tell_count(f"{name}_in_use", used)

@@ -4,17 +4,44 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_left, insort
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Final
 
-from ..core import Actor, EpicycleError, Parameter, ParameterError, Pending, PortError, Wake
+from ..core import Actor, EpicycleError, Parameter, ParameterError, Pending, PortError, Wake, quantity
 from ..distributions import Distribution
-from ..expression import FormulaParameter, number_of_token, of_token
+from ..expression import Formula, FormulaParameter, number_of_token, of_token
 
 FIFO: Final = "fifo"
 LIFO: Final = "lifo"
 RANDOM: Final = "random"
+
+
+class PatienceParameter(Parameter[Distribution | Formula | None]):
+    """``2 min``, an expression over a token, or ``{type: Exponential, mean: 2 min}``."""
+
+    def __init__(self, *, doc: str) -> None:
+        super().__init__(float, None, unit="s", doc=doc)  # type: ignore[arg-type]
+        self._time = Parameter(float, unit="s", min=0)
+        self._law: Parameter[Distribution] = Parameter(Distribution, unit="s")
+        self._formula = FormulaParameter()
+        self.forms = (self._time, self._formula, self._law)
+
+    def describe_type(self) -> str:
+        return "time, expression, or distribution"
+
+    def convert(self, value: object) -> Distribution | Formula | None:
+        if value is None:
+            return None
+        if isinstance(value, (Mapping, Distribution)):
+            return self._law.convert(value)
+        if isinstance(value, (str, Formula)):
+            try:
+                return self._formula.convert(value)
+            except ParameterError:
+                if quantity(str(value)) is None:
+                    raise
+        return self._formula.convert(self._time.convert(value))
 
 
 @dataclass(eq=False)
@@ -27,7 +54,7 @@ class Waiter:
     place: float  # among those of the same order
     size: float
     number: int  # unique
-    amount: int = 1  # of requested units
+    amounts: tuple[int, ...] = ()  # of requested units, by kind
     patience: Wake | None = None
 
     @property
@@ -60,6 +87,9 @@ class Waiters:
             waiter.patience.cancel()
             waiter.patience = None
 
+    def __getitem__(self, place: int) -> Waiter:
+        return self._all[place]
+
     def __contains__(self, waiter: Waiter) -> bool:
         place = bisect_left(self._all, waiter.key, key=lambda each: each.key)
         return place < len(self._all) and self._all[place] is waiter
@@ -91,12 +121,13 @@ class WaitingActor(Actor):
         doc="when a token that would have to wait leaves: a condition or probability over its fields, and waiting (a "
         "number)",
     )
-    patience: Parameter[Distribution | None] = Parameter(
-        Distribution, None, unit="s", doc="how long a token waits until it reneges; for ever if left out"
+    patience = PatienceParameter(
+        doc="how long a token waits until it reneges: a time, a distribution, or an expression (s) over the token's "
+        "fields, token, time, channel; for ever if left out or inf"
     )
 
     def check(self) -> None:
-        if self.patience is not None and self.patience.token_type not in (int, float):
+        if isinstance(self.patience, Distribution) and self.patience.token_type not in (int, float):
             raise ParameterError(f"patience: {type(self.patience).__name__} gives values other than numbers")
 
     def initialize(self) -> None:
@@ -160,10 +191,21 @@ class WaitingActor(Actor):
                 self._tell_of("rejected", each)
                 continue
             stay += 1
-            if self.patience is not None:
-                each.patience = self.wake_in(self.patience.draw_time(self.random_stream("patience"), "a patience"))
+            patience = self._patience_of(each)
+            if patience < math.inf:
+                each.patience = self.wake_in(patience)
         if stay < len(new):
             serve()  # those behind one that has left
+
+    def _patience_of(self, waiter: Waiter) -> float:
+        if self.patience is None:
+            return math.inf
+        if isinstance(self.patience, Distribution):
+            return self.patience.draw_time(self.random_stream("patience"), "a patience")
+        time = of_token(self.patience, waiter.token, time=self.now, channel=waiter.channel)
+        if isinstance(time, bool) or not isinstance(time, (int, float)) or not time >= 0:
+            raise EpicycleError(f"{self.patience} gives {time!r}, but a patience must be a time >= 0 s, or inf")
+        return time
 
     def _turns_away(self, waiter: Waiter, waiting: int) -> bool:
         if self.balking is None:

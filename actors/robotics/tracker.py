@@ -22,7 +22,8 @@ _LIKELY = 0.5  # probability from which a track counts as in range, or a detecti
 class _Record:
     """What is kept of a track besides its estimate."""
 
-    number: int = 0  # 0: not confirmed
+    origin: int  # a count of the tracks that have begun, also of those that a late scan has undone
+    is_confirmed: bool = False
     hits: int = 0  # steps that detected it
     steps: int = 0  # steps that could have
     expected: float = 0.0  # detections at this step
@@ -37,7 +38,6 @@ class _Picture(NamedTuple):
     covariances: Array  # (T, 4, 4)
     existence: Array  # (T,) how likely each exists
     records: tuple[_Record, ...]
-    confirmed: int = 0  # tracks so far
     rough: int = 0  # probabilities so far that are not exact
 
     def only(self, kept: list[int]) -> _Picture:
@@ -82,10 +82,12 @@ class JPDATracker(TargetModel, Actor):
     its position is less certain than ``max_deviation``.  If two tracks are nearer to each other than
     ``merge_distance``, the younger is dropped.
 
-    A late scan is inserted at its time, and the tracker runs again from there.  Later tracks and their numbers are
-    those of a tracker that received it in time.  Scans more than ``max_delay`` late are not fused but counted at
-    ``too_late``.  A scan from the future, due to a wrong clock, counts as made now.  A copy has no effect.  A scan that
-    is not finite is ignored.
+    A late scan is inserted at its time, and the tracker runs again from there.  Later tracks are those of a tracker
+    that received it in time, but maybe with other numbers: a track that was told keeps its number.  If the new run has
+    not confirmed it, maybe because it began with another detection, its number goes to the nearest track without one
+    that is within the ``gate`` during the next ``max_delay``.  Scans more than ``max_delay`` late are not fused but
+    counted at ``too_late``.  A scan from the future, due to a wrong clock, counts as made now.  A copy has no effect.
+    A scan that is not finite is ignored.
     """
 
     trigger = InputPort(object, doc="predict to the present time, fuse, and send the tracks")
@@ -141,6 +143,7 @@ class JPDATracker(TargetModel, Actor):
         self._kinds = {True: float(ukf.RANGE), False: float(ukf.RELATIVE_POSITION)}
         self._predict, self._fuse = association.predict_tracks, association.fuse_scan
         self._begin, self._duplicates = association.new_track, association.duplicates
+        self._separations = association.separations
         self._noise = self.process_noise()
         self._averaged = self.noise_direction == EXPECTED
         self._waiting: list[Detections] = []  # for the next trigger
@@ -148,6 +151,11 @@ class JPDATracker(TargetModel, Actor):
         self._steps: list[_Step] = []  # of the last ``max_delay``, and the tracks before them, with their time
         self._before = _Picture(np.empty((0, 4)), np.empty((0, 4, 4)), np.empty(0), ())
         self._before_at: int | None = None
+        self._begun = 0  # tracks so far
+        self._given = 0  # numbers so far
+        self._numbers: dict[int, int] = {}  # of the tracks that were told, by origin
+        self._told_at: int | None = None
+        self._undone: list[tuple[int, _Picture]] = []  # what was told of tracks that late scans have undone, and when
 
     def fire(self) -> None:
         now = self.tag.time
@@ -160,7 +168,8 @@ class JPDATracker(TargetModel, Actor):
         if picture.rough != self._rough:
             self._rough = picture.rough
             self.approximated.send(self._rough)
-        told = sorted((each.number, place) for place, each in enumerate(picture.records) if each.number)
+        told = sorted((self._number_of(each), place) for place, each in enumerate(picture.records) if each.is_confirmed)
+        self._told_at = now
         time = to_seconds(now)
         estimates = tuple(
             Estimate(picture.means[place], picture.covariances[place], time, picture.records[place].sources)
@@ -168,6 +177,33 @@ class JPDATracker(TargetModel, Actor):
         )
         self.tracks.send(Tracks(tuple(number for number, _ in told), estimates, time))
         self.confirmed.send(len(told))
+
+    # --- numbers ----------------------------------------------------------------------------------------
+
+    def _number_of(self, record: _Record) -> int:
+        """The number of a track, which it gets when it is first sent."""
+        if record.origin not in self._numbers:
+            self._given += 1
+            self._numbers[record.origin] = self._given
+        return self._numbers[record.origin]
+
+    def _pass_on(self, now: int, present: _Picture) -> None:
+        """Give the numbers of tracks that late scans have undone to the nearest tracks that have none."""
+        there = {each.origin for each in present.records}
+        for time, told in self._undone:
+            lost = [at for at, each in enumerate(told.records) if each.origin in self._numbers.keys() - there]
+            free = [at for at, each in enumerate(present.records) if each.origin not in self._numbers]
+            if not lost or not free:
+                continue
+            then = self._predicted(told.only(lost), to_seconds(now - time))
+            means = np.concatenate([then.means, present.means[free]])
+            covariances = np.concatenate([then.covariances, present.covariances[free]])
+            distances = self._separations(means, covariances, len(lost))
+            for at in np.argsort(distances, axis=None, kind="stable").tolist():
+                row, column = divmod(at, len(free))
+                one, other = told.records[lost[row]].origin, present.records[free[column]].origin
+                if distances[row, column] <= self.gate and one in self._numbers and other not in self._numbers:
+                    self._numbers[other] = self._numbers.pop(one)
 
     # --- in the order of time ---------------------------------------------------------------------------
 
@@ -197,8 +233,16 @@ class JPDATracker(TargetModel, Actor):
         for step in steps[first:]:
             # Sorted, so that the order of arrival has no influence.
             step.scans.sort(key=lambda each: each[0])
+            told = step.after if step.time == self._told_at else None
             before = self._step(before, 0.0 if at is None else to_seconds(step.time - at), step.scans)
             step.after, at = before, step.time
+            if told is not None:
+                sure = {each.origin for each in before.records if each.is_confirmed}
+                numbered = self._numbers.keys() - sure
+                undone = [place for place, each in enumerate(told.records) if each.origin in numbered]
+                if undone:
+                    self._undone.insert(0, (step.time, told.only(undone)))
+        self._pass_on(now, before)
         return before
 
     def _place_of(self, time: int) -> int:
@@ -217,15 +261,17 @@ class JPDATracker(TargetModel, Actor):
             assert last.after is not None
             self._before, self._before_at = last.after, last.time
             del self._steps[:count]
+            self._undone = [each for each in self._undone if each[0] >= earliest and each[1].records]
+            pictures = [self._before, *(each.after for each in self._steps if each.after is not None)]
+            pictures.extend(told for _, told in self._undone)
+            kept = {each.origin for picture in pictures for each in picture.records}
+            self._numbers = {origin: number for origin, number in self._numbers.items() if origin in kept}
 
     # --- tracks -----------------------------------------------------------------------------------------
 
     def _step(self, picture: _Picture, elapsed: float, scans: list[tuple[Any, Detections]]) -> _Picture:
         """All tracks ``elapsed`` seconds later, after the scans of that time."""
-        if elapsed > 0.0 and picture.records:
-            noise = self._noise * (elapsed / self.period)
-            means, covariances, existence = self._predict(*picture[:3], noise, elapsed, self.lifetime)
-            picture = picture._replace(means=means, covariances=covariances, existence=existence)
+        picture = self._predicted(picture, elapsed)
         before = tuple(replace(each, expected=0.0, detected=0.0, sources=()) for each in picture.records)
         picture = picture._replace(records=before)
         for _, scan in scans:
@@ -237,6 +283,13 @@ class JPDATracker(TargetModel, Actor):
         largest = 2.0 * self.max_deviation * self.max_deviation
         spread = (picture.covariances[:, 0, 0] + picture.covariances[:, 1, 1]).tolist()
         return picture.only([place for place, each in enumerate(spread) if each <= largest])
+
+    def _predicted(self, picture: _Picture, elapsed: float) -> _Picture:
+        if elapsed <= 0.0 or not picture.records:
+            return picture
+        noise = self._noise * (elapsed / self.period)
+        means, covariances, existence = self._predict(*picture[:3], noise, elapsed, self.lifetime)
+        return picture._replace(means=means, covariances=covariances, existence=existence)
 
     def _after_scan(self, picture: _Picture, scan: Detections) -> _Picture:
         count = len(scan.values)
@@ -262,28 +315,29 @@ class JPDATracker(TargetModel, Actor):
             means = np.concatenate([means, [mean for mean, _ in begun]])
             covariances = np.concatenate([covariances, [covariance for _, covariance in begun]])
             existence = np.concatenate([existence, [self.birth_density / density] * len(begun)])
-            records.extend(_counted(_Record(), scan, scan.probability, 1.0) for _ in begun)
-        return _Picture(means, covariances, existence, tuple(records), picture.confirmed, picture.rough + rough)
+            origins = range(self._begun, self._begun + len(begun))
+            records.extend(_counted(_Record(origin), scan, scan.probability, 1.0) for origin in origins)
+            self._begun += len(begun)
+        return _Picture(means, covariances, existence, tuple(records), picture.rough + rough)
 
     def _managed(self, picture: _Picture) -> _Picture:
-        """The tracks that are left at the end of a step, newly confirmed ones with a number."""
-        records, kept, confirmed = [], [], picture.confirmed
+        """The tracks that are left at the end of a step."""
+        records, kept = [], []
         for place, (known, exists) in enumerate(zip(picture.records, picture.existence.tolist(), strict=True)):
             record = known
             if known.expected > 0.0 or known.detected > 0.0:  # somebody looked there
                 is_hit = known.detected >= _LIKELY * known.expected
                 record = replace(known, hits=known.hits + is_hit, steps=known.steps + 1)
-            if record.number and exists < self.delete_probability:
+            if record.is_confirmed and exists < self.delete_probability:
                 continue
-            if not record.number:
+            if not record.is_confirmed:
                 if record.steps - record.hits > max(self.confirm_steps - self.confirm_hits, 0):
                     continue
                 if record.hits >= self.confirm_hits and exists >= self.confirm_probability:
-                    confirmed += 1
-                    record = replace(record, number=confirmed)
+                    record = replace(record, is_confirmed=True)
             records.append(record)
             kept.append(place)
-        return picture.only(kept)._replace(records=tuple(records), confirmed=confirmed)
+        return picture.only(kept)._replace(records=tuple(records))
 
 
 def _counted(record: _Record, scan: Detections, expected: float, detected: float) -> _Record:

@@ -70,7 +70,7 @@ def handle_events(
             if director._is_interrupted:
                 raise KeyboardInterrupt
             if is_of_simpy:
-                environment.step()
+                environment.happen()
             elif instant is not None:
                 director._next = None
                 director._handle(instant)

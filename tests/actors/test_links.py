@@ -8,6 +8,7 @@ import pytest
 
 from epicycle.runner.engine import ActorError
 from tests.actors.library_parts import Feeds, behave
+from tests.engine.engine_parts import simulate
 
 
 @pytest.mark.parametrize(
@@ -44,6 +45,15 @@ from tests.actors.library_parts import Feeds, behave
          [("input", [[1, {"number": 1, "data": "b"}], [2, {"number": 0, "data": "a"}],
                      [3, {"number": 0, "data": "a"}]])],
          1, [(1, 1, "ack", 1), (2, 1, "output", "a"), (2, 1, "output", "b"), (2, 1, "ack", 0), (3, 1, "ack", 0)]),
+        # It waits for none before the oldest.
+        ("ArqReceiver", [("input", [[0, {"number": 2, "data": "c", "oldest": 2}],
+                                    [1, {"number": 1, "data": "b", "oldest": 1}]])], 1,
+         [(0, 1, "output", "c"), (0, 1, "ack", 2), (1, 1, "ack", 2)]),
+        ("ArqReceiver, repeat: one", [("input", [[0, {"number": 1, "data": "b", "oldest": 0}],
+                                                 [1, {"number": 4, "data": "e", "oldest": 0}],
+                                                 [2, {"number": 3, "data": "d", "oldest": 3}], [3, {"oldest": 6}]])],
+         1, [(0, 1, "ack", 1), (1, 1, "ack", 4), (2, 1, "output", "b"), (2, 1, "output", "d"), (2, 1, "output", "e"),
+             (2, 1, "ack", 3)]),
     ],
 )  # fmt: skip
 def test_links(actor: str, feeds: Feeds, outputs: int, expected: list[Any]) -> None:
@@ -70,6 +80,72 @@ def test_a_sender_sends_anew_what_is_late() -> None:
     assert frames(sends) == [(0, 0), (0.5, 1), (1, 2), (4, 0), (5, 3)]
 
 
+def told(sends: list[Any]) -> list[Any]:
+    """Frames as (number, oldest), and the tokens that were given up."""
+    return [
+        (time, (token.get("number"), token["oldest"]) if port == "output" else token)
+        for time, _, port, token in sends
+        if port in ("output", "abandoned")
+    ]
+
+
+@pytest.mark.parametrize(
+    ("sender", "feeds", "expected"),
+    [
+        # The last one is told alone.
+        ("window: 1, tries: 2", [("input", [[0, "a"], [0, "b"]]), ("ack", [])],
+         [(0, (0, 0)), (4, (0, 0)), (8, "a"), (8, (1, 1)), (12, (1, 1)), (16, "b"), (16, (None, 2))]),
+        # Of those that are sent together, the oldest alone is tried.
+        ("window: 2, tries: 1", [("input", [[0, "a"], [0, "b"]]), ("ack", [[5, 1]])],
+         [(0, (0, 0)), (0, (1, 0)), (4, "a"), (4, (1, 1))]),
+        ("window: 2, tries: 1, repeat: one", [("input", [[0, "a"], [0, "b"]]), ("ack", [[3, 1]])],
+         [(0, (0, 0)), (0, (1, 0)), (4, "a"), (4, (None, 2))]),
+        # Those that wait grow old, too; one that is acknowledged does not.
+        ("window: 1, lifetime: 5 s", [("input", [[0, "a"], [1, "b"], [4, "c"]]), ("ack", [[4.5, 0]])],
+         [(0, (0, 0)), (4, (0, 0)), (4.5, (1, 1)), (6, "b"), (6, (2, 2)), (9, "c"), (9, (None, 3))]),
+        ("window: 1, lifetime: 3 s", [("input", [[0, "a"], [0, "b"]]), ("ack", [])],
+         [(0, (0, 0)), (3, "a"), (3, "b"), (3, (None, 1))]),
+        # The spacing is kept.
+        ("window: 2, tries: 1, repeat: one, spacing: 3 s", [("input", [[0, "a"], [0, "b"]]), ("ack", [])],
+         [(0, (0, 0)), (3, (1, 0)), (4, "a"), (6, (None, 1)), (7, "b"), (9, (None, 2))]),
+    ],
+)  # fmt: skip
+def test_a_sender_with_a_limit_gives_up(sender: str, feeds: Feeds, expected: list[Any]) -> None:
+    assert told(behave(f"{{type: ArqSender, timeout: 4 s, {sender}}}", feeds)) == expected
+
+
+LOSSY = """
+actors:
+  source: {{type: Clock, period: 1 s, stop_time: 400 s}}
+  sender: {{type: ArqSender, window: 6, timeout: 3 s, repeat: {repeat}, {limit}}}
+  there: {{type: Link, delay: 1 s, loss: 0.4}}
+  receiver: {{type: ArqReceiver, repeat: {repeat}}}
+  back: {{type: Link, delay: 1 s, loss: 0.4}}
+connections:
+  - source.output -> sender.input
+  - sender.output -> there.input
+  - there.output -> receiver.input
+  - receiver.ack -> back.input
+  - back.output -> sender.ack
+run: {{stop: 2000 s, seed: 2, record: [receiver.output, sender.abandoned, sender.acknowledged, source.output]}}
+"""
+
+
+@pytest.mark.parametrize("repeat", ["all", "one"])
+@pytest.mark.parametrize("limit", ["tries: 2", "lifetime: 9 s", "tries: 3, lifetime: 7 s"])
+def test_every_token_arrives_once_and_in_order_or_is_abandoned(repeat: str, limit: str) -> None:
+    _, results = simulate(LOSSY.format(repeat=repeat, limit=limit))
+    sent, arrived, abandoned, acknowledged = (
+        list(results.signals[name].values)
+        for name in ("source.output", "receiver.output", "sender.abandoned", "sender.acknowledged")
+    )
+    assert arrived == sorted(set(arrived))
+    assert set(arrived) | set(abandoned) == set(sent)
+    assert set(abandoned).isdisjoint(acknowledged)
+    assert set(acknowledged) <= set(arrived)
+    assert min(len(arrived), len(abandoned)) > 20
+
+
 @pytest.mark.parametrize(
     ("actor", "feeds", "message"),
     [
@@ -82,6 +158,8 @@ def test_a_sender_sends_anew_what_is_late() -> None:
          "the token {'number': 0} has no field 'data'; it has number"),
         ("ArqReceiver", [("input", [[0, {"number": 0.5, "data": 1}]])],
          "the number of a frame is 0.5, expected 0, 1, 2, ..."),
+        ("ArqReceiver", [("input", [[0, {"oldest": "a"}]])],
+         "the oldest number of a frame is 'a', expected 0, 1, 2, ..."),
         ("NetworkSwitch, port: token", [("input", [[0, 2]])],
          "'token' gives 2 for 2, but it.output has 2 channels, counted from 0"),
     ],

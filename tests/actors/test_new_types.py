@@ -104,6 +104,8 @@ ROWS = {
         "latency: -1", "it.latency: -1 is out of bounds, expected a number in s >= 0"),
     "Pool": Row("capacity: 2", {"acquire": BEATS, "release": [[t, n] for t, n in BEATS if t > 1]},
         "capacity: -1", "it.capacity: -1 is out of bounds, expected an integer >= 0"),
+    "Pools": Row("capacity: {a: 2, b: 3}", {"acquire": BEATS, "release": [[t, n] for t, n in BEATS if t > 1]},
+        "amount: {c: 1}", "it: amount: there is no pool 'c'; valid names: a, b"),
     "Previous": Row("", {"input": BEATS}),
     "Pulse": Row("repeat: true", {"trigger": BEATS},
         "indexes: [1, 0]", "it: indexes: [1, 0] is not an ascending list of whole numbers >= 0"),

@@ -202,16 +202,17 @@ def test_a_timeout_without_an_end_never_happens(behave: Callable[..., Results]) 
     assert [(time, token) for time, _, _, token in sends(behave(behaviour))] == [(3.5, math.inf)]
 
 
-def test_time_is_let_pass_by_the_director_alone(behave: Callable[..., Results]) -> None:
+@pytest.mark.parametrize("call", ["run", "step"])
+def test_time_is_let_pass_by_the_director_alone(call: str, behave: Callable[..., Results]) -> None:
     def behaviour(self: Script) -> Generator[Any, Any, None]:
         yield self.wait(1)
-        self.environment.run(until=5)
+        getattr(self.environment, call)()
 
     with pytest.raises(ActorError) as caught:
         behave(behaviour)
     assert str(caught.value).splitlines()[0] == (
         "a failed in run() at (1 s, 1): RuntimeError: the director lets time pass: yield events, and give the model a "
-        "stop time instead of run()"
+        f"stop time instead of {call}()"
     )
 
 

@@ -410,3 +410,14 @@ def duplicates(means: Array, covariances: Array, distance: float) -> Array:
             if result[j] == 0.0 and _separation(means, covariances, i, j) < distance:
                 result[i] = 1.0
     return result
+
+
+@entry("f8[:, ::1](f8[:, ::1], f8[:, :, ::1], i8)")
+def separations(means: Array, covariances: Array, count: int) -> Array:
+    """The squared Mahalanobis distance of each of the first ``count`` tracks (T, n), a row, to each of the others."""
+    others = means.shape[0] - count
+    result = np.empty((count, others))
+    for i in range(count):
+        for j in range(others):
+            result[i, j] = _separation(means, covariances, i, count + j)
+    return result

@@ -122,7 +122,7 @@ def call_others() -> None:
 
 
 def _call_tracking() -> None:
-    from .association import duplicates, fuse_scan, new_track, predict_tracks
+    from .association import duplicates, fuse_scan, new_track, predict_tracks, separations
 
     means, covariances, existence = predict_tracks(
         np.zeros((1, 4)), np.eye(4).reshape((1, 4, 4)), np.ones(1), np.eye(4), 0.1, 1.0
@@ -131,6 +131,7 @@ def _call_tracking() -> None:
     fuse_scan(means, covariances, existence, 0.0, detection, detection.reshape((1, 7)), 0.9, 1.0, 10.0, 16.0, True)
     new_track(detection, 1.0)
     duplicates(means, covariances, 1.0)
+    separations(means, covariances, 1)
 
 
 def _call_retreats() -> None:

@@ -246,7 +246,7 @@ def same(one: Harness, other: Harness, since: int = 0) -> bool:
 
 
 def test_late_scans_are_fused_at_their_time() -> None:
-    """Scans that come 0.3 s late: from then on, tracks and numbers are those of a tracker that got them in time."""
+    """Scans that come 0.3 s late: from then on, tracks are those of a tracker that got them in time."""
     random = np.random.default_rng(6)
     own = [[scan((10 + 0.1 * tick, 0.0), time=tick / 10)] for tick in range(12)]
     others = [
@@ -260,6 +260,47 @@ def test_late_scans_are_fused_at_their_time() -> None:
     assert same(punctual, late, since=11)
     copied = track(*[[*each, *others[tick : tick + 1] * 3] for tick, each in enumerate(own)])
     assert same(punctual, copied)
+
+
+@pytest.mark.parametrize("other", ["a", "z"])
+def test_a_late_scan_changes_no_number(other: str) -> None:
+    """Another robot has seen a second body before the first, and it has seen the first one, too.
+
+    All its scans come at once: then the second body's track would have been confirmed first, and the scans of the robot
+    that is the first by name would have begun the first one's.
+    """
+    own = [[scan((10.0, 0.0), time=tick / 10)] if tick > 2 else [] for tick in range(12)]
+    late = [scan((20.0, 5.0), *([(10.0, 0.0)] if tick > 2 else []), time=tick / 10, robot=other) for tick in range(8)]
+    own[8].extend(late)
+    told = track(*own).tokens("tracks")
+    assert told[7].numbers == (1,)
+    assert told[8].numbers == (1, 2)
+    assert [round(float(each.mean[0])) for each in told[8].estimates] == [10, 20]
+    assert told[-1].numbers == (1,)  # nobody sees the second body any longer
+
+
+@pytest.mark.parametrize("seed", [4, 6, 12, 19, 45])
+def test_a_number_stays_with_its_body_however_late_scans_are(seed: int) -> None:
+    """Four bodies appear within a second, and the scans of three robots are up to half a second late."""
+    random = np.random.default_rng(seed)
+    places = np.array([(10.0, 0.0), (16.0, 2.0), (10.0, 8.0), (18.0, 10.0)])
+    coming: dict[int, list[Detections]] = {}
+    for tick in range(60):
+        present = places[: 1 + tick // 3] + np.array((0.05 * tick, 0.0))
+        for robot in "abc":
+            seen = present[random.random(len(present)) < 0.8] + random.normal(0.0, 0.1, size=2)
+            clutter = random.uniform(-20.0, 20.0, size=(random.poisson(0.3), 2))
+            found = scan(*seen, *clutter, time=tick / 10, robot=robot, probability=0.8, clutter=0.3)
+            coming.setdefault(tick + int(random.integers(0, 6)), []).append(found)
+    told = track(*[coming.get(tick, []) for tick in range(60)]).tokens("tracks")
+    bodies: dict[int, int] = {}
+    for tick, each in enumerate(told):
+        assert list(each.numbers) == sorted(set(each.numbers))
+        for number, estimate in zip(each.numbers, each.estimates, strict=True):
+            away = np.linalg.norm(places + np.array((0.05 * tick, 0.0)) - estimate.mean[:2], axis=1)
+            if away.min() < 1.5:  # it is not clutter's
+                assert bodies.setdefault(number, int(away.argmin())) == away.argmin(), (tick, number)
+    assert sorted(bodies.values()) == [0, 1, 2, 3]
 
 
 def test_scans_that_come_too_late_are_counted() -> None:

@@ -180,6 +180,17 @@ def test_tracks_that_are_one(random: np.random.Generator) -> None:
     assert found.tolist() == [0.0, 1.0, 0.0, 1.0]
 
 
+def test_how_far_tracks_are_from_each_other(random: np.random.Generator) -> None:
+    covariances = np.array([spread(random, 4) for _ in range(5)])
+    means = random.normal(size=(5, 4))
+    found = association.separations(means, covariances, 2)
+    for one in range(2):
+        for other in range(3):
+            away = means[one] - means[2 + other]
+            expected = away @ np.linalg.solve(covariances[one] + covariances[2 + other], away)
+            assert found[one, other] == pytest.approx(expected)
+
+
 def test_a_new_track() -> None:
     detection = np.array([ukf.RELATIVE_POSITION, 1.0, 2.0, 0.0, 10.0, 0.2, 2.0])
     mean, covariance = association.new_track(detection, 4.0)
