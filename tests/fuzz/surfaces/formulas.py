@@ -1,0 +1,45 @@
+"""Formulas of monitors and of metrics that are computed from others."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from tests.fuzz.surfaces.case import MODEL, Case, Surface, chosen, write
+from tests.fuzz.surfaces.expressions import PIECES
+
+_LEAVES = ("scale.output <= 20", "scale.output", "ramp.output > 1 m", "scale.output >= nope", "nope.output < 3",
+           "clock.output", "scale[*].output < 1", "**.output > 0", "abs(scale.output) < 2", "true", "1", "size < 3",
+           "scale.output <= 1e400", "scale.output == 'a'", "scale.output % 0 > 1")  # fmt: skip
+_AROUND = (
+    "always {0}", "eventually {0}", "next {0}", "not {0}", "({0}) and ({1})", "({0}) or ({1})", "({0}) implies ({1})",
+    "({0}) until ({1})", "always within 3 s ({0})", "eventually within -1 s ({0})", "always from 1 s to 2 s ({0})",
+    "({0}) until within 5 s ({1})", "eventually[0, 5] ({0})", "({0}) since ({1})", "for every drone[*]: {0}",
+    "for all scale ({0})", "always ({0}", "rise({0})", "({0}) => ({1})", "if {0} then {1}", "always {0} within 1e300 s",
+    "once {0}", "historically {0}", "all({0})", "any({0})", "{0} within 10 s",
+)  # fmt: skip
+
+
+def formula(random: np.random.Generator, depth: int = 0) -> str:
+    """A property of pieces that may or may not fit each other."""
+    if depth > int(chosen(random, (3, 60))) or random.random() < 0.2:
+        return str(chosen(random, _LEAVES if random.random() < 0.8 else PIECES))
+    around = str(chosen(random, _AROUND))
+    return around.format(formula(random, depth + 1), formula(random, depth + 4) if "{1}" in around else "")
+
+
+def _make(random: np.random.Generator, home: Path, folder: Path) -> Case:
+    text = formula(random)[:20_000]
+    plain = text.replace("'", "''").replace("\x00", "")
+    match int(random.integers(3)):
+        case 0:
+            changed = MODEL.replace("last: {of: scale.output, take: last}", f"last: '{plain}'")
+        case 1:
+            changed = MODEL.replace("take: last", f"take: '{plain}'")
+        case _:
+            changed = MODEL.replace("always scale.output <= 20", f"'{plain}'")
+    return Case(("run", write(folder, "m.yaml", changed)))
+
+
+SURFACE = Surface("formulas", lambda home: None, _make)
