@@ -24,6 +24,18 @@ def in_words(value: object, *, digits: int = 6, nothing: str = "none") -> str:
     return str(value)
 
 
+def in_time(seconds: float) -> str:
+    """A duration as people say it: ``40 s``, ``7 min 5 s``, ``8 h``; fractions below two minutes."""
+    if not 120.0 <= seconds < math.inf:
+        return f"{seconds:.6g} s"
+    rest, parts = round(seconds), []
+    for size, unit in ((86_400, "d"), (3_600, "h"), (60, "min"), (1, "s")):
+        count, rest = divmod(rest, size)
+        if count:
+            parts.append(f"{count:,} {unit}")
+    return " ".join(parts)
+
+
 def short(value: Any) -> str:
     """A value in one short line, as Python writes it; numbers to six digits."""
     if isinstance(value, float):

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from epicycle.runner.shown import finite, in_words, rounded, short, six_digits
+from epicycle.runner.shown import finite, in_time, in_words, rounded, short, six_digits
 
 
 @dataclass(frozen=True)
@@ -58,3 +58,14 @@ def test_numbers_have_the_digits_of_their_interval() -> None:
     assert rounded(4.8123, 0.0) == "4.8123"
     assert rounded(4.8123, math.inf) == "4.8123"
     assert rounded(math.nan, 1.0) == "–"
+
+
+@pytest.mark.parametrize(
+    ("seconds", "told"),
+    [
+        (0.0, "0 s"), (1e-9, "1e-09 s"), (40.25, "40.25 s"), (119.5, "119.5 s"), (120.0, "2 min"), (425.4, "7 min 5 s"),
+        (28_800.0, "8 h"), (3_659.6, "1 h 1 min"), (90_061.0, "1 d 1 h 1 min 1 s"), (math.inf, "inf s"), (-3.0, "-3 s"),
+    ],
+)  # fmt: skip
+def test_durations(seconds: float, told: str) -> None:
+    assert in_time(seconds) == told

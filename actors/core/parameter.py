@@ -62,6 +62,20 @@ _WORDS: dict[Any, str] = {
 }
 
 
+_INSTEAD = (
+    "take float, int, bool, str, Path, object or a Configurable class; for a list of numbers Parameter(float, "
+    "shape=(None,)), for an array array_parameter((None,)), for texts texts_parameter(), for any list or mapping "
+    "Parameter(object)"
+)
+
+
+def _check_type(given: Any) -> None:
+    """Raise ``TypeError`` for what is not a type of parameters, with what to write instead."""
+    if not (isinstance(given, type) and issubclass(given, Configurable)) and given not in _WORDS:
+        name = given.__name__ if type(given) is type else str(given)
+        raise TypeError(f"a parameter cannot have the type {name}: {_INSTEAD}")
+
+
 class Parameter(Generic[T]):
     """A declared parameter: on an instance it reads as its value, on the class as itself.
 
@@ -94,6 +108,8 @@ class Parameter(Generic[T]):
         ptolemy: T | None = SAME,
         doc: str = "",
     ) -> None:
+        if self.__class__ is Parameter:  # others describe their types themselves
+            _check_type(type)
         self.type: Any = type
         self.default = default
         self.ptolemy = ptolemy

@@ -19,6 +19,7 @@ from ..engine import ActorError, LogFilter, LoopError, Pace, Simulation
 from ..language import Setting
 from ..printing import complain, console, notices
 from ..results import LogFile, Results
+from ..shown import in_time
 from ..text import Problems, call_site, node_of, plain
 
 PATIENCE = 5.0  # s after which the length of a run can be judged
@@ -202,7 +203,7 @@ def watched(model: Model, until: float | None, after: float = 0.0) -> Iterator[C
             watch.start()
         latest = now
         if show is not None:
-            show(now, end, f"{now:.1f} s of model time" if now >= 1.0 else f"{now:.3g} s of model time")
+            show(now, end, f"{in_time(round(now, 1) if now >= 1.0 else now)} of model time")
 
     def judge() -> None:
         if end is not None and (text := outlook(PATIENCE, latest, end)):

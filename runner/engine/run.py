@@ -257,6 +257,7 @@ class Run:
             signals=self.signals,
             log=self.log,
             end=to_seconds(self.director.last.time),
+            until=to_seconds(end),
             stopped=stopped,
             firings=self.director.firings,
             wall_time=self._spent,

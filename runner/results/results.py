@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 from epicycle.actors import counted, did_you_mean, to_seconds
 
 from ..graph import Act
-from ..shown import short
+from ..shown import in_time, short
 from ..tables import Table, Tabled, pandas_module
 from .encoding import cell, leaves
 from .log import EventLog
@@ -44,6 +44,7 @@ class Results(Tabled):
     log: EventLog
     end: float  # s, the last tag
     stopped: str  # why the run ended
+    until: float  # s, the time that the run covers: the stop time if it came to that, else the last tag
     firings: int
     wall_time: float  # s
     units: dict[str, str] = field(default_factory=dict)  # of the metrics
@@ -112,12 +113,12 @@ class Results(Tabled):
 
     def __repr__(self) -> str:
         return (
-            f"<Results of {self.model}, seed {self.seed}: {self.end:g} s, ended by {self.stopped}, "
+            f"<Results of {self.model}, seed {self.seed}: {in_time(self.until)}, ended by {self.stopped}, "
             f"{counted(self.events, 'event')}, digest {self.digest[:16]}...>"
         )
 
     def _caption(self) -> str:
-        return f"{self.model}, seed {self.seed}: {self.end:g} s of model time, ended by {self.stopped}"
+        return f"{self.model}, seed {self.seed}: {in_time(self.until)} of model time, ended by {self.stopped}"
 
     def _tables(self) -> list[Table]:
         units = {name: unit for name, unit in self.units.items() if unit != "1"}

@@ -20,7 +20,7 @@ from ..graph import extent
 from ..printing import columns
 from ..provenance import versions
 from ..results import Results, plain, write_signals
-from ..shown import finite, in_words
+from ..shown import finite, in_time, in_words
 from .pen import FigureError, draw
 
 MAX_NAME = 60  # characters of a file name; file systems limit it
@@ -40,6 +40,7 @@ def summary_object(results: Results) -> dict[str, Any]:
             "aspects": results.aspects,
             "stopped": results.stopped,
             "end": results.end,
+            "until": results.until,
             "events": results.events,
             "wall_time": round(results.wall_time, 6),
             "digest": results.digest,
@@ -52,7 +53,7 @@ def summary_table(model: Model, results: Results) -> Group:
     """The summary printed at the end of a run."""
     head = Text.assemble(
         (visible(results.model), "bold"),
-        f"  seed {results.seed}, {results.end:g} s of model time, ended by {visible(results.stopped)}",
+        f"  seed {results.seed}, {in_time(results.until)} of model time, ended by {visible(results.stopped)}",
     )
     rows = []
     for metric in model.metrics:

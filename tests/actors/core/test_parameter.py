@@ -238,3 +238,15 @@ def test_the_name_that_was_meant_is_found_in_good_time_among_many() -> None:
 
     assert seconds(names) < 5 * seconds(names[:100]) + 0.05
     assert nearest(asked, [*names, f"{asked[:-3]}123"]) == f"{asked[:-3]}123"
+
+
+@pytest.mark.parametrize("kind", [list[float], np.ndarray, list, dict, complex, float | str, "float"])
+def test_types_that_no_parameter_can_have(kind: Any) -> None:
+    name = kind.__name__ if type(kind) is type else str(kind)
+    with pytest.raises(TypeError) as raised:
+        Parameter(kind, None)
+    assert str(raised.value) == (
+        f"a parameter cannot have the type {name}: take float, int, bool, str, Path, object or a Configurable class; "
+        "for a list of numbers Parameter(float, shape=(None,)), for an array array_parameter((None,)), for texts "
+        "texts_parameter(), for any list or mapping Parameter(object)"
+    )
