@@ -82,6 +82,15 @@ def error_of(actor: str = "", aspect: str = "") -> str:
     return str(caught.value)
 
 
+def test_entry_points_that_cannot_be_read(site: Path) -> None:
+    install(site, "acme_garbled", GOOD)
+    (site / "acme_garbled-1.0.dist-info" / "entry_points.txt").write_bytes(b"[epicycle.actors]\nLidar\n")
+    with pytest.raises(CatalogueError) as caught:
+        list(installed().actors)
+    assert caught.value.message.startswith("the entry points of the package 'acme-garbled' cannot be read: ")
+    assert caught.value.help == ("fix or uninstall 'acme-garbled'",)
+
+
 def test_type_is_imported_when_a_model_names_it(site: Path) -> None:
     install(site, "acme_lidar", GOOD, actors="Lidar = acme_lidar:Lidar")
     install(site, "acme_bomb", "raise SystemExit('boom')", actors="Bomb = acme_bomb:Bomb")

@@ -2,8 +2,8 @@
 
     python -m tests.fuzz.hostile [--inputs 5000] [--seed N] [--jobs 2] [--only SURFACE] [--number N]
 
-makes inputs for each of ``surfaces/``, and gives each to a command of Epicycle in a process that may take 1 GB more than
-it has, and 20 s; that may read nothing but the folder of the input, write nowhere else, run no code but ours, and start
+makes inputs for each of ``surfaces/``, and gives each to a command of Epicycle in a process that may take 20 s, and 1 GB
+more than it has; that may read nothing but the folder of the input, write nowhere else, run no code but ours, and start
 nothing.  The seed says what the inputs are; ``--number`` makes one of them again, and shows what is said about it.
 """
 

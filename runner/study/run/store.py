@@ -74,17 +74,23 @@ class Store:
         for path in sorted(self.folder.glob("parts/*.parquet")):
             data, damage = read_part(path)
             self._check(path, damage)
-            with pq.ParquetFile(pa.BufferReader(data)) as file:
-                if not file.schema_arrow.equals(self.schema):
-                    told = f"{path} lacks the columns of {self.folder}/manifest.json: it belongs to another study"
-                    raise StoreError(told)
-                yield from file.iter_batches(columns=columns)
+            try:
+                with pq.ParquetFile(pa.BufferReader(data)) as file:
+                    if not file.schema_arrow.equals(self.schema):
+                        told = f"{path} lacks the columns of {self.folder}/manifest.json: it belongs to another study"
+                        raise StoreError(told)
+                    yield from file.iter_batches(columns=columns)
+            except (pa.ArrowException, OSError, ValueError) as error:
+                raise self._unlike(path, error) from None
         for path in sorted(self.folder.glob("journals/*.jsonl")):
             with suppress(FileNotFoundError):  # its writer has just turned it into a part
                 rows, damage = read_journal(path)
                 self._check(path, damage)
-                if rows:
-                    yield pa.RecordBatch.from_pylist(rows, self.schema).select(columns or self.schema.names)
+                try:
+                    batch = pa.RecordBatch.from_pylist(rows, self.schema)
+                except (pa.ArrowException, ValueError, TypeError, OverflowError) as error:
+                    raise self._unlike(path, error) from None
+                yield batch.select(columns or self.schema.names)
 
     def known(self, value: str | None = None) -> dict[str, Done]:
         """The existing runs by key; ``value`` names the metric to return of each."""
@@ -95,6 +101,13 @@ class Store:
                 if before is None or BEST_FIRST.index(status) < BEST_FIRST.index(before.status):
                     found[key] = Done(status, *number)
         return found
+
+    def _unlike(self, path: Path, error: Exception) -> StoreError:
+        """What to say of a file whose checksum is right, and which we cannot have written all the same."""
+        return StoreError(
+            f"{path} does not hold rows of this study: {error}\n"
+            f"   help: remove it; 'epicycle resume {self.folder}' then repeats its runs"
+        )
 
     def _check(self, path: Path, damage: str) -> None:
         if damage:
@@ -342,6 +355,16 @@ def read_journal(path: Path) -> tuple[list[Row], str]:
     except OSError as error:
         return [], f"cannot be read: {error.strerror}"
     halves = [line.partition(b" ") for line in lines]
-    whole = [json.loads(text) for digest, _, text in halves if digest == checksum(text).encode()]
-    lost = len(lines) - len(whole)
-    return whole, f"is damaged: {counted(lost, 'line')} of {len(lines):,} with a wrong checksum" if lost else ""
+    texts = [text for digest, _, text in halves if digest == checksum(text).encode()]
+    whole = [row for row in map(_row, texts) if row is not None]
+    lost, wrong = len(lines) - len(whole), "with a wrong checksum" if len(whole) == len(texts) else "cannot be read"
+    return whole, f"is damaged: {counted(lost, 'line')} of {len(lines):,} {wrong}" if lost else ""
+
+
+def _row(text: bytes) -> Row | None:
+    """A row of a journal; None for what cannot be one."""
+    try:
+        row = json.loads(text)
+    except (ValueError, RecursionError):
+        return None
+    return row if isinstance(row, dict) else None

@@ -10,9 +10,11 @@ from tests.fuzz.mutants import HOSTILE
 from tests.fuzz.surfaces.case import MODEL, Case, Surface, chosen, write
 
 PIECES = (
-    "1", "0", "-1", "2.5", "1e308", "9**99", "10**18", "x", "size", "wait", "token", "time", "index", "inf", "nan", "pi",
+    "1", "0", "-1", "2.5", "1e308", "9**99", "10**18", "x", "size", "wait", "token", "time", "index", "inf", "nan",
+    "pi",
     "'a'", "'a' * 9999", "[1, 2, 3]", "[1, 2, 3][0:1, 0]", "[1, 2][::0]", "[0] * 99999", "range(99999)", "{'a': 1}",
-    "{'a': [1]}['a']", "[i for i in range(999)]", "().__class__", "open('/etc/passwd')", "__import__('os').system('id')",
+    "{'a': [1]}['a']", "[i for i in range(999)]", "().__class__", "open('/etc/passwd')",
+    "__import__('os').system('id')",
     "lambda: 1", "(x := 3)", "f'{size}'", "true", "null", "len('a')", "sum([1, 2])", "max([])", "sorted(['a', 1])",
     "1 m", "3 km/h", "1 / 0", "0.0 ** -1", "(-8) ** 0.5", "int('9' * 4000)", "round(1.5, 99)", "str([[1]])", "a.b.c",
     "*[1]", "1 if 2 else", "not", "1 < 2 < 'a'", "'\\ud800'", "\u202e", "\x00",
@@ -26,8 +28,8 @@ _AROUND = (
 
 def grown(random: np.random.Generator, depth: int = 0) -> str:
     """An expression of pieces that do not fit each other."""
-    if depth > 4 or random.random() < 0.25:
-        return str(chosen(random, PIECES))
+    if depth > int(chosen(random, (0, 1, 4))) or random.random() < 0.25:
+        return str(chosen(random, PIECES[:21] if random.random() < 0.8 else PIECES))
     return str(chosen(random, _AROUND)).format(grown(random, depth + 1), grown(random, depth + 1))
 
 

@@ -9,6 +9,7 @@ import numpy as np
 from tests.fuzz.surfaces.case import MODEL, Case, Surface, chosen, write
 from tests.fuzz.surfaces.expressions import PIECES
 
+_GOOD = ("scale.output <= 20", "ramp.output > 1", "scale.output >= ramp.output", "abs(scale.output) < 2")
 _LEAVES = ("scale.output <= 20", "scale.output", "ramp.output > 1 m", "scale.output >= nope", "nope.output < 3",
            "clock.output", "scale[*].output < 1", "**.output > 0", "abs(scale.output) < 2", "true", "1", "size < 3",
            "scale.output <= 1e400", "scale.output == 'a'", "scale.output % 0 > 1")  # fmt: skip
@@ -23,9 +24,10 @@ _AROUND = (
 
 def formula(random: np.random.Generator, depth: int = 0) -> str:
     """A property of pieces that may or may not fit each other."""
-    if depth > int(chosen(random, (3, 60))) or random.random() < 0.2:
-        return str(chosen(random, _LEAVES if random.random() < 0.8 else PIECES))
-    around = str(chosen(random, _AROUND))
+    if depth > int(chosen(random, (1, 3, 60))) or random.random() < 0.3:
+        kind = random.random()
+        return str(chosen(random, _GOOD if kind < 0.7 else _LEAVES if kind < 0.95 else PIECES))
+    around = str(chosen(random, _AROUND[:9] if random.random() < 0.8 else _AROUND))
     return around.format(formula(random, depth + 1), formula(random, depth + 4) if "{1}" in around else "")
 
 

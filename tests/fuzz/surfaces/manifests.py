@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from epicycle.runner.cli import main
+from epicycle.runner.study.run.manifest import manifest_text
 from tests.fuzz.surfaces.case import MODEL, Case, Surface, chosen, spoiled, twisted, write
 
 STUDY = """
@@ -58,6 +59,11 @@ def _more(tree: Any, folder: Path, random: np.random.Generator) -> Any:
     return tree
 
 
+def _summed(tree: Any) -> str:
+    """The manifest as text, with the checksum that is right for it, as whoever changes one can compute it."""
+    return manifest_text(tree) if isinstance(tree, dict) and "checksum" in tree else json.dumps(tree)
+
+
 def _make(random: np.random.Generator, home: Path, folder: Path) -> Case:
     kind = str(chosen(random, ("run", "study")))
     results = folder / kind
@@ -68,9 +74,9 @@ def _make(random: np.random.Generator, home: Path, folder: Path) -> Case:
         case 0:
             manifest.write_bytes(spoiled(manifest.read_bytes(), random))
         case 1:
-            manifest.write_text(json.dumps(twisted(tree, random)), encoding="utf-8")
+            manifest.write_text(_summed(twisted(tree, random)), encoding="utf-8")
         case _:
-            manifest.write_text(json.dumps(_more(tree, folder, random)), encoding="utf-8")
+            manifest.write_text(_summed(_more(tree, folder, random)), encoding="utf-8")
     return Case(commands(random, results, kind))
 
 

@@ -13,18 +13,23 @@ _KINDS = ("float", "int", "str", "bool", "list[float]", "np.ndarray", "dict", "o
           "tuple[int, str]", "'float'", "3", "Literal['a', 'b']", "complex", "type", "Any", "bytes")  # fmt: skip
 _DEFAULTS = ("1.0", "None", "'a'", "[1, 2]", "float('nan')", "float('inf')", "-1", "object()", "{}", "10**400", "...",
              "lambda: 1", "np.zeros(3)", "b'a'", "1j")  # fmt: skip
-_OPTIONS = ("", "unit='m'", "unit='nope'", "min=3, max=1", "doc='</script>'", "shape=(3,)", "shape=(None,)", "shape='a'",
+_OPTIONS = ("", "unit='m'", "unit='nope'", "min=3, max=1", "doc='</script>'", "shape=(3,)", "shape=(None,)",
+    "shape='a'",
             "choices=['a']", "choices=[]", "doc=3", "unit=3", "min='a'", "nope=1")  # fmt: skip
 _NAMES = ("x", "output", "input", "fire", "context", "random", "_hidden", "path", "é", "__init__", "wake_at", "class_")
 _LINES = (
-    "raise ValueError('of the plug-in')", "raise SystemExit(7)", "import nope", "from epicycle.actors import Nope", "1 / 0",
-    "Thing.fire = 3", "Thing.__name__ = 'a b'", "Thing.__doc__ = 3", "del Thing", "Thing = 3", "Thing.__module__ = 'os'",
+    "raise ValueError('of the plug-in')", "raise SystemExit(7)", "import nope", "from epicycle.actors import Nope",
+    "1 / 0",
+    "Thing.fire = 3", "Thing.__name__ = 'a b'", "Thing.__doc__ = 3", "del Thing", "Thing = 3",
+    "Thing.__module__ = 'os'",
     "def broken(:", "x = " + "(" * 300 + ")" * 300, "\tx = 1", "__all__ = 3", "class Other(Thing): pass",
 )  # fmt: skip
 _POINTS = (
     "[epicycle.actors]\nThing = plug:Thing\n", "[epicycle.actors]\nThing = plug:Nope\n", "[epicycle.actors]\n= plug\n",
-    "[epicycle.aspects]\nThing = plug:Thing\n", "[epicycle.models]\nm = plug\n", "[epicycle.actors]\nClock = plug:Thing\n",
-    "[epicycle.actors]\nThing = os:system\n", "[epicycle.actors]\nThing = plug:Thing.a.b\n", "[epicycle.figures]\nf = plug:f\n",
+    "[epicycle.aspects]\nThing = plug:Thing\n", "[epicycle.models]\nm = plug\n",
+    "[epicycle.actors]\nClock = plug:Thing\n",
+    "[epicycle.actors]\nThing = os:system\n", "[epicycle.actors]\nThing = plug:Thing.a.b\n",
+    "[epicycle.figures]\nf = plug:f\n",
 )  # fmt: skip
 
 

@@ -15,7 +15,8 @@ TRACE = "time,lost,delay,sequence\n" + "".join(
 )
 TOPICS = "time,topic,value\n" + "".join(f"{each / 10},/scale/input,{each}\n" for each in range(40))
 SIGNAL = "time,value\n" + "".join(f"{each},{2 * each}\n" for each in range(8))
-_CELLS = ("", "nan", "inf", "-inf", "-1", "1e400", "1e-400", "true", "a", '"', "'", "99999999999999999999", "0x1", "1;2",
+_CELLS = ("", "nan", "inf", "-inf", "-1", "1e400", "1e-400", "true", "a", '"', "'", "99999999999999999999", "0x1",
+    "1;2",
           "\x00", "=cmd()", "1e9", "1e18", "9" * 5_000, *PIECES)  # fmt: skip
 
 

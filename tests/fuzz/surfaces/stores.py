@@ -8,10 +8,11 @@ from pathlib import Path
 import numpy as np
 
 from epicycle.runner.cli import main
+from epicycle.runner.study.run.manifest import checksum
 from tests.fuzz.surfaces.case import Case, Surface, chosen, spoiled
 from tests.fuzz.surfaces.manifests import commands, make_results
 
-_JOURNAL = b'{"run": "a", "last": 3.0}\n["x", 1]\n\x00\xff{"run": 1e999}\n'
+_JOURNAL = (b'{"run": "a", "last": 3.0}', b'["x", 1]', b'{"run": 1e999, "seed": "a"}', b"\x00\xff")
 
 
 def _prepare(home: Path) -> None:
@@ -45,11 +46,15 @@ def _make(random: np.random.Generator, home: Path, folder: Path) -> Case:
     file = Path(chosen(random, files))
     if random.random() < 0.2:
         (results / "journals").mkdir(exist_ok=True)
-        (results / "journals" / f"{chosen(random, 'abc')}.jsonl").write_bytes(spoiled(_JOURNAL, random))
+        lines = (spoiled(line, random) for line in _JOURNAL)
+        data = b"".join(b"%s %s\n" % (checksum(line).encode(), line) for line in lines)
+        (results / "journals" / f"{chosen(random, 'abc')}.jsonl").write_bytes(data)
     elif file.suffix == ".parquet" and random.random() < 0.5:
         _changed(file, random)
     else:
         file.write_bytes(spoiled(file.read_bytes(), random))
+    if file.parent.name == "parts" and random.random() < 0.7:  # whoever changes a part can compute its checksum
+        file.rename(file.with_name(f"{file.stem.rpartition('-')[0]}-{checksum(file.read_bytes())}.parquet"))
     return Case(commands(random, results, kind))
 
 
