@@ -74,23 +74,17 @@ class Store:
         for path in sorted(self.folder.glob("parts/*.parquet")):
             data, damage = read_part(path)
             self._check(path, damage)
-            try:
-                with pq.ParquetFile(pa.BufferReader(data)) as file:
-                    if not file.schema_arrow.equals(self.schema):
-                        told = f"{path} lacks the columns of {self.folder}/manifest.json: it belongs to another study"
-                        raise StoreError(told)
-                    yield from file.iter_batches(columns=columns)
-            except (pa.ArrowException, OSError, ValueError) as error:
-                raise self._unlike(path, error) from None
+            with pq.ParquetFile(pa.BufferReader(data)) as file:
+                if not file.schema_arrow.equals(self.schema):
+                    told = f"{path} lacks the columns of {self.folder}/manifest.json: it belongs to another study"
+                    raise StoreError(told)
+                yield from file.iter_batches(columns=columns)
         for path in sorted(self.folder.glob("journals/*.jsonl")):
             with suppress(FileNotFoundError):  # its writer has just turned it into a part
-                rows, damage = read_journal(path)
+                rows, damage = read_journal(path, self.schema)
                 self._check(path, damage)
-                try:
-                    batch = pa.RecordBatch.from_pylist(rows, self.schema)
-                except (pa.ArrowException, ValueError, TypeError, OverflowError) as error:
-                    raise self._unlike(path, error) from None
-                yield batch.select(columns or self.schema.names)
+                if rows:
+                    yield pa.RecordBatch.from_pylist(rows, self.schema).select(columns or self.schema.names)
 
     def known(self, value: str | None = None) -> dict[str, Done]:
         """The existing runs by key; ``value`` names the metric to return of each."""
@@ -101,13 +95,6 @@ class Store:
                 if before is None or BEST_FIRST.index(status) < BEST_FIRST.index(before.status):
                     found[key] = Done(status, *number)
         return found
-
-    def _unlike(self, path: Path, error: Exception) -> StoreError:
-        """What to say of a file whose checksum is right, and which we cannot have written all the same."""
-        return StoreError(
-            f"{path} does not hold rows of this study: {error}\n"
-            f"   help: remove it; 'epicycle resume {self.folder}' then repeats its runs"
-        )
 
     def _check(self, path: Path, damage: str) -> None:
         if damage:
@@ -161,7 +148,7 @@ def prepare(folder: Path, manifest: Mapping[str, Any]) -> Store:
             if kind := irregular(journal):
                 _put_aside(journal, f"is {kind}")
                 continue
-            rows, damage = read_journal(journal)
+            rows, damage = read_journal(journal, store.schema)
             if rows:
                 write_part(store, journal.stem, rows)
             if damage:
@@ -343,10 +330,45 @@ def read_part(path: Path) -> tuple[bytes, str]:
         data = read_regular(path)
     except OSError as error:
         return b"", f"cannot be read: {error.strerror}"
-    return data, "" if path.stem.endswith(f"-{checksum(data)}") else "is damaged: it does not match its checksum"
+    if not path.stem.endswith(f"-{checksum(data)}"):
+        return data, "is damaged: it does not match its checksum"
+    return data, f"is damaged: {wrong}" if (wrong := _wrong_part(data)) else ""
 
 
-def read_journal(path: Path) -> tuple[list[Row], str]:
+def _wrong_part(data: bytes) -> str:
+    """Why a part whose checksum is right, as anybody can compute it, is not one that we have written."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    try:
+        with pq.ParquetFile(pa.BufferReader(data)) as file:
+            return next(filter(None, map(_wrong_batch, file.iter_batches())), "")
+    except (pa.ArrowException, OSError, ValueError) as error:
+        return str(error)
+
+
+def _wrong_batch(batch: pa.RecordBatch) -> str:
+    """Why rows cannot be those of a study; raises pyarrow's errors for values that are none."""
+    batch.validate(full=True)
+    said = dict(zip(batch.schema.names, batch.columns, strict=True))
+    if "run" not in said or "status" not in said:
+        return ""  # of another study, which is told elsewhere
+    is_known = {*said["status"].unique().to_pylist()} <= {*BEST_FIRST}
+    return "" if is_known and not said["run"].null_count else "it has a row without a run or a known status"
+
+
+def _are_rows(rows: list[Any], schema: pa.Schema) -> bool:
+    """Whether lines of a journal are rows of a study with these columns."""
+    import pyarrow as pa
+
+    try:
+        is_plain = all(isinstance(row, dict) for row in rows)
+        return is_plain and not _wrong_batch(pa.RecordBatch.from_pylist(rows, schema))
+    except (pa.ArrowException, ValueError, TypeError, OverflowError):
+        return False
+
+
+def read_journal(path: Path, schema: pa.Schema) -> tuple[list[Row], str]:
     """The intact rows of a journal, and what is wrong with others; an incomplete last line was never finished."""
     try:
         lines = read_regular(path).split(b"\n")[:-1]
@@ -356,15 +378,15 @@ def read_journal(path: Path) -> tuple[list[Row], str]:
         return [], f"cannot be read: {error.strerror}"
     halves = [line.partition(b" ") for line in lines]
     texts = [text for digest, _, text in halves if digest == checksum(text).encode()]
-    whole = [row for row in map(_row, texts) if row is not None]
+    whole = list(map(_parsed, texts))
+    if not _are_rows(whole, schema):
+        whole = [row for row in whole if _are_rows([row], schema)]
     lost, wrong = len(lines) - len(whole), "with a wrong checksum" if len(whole) == len(texts) else "cannot be read"
     return whole, f"is damaged: {counted(lost, 'line')} of {len(lines):,} {wrong}" if lost else ""
 
 
-def _row(text: bytes) -> Row | None:
-    """A row of a journal; None for what cannot be one."""
+def _parsed(text: bytes) -> Any:
     try:
-        row = json.loads(text)
+        return json.loads(text)
     except (ValueError, RecursionError):
         return None
-    return row if isinstance(row, dict) else None

@@ -44,6 +44,7 @@ def commands(random: np.random.Generator, results: Path, kind: str) -> tuple[obj
         ("status", results),
         ("status", results, "--conditions", "--json"),
         ("report", results, "--out", out, "--jobs", 1),
+        ("resume", results, "--jobs", 1),
         ("replay", results, str(chosen(random, "0123456789abcdef")), "--out", out),
     ))  # fmt: skip
 

@@ -262,6 +262,5 @@ def test_a_part_with_the_right_checksum_that_is_no_table(copied: Path, capsys: p
     (copied / "out" / "parts" / f"a-{checksum(b'')}.parquet").write_bytes(b"")
     assert main(["status", "out"]) == 2
     assert capsys.readouterr().err == (
-        f"error: out/parts/a-{checksum(b'')}.parquet does not hold rows of this study: Parquet file size is 0 bytes\n"
-        "   help: remove it; 'epicycle resume out' then repeats its runs\n"
+        f"error: out/parts/a-{checksum(b'')}.parquet is damaged: Parquet file size is 0 bytes\n{HELP}\n"
     )
