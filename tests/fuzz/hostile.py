@@ -50,7 +50,7 @@ READING = {"open", "os.listdir", "os.scandir"}
 WRITING = {"os.remove", "os.rename", "os.rmdir", "os.mkdir", "os.truncate", "os.chmod", "os.link", "os.symlink",
            "shutil.rmtree", "shutil.move", "shutil.copyfile"}  # fmt: skip
 FORBIDDEN = ("subprocess.", "os.system", "os.exec", "os.posix_spawn", "os.spawn", "os.startfile", "socket.", "urllib.",
-             "ftplib.", "http.", "smtplib.", "webbrowser.", "pty.", "os.kill")  # fmt: skip
+             "ftplib.", "http.", "smtplib.", "webbrowser.", "pty.")  # fmt: skip
 
 
 class Late(KeyboardInterrupt):

@@ -16,7 +16,10 @@ _JOURNAL = (b'{"run": "a", "last": 3.0}', b'["x", 1]', b'{"run": 1e999, "seed": 
 
 
 def _prepare(home: Path) -> None:
-    make_results(home)
+    if (made := home.parent / "manifests").exists():
+        shutil.copytree(made, home, dirs_exist_ok=True)
+    else:
+        make_results(home)
     main(["status", str(home / "study"), "--conditions", "--json"])
 
 
