@@ -296,19 +296,22 @@ class Builder:
 
 def copied(entity: Entity) -> Entity:
     """A copy of an entity, paid by the number of its parts."""
-    spend(COPY * sum(map(_parts, entity.everything())))
+    spend(COPY * sum(1 for each in entity.everything() for _ in _parts(each)))
     found: Entity = pickle.loads(pickle.dumps(entity))  # much faster than deepcopy
     return found
 
 
-def _parts(said: Property) -> int:
-    """How many parts something has besides other entities: itself, and properties, ports, relations and links."""
+def _parts(said: Property) -> Iterator[object]:
+    """What something consists of besides other entities: itself, and properties, ports, relations and links."""
+    yield said
     inside: list[Property] = [*said.properties.values()]
-    links = 0
     if isinstance(said, Entity):
+        yield from said.joined
+        for links in said.links.values():
+            yield from links
         inside += [*said.ports.values(), *said.relations.values(), *said.classes.values()]
-        links = len(said.joined) + sum(map(len, said.links.values()))
-    return 1 + links + sum(map(_parts, inside))
+    for each in inside:
+        yield from _parts(each)
 
 
 def _inherited(entity: Entity) -> None:

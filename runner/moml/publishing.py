@@ -11,7 +11,7 @@ from .notes import Notes
 from .scope import Scope, is_text
 from .syntax import ExpressionError
 
-MAX_REPEATED = 3  # in a pattern, whose time grows as this power of the length of a name
+MAX_REPEATED = 3  # in a pattern: the time that it takes grows with the third power of the length of a name
 _REPEATED = re.compile(r"[*+?{]")
 _OF_GROUP = re.compile(r"\)[*+?{]")
 _LIBRARY = "ptolemy.actor.lib."
@@ -102,7 +102,8 @@ def _aggregate(composite: Entity, child: Entity, channels: list[str], orders: co
     for name in ("channel", "global", "operation", "propagateNameChanges"):
         child.properties.pop(name, None)
     child.ports.pop("input", None)
-    spend(sum(1 + len(each) ** MAX_REPEATED // 100 for each in channels))
+    for each in channels:
+        spend(1 + len(each) * len(each) * len(each) // 100)
     for number, channel in enumerate(each for each in channels if pattern.fullmatch(each)):
         name = _named(composite, f"{child.name}_subscriber_{number}")
         made = composite.entities[name] = Entity(name, f"{_LIBRARY}Subscriber", line=child.line)

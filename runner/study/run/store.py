@@ -352,7 +352,7 @@ def _wrong_batch(batch: pa.RecordBatch) -> str:
     batch.validate(full=True)
     said = dict(zip(batch.schema.names, batch.columns, strict=True))
     if "run" not in said or "status" not in said:
-        return ""  # of another study, which is told elsewhere
+        return ""  # of another study, which ``rows`` reports
     is_known = {*said["status"].unique().to_pylist()} <= {*BEST_FIRST}
     return "" if is_known and not said["run"].null_count else "it has a row without a run or a known status"
 
