@@ -15,7 +15,7 @@ import pytest
 
 from epicycle.runner.build import load_model
 from epicycle.runner.catalogue import CatalogueError, Types, built_in, describe, figure_types, installed
-from epicycle.runner.catalogue.reference import TOPICS
+from epicycle.runner.catalogue.reference import TOPICS, doc_of
 from epicycle.runner.catalogue.types import _offered
 from epicycle.runner.language import read_study
 from epicycle.runner.show.report import check_figures
@@ -283,3 +283,7 @@ def test_every_type_of_epicycle_has_a_topic_and_every_topic_a_type() -> None:
     types = built_in()
     groups = {describe(name, cls).group for known in (types.actors, types.aspects) for name, cls in known.items()}
     assert groups == {*TOPICS}
+
+
+def test_a_docstring_that_is_no_text() -> None:
+    assert doc_of(type("Thing", (), {"__doc__": 3})) == "3"
