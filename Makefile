@@ -22,7 +22,7 @@ help:
 	@echo "make lint   check style, formatting, portable arithmetic, prose, the order of imports, and types"
 	@echo "make check  lint and every test, including the slow ones"
 	@echo "make bench  benchmarks against peers, into benchmarks/RESULTS.md (20 min; keep the machine otherwise idle)"
-	@echo "make fuzz   50,000 mutants of valid models: does each soon give a model or a message?"
+	@echo "make fuzz   50,000 mutants of valid models and 5,000 hostile inputs: does each soon give a model or a message?"
 	@echo "make mutants 200 small changes of our sources: do the quick tests notice at least 90 % of them?"
 	@echo "make robust 100,000 problems beyond any scenario: does the solver answer each within its limits?"
 	@echo "make reference  regenerate docs/reference.md and models/schema.json from the declarations in the code"
@@ -48,6 +48,7 @@ bench: $(DEV) $(CORE)
 
 fuzz: $(DEV) $(CORE)
 	$(BIN)/python -m tests.fuzz.fuzz
+	$(BIN)/python -m tests.fuzz.hostile
 
 mutants: $(DEV) $(CORE)
 	$(BIN)/python -m tests.mutation

@@ -52,8 +52,11 @@ def read_table(path: Path) -> Any:
 
     with open_regular(path) as file:
         try:
-            return (csv.read_csv if path.suffix.lower() == ".csv" else parquet.read_table)(file)
-        except arrow.ArrowException as error:
+            table = (csv.read_csv if path.suffix.lower() == ".csv" else parquet.read_table)(file)
+            _ = table.column_names  # which may not be UTF-8, as texts in the table
+            table.validate(full=True)
+            return table
+        except (arrow.ArrowException, UnicodeDecodeError) as error:
             raise OSError(errno.EINVAL, " ".join(str(error).split()), str(path)) from None
 
 

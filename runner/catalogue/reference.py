@@ -240,7 +240,7 @@ def topic_order(reference: TypeReference) -> tuple[int, str, str]:
 def doc_of(cls: type) -> str:
     """The docstring of the class itself: a line for each paragraph, code in single backquotes as in Markdown."""
     own = vars(cls).get("__doc__") or ""
-    paragraphs = re.sub(r"``(.+?)``", r"`\1`", cleandoc(own), flags=re.DOTALL).split("\n\n")
+    paragraphs = re.sub(r"``(.+?)``", r"`\1`", cleandoc(str(own)), flags=re.DOTALL).split("\n\n")
     # Lists and examples keep their lines.
     return "\n\n".join(
         each if re.search(r"^( |[-*>] )", each, re.MULTILINE) else " ".join(each.split()) for each in paragraphs

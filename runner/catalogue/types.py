@@ -15,7 +15,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import cache, cached_property
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import EntryPoint, distributions, entry_points
 from importlib.util import module_from_spec, spec_from_file_location
 from inspect import isabstract
 from pathlib import Path
@@ -92,6 +92,22 @@ class _Offer:
         )
 
 
+def _points(group: str) -> Iterable[EntryPoint]:
+    """The entry points of a group; raises ``CatalogueError`` if a package has a list of them that cannot be read."""
+    try:
+        return entry_points(group=group)
+    except Exception:  # of importlib.metadata, which does not say whose list it is
+        for each in distributions():
+            try:
+                _ = each.entry_points
+            except Exception as error:
+                raise CatalogueError(
+                    f"the entry points of the package {each.name!r} cannot be read: {error}",
+                    f"fix or uninstall {each.name!r}",
+                ) from None
+        raise
+
+
 class _Offers:
     """What the installed packages offer of a kind; they are searched on first use, which takes a while."""
 
@@ -104,7 +120,7 @@ class _Offers:
     def qualified(self) -> dict[str, _Offer]:
         """By ``package.Name``."""
         found: dict[str, _Offer] = {}
-        offers = (_Offer(point, self._base) for point in entry_points(group=self._group))
+        offers = (_Offer(point, self._base) for point in _points(self._group))
         for offer in sorted(offers, key=lambda offer: offer.qualified):
             found.setdefault(offer.qualified, offer)
         return found

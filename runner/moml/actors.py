@@ -11,6 +11,7 @@ from typing import Any
 from epicycle.actors import ParameterError, declared_parameters
 
 from ..catalogue import built_in
+from .budget import spend
 from .counterpart import UNSAID, Counterpart, ParameterSaid
 from .entities import Entity, Property
 from .notes import Notes
@@ -162,6 +163,7 @@ class Actor:
         """Whether this is an added parameter that only serves expressions of other parameters."""
         if not is_variable(said):
             return False
+        spend(len(self.entity.properties) // 10)
         pattern = re.compile(rf"(?<!\w){re.escape(name)}(?!\w)")
         return any(pattern.search(other.value or "") for key, other in self.entity.properties.items() if key != name)
 

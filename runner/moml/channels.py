@@ -10,9 +10,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import count, pairwise
 
+from .budget import spend
 from .directors import director_of
 from .entities import Entity, Link, Port, Property, Relation, kind
 from .notes import Notes
+
+_LINK = 5  # steps
 
 
 @dataclass(frozen=True)
@@ -46,6 +49,7 @@ def join_channels(model: Entity, notes: Notes) -> None:
     sources = [each for each in terminals if each.is_source]
     orders = count(1_000_000)  # after all links of the file
     for each in terminals:
+        spend(len(sources))
         heard = [] if each.is_source else [source for source in sources if each.hears(source)]
         for source in heard:
             shared = _shared(source.around, each.around)
@@ -103,6 +107,7 @@ def _lead(terminal: _Terminal, shared: int, orders: Iterator[int]) -> None:
 def _link(composite: Entity, port: str, relation: str, orders: Iterator[int]) -> None:
     """Link a port to a relation, unless it is linked already."""
     links = composite.links.setdefault(port, [])
+    spend(_LINK + len(links))
     if all(link.relation != relation for link in links):
         links.append(Link(port, relation, 0, next(orders)))
 

@@ -6,7 +6,6 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from .actors import plain
-from .entities import Entity
 from .syntax import ExpressionError
 
 if TYPE_CHECKING:
@@ -64,15 +63,12 @@ def _shared(actor: Actor, name: str) -> object:
     top = actor.scope
     while top.around is not None:
         top = top.around
-    found: object = None
-    for each in top.entity.everything() if isinstance(top.entity, Entity) else ():
-        said = each.properties.get(name)
-        if each.java == actor.entity.java and said is not None and (said.value or "").strip():
-            try:
-                found = actor.scope.value_of(said)
-            except ExpressionError as error:
-                actor.notes.note(f"{actor.path}.{name} = {said.value!r}: {error}")
-    return found
+    for said in reversed(top.set_by_class.get((actor.entity.java, name), [])):
+        try:
+            return actor.scope.value_of(said)
+        except ExpressionError as error:
+            actor.notes.note(f"{actor.path}.{name} = {said.value!r}: {error}")
+    return None
 
 
 def _records(actor: Actor) -> None:

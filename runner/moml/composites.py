@@ -12,6 +12,7 @@ from epicycle.actors import Actor as OwnActor
 from ..catalogue import installed
 from .actors import Actor, face_of, is_decoration, is_layout, plain
 from .aspects import MODELS, aspects_of, is_aspect, is_request, is_response
+from .budget import spend
 from .counterpart import UNSAID, Counterpart, counterpart_of_type
 from .directors import director_of, said_of
 from .entities import Entity, Property, kind, version_of
@@ -30,6 +31,7 @@ from .whole import array_ports, whole_ports
 from .wires import Counting, connections_of
 from .writing import Flow
 
+_FACE = 5  # steps to look up a port, which is most of the work of wiring
 COMPOSITES = frozenset({
     "TypedCompositeActor", "CompositeActor", "CompositeEntity", "ModalModel", "Refinement", "ModalRefinement",
     "TypedAtomicActorComposite", "DECompositeActor", "ThreadedComposite", "CaseRefinement", "TypedOpaqueComposite",
@@ -71,6 +73,7 @@ class Conversion:
 
     def face(self, entity: Entity, port: str) -> PortFace | None:
         """The direction of a port, and whether it is a multiport; None if nothing is wired to it."""
+        spend(_FACE)
         if id(entity) in self.idle:
             return None
         if self.variables.has_port(entity, port):

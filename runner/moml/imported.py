@@ -9,8 +9,10 @@ from pathlib import Path
 from typing import Any
 
 from epicycle.actors import Actor, visible_lines
+from epicycle.actors.expression import BudgetError
 
 from .actors import seconds
+from .budget import limited_steps
 from .channels import join_channels
 from .composites import Conversion
 from .directors import director_of, said_of
@@ -46,8 +48,11 @@ def import_moml(path: Path, load: Callable[[Path], object] | None = None, types:
     notes = Notes()
     own = {each.__name__: each for each in types if issubclass(each, Actor)}
     try:
-        root = Builder(path.name, lambda text, line: notes.note(f"line {line}: {text}")).build(read_document(path))
-        text = _text(root, path.name, notes, own)
+        with limited_steps():
+            root = Builder(path.name, lambda text, line: notes.note(f"line {line}: {text}")).build(read_document(path))
+            text = _text(root, path.name, notes, own)
+    except BudgetError as error:
+        raise MomlError(f"{path.name} cannot be imported: {error}") from None
     except RecursionError:
         raise MomlError(f"{path.name}: the model is nested too deeply") from None
     if notes.errors:

@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from copy import deepcopy
 from itertools import count
 
 from .actors import face_of
 from .document import MomlError
-from .entities import ABSTRACT_COMPOSITE, MAX_ENTITIES, Entity, Link, Property, Relation, kind
+from .entities import ABSTRACT_COMPOSITE, MAX_ENTITIES, Entity, Link, Property, Relation, copied, kind
 from .notes import Notes
 from .scope import Scope
 from .syntax import ExpressionError
@@ -56,7 +55,7 @@ class _Expansion:
             if link.relation is not None
         ]
         for place in range(1, number):
-            each = deepcopy(first)
+            each = copied(first)
             each.name = f"{first.name}_{place}"
             _number(each, place)
             composite.entities[each.name] = each

@@ -24,6 +24,7 @@ class Names:
     def __init__(self, taken: Iterable[str] = (), *, in_expressions: bool = False) -> None:
         self._of: dict[str, str] = {}
         self._taken = set(taken)
+        self._next: dict[str, int] = {}  # the number to try first, by name
         self._in_expressions = in_expressions  # in which keywords and functions cannot be names
 
     def of(self, name: str) -> str:
@@ -39,9 +40,10 @@ class Names:
             base = f"_{base}" if base[:1] != "_" else base
         if self._in_expressions and (iskeyword(base) or base in _TAKEN):
             base += "_"
-        found, number = base, 2
+        found, number = base, self._next.get(base, 2)
         while found in self._taken:
             found, number = f"{base}_{number}", number + 1
+        self._next[base] = number
         self._taken.add(found)
         return found
 

@@ -10,6 +10,7 @@ from typing import Any
 
 from epicycle.actors import elementary
 
+from .budget import spend
 from .syntax import ExpressionError
 
 MAX_ELEMENTS = 10_000
@@ -45,6 +46,7 @@ def number(value: Any) -> Any:
 
 def java_text(value: Any) -> str:
     """A value as Ptolemy writes it as text."""
+    spend(1 + len(value) // 10 if isinstance(value, str) else 1)
     if isinstance(value, bool):
         return "true" if value else "false"
     if isinstance(value, float):
@@ -127,6 +129,7 @@ def _product(left: Rows, right: Rows) -> Rows:
     columns = list(zip(*right, strict=True))
     if any(len(row) != len(right) for row in left):
         raise TypeError("the sizes of the matrices do not match")
+    spend(len(left) * len(columns) * len(right) // 4)
     return Rows([_sum_of_products(row, column) for column in columns] for row in left)
 
 

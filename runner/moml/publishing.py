@@ -5,11 +5,15 @@ from __future__ import annotations
 import re
 from itertools import count
 
+from .budget import spend
 from .entities import Entity, Link, Property, Relation, kind
 from .notes import Notes
 from .scope import Scope, is_text
 from .syntax import ExpressionError
 
+MAX_REPEATED = 3  # in a pattern: the time that it takes grows with the third power of the length of a name
+_REPEATED = re.compile(r"[*+?{]")
+_OF_GROUP = re.compile(r"\)[*+?{]")
 _LIBRARY = "ptolemy.actor.lib."
 _CHECKS = {"PublisherTest": "Test", "PublisherNonStrictTest": "NonStrictTest"}
 _TERMINALS = ("Publisher", "Subscriber", "PublisherPort", "SubscriberPort", "SubscriptionAggregator")
@@ -82,6 +86,11 @@ def channel_name(said: Property, scope: Scope) -> str:
 def _aggregate(composite: Entity, child: Entity, channels: list[str], orders: count[int], notes: Notes) -> None:
     """Replace it by several Subscribers, and the sum or product of what they receive."""
     text = (child.text("channel") or "channel1").strip().strip('"')
+    if _OF_GROUP.search(text) or len(_REPEATED.findall(text)) > MAX_REPEATED:
+        notes.error(
+            f"{child.name}.channel = {text!r}: a pattern may have {MAX_REPEATED} repetitions, and none of a group"
+        )
+        return
     try:
         pattern = re.compile(text)
     except re.error as error:
@@ -93,6 +102,8 @@ def _aggregate(composite: Entity, child: Entity, channels: list[str], orders: co
     for name in ("channel", "global", "operation", "propagateNameChanges"):
         child.properties.pop(name, None)
     child.ports.pop("input", None)
+    for each in channels:
+        spend(1 + len(each) * len(each) * len(each) // 100)
     for number, channel in enumerate(each for each in channels if pattern.fullmatch(each)):
         name = _named(composite, f"{child.name}_subscriber_{number}")
         made = composite.entities[name] = Entity(name, f"{_LIBRARY}Subscriber", line=child.line)

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from epicycle.actors import InputPort, declared_ports
 
 from ..catalogue import built_in
+from .budget import spend
 from .counterpart import Counterpart
 from .directors import director_of, fires_whole
 from .entities import Entity
@@ -36,6 +37,7 @@ def _idle(
     conversion: Converting, composite: Entity, counting: Counting, inputs: dict[int, list[str]]
 ) -> list[tuple[Entity, str]]:
     found = []
+    spend(len(composite.entities))
     for child in composite.entities.values():
         row = conversion.rows.get(id(child))
         if row is None or row.is_view or id(child) in conversion.idle:

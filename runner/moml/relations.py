@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
+from .budget import spend
 from .entities import Entity, Link, kind
 
 MAX_WIDTH = 1000
@@ -68,6 +69,7 @@ class Groups:
 
     def _root(self, name: str) -> str:
         while self._of[name] != name:
+            self._of[name] = self._of[self._of[name]]  # halves the way for the next time
             name = self._of[name]
         return name
 
@@ -133,6 +135,7 @@ class Wiring:
         """Carry known widths from one side of a composite's ports to the other."""
         found = False
         for composite in self._composites:
+            spend(len(composite.links))
             outer = self.groups[id(composite)]
             for port, links in composite.links.items():
                 actor, _, name = port.rpartition(".")
@@ -185,6 +188,7 @@ class Wiring:
         for group, width in groups.width.items():
             ends = self._ends(composite, groups, group, at)
             for number in range(width or 0):
+                spend(1 + len(ends))
                 net = Net(order=min((order for order, _, _ in ends), default=0))
                 for _, port, first in ends:
                     actor, _, name = port.rpartition(".")

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from functools import cached_property
 from typing import Any
 
+from .budget import spend
 from .entities import Entity, Property
 from .operators import java_text
 from .syntax import ExpressionError, Tree, parse
@@ -39,6 +41,7 @@ class Scope:
         self.around = around
         self.defaults = defaults or {}
         self._values: dict[str, object] = {}
+        self._failed: dict[str, str] = {}
         self._open: set[str] = set()
 
     def inside(self, entity: Entity, defaults: Mapping[str, object] | None = None) -> Scope:
@@ -59,10 +62,23 @@ class Scope:
         found = self.entity.properties.get(name)
         if found is not None and is_variable(found):
             return found
-        for each in self.entity.properties.values():  # attributes that extend the scope
-            if each.java.endswith(("ScopeExtendingAttribute", "ScopeExtender")) and name in each.properties:
-                return each.properties[name]
-        return None
+        return next((each.properties[name] for each in self._extending if name in each.properties), None)
+
+    @cached_property
+    def _extending(self) -> list[Property]:
+        """The attributes here that extend the scope."""
+        extending = ("ScopeExtendingAttribute", "ScopeExtender")
+        return [each for each in self.entity.properties.values() if each.java.endswith(extending)]
+
+    @cached_property
+    def set_by_class(self) -> dict[tuple[str, str], list[Property]]:
+        """The attributes with a value of everything inside, by the class of their owner and by name."""
+        found: dict[tuple[str, str], list[Property]] = {}
+        for each in self.entity.everything() if isinstance(self.entity, Entity) else ():
+            for name, said in each.properties.items():
+                if (said.value or "").strip():
+                    found.setdefault((each.java, name), []).append(said)
+        return found
 
     def home(self, name: str) -> Scope | None:
         """Where a name is declared."""
@@ -85,12 +101,18 @@ class Scope:
         raise KeyError(name)
 
     def _value(self, name: str, said: Property) -> object:
+        if name in self._failed:
+            raise ExpressionError(self._failed[name])
         if name not in self._values:
             if name in self._open or len(self._open) > MAX_DEPTH:
                 raise ExpressionError(f"{name!r} is defined in terms of itself")
             self._open.add(name)
             try:
                 self._values[name] = self.value_of(said)
+            except ExpressionError as error:
+                if len(self._open) == 1:  # otherwise it may be too deep only from where it was asked for
+                    self._failed[name] = str(error)
+                raise
             finally:
                 self._open.discard(name)
         return self._values[name]
@@ -108,6 +130,7 @@ class Scope:
 
     def tree(self, text: str) -> Tree:
         """The expression, with ``$name`` in its texts resolved."""
+        spend(1 + len(text) // 10)
         return parse(text)
 
     def filled(self, text: str, *, as_is: bool = False) -> str:

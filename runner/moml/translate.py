@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Mapping
 from typing import TypeAlias
 
+from .budget import spend
 from .syntax import (
+    MAX_LENGTH,
     Array,
     Binary,
     Call,
@@ -118,6 +120,7 @@ def literal(value: object) -> str:
 
 def names_of(tree: Tree) -> set[str]:
     """All names in an expression, including those of functions."""
+    spend()
     match tree:
         case Name(name):
             return {name}
@@ -174,6 +177,13 @@ class _Translation:
 
     def said(self, tree: Tree) -> Said:
         """The text, and how tightly it binds."""
+        text, holds = self._written(tree)
+        spend(len(text) // 10)
+        if len(text) > MAX_LENGTH:
+            raise ExpressionError(f"the translated expression has more than the maximum of {MAX_LENGTH:,} characters")
+        return text, holds
+
+    def _written(self, tree: Tree) -> Said:
         if not names_of(tree) & self._names.keys():
             text = literal(evaluate(tree, self._scope))
             return text, _SIGN if text.startswith("-") else _ATOM

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import Any
 
+from .budget import spend, weigh
 from .functions import FUNCTIONS, element
 from .operators import MAX_ELEMENTS, OPERATORS, Rows, limited, times, truth, unified
 from .syntax import (
@@ -27,7 +27,6 @@ from .syntax import (
     parse,
 )
 
-MAX_CALLS = 20_000  # of functions defined in expressions
 CONSTANTS: Mapping[str, object] = {
     "PI": math.pi,
     "pi": math.pi,
@@ -63,17 +62,6 @@ CONSTANTS: Mapping[str, object] = {
 Scope = Callable[[str], object]
 
 
-@dataclass
-class _Calls:
-    """How many calls an evaluation may still make, and how many evaluations are in progress."""
-
-    left: int = MAX_CALLS
-    open: int = 0
-
-
-_CALLS = _Calls()
-
-
 class Function:
     """The value of ``function(x) ...``."""
 
@@ -85,18 +73,12 @@ class Function:
     def __call__(self, *arguments: Any) -> Any:
         if len(arguments) != len(self.names):
             raise TypeError(f"wrong number of arguments: the function takes {len(self.names)}, not {len(arguments)}")
-        _CALLS.left -= 1
-        if _CALLS.left < 0:
-            raise ExpressionError("evaluating it takes too long")
         given = dict(zip(self.names, arguments, strict=True))
         return _value(self.body, lambda name: given[name] if name in given else self.scope(name))
 
 
 def evaluate(tree: Tree, scope: Scope) -> Any:
     """The value; ``scope`` returns that of a name, or raises ``KeyError``.  Raises ``ExpressionError``."""
-    if _CALLS.open == 0:
-        _CALLS.left = MAX_CALLS
-    _CALLS.open += 1
     try:
         return _value(tree, scope)
     except KeyError as error:
@@ -105,11 +87,16 @@ def evaluate(tree: Tree, scope: Scope) -> Any:
         raise ExpressionError("the expression is nested too deeply") from None
     except (TypeError, ValueError, IndexError, ZeroDivisionError, OverflowError, AttributeError, MemoryError) as error:
         raise ExpressionError(f"it cannot be evaluated: {error}") from None
-    finally:
-        _CALLS.open -= 1
 
 
 def _value(tree: Tree, scope: Scope) -> Any:
+    spend()
+    found = _computed(tree, scope)
+    weigh(found)
+    return found
+
+
+def _computed(tree: Tree, scope: Scope) -> Any:
     match tree:
         case Const(value):
             return value
@@ -163,18 +150,11 @@ def _called(tree: Call, scope: Scope) -> Any:
         whole = scope(name)
     except KeyError:
         if name == "eval" and len(arguments) == 1 and isinstance(arguments[0], str):
-            return _evaluated(arguments[0], scope)
+            return _value(parse(arguments[0]), scope)
         if name not in FUNCTIONS:
             raise ExpressionError(f"the function {name!r} is not supported") from None
         return FUNCTIONS[name](*arguments)
     return _applied(whole, arguments)
-
-
-def _evaluated(text: str, scope: Scope) -> Any:
-    _CALLS.left -= 1
-    if _CALLS.left < 0:
-        raise ExpressionError("evaluating it takes too long")
-    return _value(parse(text), scope)
 
 
 def _applied(whole: Any, arguments: list[Any]) -> Any:

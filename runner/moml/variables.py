@@ -6,10 +6,9 @@ Each becomes a ``Variable`` among the actors of the composite that declares it; 
 
 from __future__ import annotations
 
-import re
-
 from .actors import Actor, plain
 from .entities import Entity
+from .modes import is_machine
 from .parts import Changing, Converting, Level, Part
 from .scope import Scope
 from .syntax import ExpressionError, Tree
@@ -32,6 +31,12 @@ class Variables:
                 for name, said in entity.properties.items():
                     if said.java.endswith(".PortParameter") and conversion.is_linked(entity, name):
                         self._found[id(entity), name] = Changing(entity, name, delayed=False, is_port=True)
+        for key, each in list(self._found.items()):
+            if is_machine(each.owner):  # it would hold the Variable, and has no actors
+                conversion.notes.error(
+                    f"{each.owner.name}.{each.name} changes during the run, and a state machine cannot hold it"
+                )
+                del self._found[key]
 
     def _set_by(self, entity: Entity) -> None:
         scope = self._conversion.scope_of(entity)
@@ -79,7 +84,7 @@ class Variables:
         try:
             tree = scope.tree(text)
             names, found = self._names(tree, scope, 0)
-            return None if found is None else (translated(tree, names, scope), found)
+            return (translated(tree, names, scope), found[-1]) if found else None
         except ExpressionError:
             return None
 
@@ -87,11 +92,10 @@ class Variables:
         """The names in an expression that change, with our names for the variables, and these variables."""
         if not self._found:
             return {}, {}
-        names, _ = self._names(tree, scope, 0)
-        variables = {self.actor_of(each): each for each in self._found.values() if each.owner.entities}
+        names, found = self._names(tree, scope, 0)
         ours = {name: text.replace(".value", "") for name, text in names.items()}
-        said = " ".join(ours.values())
-        return ours, {name: each for name, each in variables.items() if re.search(rf"(?<!\w){name}(?!\w)", said)}
+        read = {id(each) for each in found if each.owner.entities}
+        return ours, {self.actor_of(each): each for each in self._found.values() if id(each) in read}
 
     def lead_to(self, changing: Changing, level: Level, port: str) -> None:
         """Connect a variable to the input of an actor, through the composites between."""
@@ -104,14 +108,14 @@ class Variables:
             here = here.outer
         changing.inputs.append(port)
 
-    def _names(self, tree: Tree, scope: Scope, depth: int) -> tuple[dict[str, str], Changing | None]:
+    def _names(self, tree: Tree, scope: Scope, depth: int) -> tuple[dict[str, str], list[Changing]]:
         names: dict[str, str] = {}
-        some: Changing | None = None
+        some: list[Changing] = []
         for name in sorted(names_of(tree)) if depth < 20 else ():
             found = self.find(scope, name)
             if found is not None:
                 names[name] = f"{self.actor_of(found)}.value"
-                some = found
+                some.append(found)
                 continue
             home = scope.home(name)
             said = None if home is None else home.own(name)
@@ -120,8 +124,9 @@ class Variables:
             try:
                 inner = home.tree(said.value or "")
                 deeper, changing = self._names(inner, home, depth + 1)
-                if changing is not None:
-                    names[name], some = f"({translated(inner, deeper, home)})", changing
+                if changing:
+                    names[name] = f"({translated(inner, deeper, home)})"
+                    some += changing
             except ExpressionError:
                 continue
         return names, some

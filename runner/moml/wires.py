@@ -91,6 +91,7 @@ class Counting:
         self._conversion = conversion
         self._found: dict[tuple[int, str, int, bool], int] = {}  # 0 while it is being counted
         self._nets: dict[tuple[int, bool], int] = {}
+        self._ends: dict[tuple[int, bool], tuple[list[End], int]] = {}  # by the identity of the ends, kept alive here
         self._machines: dict[int, bool] = {}
 
     def senders(self, composite: Any, ends: list[End]) -> int:
@@ -102,12 +103,15 @@ class Counting:
         return self._all(composite, ends, senders=False)
 
     def _all(self, composite: Any, ends: list[End], *, senders: bool) -> int:
-        found = 0
-        for end in ends:
-            found += self._beyond(composite, end, senders=senders)
-            if found > 1:
-                break
-        return min(found, 2)
+        key = (id(ends), senders)
+        if key not in self._ends:
+            found = 0
+            for end in ends:
+                found += self._beyond(composite, end, senders=senders)
+                if found > 1:
+                    break
+            self._ends[key] = ends, min(found, 2)
+        return self._ends[key][1]
 
     def _beyond(self, composite: Any, end: End, *, senders: bool) -> int:
         """How many there are beyond one end; 2 means several."""

@@ -15,7 +15,7 @@ import pytest
 
 from epicycle.runner.build import load_model
 from epicycle.runner.catalogue import CatalogueError, Types, built_in, describe, figure_types, installed
-from epicycle.runner.catalogue.reference import TOPICS
+from epicycle.runner.catalogue.reference import TOPICS, doc_of
 from epicycle.runner.catalogue.types import _offered
 from epicycle.runner.language import read_study
 from epicycle.runner.show.report import check_figures
@@ -80,6 +80,15 @@ def error_of(actor: str = "", aspect: str = "") -> str:
     with pytest.raises(ModelError) as caught:
         load_model("./m.yaml")
     return str(caught.value)
+
+
+def test_entry_points_that_cannot_be_read(site: Path) -> None:
+    install(site, "acme_garbled", GOOD)
+    (site / "acme_garbled-1.0.dist-info" / "entry_points.txt").write_bytes(b"[epicycle.actors]\nLidar\n")
+    with pytest.raises(CatalogueError) as caught:
+        list(installed().actors)
+    assert caught.value.message.startswith("the entry points of the package 'acme-garbled' cannot be read: ")
+    assert caught.value.help == ("fix or uninstall 'acme-garbled'",)
 
 
 def test_type_is_imported_when_a_model_names_it(site: Path) -> None:
@@ -274,3 +283,7 @@ def test_every_type_of_epicycle_has_a_topic_and_every_topic_a_type() -> None:
     types = built_in()
     groups = {describe(name, cls).group for known in (types.actors, types.aspects) for name, cls in known.items()}
     assert groups == {*TOPICS}
+
+
+def test_a_docstring_that_is_no_text() -> None:
+    assert doc_of(type("Thing", (), {"__doc__": 3})) == "3"

@@ -81,7 +81,7 @@ class Store:
                 yield from file.iter_batches(columns=columns)
         for path in sorted(self.folder.glob("journals/*.jsonl")):
             with suppress(FileNotFoundError):  # its writer has just turned it into a part
-                rows, damage = read_journal(path)
+                rows, damage = read_journal(path, self.schema)
                 self._check(path, damage)
                 if rows:
                     yield pa.RecordBatch.from_pylist(rows, self.schema).select(columns or self.schema.names)
@@ -148,7 +148,7 @@ def prepare(folder: Path, manifest: Mapping[str, Any]) -> Store:
             if kind := irregular(journal):
                 _put_aside(journal, f"is {kind}")
                 continue
-            rows, damage = read_journal(journal)
+            rows, damage = read_journal(journal, store.schema)
             if rows:
                 write_part(store, journal.stem, rows)
             if damage:
@@ -330,10 +330,45 @@ def read_part(path: Path) -> tuple[bytes, str]:
         data = read_regular(path)
     except OSError as error:
         return b"", f"cannot be read: {error.strerror}"
-    return data, "" if path.stem.endswith(f"-{checksum(data)}") else "is damaged: it does not match its checksum"
+    if not path.stem.endswith(f"-{checksum(data)}"):
+        return data, "is damaged: it does not match its checksum"
+    return data, f"is damaged: {wrong}" if (wrong := _wrong_part(data)) else ""
 
 
-def read_journal(path: Path) -> tuple[list[Row], str]:
+def _wrong_part(data: bytes) -> str:
+    """Why a part whose checksum is right, as anybody can compute it, is not one that we have written."""
+    import pyarrow as pa
+    import pyarrow.parquet as pq
+
+    try:
+        with pq.ParquetFile(pa.BufferReader(data)) as file:
+            return next(filter(None, map(_wrong_batch, file.iter_batches())), "")
+    except (pa.ArrowException, OSError, ValueError) as error:
+        return str(error)
+
+
+def _wrong_batch(batch: pa.RecordBatch) -> str:
+    """Why rows cannot be those of a study; raises pyarrow's errors for values that are none."""
+    batch.validate(full=True)
+    said = dict(zip(batch.schema.names, batch.columns, strict=True))
+    if "run" not in said or "status" not in said:
+        return ""  # of another study, which ``rows`` reports
+    is_known = {*said["status"].unique().to_pylist()} <= {*BEST_FIRST}
+    return "" if is_known and not said["run"].null_count else "it has a row without a run or a known status"
+
+
+def _are_rows(rows: list[Any], schema: pa.Schema) -> bool:
+    """Whether lines of a journal are rows of a study with these columns."""
+    import pyarrow as pa
+
+    try:
+        is_plain = all(isinstance(row, dict) for row in rows)
+        return is_plain and not _wrong_batch(pa.RecordBatch.from_pylist(rows, schema))
+    except (pa.ArrowException, ValueError, TypeError, OverflowError):
+        return False
+
+
+def read_journal(path: Path, schema: pa.Schema) -> tuple[list[Row], str]:
     """The intact rows of a journal, and what is wrong with others; an incomplete last line was never finished."""
     try:
         lines = read_regular(path).split(b"\n")[:-1]
@@ -342,6 +377,16 @@ def read_journal(path: Path) -> tuple[list[Row], str]:
     except OSError as error:
         return [], f"cannot be read: {error.strerror}"
     halves = [line.partition(b" ") for line in lines]
-    whole = [json.loads(text) for digest, _, text in halves if digest == checksum(text).encode()]
-    lost = len(lines) - len(whole)
-    return whole, f"is damaged: {counted(lost, 'line')} of {len(lines):,} with a wrong checksum" if lost else ""
+    texts = [text for digest, _, text in halves if digest == checksum(text).encode()]
+    whole = list(map(_parsed, texts))
+    if not _are_rows(whole, schema):
+        whole = [row for row in whole if _are_rows([row], schema)]
+    lost, wrong = len(lines) - len(whole), "with a wrong checksum" if len(whole) == len(texts) else "cannot be read"
+    return whole, f"is damaged: {counted(lost, 'line')} of {len(lines):,} {wrong}" if lost else ""
+
+
+def _parsed(text: bytes) -> Any:
+    try:
+        return json.loads(text)
+    except (ValueError, RecursionError):
+        return None

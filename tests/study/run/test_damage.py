@@ -242,3 +242,25 @@ def test_every_edit_of_a_manifest_gives_a_message(copied: Path) -> None:
     with pytest.raises(StoreError) as caught:
         read_manifest(out)
     assert str(caught.value) == f"out/manifest.json is damaged: it is nested too deep\n{ANEW}"
+
+
+@pytest.mark.parametrize("text", [b'["x"]', b"\xff", b"{"])
+def test_a_line_with_the_right_checksum_that_is_no_row(
+    copied: Path, capsys: pytest.CaptureFixture[str], text: bytes
+) -> None:
+    journal = copied / "out" / "journals" / "behind.jsonl"
+    journal.write_bytes(journal.read_bytes() + b"%s %s\n" % (checksum(text).encode(), text))
+    assert main(["status", "out"]) == 2
+    assert (
+        capsys.readouterr().err == f"error: out/journals/behind.jsonl is damaged: 1 line of 7 cannot be read\n{HELP}\n"
+    )
+
+
+def test_a_part_with_the_right_checksum_that_is_no_table(copied: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    [part] = (copied / "out" / "parts").iterdir()
+    part.unlink()
+    (copied / "out" / "parts" / f"a-{checksum(b'')}.parquet").write_bytes(b"")
+    assert main(["status", "out"]) == 2
+    assert capsys.readouterr().err == (
+        f"error: out/parts/a-{checksum(b'')}.parquet is damaged: Parquet file size is 0 bytes\n{HELP}\n"
+    )
