@@ -67,7 +67,7 @@ def headings(path: Path) -> set[str]:
     text = re.sub(r"^```.*?^```", "", path.read_text(encoding="utf-8"), flags=re.M | re.S)
     titles = re.findall(r"^#+ (.+)$", text, re.M)
     slugs = {re.sub(r"[-\s]+", "-", re.sub(r"[^\w\s-]", "", title).strip().lower()) for title in titles}
-    return slugs | set(re.findall(r'id="([^"]+)"', text)) | set(re.findall(r"^::: (\S+)$", text, re.M))
+    return slugs | set(re.findall(r'id="([^"]+)"', text)) | set(re.findall(r"^- `(epicycle[.\w]+)`", text, re.M))
 
 
 def test_links_to_places_in_documents_hold() -> None:
