@@ -44,7 +44,7 @@ from .process import Process
 from .quantity import MAX_DEPTH, Quantity, counted_in_si, is_too_deep, plain
 from .random import Stream, Streams, random_stream
 from .tag import NANOSECONDS_PER_SECOND, Tag, new_tag, to_nanoseconds, to_seconds
-from .units import UnitError, convert, in_si, parse_unit, quantity
+from .units import UnitError, convert, in_si, parse_unit
 
 __all__ = [
     "ABSENT", "MAX_DEPTH", "NANOSECONDS_PER_SECOND", "NEVER", "REQUIRED", "SAME", "Actor", "Configurable", "Context",
@@ -54,7 +54,7 @@ __all__ = [
     "accepts", "array_parameter", "bounds_text", "brief", "convert", "counted", "counted_in_si", "cut",
     "declared_parameters", "declared_ports", "did_you_mean", "digits", "elementary", "has_own_ports", "in_si",
     "irregular", "is_alone", "is_too_deep", "nearest", "new_tag", "new_wake", "normal_quantile", "normal_share",
-    "open_regular", "parse_unit", "paths", "plain", "present", "quantity", "random_stream", "read_regular",
+    "open_regular", "parse_unit", "paths", "plain", "present", "random_stream", "read_regular",
     "read_table", "readable", "rounds", "shaped", "shortened", "texts_parameter", "to_nanoseconds", "to_seconds",
     "token_type", "type_name", "unknown_parameter", "variants", "visible", "visible_character", "visible_lines",
 ]  # fmt: skip

@@ -8,7 +8,8 @@ from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, Final
 
-from ..core import Actor, EpicycleError, Parameter, ParameterError, Pending, PortError, Wake, quantity
+from ..core import Actor, EpicycleError, Parameter, ParameterError, Pending, PortError, Wake
+from ..core.units import quantity
 from ..distributions import Distribution
 from ..expression import Formula, FormulaParameter, number_of_token, of_token
 

@@ -159,9 +159,10 @@ def parts_of(types: Iterable[type[Configurable]]) -> dict[type[Configurable], di
     waiting = list(types)
     while waiting:
         for parameter in declared_parameters(waiting.pop(0)).values():
-            if is_part(parameter) and parameter.type not in found:
-                found[parameter.type] = dict(sorted(variants(parameter.type).items()))
-                waiting += found[parameter.type].values()
+            for form in (parameter, *parameter.forms):
+                if is_part(form) and form.type not in found:
+                    found[form.type] = dict(sorted(variants(form.type).items()))
+                    waiting += found[form.type].values()
     return found
 
 

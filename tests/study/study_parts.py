@@ -5,10 +5,13 @@ from __future__ import annotations
 import os
 import sys
 import time
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, ClassVar
 
 from epicycle.actors import Actor, OutputPort, Parameter
+from epicycle.runner.seal import seal
+from epicycle.runner.study.plan.plan import sealed
 
 THIS = Path(__file__)
 
@@ -88,3 +91,9 @@ def plan_of(path: Path, **changes: Any) -> Any:
     from epicycle.runner.study import Plan
 
     return Plan.made(read_study(path, types=[THIS], **changes))
+
+
+def moved(manifest: Mapping[str, Any], study: Path) -> dict[str, Any]:
+    """The manifest of a study that this user has made elsewhere."""
+    file = str(study)
+    return {**manifest, "file": file, "seal": seal(sealed(file, manifest["text"], manifest.get("code", {})))}

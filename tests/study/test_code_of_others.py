@@ -170,3 +170,27 @@ def test_a_key_that_others_can_read_seals_nothing(tmp_path: Path, capsys: pytest
     assert main(["resume", str(place.out)]) == 2
     assert said(capsys, place) == "error: " + NOT_YOURS.format("Open")
     assert not place.has_run()
+
+
+def test_a_model_that_a_folder_of_somebody_else_names_is_not_read(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    study, out = tmp_path / "walks.yaml", tmp_path / "out"
+    text = MODEL.replace("NAME", "Scale").replace("stop: 3 s", "stop: 2 s").replace("place", "way")
+    write(tmp_path, STUDY.replace("place", "way"), text)
+    assert main(["study", str(study), "--out", str(out)]) == 0
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "other"))
+    capsys.readouterr()
+    for words in ("resume", "report"):
+        assert main([words, str(out)]) != 0
+        told = capsys.readouterr().err.replace(f"{tmp_path}/", "")
+        assert told.endswith(
+            "the results were not made here by you, and loading their model would read walk.yaml\n"
+            "   help: if you trust it, make the runs yourself: epicycle study walks.yaml --out DIR\n"
+        )
+    assert main(["status", str(out)]) == 0
+    # A model of the library is read by anyone.
+    study.write_text("study: queue\nmodel: mm1\nreplications: 1\n")
+    assert main(["study", str(study), "--out", str(tmp_path / "queue")]) == 0
+    monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "third"))
+    assert main(["resume", str(tmp_path / "queue")]) == 0

@@ -17,7 +17,7 @@ from epicycle.runner.study.plan import plan as plan_module
 from epicycle.runner.study.run.backlog import Backlog
 from epicycle.runner.study.run.manifest import manifest_text
 from tests.study.study_commands import message, study
-from tests.study.study_parts import MODEL, STUDY, plan_of, write
+from tests.study.study_parts import MODEL, STUDY, moved, plan_of, write
 
 
 def test_extension_makes_only_what_is_new(done: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -74,7 +74,7 @@ def test_another_first_seed_is_that_of_a_study_that_says_so(tmp_path: Path, caps
 def test_resume_wants_the_same_model(copied: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (copied / "walk.yaml").write_text(MODEL + "\n")
     manifest = json.loads((copied / "out" / "manifest.json").read_text())
-    (copied / "out" / "manifest.json").write_text(manifest_text(manifest | {"file": str(copied / "walks.yaml")}))
+    (copied / "out" / "manifest.json").write_text(manifest_text(moved(manifest, copied / "walks.yaml")))
     assert main(["resume", str(copied / "out")]) == 2
     assert message(capsys, copied) == (
         "error: the model has changed since out was made: walk.yaml\n"
@@ -88,7 +88,7 @@ def test_results_can_be_read_where_their_model_is_not(copied: Path, capsys: pyte
     home.mkdir()
     (copied / "out").rename(home / "out")
     manifest = json.loads((home / "out" / "manifest.json").read_text())
-    (home / "out" / "manifest.json").write_text(manifest_text(manifest | {"file": "/nowhere/walks.yaml"}))
+    (home / "out" / "manifest.json").write_text(manifest_text(moved(manifest, Path("/nowhere/walks.yaml"))))
     assert open_study(home / "out").means("place") == before
     assert main(["status", str(home / "out")]) == 0
     capsys.readouterr()
@@ -101,7 +101,7 @@ def test_results_of_another_version_are_read_and_not_gone_on_with(
 ) -> None:
     before = open_study(copied / "out").table()
     manifest = json.loads((copied / "out" / "manifest.json").read_text())
-    (copied / "out" / "manifest.json").write_text(manifest_text(manifest | {"file": str(copied / "walks.yaml")}))
+    (copied / "out" / "manifest.json").write_text(manifest_text(moved(manifest, copied / "walks.yaml")))
     for module in (plan_module, session_module):
         monkeypatch.setattr(module, "epicycle_version", lambda: "47.11")
     assert open_study(copied / "out").table() == before

@@ -16,7 +16,7 @@ from epicycle.actors import EpicycleError
 from epicycle.actors.expression import ExpressionError
 
 from ...build import Model, load_model
-from ...catalogue import code_of, types_of_file
+from ...catalogue import code_of, is_path, types_of_file
 from ...language import RESERVED, Dimension, Factor, Level, Study, StudyMetric, study_of_text
 from ...provenance import version_of
 from ...seal import has_seal, seal
@@ -170,7 +170,7 @@ class Plan:
         problems.raise_if_any()
         columns = {name: Column(**said) for name, said in manifest["columns"].items()}
         said_of = (manifest["sources"], extra, manifest["model"], columns, manifest["epicycle"])
-        return cls(study, metrics, *said_of, search=manifest.get("search"), denied=_why_denied(manifest))
+        return cls(study, metrics, *said_of, search=manifest.get("search"), denied=_why_denied(manifest, study.model))
 
     def allowed(self, types: Iterable[Path] = ()) -> Plan:
         """The same with leave to run the code of its types, or of these files in their place."""
@@ -203,7 +203,8 @@ class Plan:
             "sources": self.sources,
             "level_sources": [{str(index): found for index, found in each.items()} for each in self.extra],
             **({} if self.search is None else {"search": self.search}),
-            **({"code": code, "seal": seal(code)} if code else {}),
+            **({"code": code} if code else {}),
+            "seal": seal(sealed(str(study.path.resolve()), study.text, code)),
             **({"changed": changed} if (changed := _changed(study)) else {}),
         }
 
@@ -302,14 +303,25 @@ def index_of(place: Iterable[int], dimensions: Sequence[Dimension]) -> int:
     return found
 
 
-def _why_denied(manifest: Mapping[str, Any]) -> str:
-    """Why the code that a manifest names must not be run; empty for what this user has run to make the folder."""
-    types, code = manifest["types"], manifest.get("code", {})
+def sealed(file: str, text: str, code: Mapping[str, str]) -> list[object]:
+    """What a seal covers: whatever leads to files that loading the model reads or runs."""
+    return [file, text, dict(code)]
+
+
+def _why_denied(manifest: Mapping[str, Any], model: str) -> str:
+    """Why the model that a manifest names must not be loaded; empty for what this user has run to make the folder."""
+    types, code, file = manifest["types"], manifest.get("code", {}), manifest["file"]
+    is_own = has_seal(sealed(file, manifest["text"], code), manifest.get("seal"))
     if not types:
-        return ""
+        if is_own or not is_path(model):
+            return ""
+        return (
+            f"the results were not made here by you, and loading their model would read {Path(file).parent / model}\n"
+            f"   help: if you trust it, make the runs yourself: epicycle study {shlex.quote(file)} --out DIR"
+        )
     option = " ".join(f"--types {shlex.quote(file)}" for file in types)
     told = f"\n   help: if you trust {'it' if len(types) == 1 else 'them'}, add {option}; in Python, types=[...]"
-    if not (set(types) <= code.keys() and has_seal(code, manifest.get("seal"))):
+    if not (set(types) <= code.keys() and is_own):
         files = ", ".join(types)
         return f"the results were not made here by you, and loading their model would run the code of {files}{told}"
     try:
