@@ -22,6 +22,7 @@ from .chart import Statechart, chart_text, statechart, write_statechart
 from .layout import Drawing, draw
 from .outlines import Outline, outline
 
+MOST_BOXES = 2000  # in a picture; Mermaid text has no limit
 PICTURES, TEXTS = (".svg", ".png", ".pdf"), (".mmd", ".md")
 
 __all__ = [
@@ -67,6 +68,13 @@ def write_graph(drawn: Outline | Statechart, path: Path) -> None:
         elif isinstance(drawn, Outline):
             from .picture import write_picture
 
+            boxes = sum(1 for _ in drawn.root.walk())
+            if boxes > MOST_BOXES:
+                raise GraphError(
+                    f"{boxes:,} boxes are too many for a picture (at most {MOST_BOXES:,})\n"
+                    "   help: --depth 0 draws the outermost level only, without --expand what is alike is one box, and "
+                    "Mermaid text (.mmd) has no limit"
+                )
             write_picture(draw(drawn), path)
         else:
             write_statechart(drawn, path)

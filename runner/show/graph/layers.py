@@ -18,7 +18,8 @@ from typing import Any, TypeAlias, TypeVar
 import networkx as nx
 
 T = TypeVar("T")
-SWEEPS = 12
+SWEEPS, PATIENCE = 12, 3  # how often all layers are ordered, and how often in vain
+MOST_PASSES = 400  # in one drawing; the lines of more could not be followed by eye, and take minutes to order
 
 
 @dataclass(eq=False)
@@ -66,6 +67,7 @@ class Net:
     targets: list[Pin]
     label: tuple[float, float] | None = None  # width and height
     labelled: Cell | None = None  # the pass that carries the label
+    is_cut: bool = False  # shown by names at its ends, without a line between them
 
 
 @dataclass(eq=False)
@@ -104,9 +106,21 @@ def layer(cells: Sequence[Cell], nets: Sequence[Net]) -> tuple[Layers, Runs]:
     for cell in cells:
         layers[cell.layer].append(cell)
     runs: Runs = [[] for _ in range(last + 1)]
+    passes = 0
+    for net in sorted(nets, key=_length):
+        passes += _length(net) - 1
+        ends = (net.source.cell, *(pin.cell for pin in net.targets))
+        net.is_cut = passes > MOST_PASSES and all(cell.kind == "box" for cell in ends)
     for net in nets:
-        _spread(net, layers, runs)
+        if not net.is_cut:
+            _spread(net, layers, runs)
     return layers, runs
+
+
+def _length(net: Net) -> int:
+    """How many layers a net spans."""
+    ends = [net.source.cell.layer, *(pin.cell.layer - 1 for pin in net.targets)]
+    return max(ends) - min(ends) + 1
 
 
 def _forward(cells: Sequence[Cell], nets: Sequence[Net]) -> Any:
@@ -179,14 +193,15 @@ def order(layers: Layers, runs: Runs, fixed: Iterable[Cell] = ()) -> None:
             for cells in layers:
                 cells.reverse()
                 _keep(cells, given)
-        for _ in range(SWEEPS):
-            if least == (0, 0):
+        better = 0  # the last sweep that was
+        for number in range(SWEEPS):
+            if least == (0, 0) or number - better > PATIENCE:
                 break
             for rightwards in (True, False):
                 _sweep(layers, joints, given, rightwards)
                 found = _all_crossings(layers, joints)
                 if found < least:
-                    best, least = [[*each] for each in ordered], found
+                    best, least, better = [[*each] for each in ordered], found, number
     _restore(ordered, best)
     for cells in layers:
         cells[:] = [cell for cell in cells if cell.kind != "turn"]

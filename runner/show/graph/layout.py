@@ -7,7 +7,7 @@ composite is one flat drawing with a frame around it.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 
@@ -109,6 +109,7 @@ class Drawing:
     wires: list[Wire] = field(default_factory=list)
     pills: list[Pill] = field(default_factory=list)
     words: list[Words] = field(default_factory=list)
+    cut: int = 0  # wires shown by names at their ends
 
 
 def draw(outline: Outline) -> Drawing:
@@ -121,10 +122,6 @@ def draw(outline: Outline) -> Drawing:
 
 def pill_width(words: str) -> float:
     return text_width(words, PILL) + 8.0
-
-
-def _pills_width(port: Port) -> float:
-    return sum(pill_width(aspect) + PILL_GAP for aspect in port.aspects)
 
 
 class _Scope:
@@ -148,6 +145,9 @@ class _Scope:
                     self._pin(cell, side, port)
         self.nets = self._nets()
         self.layers, self.runs = layer([*frame, *self.cells.values()], list(self.nets))
+        self.flags = {
+            pin: text for net, link in self.nets.items() if net.is_cut for pin, text in self._flags(net, link)
+        }
         order(self.layers, self.runs, frame)
         for child, cell in self.cells.items():
             self._measure(child, cell)
@@ -172,6 +172,27 @@ class _Scope:
             size = (pill_width(words) + 8.0, PILL_HEIGHT) if words else None
             nets[Net(self.pins[source], [self.pins[link.target] for link in links], size)] = links[0]
         return nets
+
+    def _flags(self, net: Net, link: Link) -> Iterator[tuple[Pin, str]]:
+        """What stands at the ends of a net that has no line."""
+        targets = [self._name(pin) for pin in net.targets]
+        yield (
+            net.source,
+            f"{label(link)} \u2192 {targets[0] if len(targets) == 1 else f'{len(targets)} inputs'}".strip(),
+        )
+        for pin in net.targets:
+            yield pin, f"{self._name(net.source)} \u2192"
+
+    def _name(self, pin: Pin) -> str:
+        return self.ends[pin].path.removeprefix(f"{self.box.path}.")
+
+    def _badges(self, pin: Pin) -> list[tuple[str, str]]:
+        """The texts beside a port, and the aspects that they are."""
+        flag = self.flags.get(pin)
+        return [*((aspect, aspect) for aspect in self.ends[pin].aspects), *([] if flag is None else [(flag, "")])]
+
+    def _badges_width(self, pin: Pin) -> float:
+        return sum(pill_width(text) + PILL_GAP for text, _ in self._badges(pin))
 
     def _measure(self, child: Box, cell: Cell) -> None:
         """Set the size of a box and the positions of its ports; an open composite is laid out to do so."""
@@ -223,7 +244,7 @@ class _Scope:
         if cell.kind != "box":
             return 0.0
         arrow = HEAD if pins is cell.left else 4.0
-        return max((_pills_width(self.ends[pin]) + arrow for pin in pins), default=0.0)
+        return max((self._badges_width(pin) + arrow for pin in pins), default=0.0)
 
     def _point(self, pin: Pin) -> Point:
         cell, is_left = pin.cell, pin in pin.cell.left
@@ -248,10 +269,12 @@ class _Scope:
                     port, at = self.ends[pin], upper + pin.offset
                     edge = left if side == "left" else left + cell.width
                     ports.append(PlacedPort(port, side, edge, at, port.path in joined))
-                    start = edge - HEAD - _pills_width(port) + PILL_GAP if side == "left" else edge + 4.0 + PILL_GAP
-                    for aspect in port.aspects:
-                        drawing.pills.append(Pill(aspect, aspect, start, at, place=port.path))
-                        start += pill_width(aspect) + PILL_GAP
+                    start = (
+                        edge - HEAD - self._badges_width(pin) + PILL_GAP if side == "left" else edge + 4.0 + PILL_GAP
+                    )
+                    for text, aspect in self._badges(pin):
+                        drawing.pills.append(Pill(text, aspect, start, at, place=port.path))
+                        start += pill_width(text) + PILL_GAP
                     drawing.words.append(_port_name(ports[-1], child.is_open))
             drawing.words += self._names(child, left, upper, cell.width)
             hidden = upper + cell.height - PILL_GAP - PILL_HEIGHT / 2
@@ -264,6 +287,7 @@ class _Scope:
                 self.inner[child].put(drawing, left, upper, level + 1)
         for net, link in self.nets.items():
             drawing.wires.append(self._wire(net, x, top, level))
+            drawing.cut += net.is_cut
             if net.labelled is not None:
                 cell = net.labelled
                 begin, end = self.spans[cell.layer]
@@ -284,6 +308,9 @@ class _Scope:
 
     def _wire(self, net: Net, x: float, y: float, level: int) -> Wire:
         pieces: list[Piece] = []
+        if net.is_cut:
+            ends = [(net.source, 4.0), *((pin, -HEAD) for pin in net.targets)]
+            pieces = [((at, height), (at + stub, height)) for pin, stub in ends for at, height in [self._point(pin)]]
         for span, runs in zip(self.spans, self.runs, strict=False):
             for run in (each for each in runs if each.net is net):
                 pieces += self._pieces(run)

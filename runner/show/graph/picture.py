@@ -102,6 +102,11 @@ def legend_of(drawing: Drawing, aspects: dict[str, list[WovenAspect]]) -> list[R
     delay = next((pill.delay for pill in drawing.pills if pill.delay is not None), None)
     if delay is not None:
         rows.append(Row("label", duration(delay), "delay of a connection"))
+    if drawing.cut:
+        told = (
+            f"the other end of {'a connection' if drawing.cut == 1 else f'{drawing.cut} connections'} with a long way"
+        )
+        rows.append(Row("label", "a.output \u2192", told))
     signs = {
         "port": ("port for any number of connections", any(p.is_multi for b in boxes for p in (*b.inputs, *b.outputs))),
         "stack": ("identical instances", any(box.count > 1 for box in boxes)),
@@ -129,6 +134,7 @@ class Painter:
         self.sheet = sheet
         self.shapes = patches
         self.colours = colours  # of aspects
+        self.waiting: dict[tuple[str, str, float], list[Any]] = {}  # small shapes by face, edge and order
 
     def paint(self, drawing: Drawing, legend: list[Row]) -> None:  # from bottom to top
         for placed in drawing.boxes:
@@ -139,12 +145,14 @@ class Painter:
         for placed in drawing.boxes:
             for port in placed.ports:
                 self.port(port.x, port.y, INK if port.is_joined else FAINT, port.port.is_multi)
+        self.marks()
         for words in drawing.words:
             self.words(words)
         for pill in drawing.pills:
             self.pill(pill.text, pill.aspect, pill.x, pill.y)
         for number, row in enumerate(legend):
             self.row(row, MARGIN, drawing.height + MARGIN / 2 + LINE * (number + 0.5))
+        self.marks()
 
     def box(self, placed: PlacedBox) -> None:
         """A box: white for an actor, shaded for a composite, with a double border if it has a director."""
@@ -174,12 +182,22 @@ class Painter:
 
     def port(self, x: float, y: float, ink: str, is_multi: bool) -> None:
         """A mark on the edge, white if it takes any number of connections."""
-        look: Any = {"facecolor": "white" if is_multi else ink, "edgecolor": ink, "linewidth": 0.8, "zorder": 3}
-        self.sheet.add_artist(self.shapes.Rectangle((x - 2.2, y - 2.2), 4.4, 4.4, **look))
+        corners = [(x - 2.2, y - 2.2), (x + 2.2, y - 2.2), (x + 2.2, y + 2.2), (x - 2.2, y + 2.2)]
+        self.waiting.setdefault(("white" if is_multi else ink, ink, 3.0), []).append(self.shapes.Polygon(corners))
+
+    def marks(self) -> None:
+        """Paint the small shapes that wait: those that look alike as one path, which is much quicker."""
+        from matplotlib.path import Path as Outline
+
+        for (face, edge, order), shapes in self.waiting.items():
+            paths = [shape.get_transform().transform_path(shape.get_path()) for shape in shapes]
+            look: Any = {"facecolor": face, "edgecolor": edge, "linewidth": 0.8, "zorder": order}
+            self.sheet.add_artist(self.shapes.PathPatch(Outline.make_compound_path(*paths), **look))
+        self.waiting.clear()
 
     def wires(self, wires: Iterable[Wire]) -> None:
         """All lines, dots where they branch, and arrowheads where they end."""
-        look: Any = {"facecolor": INK, "edgecolor": "none", "zorder": 2.5}
+        marks = self.waiting.setdefault((INK, "none", 2.5), [])
         # Lines that share a port partly overlap: painted as one path, they are not darker there.
         graph: Any = nx.Graph()
         for wire in wires:
@@ -187,10 +205,9 @@ class Painter:
         for together in nx.connected_components(graph):
             self.path([line for wire in wires if wire in together for line in wire.lines], INK, 1.0)
         for dot in (dot for wire in wires for dot in wire.dots):
-            self.sheet.add_artist(self.shapes.Circle(dot, 1.8, **look))
+            marks.append(self.shapes.Circle(dot, 1.8))
         for x, y in (head for wire in wires for head in wire.heads):
-            corners = [(x - 2.4, y), (x - 8.4, y - 2.6), (x - 8.4, y + 2.6)]
-            self.sheet.add_artist(self.shapes.Polygon(corners, closed=True, **look))
+            marks.append(self.shapes.Polygon([(x - 2.4, y), (x - 8.4, y - 2.6), (x - 8.4, y + 2.6)]))
 
     def path(
         self, lines: Iterable[Line], colour: str, width: float, radius: float = 4.0, dashes: Sequence[float] = ()

@@ -13,8 +13,9 @@ import pytest
 from epicycle.runner import load_model
 from epicycle.runner.build import Model
 from epicycle.runner.catalogue import packaged_models
+from epicycle.runner.cli import main
 from epicycle.runner.commands.options import BAD_INPUT
-from epicycle.runner.show.graph import mermaid, outline, write_graph
+from epicycle.runner.show.graph import layers, mermaid, outline, write_graph
 from epicycle.runner.show.graph.layout import draw
 from epicycle.runner.show.graph.outlines import Outline
 from epicycle.runner.show.graph.picture import aspects_seen, legend_of, tied, ties
@@ -185,6 +186,55 @@ def test_large_models_are_folded_and_say_so(tmp_path: Path) -> None:
     assert drawn.note == "41 composites are drawn closed; --depth 1 opens everything"
     assert outline(model, depth=1).note == ""
     check(draw(drawn))
+
+
+def test_wires_that_could_not_be_followed_are_names(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where nets would take too many places in the layers between, the longest of them are cut first."""
+    chain = "".join(f"  a{n}: {{type: Merge}}\n" for n in range(6))
+    text = (
+        f"model: long\nactors:\n  clock: {{type: Clock, period: 1 s}}\n{chain}  last: {{type: Merge}}\nconnections:\n"
+    )
+    text += "  - clock.output -> a0.input\n" + "".join(f"  - a{n}.output -> a{n + 1}.input\n" for n in range(5))
+    text += "  - a5.output -> last.input\n  - a4.output -> last.input\n"
+    text += "  - {from: a1.output, to: [last.input, a4.input], delay: 10 ms}\n"
+    (tmp_path / "long.yaml").write_text(text, encoding="utf-8")
+    drawn = outline(load_model(tmp_path / "long.yaml"))
+    whole = draw(drawn)
+    assert (whole.cut, [pill.text for pill in whole.pills]) == (0, ["10 ms"])
+    check(whole)
+    monkeypatch.setattr(layers, "MOST_PASSES", 2)
+    thin = draw(drawn)
+    assert thin.cut == 1
+    assert sorted(pill.text for pill in thin.pills) == ["10 ms \u2192 2 inputs", "a1.output \u2192", "a1.output \u2192"]
+    (wire,) = (wire for wire in thin.wires if wire.source == "a1.output" and len(wire.targets) == 2)
+    ports = {port.port.path: port for placed in thin.boxes for port in placed.ports}
+    assert wire.lines == tuple(
+        ((ports[path].x + start, ports[path].y), (ports[path].x + end, ports[path].y))
+        for path, start, end in (("a1.output", 0.0, 4.0), ("last.input", -9.0, 0.0), ("a4.input", -9.0, 0.0))
+    )
+    legend = legend_of(thin, aspects_seen(thin))
+    assert [(row.words, row.explanation) for row in legend][:1] == [
+        ("a.output \u2192", "the other end of a connection with a long way")
+    ]
+    write_graph(drawn, tmp_path / "long.svg")
+
+
+def test_what_nobody_could_read_is_not_drawn(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    small(tmp_path)
+    monkeypatch.setattr("epicycle.runner.show.graph.MOST_BOXES", 5)
+    words = ["graph", str(tmp_path / "small.yaml"), "--depth", "1", "-o", str(tmp_path / "small")]
+    words[-1] += ".svg"
+    assert main([*words, "--expand"]) == BAD_INPUT
+    assert capsys.readouterr().err == (
+        "error: 9 boxes are too many for a picture (at most 5)\n"
+        "   help: --depth 0 draws the outermost level only, without --expand what is alike is one box, and Mermaid "
+        "text (.mmd) has no limit\n"
+    )
+    assert main(words) == 0
+    words[-1] = str(tmp_path / "small.mmd")
+    assert main([*words, "--expand"]) == 0
 
 
 def test_mermaid_text(tmp_path: Path) -> None:

@@ -27,7 +27,7 @@ from epicycle.runner.study import Column, Plan, Replay, ReplayError, half_width,
 from epicycle.runner.study.plan.columns import si_unit
 from epicycle.runner.study.run.manifest import manifest_text
 from epicycle.runner.text import Problems
-from tests.study.study_parts import STUDY, THIS, write
+from tests.study.study_parts import STUDY, THIS, moved, write
 
 QUEUE = """
 study: queue
@@ -300,7 +300,7 @@ def test_report_repeats_runs(wheels: Path, tmp_path: Path, capsys: pytest.Captur
     assert "Replication 0 (speed: 2 m/s, seed 0), which has the most ticks: 21." in found.text
     shutil.copytree(wheels.parent, tmp_path / "copy")
     manifest = json.loads((tmp_path / "copy" / "out" / "manifest.json").read_text())
-    manifest["file"] = str(tmp_path / "copy" / "wheels.yaml")
+    manifest = moved(manifest, tmp_path / "copy" / "wheels.yaml")
     (tmp_path / "copy" / "out" / "manifest.json").write_text(manifest_text(manifest))
     (tmp_path / "copy" / "wheel.yaml").write_text(WHEEL + "# changed\n")
     capsys.readouterr()
