@@ -47,8 +47,6 @@ LIBRARIES = {
     "robots": (
         "epicycle.actors.robotics.arrays",
         "epicycle.actors.robotics.messages",
-        "epicycle.actors.robotics.world",
-        "epicycle.actors.robotics.monitors",
         "epicycle.actors.robotics.estimator",
         "epicycle.actors.robotics.controller",
     ),

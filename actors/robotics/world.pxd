@@ -1,3 +1,0 @@
-# Types for C; world.py documents everything.
-
-from epicycle.actors.robotics.arrays cimport all_finite, floats, pair
