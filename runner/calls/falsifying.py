@@ -81,8 +81,7 @@ class Falsified(Tabled):
         own = [f"{path}={value}" for path, value in _settings(run)]
         changes: Changes = {"set": [*asked.set, *own], "disturb": asked.disturb}
         changes |= {"aspects": asked.aspects, "without_aspects": asked.without}
-        command = as_command(asked.model, run.seed, asked.until, changes)
-        return command + [word for file in asked.types for word in ("--types", str(file))]
+        return as_command(asked.model, run.seed, asked.until, changes, asked.types)
 
     @property
     def covered(self) -> str:

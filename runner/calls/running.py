@@ -94,8 +94,10 @@ def run(
 FLAGS = {"overrides": "--overrides", "disturb": "--disturb", "aspects": "--aspect", "without_aspects": "--without"}
 
 
-def as_command(model: str | Path, seed: int | None, until: float | str | None, changes: Changes) -> list[str]:
-    """The command that makes the same run; it cannot name classes that a program defines."""
+def as_command(
+    model: str | Path, seed: int | None, until: float | str | None, changes: Changes, files: Iterable[str | Path] = ()
+) -> list[str]:
+    """The command that makes the same run, with these files of types; it cannot name classes that a program defines."""
     words: list[object] = ["epicycle", "run", model]
     for key, value in changes.items():
         if key == "set" and isinstance(value, Mapping):
@@ -104,6 +106,9 @@ def as_command(model: str | Path, seed: int | None, until: float | str | None, c
         elif key in FLAGS or key == "set":
             each_of = [value] if isinstance(value, (str, Path)) else cast(Iterable[object], value)
             words += [word for each in each_of for word in (FLAGS.get(key, "--set"), each)]
+    if "max_actors" in changes:
+        words += ["--max-actors", changes["max_actors"]]
+    words += [word for file in files for word in ("--types", file)]
     words += [] if seed is None else ["--seed", seed]
     words += [] if until is None else ["--until", until]
     return list(map(str, words))

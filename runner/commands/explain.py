@@ -51,7 +51,9 @@ def explain(options: argparse.Namespace) -> int:
     seed = made.seed if options.seed is None else options.seed
     changes: Changes = {"set": options.set, "overrides": options.overrides, "disturb": options.disturb}
     changes |= {"aspects": options.aspect, "without_aspects": options.without}
-    given = as_command(options.model, seed, options.until, changes)
+    if options.max_actors is not None:
+        changes["max_actors"] = options.max_actors
+    given = as_command(options.model, seed, options.until, changes, options.types)
     until = seconds("--until", options.until)
 
     def search() -> Explained:

@@ -190,6 +190,22 @@ def test_the_command(model: Path, tmp_path: Path, capsys: pytest.CaptureFixture[
     assert "did you mean 'alive'?" in capsys.readouterr().err
 
 
+def test_the_command_that_is_saved_makes_the_run(
+    model: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    types, out = tmp_path / "own.py", tmp_path / "out"
+    types.write_text("from epicycle.actors import Scale\n\n\nclass OwnScale(Scale):\n    pass\n", encoding="utf-8")
+    model.write_text(TEXT.replace("{type: Scale, factor: 1}", "{type: OwnScale, factor: 1}"), encoding="utf-8")
+    further = ["--max-actors", "50", "--types", str(types)]
+    seed = next(seed for seed in range(50) if main(["run", str(model), "--seed", str(seed), *further, "--check"]) == 3)
+    capsys.readouterr()
+    words = ["explain", str(model), "--seed", str(seed), "--monitor", "alive", "--out", str(out), "--json", "--no-page"]
+    assert main([*words, *further]) == 0
+    said = json.loads(capsys.readouterr().out)["command"]
+    assert said == ["epicycle", "run", str(model), *further, "--seed", str(seed)]
+    assert main([*said[1:], "--check"]) == 3
+
+
 # -- one run, and not two ---------------------------------------------------------------------------------------------
 
 
