@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 import tempfile
 from collections import Counter
 from typing import Any
@@ -15,6 +16,10 @@ import hypothesis
 hypothesis.settings.register_profile("the same", derandomize=True, deadline=None)
 hypothesis.settings.load_profile("the same")
 
+
+# Tests start hundreds of processes, which take a third longer where Python may not keep what it has compiled.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
 
 # The key of seals is not the user's.
 _STATE = tempfile.TemporaryDirectory()

@@ -119,11 +119,12 @@ class Actor(Configurable):
         """Whether it is known to drive itself for ever, so that something else must end a run."""
         return False
 
+    _streams: dict[str, Stream] | None = None  # by purpose, once there is one
+
     def __init__(self, path: str, **parameters: object) -> None:
         self.path = path
         self.is_part = False  # of a model
         self.context: Context = _NoContext(self)  # the run that the actor is part of
-        self._streams: dict[str, Stream] = {}
         self.inputs: dict[str, InputPort[Any]] = {}
         self.outputs: dict[str, OutputPort[Any]] = {}
         for name, port in declared_ports(type(self)).items():
@@ -166,8 +167,9 @@ class Actor(Configurable):
         made = object.__new__(type(self))
         made.path = self.path
         for side in (self.inputs, self.outputs):
-            known[id(side)] = bound = {name: port.bind(made) for name, port in side.items()}
-            known.update((id(port), bound[name]) for name, port in side.items())
+            known[id(side)] = twins = {}
+            for name, port in side.items():
+                known[id(port)] = twins[name] = port.twin(made)
         known[id(self.context)] = _NoContext(made)
         return made
 
@@ -214,7 +216,7 @@ class Actor(Configurable):
     def enter(self, context: Context) -> None:
         """Engine: the actor becomes part of a run."""
         self.context = context
-        self._streams.clear()
+        self._streams = None
         for port in self.inputs.values():
             if isinstance(port, ParameterPort):
                 port.reset()
@@ -236,6 +238,8 @@ class Actor(Configurable):
 
     def random_stream(self, purpose: str) -> Stream:
         """A random stream of the actor for one purpose, independent of all others."""
+        if self._streams is None:
+            self._streams = {}
         if purpose not in self._streams:
             self._streams[purpose] = self.context.streams.of(self.path, purpose)
         return self._streams[purpose]

@@ -10,7 +10,7 @@ cdef object _NOTHING
 cdef class ParameterPort(InputPort):
     cdef public object given, _before, _current, _parameter, _received
     cdef public bint has_received
-    cpdef tell(self, bound)
+    cpdef begin(self, like)
     cpdef start_with(self, value)
     cpdef reset(self)
     cpdef receive(self, token, channel)

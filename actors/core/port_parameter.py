@@ -17,7 +17,7 @@ class ParameterPort(InputPort[T]):
 
     __slots__ = ("_before", "_current", "_parameter", "_received", "given", "has_received")
 
-    copies_share = ("_parameter",)  # the declaration is the class's
+    copies_share = (*InputPort.copies_share, "_parameter")  # the declaration is the class's
 
     def __init__(self, parameter: PortParameter[T], type: Any, doc: str) -> None:
         InputPort.__init__(self, type, required=False, doc=doc)
@@ -25,10 +25,10 @@ class ParameterPort(InputPort[T]):
         self.has_received = False
         self.start_with(_NOTHING)
 
-    def tell(self, bound: Any) -> None:
-        InputPort.tell(self, bound)
-        bound._parameter, bound.has_received = self._parameter, False
-        bound.start_with(self.given)
+    def begin(self, like: Any) -> None:
+        InputPort.begin(self, like)
+        self._parameter, self.has_received = like._parameter, False
+        self.start_with(like.given)
 
     def start_with(self, value: T | None) -> None:
         """Take the value given in the model, which is used until a token comes."""

@@ -17,12 +17,23 @@ cdef class _Told(Emitter):
     cpdef send(self, token, channel=*)
 
 
+cdef class Terms:
+    cdef public object depends_on, doc, ptolemy, type
+    cdef public bint keep, multi, required, triggers
+    cdef public str name
+    cpdef Terms but(self, str option, value)
+
+
 cdef class Port:
-    cdef public object actor, type, doc, ptolemy
-    cdef public bint multi
-    cdef public str name, path
+    cdef public object actor
+    cdef public Terms terms
+    cdef public str path
     cdef public Py_ssize_t width
-    cpdef tell(self, bound)
+    cpdef change(self, str option, value)
+    cpdef bind(self, actor)
+    @cython.locals(bound=Port)
+    cpdef twin(self, actor)
+    cpdef begin(self, like)
 
 
 cdef class Kept:
@@ -35,9 +46,9 @@ cdef class Kept:
 
 cdef class InputPort(Port):
     cdef public list arrived, channels, shown
-    cdef public bint keep, required, triggers
     cdef public Kept kept
-    cpdef tell(self, bound)
+    cpdef begin(self, like)
+    cpdef open(self)
     cpdef receive(self, token, channel)
     cpdef prepare(self)
     cpdef clear(self)
@@ -47,7 +58,6 @@ cdef class InputPort(Port):
 
 
 cdef class OutputPort(Port):
-    cdef public object depends_on
     cdef public Emitter emitter
-    cpdef tell(self, bound)
+    cpdef begin(self, like)
     cpdef send(self, token, channel=*)

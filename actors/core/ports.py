@@ -10,7 +10,7 @@ from __future__ import annotations
 import types
 from collections import deque
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any, Generic
+from typing import TYPE_CHECKING, Any, ClassVar, Generic
 
 from .errors import EpicycleError
 from .port_types import shaped, type_name
@@ -26,6 +26,7 @@ else:
     T = TypeVar("T")
 
 _ANY: Any = Any
+NO_TOKENS: list[Any] = []  # of all ports at which no token has arrived; nothing is added to it
 
 
 class PortError(EpicycleError):
@@ -64,12 +65,60 @@ class _Told(Emitter):
         self.function(token, channel)
 
 
+class Terms:
+    """What is declared of a port: the same object for the port of an actor class and those of all its instances."""
+
+    __slots__ = ("depends_on", "doc", "keep", "multi", "name", "ptolemy", "required", "triggers", "type")
+
+    def __init__(self, type: Any, multi: bool, ptolemy: Mapping[str, object] | None, doc: str) -> None:
+        self.name = ""
+        self.type = type
+        self.multi = multi
+        self.ptolemy = ptolemy
+        self.doc = doc
+        self.required = self.triggers = self.keep = False  # of inputs
+        self.depends_on: tuple[str, ...] | None = None  # of outputs
+
+    def but(self, option: str, value: object) -> Terms:
+        """The same, except for one of them."""
+        made = Terms(self.type, self.multi, self.ptolemy, self.doc)
+        made.name, made.depends_on = self.name, self.depends_on
+        made.required, made.triggers, made.keep = self.required, self.triggers, self.keep
+        setattr(made, option, value)
+        return made
+
+
+V = TypeVar("V")
+
+
+class _Term(Generic[V]):
+    """One of the terms, as an attribute of a port; when it is set, it changes for this port alone."""
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+
+    def __get__(self, port: Any, owner: object) -> V:
+        term: V = getattr(port.terms, self.name)
+        return term
+
+    def __set__(self, port: Any, value: V) -> None:
+        port.change(self.name, value)
+
+
 class Port(Generic[T]):
     """The common part of both directions: the declaration, and the place of the instance."""
 
-    __slots__ = ("actor", "doc", "multi", "name", "path", "ptolemy", "type", "width")
+    __slots__ = ("actor", "path", "terms", "width")
+
+    copies_share: ClassVar[tuple[str, ...]] = ("terms",)  # attributes that copies of a run share
 
     direction = ""
+
+    name = _Term[str]("name")
+    type = _Term[Any]("type")
+    multi = _Term[bool]("multi")
+    ptolemy = _Term["Mapping[str, object] | None"]("ptolemy")
+    doc = _Term[str]("doc")
 
     def __init__(
         self,
@@ -80,35 +129,39 @@ class Port(Generic[T]):
         ptolemy: Mapping[str, object] | None,
         doc: str,
     ) -> None:
-        self.type = type if shape is None else shaped(type, shape)
-        self.multi = multi
-        self.ptolemy = ptolemy
-        self.doc = doc
-        self.name = ""
+        self.terms = Terms(type if shape is None else shaped(type, shape), multi, ptolemy, doc)
         self.path = ""
         self.actor: Any = None
         self.width = 0
 
-    def __set_name__(self, owner: type, name: str) -> None:
+    def __set_name__(self, owner: object, name: str) -> None:
         self.name = name
+
+    def change(self, option: str, value: object) -> None:
+        """Change one of the terms for this port alone."""
+        if getattr(self.terms, option) != value:
+            self.terms = self.terms.but(option, value)
 
     def bind(self, actor: Any) -> Any:
         """The port of one instance."""
-        bound = type(self).__new__(type(self))
-        self.tell(bound)
-        bound.actor = actor
+        bound = self.twin(actor)
         bound.path = f"{actor.path}.{self.name}"
         return bound
 
-    def tell(self, bound: Any) -> None:
-        """Copy the declaration to the port of an instance."""
-        bound.type, bound.multi, bound.doc, bound.name = self.type, self.multi, self.doc, self.name
-        bound.ptolemy, bound.width = self.ptolemy, 0
+    def twin(self, actor: Any) -> Any:
+        """The same port of another instance with the same path."""
+        bound = type(self).__new__(type(self))
+        bound.terms, bound.path, bound.actor, bound.width = self.terms, self.path, actor, 0
+        bound.begin(self)
+        return bound
+
+    def begin(self, like: Any) -> None:
+        """Take the state that the port of an instance begins with."""
 
     def follow_ptolemy(self) -> None:
         """Engine: make the port as in Ptolemy, if the declaration says how."""
         for option, value in (self.ptolemy or {}).items():
-            setattr(self, option, value)
+            self.change(option, value)
 
     def __repr__(self) -> str:
         return f"<{self.direction} port {self.path or self.name}: {type_name(self.type)}>"
@@ -157,7 +210,7 @@ class InputPort(Port[T]):
     options that differ under a director with ``like: ptolemy``: ``ptolemy={"keep": True}``.
     """
 
-    __slots__ = ("arrived", "channels", "keep", "kept", "required", "shown", "triggers")
+    __slots__ = ("arrived", "channels", "kept", "shown")
 
     direction = "input"
 
@@ -166,6 +219,10 @@ class InputPort(Port[T]):
         channels: list[int] | None  # of these tokens, if there are several connections
         kept: Kept | None  # earlier tokens that are kept, or wait to be taken out
         shown: list[Any]  # the same as arrived, or empty while they are hidden
+
+    required = _Term[bool]("required")
+    triggers = _Term[bool]("triggers")
+    keep = _Term[bool]("keep")
 
     def __init__(
         self,
@@ -180,15 +237,13 @@ class InputPort(Port[T]):
         doc: str = "",
     ) -> None:
         Port.__init__(self, type, shape=shape, multi=multi, ptolemy=ptolemy, doc=doc)
-        self.required = required
-        self.triggers = triggers
-        self.keep = keep
-        self.prepare()
+        terms = self.terms
+        terms.required, terms.triggers, terms.keep = required, triggers, keep
+        InputPort.begin(self, self)
 
-    def tell(self, bound: Any) -> None:
-        Port.tell(self, bound)
-        bound.required, bound.triggers, bound.keep = self.required, self.triggers, self.keep
-        bound.prepare()
+    def begin(self, like: Any) -> None:
+        self.arrived = self.shown = NO_TOKENS
+        self.channels = self.kept = None
 
     @property
     def present(self) -> bool:
@@ -244,11 +299,20 @@ class InputPort(Port[T]):
 
     def receive(self, token: Any, channel: int) -> None:
         """Engine: a token arrives."""
+        self.open()
         self.arrived.append(token)
         if self.width > 1:
             if self.channels is None:
                 self.channels = []
             self.channels.append(channel)
+
+    def open(self) -> None:
+        """Engine: make room for tokens; most ports with a default never get any."""
+        if self.arrived is NO_TOKENS:
+            is_shown = self.shown is self.arrived
+            self.arrived = []
+            if is_shown:
+                self.shown = self.arrived
 
     def prepare(self) -> None:
         """Reset the port: no token has come yet."""
@@ -304,9 +368,11 @@ class OutputPort(Port[T]):
     none (an actor that delays), so that the port may be part of a loop.  ``ptolemy`` is as for inputs.
     """
 
-    __slots__ = ("depends_on", "emitter")
+    __slots__ = ("emitter",)
 
     direction = "output"
+
+    depends_on = _Term["tuple[str, ...] | None"]("depends_on")
 
     def __init__(
         self,
@@ -319,12 +385,11 @@ class OutputPort(Port[T]):
         doc: str = "",
     ) -> None:
         Port.__init__(self, type, shape=shape, multi=multi, ptolemy=ptolemy, doc=doc)
-        self.depends_on = depends_on
+        self.terms.depends_on = depends_on
         self.emitter: Emitter | None = None
 
-    def tell(self, bound: Any) -> None:
-        Port.tell(self, bound)
-        bound.depends_on, bound.emitter = self.depends_on, None
+    def begin(self, like: Any) -> None:
+        self.emitter = None
 
     def send(self, token: T, channel: int | None = None) -> None:
         """Send a token at the present tag: to all channels, or to the one given."""

@@ -46,8 +46,9 @@ class Turn:
         self.fires_for_nothing = bool(all_at_once)
         self.is_own = ranks.get(actor.path) == rank
         self.ports: list[InputPort[Any]] = [p for p in connected if self.takes_all or ranks[p.path] == rank]
-        self.later: list[InputPort[Any]] = [p for p in connected if not self.takes_all and ranks[p.path] > rank]
-        keeps = [port for port in self.ports if port.keep]
+        later = [p for p in connected if not self.takes_all and ranks[p.path] > rank]
+        self.later: list[InputPort[Any]] = later or _NOTHING
+        keeps = [port for port in self.ports if port.terms.keep]
         self.keeps: list[InputPort[Any]] | None = keeps or None
         self.poster: Poster | None = None
         self.nesting = 0
@@ -101,7 +102,7 @@ class Turn:
         """The actor has fired: unread tokens are dropped."""
         for port in self.ports:
             if port.arrived or port.kept is not None:
-                if port.keep:
+                if port.terms.keep:
                     port.put_in_line()
                 else:
                     port.clear()

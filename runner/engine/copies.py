@@ -29,7 +29,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from epicycle.actors import CORE_MODULES, Actor, EpicycleError, Parameter
+from epicycle.actors import CORE_MODULES, NO_TOKENS, Actor, EpicycleError, Parameter
 from epicycle.actors.expression import Formula, PortFormula
 from epicycle.aspects import Aspect, JoinPoint
 
@@ -51,7 +51,7 @@ class Copies:
     """
 
     def __init__(self, shared: Iterable[object] = (), callbacks: list[object] | None = None) -> None:
-        self._known: dict[int, Any] = {id(thing): thing for thing in shared}
+        self._known: dict[int, Any] = {id(thing): thing for thing in (NO_TOKENS, *shared)}
         self._kept: list[Any] = []  # originals are kept alive, so that nothing else gets their ids
         self._to_fill: list[tuple[_Fill, Any, Any, tuple[Any, str]]] = []
         self._owner: tuple[Any, str] = None, ""  # the owner of the object being copied, and the attribute

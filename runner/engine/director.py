@@ -434,6 +434,7 @@ class Entry(Way):
         self.port = port
         self.channel = channel
         self.is_plain = type(port) is InputPort and port.width == 1
+        port.open()
 
     def go(self, token: Any) -> None:
         """Put a token in."""

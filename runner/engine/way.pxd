@@ -33,7 +33,6 @@ cdef class Sender(Emitter):
     cdef public Director director
     cdef public Writer writer
     cdef public Way onward
-    cdef public list wires
     cdef public dict single
     cpdef go(self, token)
     cpdef send(self, token, channel=*)

@@ -107,17 +107,17 @@ class Delayed(Way):
 class Channels(Protocol):
     """Makes ways along single wires."""
 
-    def along(self, port: OutputPort[Any], wires: list[Any], channel: int) -> Sender:
-        """The sender over one wire of a port."""
+    def along(self, port: OutputPort[Any], channel: int) -> Sender:
+        """The sender over one of the channels of a port."""
 
 
 class Sender(Emitter):
     """The effect of ``send`` at an output port: a token is logged, and sent along all channels or one.
 
-    ``channels`` makes the way along one of its wires, with the writer of its log records.
+    ``channels`` makes the way along one of them, with the writer of its log records.
     """
 
-    __slots__ = ("channels", "director", "onward", "port", "single", "wires", "writer")
+    __slots__ = ("channels", "director", "onward", "port", "single", "writer")
 
     def __init__(
         self,
@@ -126,14 +126,12 @@ class Sender(Emitter):
         writer: Writer,
         onward: Way,
         channels: Channels,
-        wires: list[Any],
     ) -> None:
         self.port = port
         self.director = director
         self.writer = writer
         self.onward = onward
         self.channels = channels
-        self.wires = wires
         self.single: dict[int, Sender] | None = None  # made when the first token takes them: few ever do
 
     def go(self, token: Any) -> None:
@@ -154,11 +152,11 @@ class Sender(Emitter):
             self.single = {}
         sender = self.single.get(channel)
         if sender is None:
-            width = len(self.wires)
+            width = self.port.width
             if not 0 <= channel < width:
                 known = f"it has {counted(width, 'channel')}, counted from 0"
                 raise PortError(f"{self.port.path} has no channel {channel}: {known}")
-            sender = self.single[channel] = self.channels.along(self.port, self.wires, channel)
+            sender = self.single[channel] = self.channels.along(self.port, channel)
         return sender
 
 

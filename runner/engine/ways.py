@@ -82,7 +82,6 @@ class Ways:
         self._woven_on: dict[tuple[str, str], list[WovenAspect]] = {}
         self._requests = {woven.name: Requests(woven) for woven in aspects if woven.model is not None}
         self._shared: dict[object, dict[Any, Any]] = {}
-        self._channels: dict[tuple[Hop, ...], int] = {}  # at their ends
         self._latest: dict[str, Any] = {}  # the latest tokens of ports that aspects look at
         for woven in aspects:
             for path in (*woven.ports, *(woven.actors if isinstance(woven.aspect, ExecutionAspect) else ())):
@@ -161,33 +160,15 @@ class Ways:
             output.disconnect()
 
     def _find(self) -> list[tuple[OutputPort[Any], Emitter]]:
-        # A port's channels are its wires, on both sides: composite ports on the way neither add nor merge any.  Where a
-        # connection is shared, all wires over it are one.
-        leaving: dict[str, list[tuple[Hop, ...]]] = {}
+        channels = self.graph.channels
         for actor in self.actors.values():
             for port in actor.inputs.values():
-                channels = self.graph.channels_to(port)
-                port.width = len(channels)
-                for channel, wires in enumerate(channels):
-                    for wire in wires:
-                        self._channels[wire.hops] = channel
-                        leaving.setdefault(wire.source.path, []).append(wire.hops)
-        for hops in leaving.values():
-            hops.sort(key=lambda way: [hop.order for hop in way])  # in the order of declaration
+                port.width = channels.width(port.path)
         emitters = [
-            (output, self._emitter(output, self._by_channel(leaving.get(output.path, []))))
-            for actor in self.actors.values()
-            for output in actor.outputs.values()
+            (output, self._emitter(output)) for actor in self.actors.values() for output in actor.outputs.values()
         ]
         self._open_requests()
         return emitters
-
-    def _by_channel(self, wires: list[tuple[Hop, ...]]) -> list[list[tuple[Hop, ...]]]:
-        """The wires of an output port by channel, in order."""
-        found: dict[object, list[tuple[Hop, ...]]] = {}
-        for hops in wires:
-            found.setdefault(self.graph.channel_of(hops, hops[0]), []).append(hops)
-        return list(found.values())
 
     def _open_requests(self) -> None:
         """Find the ways from the request ports of aspects that are models to the actors inside."""
@@ -209,26 +190,24 @@ class Ways:
         listeners = self._listeners.get(path, [])
         return [listener if isinstance(listener, Way) else Call(listener) for listener in listeners]
 
-    def _emitter(self, port: OutputPort[Any], channels: list[list[tuple[Hop, ...]]]) -> Emitter:
+    def _emitter(self, port: OutputPort[Any]) -> Emitter:
         """The effect of ``port.send``."""
-        port.width = len(channels)
-        everywhere = self._sender(port, channels, None, self._branches(port.path, ()))
+        port.width = len(self.graph.channels.leaving(port.path))
+        everywhere = self._sender(port, None, self._branches(port.path, ()))
         # An aspect at an output comes before the send itself: what it drops has not been sent.
         if port.path not in self._woven_at:
             return everywhere
         return Screened(everywhere, partial(self._woven, port.path, port.path))
 
-    def _sender(
-        self, port: OutputPort[Any], channels: list[list[tuple[Hop, ...]]], channel: int | None, ways: list[Way]
-    ) -> Sender:
+    def _sender(self, port: OutputPort[Any], channel: int | None, ways: list[Way]) -> Sender:
         writer = self.log.writer("send", port.actor.path, port.name, channel, "")
-        return Sender(port, self.director, writer, all_of([*self._heard(port.path), *ways]), self, channels)
+        return Sender(port, self.director, writer, all_of([*self._heard(port.path), *ways]), self)
 
-    def along(self, port: OutputPort[Any], channels: list[list[tuple[Hop, ...]]], channel: int) -> Sender:
+    def along(self, port: OutputPort[Any], channel: int) -> Sender:
         """The sender over one of the channels of a port."""
-        wires = channels[channel]
+        wires = self.graph.channels.leaving(port.path)[channel]
         ways = [self._way(wires[0])] if len(wires) == 1 else self._branches(port.path, (), wires)
-        return self._sender(port, channels, channel, ways)
+        return self._sender(port, channel, ways)
 
     def _branches(self, path: str, hops: tuple[Hop, ...], wires: list[tuple[Hop, ...]] | None = None) -> list[Way]:
         """The ways onward from a port, one for each connection that leaves it, or that some wires take."""
@@ -274,7 +253,8 @@ class Ways:
         """The end of a wire, in the port of an actor."""
         owner, _, name = hops[-1].destination.rpartition(".")
         port, execution = self.actors[owner].inputs[name], self._executions.get(owner)
-        return self.director.entry(port, self._channels[hops], None if execution is None else execution.turn_of(port))
+        stand_in = None if execution is None else execution.turn_of(port)
+        return self.director.entry(port, self.graph.channels.of(hops), stand_in)
 
     def _woven(self, path: str, source: str, onward: Way) -> Way:
         """``onward`` preceded by the aspects at a port, the first declared outermost."""

@@ -96,6 +96,7 @@ class ModelGraph:
         self.detours: list[Detour] = []  # found when the model is checked, see ``detours``
         self.limits: Limits = limits if inside is None else inside.limits
         self.is_frozen = False
+        self._channels: Channels | None = None  # worked out since then
         self._outgoing: dict[str, list[Hop]] = {}  # of each port, in their order
         self._incoming: dict[str, list[Hop]] = {}
         self._borders: dict[str, tuple[list[str], list[str]]] = {}
@@ -117,7 +118,7 @@ class ModelGraph:
         for name, value in vars(self).items():
             setattr(made, name, copy(value))
         made.ports = {path: copy(node) for path, node in self.ports.items()}
-        made.is_frozen = False
+        made.is_frozen, made._channels = False, None
         made.members = {path: [*each] for path, each in self.members.items()}
         made._outgoing = {path: [*hops] for path, hops in self._outgoing.items()}
         made._incoming = {path: [*hops] for path, hops in self._incoming.items()}
@@ -356,6 +357,15 @@ class ModelGraph:
             found.setdefault(self.channel_of(wire.hops, wire.hops[-1]), []).append(wire)
         return list(found.values())
 
+    @property
+    def channels(self) -> Channels:
+        """The channels of all ports of a frozen graph."""
+        if self._channels is None:
+            if not self.is_frozen:
+                raise RuntimeError("the channels of a graph that is not frozen may change")
+            self._channels = Channels(self)
+        return self._channels
+
     def channel_of(self, hops: tuple[Hop, ...], hop: Hop) -> object:
         """What distinguishes the channels of a port: the wire, or the connection at the port if that is one channel.
 
@@ -399,6 +409,47 @@ class ModelGraph:
                 waiting += [each for each in reversed(before) if each not in seen]
                 seen.update(before)
         return found
+
+
+class Channels:
+    """The channels of all ports of a graph: their wires, on both sides, in the order of declaration.
+
+    Ports of composites on the way neither add nor merge any.  Where a connection is shared, all wires over it are one.
+    """
+
+    def __init__(self, graph: ModelGraph) -> None:
+        self._widths: dict[str, int] = {}  # of inputs
+        self._at: dict[tuple[Hop, ...], int] = {}  # the channel of each wire at its end
+        self._leaving: dict[str, list[list[tuple[Hop, ...]]]] = {}  # the wires of each output by channel
+        leaving: dict[str, list[tuple[Hop, ...]]] = {}
+        for actor in graph.actors.values():
+            for port in actor.inputs.values():
+                channels = graph.channels_to(port)
+                if channels:
+                    self._widths[port.path] = len(channels)
+                for channel, wires in enumerate(channels):
+                    for wire in wires:
+                        self._at[wire.hops] = channel
+                        leaving.setdefault(wire.source.path, []).append(wire.hops)
+        for path, ways in leaving.items():
+            if len(ways) > 1:
+                ways.sort(key=lambda way: [hop.order for hop in way])
+            found: dict[object, list[tuple[Hop, ...]]] = {}
+            for hops in ways:
+                found.setdefault(graph.channel_of(hops, hops[0]), []).append(hops)
+            self._leaving[path] = list(found.values())
+
+    def width(self, path: str) -> int:
+        """The number of channels of an input."""
+        return self._widths.get(path, 0)
+
+    def of(self, hops: tuple[Hop, ...]) -> int:
+        """The channel of a wire at its end."""
+        return self._at[hops]
+
+    def leaving(self, path: str) -> Sequence[list[tuple[Hop, ...]]]:
+        """The wires that leave an output, by channel."""
+        return self._leaving.get(path, ())
 
 
 def is_within(path: str, outer: str) -> bool:

@@ -10,7 +10,7 @@ cdef Py_ssize_t _MANY
 cdef class Writer:
     cdef public EventLog log
     cdef public tuple names
-    cdef public bytes _names, _number
+    cdef public bytes _number
     cdef public object _keep
     @cython.locals(hashed=RecordHash)
     cpdef write(self, when, value)

@@ -69,23 +69,27 @@ class Record:
 class Writer:
     """Appends records with the same names to a log; each needs only a tag and a value."""
 
-    __slots__ = ("_keep", "_names", "_number", "log", "names")
+    __slots__ = ("_keep", "_number", "log", "names")
 
     def __init__(self, log: EventLog, names: Names, keep: Callable[[Record], None] | None) -> None:
-        event, actor, port, channel, aspect = self.names = names
+        self.names = names
         self.log = log
-        self._names = b"".join(map(canonical, (event, actor, port, aspect, channel)))
         self._number = b""  # of these names; none before the first record
         self._keep = keep
 
     def write(self, when: When, value: Any) -> None:
         """Append a record; raises an exception if the value cannot be logged."""
         hashed = self.log.hash
-        self._number = hashed.add(self._number, self._names, when, value)
+        self._number = hashed.add(self._number, b"" if self._number else _encoded(self.names), when, value)
         if hashed.at_tag > _MANY:
             self.log.report(when, f"{self.names[1]}.{self.names[2]}")
         if self._keep is not None:
             self._keep(Record(_tag(when), *self.names, value))
+
+
+def _encoded(names: Names) -> bytes:
+    event, actor, port, channel, aspect = names
+    return b"".join(map(canonical, (event, actor, port, aspect, channel)))
 
 
 def _tag(when: When) -> Tag:

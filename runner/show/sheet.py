@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Iterator, Sequence
-from contextlib import contextmanager
-from contextvars import ContextVar
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from textwrap import fill
 from typing import Any, Literal, NamedTuple
@@ -27,26 +25,20 @@ MAX_LINES = 40  # per panel of a study
 MAX_PANELS = 24
 MAX_TEXT = 200  # characters per label
 MAX_TIPS = 3000  # per picture
-WIDTH, NARROW = 7.0, 3.7  # inches; the latter is for the screen of a telephone
+WIDTH, NARROW = 7.0, 4.6  # inches; the latter, of one or two columns, can be read on the screen of a telephone
 _MAX_NAME = 36  # characters of a name beside an axis
 _LONG = 30  # characters per line beside an axis
-_LONGEST = {1: 90, 2: 46, 3: 30}  # and above a panel, by the number of columns
-_LONGEST_NARROW = 44
+_LONGEST = {1: 58, 2: 29, 3: 30}  # and above a panel, by the number of columns
+_PER_INCH = 15  # characters of a legend, in which a line takes the room of six
 _NAMED = 26  # rows of a band that are named
 _PAD = 0.06  # inches around the drawing
 _SVG = "http://www.w3.org/2000/svg"
 _INDEX = re.compile(r"\[(\d+)\]")
-_is_narrow: ContextVar[bool] = ContextVar("is_narrow", default=False)
 
 
-@contextmanager
-def narrow() -> Iterator[None]:
-    """Within this, sheets are narrow: their panels are below each other."""
-    token = _is_narrow.set(True)
-    try:
-        yield
-    finally:
-        _is_narrow.reset(token)
+def width_of(columns: int) -> float:
+    """The width of a sheet with so many columns, in inches."""
+    return NARROW if columns <= 2 else WIDTH
 
 
 def colours(count: int) -> list[str]:
@@ -71,8 +63,8 @@ class Tip(NamedTuple):
 class Sheet:
     """Panels in rows and columns, with letters if there are several; used within ``style``.
 
-    With ``heights`` (inches), the panels are below each other and belong together: the top one carries the title, and
-    each has its legend beside it.
+    One or two columns fit on the screen of a telephone.  With ``heights`` (inches), the panels are below each other
+    and belong together: the top one carries the title, and each has its legend beside it.
     """
 
     def __init__(
@@ -85,12 +77,13 @@ class Sheet:
         same_x: bool = False,
         same_y: bool | Literal["row"] = False,
     ) -> None:
-        count, is_narrow = len(panels), _is_narrow.get()
-        few = {0: 1, 4: 2}.get(count, min(count, 3))
-        self.columns = 1 if heights or is_narrow else columns or (few if count <= 12 else 4)
+        count = len(panels)
+        few = max(1, min(count, 2)) if count <= 6 else 3
+        self.columns = 1 if heights else columns or (few if count <= 12 else 4)
+        self._width = WIDTH if heights else width_of(self.columns)
         rows = math.ceil(count / self.columns)
         tall = sum(heights) if heights else rows * height * {1: 1.25, 2: 1.0, 3: 1.0}.get(self.columns, 0.85)
-        self.canvas = new_canvas(NARROW if is_narrow else WIDTH, 0.5 + tall)
+        self.canvas = new_canvas(self._width, 0.5 + tall)
         self.canvas.set_layout_engine("constrained", h_pad=0.06, w_pad=0.06)
         grid = self.canvas.subplots(
             rows, self.columns, squeeze=False, sharex=same_x, sharey=same_y, height_ratios=heights or None
@@ -103,7 +96,7 @@ class Sheet:
         for index, (axes, title) in enumerate(zip(self.axes, panels, strict=True)):
             letter = f"({chr(ord('a') + index)}) " if 1 < count <= 26 and not heights else ""
             if letter or title:
-                longest = _LONGEST_NARROW if is_narrow else _LONGEST.get(self.columns, 22)
+                longest = 90 if heights else _LONGEST.get(self.columns, 22)
                 axes.set_title(fill(f"{letter}{title}", longest), loc="left")
 
     def call(self, axes: Any, x: str, y: str) -> None:
@@ -124,10 +117,8 @@ class Sheet:
         """Add a legend above the panels, where it hides nothing."""
         if not handles:
             return
-        long = max(map(len, labels)) > 22
-        columns = min(len(handles), 2 if long else 5 if self.columns > 1 else 4)
-        if _is_narrow.get():
-            columns = 1 if long else 2
+        fit = int(self._width * _PER_INCH) // (max(map(len, labels)) + 6)
+        columns = max(1, min(len(handles), fit, 5))
         self.canvas.legend(handles, labels, title=title or None, loc="outside upper center", ncols=columns)
 
     def band(self, names: Sequence[str], shades: Sequence[str], title: str) -> None:
@@ -212,10 +203,7 @@ def tips_of(svg: bytes) -> Tipped | None:
 
 def legend_beside(axes: Any, **options: Any) -> None:
     """A legend to the right of the axes, of any length."""
-    where = {"loc": "upper left", "bbox_to_anchor": (1.02, 1.0), "borderaxespad": 0.0}
-    if _is_narrow.get():  # below
-        where = {"loc": "upper center", "bbox_to_anchor": (0.5, -0.2)}
-    found = axes.legend(**where, **options)
+    found = axes.legend(loc="upper left", bbox_to_anchor=(1.02, 1.0), borderaxespad=0.0, **options)
     for text in found.get_texts():
         text.set_text(fill(abridged(text.get_text(), 2 * _MAX_NAME), _MAX_NAME))
 

@@ -22,7 +22,7 @@ SOURCES = (
     ("core/laws.py", "gamma", "da1afffdbd29a311"),
     ("core/laws.py", "normal", "c6bfa77a937cc231"),
     ("core/laws.py", "uniform", "36b3b17c5a3d5e40"),
-    ("core/port_parameter.py", "ParameterPort", "8a9a3fc4f574c08e"),
+    ("core/port_parameter.py", "ParameterPort", "b1efbd3445a35318"),
     ("core/tag.py", "to_nanoseconds", "92eec895841c04b6"),
     ("core/tag.py", "to_seconds", "f6c6aae6371c52a3"),
     ("distributions.py", "Constant", "e6f123317132cd9d"),

@@ -113,7 +113,7 @@ def assert_goes_on(model: Model, number: int, seed: int = 0, keep_log: bool = Tr
 def test_snapshots_of_packaged_models(name: str) -> None:
     short = ["observers=1", "disturbance=0.5"] if name == "collision_avoidance" else []
     model = load_model(name, set=short)
-    model.stop = min(model.stop or 100.0, DURATIONS.get(name, 300.0))
+    model.stop = min(model.stop or 100.0, DURATIONS.get(name, 300.0)) / 4.0
     assert_goes_on(model, 3)
 
 

@@ -12,7 +12,7 @@ import pytest
 ROOT = Path(__file__).parents[2]
 
 
-@pytest.mark.parametrize(("seed", "mutants"), [(1, 100), pytest.param(2, 2_000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(("seed", "mutants"), [(1, 50), pytest.param(2, 2_000, marks=pytest.mark.slow)])
 def test_mutants_of_good_models(seed: int, mutants: int) -> None:
     # In a process of its own, which watches what it opens, and whose memory is limited.
     command = [sys.executable, "-m", "tests.fuzz.fuzz", "--mutants", str(mutants), "--seed", str(seed), "--jobs", "1"]

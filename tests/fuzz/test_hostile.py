@@ -15,7 +15,7 @@ from tests.fuzz.surfaces import SURFACES
 ROOT = Path(__file__).parents[2]
 
 
-@pytest.mark.parametrize(("seed", "inputs"), [(1, 90), pytest.param(2, 900, marks=pytest.mark.slow)])
+@pytest.mark.parametrize(("seed", "inputs"), [(1, 45), pytest.param(2, 900, marks=pytest.mark.slow)])
 def test_hostile_inputs(seed: int, inputs: int) -> None:
     # In processes of their own, which watch what they open, and whose memory is limited.
     command = [sys.executable, "-m", "tests.fuzz.hostile", "--inputs", str(inputs), "--seed", str(seed), "--jobs", "1"]

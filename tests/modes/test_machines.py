@@ -39,15 +39,14 @@ def sent(
 # -- against the reference ----------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("start", range(0, 200, 50))
-def test_random_machines_are_the_same_in_a_file_in_python_and_in_the_reference(start: int) -> None:
-    found = {seed: disagreement(seed) for seed in range(start, start + 50)}
+def test_random_machines_are_the_same_in_a_file_in_python_and_in_the_reference() -> None:
+    found = {seed: disagreement(seed) for seed in range(50)}
     assert {seed: each for seed, each in found.items() if each is not None} == {}
 
 
 @pytest.mark.slow
 def test_ten_thousand_random_machines_are() -> None:
-    found = {seed: disagreement(seed) for seed in range(1000, 11_000)}
+    found = {seed: disagreement(seed) for seed in range(50, 10_050)}
     assert {seed: each for seed, each in found.items() if each is not None} == {}
 
 

@@ -13,6 +13,8 @@ from .portable import GOLDEN, Setting, differences, old_libraries, outcome
 
 # Their kernels, which no other model has, take long to compile for another processor.
 OWN_KERNELS = ("model flying_observers", "model many_obstacles", "model safe_avoidance")
+# What other tests compare: function by function, and with what tutorials show.
+ELSEWHERE = ("functions, compiled", "tutorial ")
 
 
 def test_every_part_has_a_digest_in_the_repository() -> None:
@@ -24,18 +26,20 @@ def test_every_function_is_in_it() -> None:
     assert {*elementary.__all__} - {*ONE_ARGUMENT, *TWO_ARGUMENTS} <= {"distance", "power", "total", "log_gamma"}
 
 
+@pytest.mark.slow  # tests/actors/core/elementary compares each function by itself
 def test_compiled_functions_have_the_same_bits() -> None:
     assert functions(compiled=True) == functions()
 
 
-@pytest.mark.parametrize("name", OWN_KERNELS)
+@pytest.mark.parametrize("name", [name for name in parts() if not name.startswith(ELSEWHERE)])
 def test_digests_hold(name: str) -> None:
     assert dict(digests([name])) == {name: json.loads(GOLDEN.read_text())[name]}
 
 
+@pytest.mark.slow  # which compiles all kernels for another processor
 def test_digests_hold_with_the_libraries_of_an_old_processor() -> None:
     golden = json.loads(GOLDEN.read_text())
-    # The rest is compared as it is: below, and with what tutorials show.  `make portable` does it all.
+    # The rest is compared as it is: above, and with what tutorials show.  `make portable` does it all.
     parts = tuple(name for name in golden if name not in OWN_KERNELS and not name.startswith("tutorial "))
     found, wrong, _ = outcome(Setting("old", {**old_libraries(), "PYTHONHASHSEED": "2"}, parts=parts))
     assert wrong == ""

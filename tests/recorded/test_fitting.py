@@ -22,6 +22,8 @@ from tests.aspects.bench import Bench
 from tests.aspects.laws import lost_of
 
 COUNT = 20_000
+# More of them repeat the proof.
+SEEDS = pytest.mark.parametrize("seed", [1, *(pytest.param(seed, marks=pytest.mark.slow) for seed in (2, 3))])
 
 
 def losses_of(aspect: PortAspect, seed: int, count: int = COUNT) -> np.ndarray:
@@ -35,7 +37,7 @@ def best(found: list[LossModel]) -> LossModel:
 # -- losses -----------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@SEEDS
 @pytest.mark.parametrize(
     "truth",
     [
@@ -60,7 +62,7 @@ def test_a_hidden_channel_is_found_again(truth: dict[str, float], seed: int) -> 
     assert found.gain.p < 1e-6
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@SEEDS
 def test_bursts_are_found_again_and_no_more_is_made_of_them(seed: int) -> None:
     found = best(loss_models(losses_of(GilbertElliott(p=1 / 12, r=0.25), seed)))
     assert found.name == "Gilbert"
@@ -72,7 +74,7 @@ def test_bursts_are_found_again_and_no_more_is_made_of_them(seed: int) -> None:
     assert found.runs.p > 0.001
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@SEEDS
 def test_independent_losses_stay_independent(seed: int) -> None:
     found = best(loss_models(losses_of(PacketLoss(probability=0.2), seed)))
     assert (found.name, found.aspect) == ("independent", "PacketLoss")
@@ -138,7 +140,7 @@ def test_little_to_fit(lost: list[bool]) -> None:
 # -- delays -----------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@SEEDS
 @pytest.mark.parametrize(
     ("name", "shift", "mean", "shape"),
     [

@@ -342,6 +342,7 @@ def test_more_runs_continue_it() -> None:
     assert table("out") == table("calm")
 
 
+@pytest.mark.slow  # an estimate that is killed (test_rare.py), and a study, keep their rows in the same way
 def test_a_search_that_is_killed_comes_to_the_same() -> None:
     Path("walk.yaml").write_text(MODEL, encoding="utf-8")
     said = ["falsify", "walk.yaml", "--monitor", "always walk.output < 8.5", "--vary", "drift=-1 m/s..0.2 m/s"]

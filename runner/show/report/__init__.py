@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import tempfile
 from collections import Counter
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
@@ -16,7 +15,6 @@ from ...study import Replay, StudyResults, plan_of_folder, ranked, repeat, repla
 from ...text import ModelError, Problems, describe, raised_at
 from ..outcome import MAX_NAME
 from ..pen import FORMATS, FigureError, style
-from ..sheet import narrow
 from .data import Data
 from .declared import check_figures, figures_of_study, own_study_figures, study_figure_types
 from .figure import RunKey, SignalFigure, StudyFigure
@@ -73,9 +71,7 @@ def write_report(
         else:
             report.files += paths
             svg = paths[FORMATS.index("svg")].read_bytes()
-            pictures.append(
-                Picture(name, figure.doc, svg, caption, _narrow(name, figure, data, extracts.get(name, {})))
-            )
+            pictures.append(Picture(name, figure.doc, svg, caption))
     judgements, recommendations = results.claims(), results.guideline()
     texts = {}
     if judgements or recommendations:
@@ -94,14 +90,6 @@ def write_report(
         report.files.append(path)
     report.verdicts = Counter(each.verdict for each in judgements)
     return report
-
-
-def _narrow(name: str, figure: StudyFigure, data: Data, extracts: Mapping[RunKey, Any]) -> bytes:
-    """A figure for the screen of a telephone, as SVG."""
-    with tempfile.TemporaryDirectory() as folder, narrow():
-        path = Path(folder) / "narrow.svg"
-        _draw(name, figure, data, extracts, [path])
-        return path.read_bytes()
 
 
 def _draw(name: str, figure: StudyFigure, data: Data, extracts: Mapping[RunKey, Any], paths: list[Path]) -> str:

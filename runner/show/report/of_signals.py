@@ -30,7 +30,7 @@ from ...study import Plan, half_width
 from ...text import Problems
 from ..pen import FORMATS, draw
 from ..samples import selected
-from ..sheet import colours, set_log
+from ..sheet import colours, set_log, width_of
 from ..space import positions
 from ..trajectories import arrows, every, round_step, tip_path, write_times
 from .data import Condition, Data, Names
@@ -193,7 +193,7 @@ class Tracks(RepeatedFigure):
             (way.times[-1] for each in extracts.values() for way in each["ways"] if len(way.times)), default=1.0
         )
         step = round_step(longest / 5)
-        height = min(6.0, (3.8 if columns == 1 else 6.4 / columns) * depth / width + 0.35)
+        height = min(6.0, min(3.8, (width_of(columns) - 0.6) / columns) * depth / width + 0.35)
         sheet = arranged.sheet(columns=columns, height=height, same_x=True, same_y=True)
         for axes, panel in zip(sheet.axes, arranged.panels, strict=False):
             runs = [run for conditions in panel.lines.values() for run in self.first(conditions)]

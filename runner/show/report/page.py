@@ -27,6 +27,7 @@ from .data import Condition, Data, estimated, shown
 from .indices import indices
 
 MAX_ROWS = 400  # of one table
+MAX_NARROW = 400  # points; a wider picture is scrolled on the screen of a telephone
 MAX_FAILURES = 50  # that are listed one by one
 MAX_PIVOT = 10  # levels of a factor that become columns
 
@@ -38,7 +39,6 @@ class Picture(NamedTuple):
     doc: str
     svg: bytes | None
     said: str
-    narrow: bytes | None = None  # the same for a narrow screen
 
 
 def report_page(
@@ -203,28 +203,27 @@ def _picture(number: int, picture: Picture) -> Html:
     if picture.svg is None:
         shown = tag("p", f"This figure could not be drawn: {picture.said}", class_="problem")
     else:
-        shown = _shown(picture.svg, what, "wide" if picture.narrow else "")
-        if picture.narrow:
-            shown = tag("div", shown, _shown(picture.narrow, what, "narrow"))
+        shown = _shown(picture.svg, what)
         caption += [" ", tag("span", picture.said, class_="note")]
         caption.insert(0, tag("button", "enlarge", type="button", class_="enlarge", aria_label=f"enlarge: {what}"))
     return tag("figure", shown, tag("figcaption", caption), id=f"figure-{picture.name}")
 
 
-def _shown(svg: bytes, what: str, screen: str) -> Html:
+def _shown(svg: bytes, what: str) -> Html:
     """A picture that can be enlarged, with tips over it; as an image, it cannot run anything."""
     source = f"data:image/svg+xml;base64,{base64.b64encode(svg).decode()}"
     found = tips_of(svg)
     if found is None:
-        frame = tag("div", tag("img", src=source, alt=what), class_="frame", tabindex="0")
+        frame = tag("div", tag("img", src=source, alt=what), class_="frame wide", tabindex="0")
     else:
         width, height = f"{found.width:.0f}", f"{found.height:.0f}"
         dots = [tag("circle", tag("title", tip.text), cx=f"{tip.x:g}", cy=f"{tip.y:g}", r="4") for tip in found.tips]
         view = {"viewBox": f"0 0 {found.width:g} {found.height:g}"}
         over = tag("svg", dots, class_="tips", aria_hidden="true", **view)
         image = tag("img", src=source, alt=what, width=width, height=height)
-        frame = tag("div", image, over, class_="frame", tabindex="0")
-    return tag("div", frame, class_=f"scroll {screen}".rstrip())
+        kind = "frame wide" if found.width > MAX_NARROW else "frame"
+        frame = tag("div", image, over, class_=kind, tabindex="0")
+    return tag("div", frame, class_="scroll")
 
 
 def _means(data: Data) -> Iterable[Html]:

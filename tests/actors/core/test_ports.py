@@ -31,6 +31,30 @@ def test_what_ports_declare() -> None:
     assert Hub("b").one is not one
 
 
+def test_a_port_may_differ_from_its_declaration() -> None:
+    hub, other = Hub("hub"), Hub("other")
+    assert hub.one.terms is other.one.terms is Hub.one.terms
+    hub.one.keep = False  # as declared
+    assert hub.one.terms is Hub.one.terms
+    hub.one.keep, hub.out.depends_on = True, ()
+    twin = hub.one.twin(other)
+    assert (hub.one.keep, twin.keep, other.one.keep, Hub.one.keep) == (True, True, False, False)
+    assert (hub.out.depends_on, other.out.depends_on) == ((), ("one",))
+    assert (hub.one.name, hub.one.type, hub.one.required, twin.path, twin.actor) == (
+        "one", float, True, "hub.one", other,
+    )  # fmt: skip
+
+
+def test_tokens_are_those_of_one_port() -> None:
+    one, other = Hub("a").one, Hub("b").one
+    assert one.arrived is other.arrived  # neither has any
+    one.receive(1.0, 0)
+    assert (one.tokens, one.value, other.present, Hub.one.present) == ((1.0,), 1.0, False, False)
+    other.shown = []  # hidden while something else is done
+    other.receive(2.0, 0)
+    assert (other.present, other.arrived, one.tokens) == (False, [2.0], (1.0,))
+
+
 def test_what_an_input_holds() -> None:
     port = Hub("hub").many
     assert (port.present, port.tokens) == (False, ())

@@ -37,7 +37,7 @@ def is_mean(values: NDArray[np.float64], mean: float, batches: int = 40) -> bool
 # -- the bus -----------------------------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("load", [0.3, 0.8])
+@pytest.mark.parametrize("load", [pytest.param(0.3, marks=pytest.mark.slow), 0.8])
 def test_bus_is_an_m_d_1_queue(load: float) -> None:
     service, count = 1e-3, 40_000
     times = poisson(load / service, count, seed=3)
@@ -158,7 +158,7 @@ def radio(**parameters: Any) -> RadioMedium:
     return RadioMedium(**{"message_length": "1 kbit", "rate": "1 Mbit/s", **parameters})
 
 
-@pytest.mark.parametrize("load", [0.2, 1.0])
+@pytest.mark.parametrize("load", [0.2, pytest.param(1.0, marks=pytest.mark.slow)])
 def test_aloha(load: float) -> None:
     count = 10_000
     aloha = radio(carrier_sense=False, window=1, retries=0)
@@ -176,7 +176,7 @@ def test_aloha(load: float) -> None:
     assert len(bench.of("collided")) == len(bench.of("dropped")) == count - through.sum()
 
 
-@pytest.mark.parametrize(("robots", "window"), [(2, 4), (5, 16), (12, 32)])
+@pytest.mark.parametrize(("robots", "window"), [(2, 4), pytest.param(5, 16, marks=pytest.mark.slow), (12, 32)])
 def test_broadcasts_at_once_are_heard_if_their_backoffs_differ(robots: int, window: int) -> None:
     ticks = 1600
     bench = Bench(radio=radio(window=window, slot="20 us", retries=0)).play_at(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 import random  # noqa: TID251 (to be caught at it)
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import replace
 from functools import cache
 from typing import Any
@@ -92,10 +92,12 @@ def at_home(aspect: Aspect, model: str, at: str = "**") -> Woven | None:
     return Woven("tested", aspect, home["at"][min(aspect.stands_at)] if at == "**" else at)
 
 
-def over_models(aspect: Aspect, test: Callable[..., None], **options: Any) -> int:
-    """Do a test on all packaged models that an aspect can stand on; how many these are."""
+def over_models(
+    aspect: Aspect, test: Callable[..., None], models: Collection[str] = packaged_models(), **options: Any
+) -> int:
+    """Do a test on all of these models that an aspect can stand on; how many these are."""
     pairs = 0
-    for name in packaged_models():
+    for name in models:
         woven = at_home(aspect, name)
         if woven is not None:
             test(woven.aspect, trial_of(name), woven.at, **options)
@@ -103,17 +105,31 @@ def over_models(aspect: Aspect, test: Callable[..., None], **options: Any) -> in
     return pairs
 
 
-@pytest.mark.parametrize("aspect", AT_ZERO, ids=repr)
-def test_strength_zero_leaves_every_model_as_it_is(aspect: Aspect, record_property: Any) -> None:
-    pairs = over_models(aspect, assert_silent_at_zero)
+def dealt(aspects: list[Aspect]) -> Any:
+    """Pairs of an aspect and some models: a quarter of all pairs, in which each model meets many aspects, and the rest.
+
+    A model that few aspects can select something in is in all quarters.
+    """
+    models, cases = packaged_models(), []
+    for number, aspect in enumerate(aspects):
+        for quarter in range(4):
+            share = [name for place, name in enumerate(models) if (number + place) % 4 == quarter or name in HOMES]
+            marks = pytest.mark.slow if quarter else ()
+            cases.append(pytest.param(aspect, share, id=f"{aspect!r}-{quarter}", marks=marks))
+    return pytest.mark.parametrize(("aspect", "models"), cases)
+
+
+@dealt(AT_ZERO)
+def test_strength_zero_leaves_every_model_as_it_is(aspect: Aspect, models: list[str], record_property: Any) -> None:
+    pairs = over_models(aspect, assert_silent_at_zero, models)
     assert pairs > 0
     record_property("pairs of aspect and model: silent at zero", pairs)
 
 
-@pytest.mark.parametrize("aspect", AT_WORK, ids=repr)
-def test_removal_moves_no_stream_of_others(aspect: Aspect, record_property: Any) -> None:
+@dealt(AT_WORK)
+def test_removal_moves_no_stream_of_others(aspect: Aspect, models: list[str], record_property: Any) -> None:
     loss = Woven("loss", PacketLoss(probability=0.1), "**")
-    pairs = over_models(aspect, assert_removal_moves_nothing, beside=[loss])
+    pairs = over_models(aspect, assert_removal_moves_nothing, models, beside=[loss])
     assert pairs > 0
     record_property("pairs of aspect and model: removal moves nothing", pairs)
 

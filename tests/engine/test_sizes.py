@@ -1,0 +1,57 @@
+"""What runs of large models take."""
+
+from __future__ import annotations
+
+import gc
+import tracemalloc
+from pathlib import Path
+
+import pytest
+
+from epicycle.actors import NO_TOKENS
+from epicycle.runner import Simulation, load_model
+from epicycle.runner.build import Model
+
+ACTORS = 500
+PIPELINE = f"""
+model: pipeline
+actors:
+  clock: {{type: Clock, period: 1 s, values: [1.0]}}
+  scale: {{type: Scale, count: {ACTORS}, offset: 1}}
+connections:
+  - clock.output -> scale[0].input
+  - scale[..-2].output -> scale[1..].input
+run: {{stop: 3 s}}
+"""
+
+
+@pytest.fixture
+def model(tmp_path: Path) -> Model:
+    path = tmp_path / "pipeline.yaml"
+    path.write_text(PIPELINE)
+    return load_model(path)
+
+
+def test_an_actor_of_a_pipeline_takes_at_most_2200_bytes_in_a_run(model: Model) -> None:
+    Simulation(model).run()  # what all runs share is there
+    gc.collect()
+    tracemalloc.start()
+    simulation = Simulation(model)
+    simulation.run()
+    gc.collect()
+    taken = tracemalloc.get_traced_memory()[0] / len(simulation.actors)
+    tracemalloc.stop()
+    assert taken <= 2_200
+
+
+def test_runs_share_what_does_not_change(model: Model) -> None:
+    first = Simulation(model)
+    first.advance(1.0)
+    for other in (first.fork(), Simulation(model)):
+        for path, actor in model.graph.actors.items():
+            for name, port in actor.inputs.items():
+                ours = other.actors[path].inputs[name]
+                assert ours is not port
+                assert (ours.terms, ours.path) == (port.terms, port.path)
+                assert (ours.arrived is NO_TOKENS) is (name != "input")  # to which nothing is connected
+    assert first.log.digest != first.fork().run().digest == Simulation(model).run().digest
