@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 from ..core import REQUIRED, EpicycleError, brief, did_you_mean
@@ -25,16 +25,20 @@ class TokenFormula:
         self._formula = Formula(source)
         self.source = source
         self.known = tuple(known)
-        self._function: Any = None
+        self._function: Callable[..., Any] | None = None
 
     def __call__(self, token: Any, *known: Any) -> Any:
         """The value; raises ``EpicycleError``, also for a name that is neither known nor a field."""
-        if self._function is None:
-            self._function = translated(self.source, ("token", *self.known), self._formula.names) or undecided_by
         try:
-            return self._function(token, *known)
+            return (self._function or self._translated())(token, *known)
         except UNDECIDED:
             return self._decided(token, dict(zip(self.known, known, strict=True)))
+
+    def _translated(self) -> Callable[..., Any]:
+        arguments = ("" if "token" in self.known else "token", *self.known)  # a nameless one is in the way of none
+        fields = tuple(name for name in self._formula.names if name not in arguments)
+        self._function = translated(self.source, arguments, fields) or undecided_by
+        return self._function
 
     def number(self, what: str, token: Any, *known: Any) -> float:
         """The value, which must be a finite number; ``what`` names it."""

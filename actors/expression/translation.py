@@ -51,7 +51,7 @@ class _UnfitError(Exception):
 def translated(source: str, arguments: tuple[str, ...], fields: tuple[str, ...] = ()) -> Callable[..., Any] | None:
     """A function of the values of names, in their order; None if the expression does not fit.
 
-    If some names are ``fields``, the first argument is the token that has them.  The function raises one of
+    Those that are ``fields`` of the first argument, which is a token, are read there.  The function raises one of
     ``UNDECIDED`` for what the evaluator must decide.
     """
     names = {name: f"v{place}" for place, name in enumerate((*fields, *arguments))}
@@ -64,8 +64,11 @@ def translated(source: str, arguments: tuple[str, ...], fields: tuple[str, ...] 
         return None
     known = [names[name] for name in arguments]
     if fields:
-        known.insert(0, "t")
-        found = [f"({names[each]} := t[{each!r}] if type(t) is dict else part(t, {each!r})), " for each in fields]
+        token = known[0]
+        found = [
+            f"({names[each]} := {token}[{each!r}] if type({token}) is dict else part({token}, {each!r})), "
+            for each in fields
+        ]
         text = f"{text} if ({''.join(found)}) else None"
     try:
         code = compile(f"lambda {', '.join(known)}: {text}", "<expression>", "eval")
