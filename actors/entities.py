@@ -20,7 +20,7 @@ from .core import (
     texts_parameter,
 )
 from .distributions import Distribution
-from .expression import FormulaParameter, field_of, number_of_token, of_token, operand
+from .expression import TokenFormulaParameter, field_of, operand
 
 
 class SetFields(Actor):
@@ -40,7 +40,7 @@ class SetFields(Actor):
         Parameter(Distribution), {}, doc="distributions of fields to draw; times in s"
     )
     set: Parameter[dict[str, Any]] = MappingParameter(
-        FormulaParameter(), {}, doc="expressions for fields, computed in order"
+        TokenFormulaParameter(known=("token", "time")), {}, doc="expressions for fields, computed in order"
     )
     remove = texts_parameter((), doc="fields to remove, after all others are set")
 
@@ -51,7 +51,7 @@ class SetFields(Actor):
             for name, distribution in self.draw.items():
                 fields[name] = distribution.draw(self.random_stream(name))
             for name, formula in self.set.items():
-                fields[name] = of_token(formula, fields, token=seen, time=self.now)
+                fields[name] = formula(fields, seen, self.now)
             for name in self.remove:
                 fields.pop(name, None)
             self.output.send(fields)
@@ -148,11 +148,13 @@ class Batch(Actor):
 
     number: Parameter[int | None] = Parameter(int, None, min=1, doc="tokens in a full batch")
     size: Parameter[float | None] = Parameter(float, None, above=0, doc="largest size of a batch")
-    weight = FormulaParameter("1", doc="size of a token: an expression over its fields, token, time")
+    weight = TokenFormulaParameter(
+        "1", known=("time",), doc="size of a token: an expression over its fields, token, time"
+    )
     after: Parameter[float | None] = Parameter(
         float, None, unit="s", min=0, doc="longest wait of the first token of a batch"
     )
-    key: Parameter[Any] = FormulaParameter(
+    key: Parameter[Any] = TokenFormulaParameter(
         None, doc="tokens of a batch have this value in common: an expression over their fields, and token"
     )
 
@@ -176,10 +178,10 @@ class Batch(Actor):
             self.waiting.send(count)
 
     def _collect(self, token: Any) -> None:
-        key = _hashable(None if self.key is None else of_token(self.key, token))
+        key = _hashable(None if self.key is None else self.key(token))
         weight = 0.0
         if self.size is not None:
-            weight = number_of_token(self.weight, "a weight", token, time=self.now)
+            weight = self.weight.number("a weight", token, self.now)
             if key in self._batches and self._batches[key].size + weight > self.size:
                 self._close(key)
         batch = self._batches.get(key)
@@ -281,7 +283,7 @@ class Match(Actor):
     output: OutputPort[Any] = OutputPort(list, doc="a token of each channel, in the order of the channels")
     waiting = OutputPort(int, doc="number of tokens that wait for others, whenever it changes")
 
-    key: Parameter[Any] = FormulaParameter(
+    key: Parameter[Any] = TokenFormulaParameter(
         None, doc="tokens with an equal value belong together: an expression over their fields, and token"
     )
 
@@ -293,7 +295,7 @@ class Match(Actor):
         count = self._count
         for channel, tokens in enumerate(self.input.by_channel()):
             for token in tokens:
-                key = _hashable(None if self.key is None else of_token(self.key, token))
+                key = _hashable(None if self.key is None else self.key(token))
                 if key not in self._parts:
                     self._parts[key] = [deque() for _ in range(self.input.width)]
                 parts = self._parts[key]

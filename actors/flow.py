@@ -21,7 +21,7 @@ from .core import (
     rounds,
 )
 from .core.choices import cumulated, weighted
-from .expression import FormulaParameter, of_token
+from .expression import TokenFormulaParameter
 
 
 class Merge(Actor):
@@ -86,8 +86,9 @@ class Router(Actor):
     weights: Parameter[Any] = array_parameter(
         (None,), None, unit="1", min=0, doc="relative probability of each channel with 'random'; all equal if left out"
     )
-    channel: Parameter[Any] = FormulaParameter(
+    channel: Parameter[Any] = TokenFormulaParameter(
         None,
+        known=("time", "channels"),
         doc="the channel for 'expression', from 0: an expression over the token's fields, token, time, channels "
         "(their number)",
     )
@@ -139,7 +140,7 @@ class Router(Actor):
         if self.policy == "random":
             return self.random.below(width) if self._sums is None else weighted(self.random, self._sums)
         if self.policy == "expression":
-            number = of_token(self.channel, token, time=self.now, channels=width)
+            number = self.channel(token, self.now, width)
             if isinstance(number, bool) or not isinstance(number, int) or not 0 <= number < width:
                 raise EpicycleError(
                     f"{self.channel} gives {number!r} for {brief(token)}, but {self.output.path} has "

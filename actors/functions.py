@@ -27,7 +27,7 @@ from .core import (
     did_you_mean,
     token_type,
 )
-from .expression import FormulaParameter, operand
+from .expression import FormulaParameter
 from .matching import matched
 
 FUNCTION_GROUP = "epicycle.functions"
@@ -91,10 +91,7 @@ class Expression(Actor):
         if self.iteration:
             self._count += 1
             values["iteration"] = self._count
-        value = formula.of_floats(*map(values.get, formula.names))
-        if value is None:
-            value = formula({name: operand(token) for name, token in values.items()})
-        return self._checked(value)
+        return self._checked(formula(values))
 
     def _checked(self, value: Any) -> Any:
         if _IS_KIND[self._kind](value):

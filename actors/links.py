@@ -22,7 +22,7 @@ from .core import (
     to_nanoseconds,
     to_seconds,
 )
-from .expression import FormulaParameter, field_of, number_of_token, of_token
+from .expression import TokenFormulaParameter, field_of
 from .resources import Waiter, Waiters
 
 
@@ -42,9 +42,13 @@ class _Transmitting(Actor):
     rate: PortParameter[float | None] = PortParameter(
         float, None, unit="bit/s", above=0, doc="rate at which frames are sent; without delay if left out"
     )
-    size = FormulaParameter("1", doc="length of a frame in bits: an expression over its fields, token, time")
-    order = FormulaParameter(
-        "0", doc="of waiting frames, the one with the lowest value is sent first: an expression like size"
+    size = TokenFormulaParameter(
+        "1", known=("time",), doc="length of a frame in bits: an expression over its fields, token, time"
+    )
+    order = TokenFormulaParameter(
+        "0",
+        known=("time",),
+        doc="of waiting frames, the one with the lowest value is sent first: an expression like size",
     )
     buffer: Parameter[float | None] = Parameter(
         float, None, unit="bit", min=0, doc="most bits that may wait, without the frame that is being sent"
@@ -67,10 +71,10 @@ class _Transmitting(Actor):
     def _enqueue(self, token: Any, channel: int) -> bool:
         """Let a frame wait for its channel; returns whether there is room for it."""
         transmitter = self._transmitters[channel]
-        size = number_of_token(self.size, "a size", token, time=self.now)
+        size = self.size.number("a size", token, self.now)
         if size < 0:
             raise EpicycleError(f"{self.size} gives {size:g} for {brief(token)}, but a size must be >= 0")
-        order = number_of_token(self.order, "an order", token, time=self.now)
+        order = self.order.number("an order", token, self.now)
         frame = Waiter(token, channel, order, float(self._came), size, self._came)
         self._came += 1
         transmitter.waiting.add(frame)
@@ -160,7 +164,9 @@ class NetworkSwitch(_Transmitting):
     rejected = OutputPort(depends_on=(), doc="frames that found the buffer of their channel full")
     waiting = OutputPort(int, depends_on=(), doc="total number of waiting frames, whenever it changes")
 
-    port = FormulaParameter(doc="the channel of the output, from 0: an expression over the frame's fields, token, time")
+    port = TokenFormulaParameter(
+        known=("time",), doc="the channel of the output, from 0: an expression over the frame's fields, token, time"
+    )
     latency = Parameter(float, 0.0, unit="s", min=0, doc="processing time of a frame; 0 is a microstep")
 
     def initialize(self) -> None:
@@ -172,7 +178,7 @@ class NetworkSwitch(_Transmitting):
         for channel, token in self._finish():
             self.output.send(token, channel if width > 1 else None)
         for token in self._looked_at.due():
-            channel = of_token(self.port, token, time=self.now)
+            channel = self.port(token, self.now)
             if isinstance(channel, bool) or not isinstance(channel, int) or not 0 <= channel < max(width, 1):
                 raise EpicycleError(
                     f"{self.port} gives {channel!r} for {brief(token)}, but {self.output.path} has "

@@ -7,7 +7,7 @@ from collections import deque
 from typing import Any
 
 from .core import ABSENT, Actor, EpicycleError, InputPort, OutputPort, Parameter, brief, present, rounds
-from .expression import FormulaParameter, of_token
+from .expression import TokenFormulaParameter
 from .flow import ByChannel, MostRecent
 from .matching import matched
 
@@ -18,12 +18,14 @@ class Filter(ByChannel):
     Ptolemy: ``EventFilter``, ``TrueGate``.
     """
 
-    condition = FormulaParameter("token", doc="which tokens pass: an expression over the token's fields, token, time")
+    condition = TokenFormulaParameter(
+        "token", known=("time",), doc="which tokens pass: an expression over the token's fields, token, time"
+    )
 
     def fire(self) -> None:
         for channel, tokens in enumerate(self.input.by_channel()):
             for token in tokens:
-                passes = of_token(self.condition, token, time=self.now)
+                passes = self.condition(token, self.now)
                 if not isinstance(passes, bool):
                     raise EpicycleError(f"{self.condition} gives {passes!r} for {brief(token)}, expected true or false")
                 if passes:

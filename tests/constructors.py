@@ -12,7 +12,13 @@ from pathlib import Path
 from typing import Any
 
 from epicycle.actors import Actor, Configurable, MappingParameter, Parameter, declared_parameters
-from epicycle.actors.expression import Formula, FormulaParameter, PortFormula, PortFormulaParameter
+from epicycle.actors.expression import (
+    Formula,
+    FormulaParameter,
+    PortFormula,
+    PortFormulaParameter,
+    TokenFormulaParameter,
+)
 from epicycle.actors.functions import FunctionParameter
 from epicycle.aspects import ByActorParameter, GroupsParameter
 from epicycle.runner.catalogue import built_in, describe, is_part, parts_of
@@ -105,7 +111,7 @@ def annotation(parameter: Parameter[Any]) -> str:
         return f"abc.Mapping[str, {annotation(parameter.item)}]"
     if isinstance(parameter, GroupsParameter):
         return "abc.Mapping[str, _Texts]"
-    if isinstance(parameter, FormulaParameter):
+    if isinstance(parameter, (FormulaParameter, TokenFormulaParameter)):
         return "str | float | Formula"
     if isinstance(parameter, PortFormulaParameter):
         return "str | PortFormula"

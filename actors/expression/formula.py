@@ -6,17 +6,15 @@ A ``Formula`` is over names, a ``PortFormula`` over the latest tokens of ports: 
 from __future__ import annotations
 
 import ast
-import dataclasses
 import re
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any, Final, TypeVar
-
-import numpy as np
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, TypeVar
 
 from ..core import REQUIRED, EpicycleError, Parameter, ParameterError, counted_in_si
 from .evaluation import evaluate
-from .floats import UNDECIDED, of_floats
 from .syntax import ExpressionError, free_names, parse
+from .tokens import operand, value_at
+from .translation import UNDECIDED, translated, undecided_by
 from .values import CONSTANTS, FUNCTIONS
 
 T = TypeVar("T")
@@ -37,7 +35,7 @@ class Formula:
     expression.
     """
 
-    __slots__ = ("function", "is_condition", "names", "source")
+    __slots__ = ("_function", "is_condition", "names", "source")
 
     def __init__(self, source: str) -> None:
         tree = parse(source)
@@ -51,21 +49,29 @@ class Formula:
         self.source = source
         self.is_condition = _is_condition(tree)
         self.names = tuple(sorted(free, key=places.__getitem__))
-        self.function = of_floats(source, self.names)
+        self._function: Callable[..., Any] | None = None
 
-    def of_floats(self, *values: Any) -> Any:
-        """A faster function of the values of the names, in their order; None if that takes more than floats."""
-        try:
-            return None if self.function is None else self.function(*values)
-        except UNDECIDED:
-            return None
+    @property
+    def function(self) -> Callable[..., Any]:
+        """The expression as a function of tokens, the values of its names in their order.
+
+        It raises one of ``UNDECIDED`` for what only a call of the formula can tell.
+        """
+        if self._function is None:  # most copies of a model are never run
+            self._function = translated(self.source, self.names) or undecided_by
+        return self._function
 
     def __call__(self, values: Mapping[str, object]) -> Any:
-        """The value of the expression; raises an ``EpicycleError`` with the values of its names."""
-        if self.function is not None and CONSTANTS.keys().isdisjoint(values):
-            found = self.of_floats(*map(values.get, self.names))
-            if found is not None:
-                return found
+        """The value of the expression, for tokens; raises an ``EpicycleError`` with the values of its names."""
+        try:
+            if CONSTANTS.keys().isdisjoint(values):
+                return (self._function or self.function)(*[values[name] for name in self.names])
+        except UNDECIDED:
+            pass
+        return self.decided({name: operand(value) for name, value in values.items()})
+
+    def decided(self, values: Mapping[str, object]) -> Any:
+        """The value by the evaluator, for operands."""
         try:
             return evaluate(self.source, values)
         except ExpressionError as error:
@@ -139,7 +145,7 @@ class PortFormula:
         """The value, for those of the references in their order and of the given names; raises ``EpicycleError``."""
         known = dict(zip(self._ports.values(), values, strict=True))
         for name, (root, *fields) in self._given.items():
-            known[name] = operand(value_at(given[root], fields))
+            known[name] = value_at(given[root], fields)
         try:
             return self._formula(known)
         except EpicycleError as error:
@@ -150,7 +156,7 @@ class PortFormula:
         return repr(self.source)
 
 
-class _ExpressionParameter(Parameter[T]):
+class ExpressionParameter(Parameter[T]):
     """A parameter whose value is made of a text; ``words`` describe it."""
 
     words = "expression"
@@ -173,19 +179,22 @@ class _ExpressionParameter(Parameter[T]):
             raise ParameterError(f"{value!r} is not an {self.words}: {error}") from None
 
 
-class FormulaParameter(_ExpressionParameter[Formula]):
+class FormulaParameter(ExpressionParameter[Formula]):
     """A parameter whose value is an expression: a text, or a number or truth value that means itself."""
 
     def __init__(self, default: Any = REQUIRED, *, doc: str = "") -> None:
         super().__init__(Formula, default, doc=doc)
 
     def convert(self, value: object) -> Formula | None:
-        if isinstance(value, Formula):
-            return value
-        return super().convert(repr(counted_in_si(value)) if isinstance(value, (bool, int, float)) else value)
+        return value if isinstance(value, Formula) else super().convert(as_text(value))
 
 
-class PortFormulaParameter(_ExpressionParameter[PortFormula | None]):
+def as_text(value: object) -> object:
+    """A number or truth value as the expression that means it."""
+    return repr(counted_in_si(value)) if isinstance(value, (bool, int, float)) else value
+
+
+class PortFormulaParameter(ExpressionParameter[PortFormula | None]):
     """A parameter whose value is an expression over ports, and over the ``given`` names."""
 
     words = "expression over ports"
@@ -196,30 +205,3 @@ class PortFormulaParameter(_ExpressionParameter[PortFormula | None]):
 
     def convert(self, value: object) -> PortFormula | None:
         return value if isinstance(value, PortFormula) else super().convert(value)
-
-
-_PLAIN: Final = frozenset({bool, int, float, str, type(None)})
-
-
-def operand(token: Any) -> Any:
-    """A token as the expression language knows it: arrays become lists, dataclasses dicts of their fields."""
-    if type(token) in _PLAIN:
-        return token
-    if isinstance(token, (np.generic, np.ndarray)):  # one that is also a float divides by zero without an error
-        return token.tolist()
-    if isinstance(token, (bool, int, float, str)):
-        return token
-    if isinstance(token, (list, tuple)):
-        return [operand(item) for item in token]
-    if isinstance(token, Mapping):
-        return {str(key): operand(item) for key, item in token.items()}
-    if dataclasses.is_dataclass(token) and not isinstance(token, type):
-        return {each.name: operand(getattr(token, each.name)) for each in dataclasses.fields(token)}
-    return token
-
-
-def value_at(token: Any, fields: Iterable[str]) -> Any:
-    """A part of a token; None if there is no such part."""
-    for name in fields:
-        token = token.get(name) if isinstance(token, Mapping) else getattr(token, name, None)
-    return token

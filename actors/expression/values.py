@@ -55,10 +55,10 @@ class Budget:
             _check_text(len(value))
             self.spend(len(value) // 10)
         elif isinstance(value, (list, tuple, dict)):
-            self.spend(_size(value) // 10)
+            self.spend(size_of(value) // 10)
 
 
-def _size(value: object) -> int:
+def size_of(value: object) -> int:
     """Count the elements at all levels, shared ones as often as they appear; a text counts by its length."""
     size = depth = 0
     level = [value]
@@ -93,7 +93,7 @@ def check_result(value: object) -> None:
     """Raise if the value that an expression hands out is too large or has a NaN in it."""
     if isinstance(value, str):
         _check_text(len(value))
-    _size(value)
+    size_of(value)
     stack = [value]
     while stack:
         item = stack.pop()
@@ -131,7 +131,7 @@ def kind_of(value: object) -> str:
 
 def text_of(value: object) -> str:
     """Return a value as it appears in a text: `true`, `null`, `3`, `2.5`, `[1, 'a']`."""
-    _size(value)  # which bounds what must be written
+    size_of(value)  # which bounds what must be written
     text = value if isinstance(value, str) else _written(value)
     _check_text(len(text))
     return text

@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from typing import Any
 
-from ..core import EpicycleError
-from ..expression import ExpressionError, Formula, evaluate
+from ..core import ABSENT, EpicycleError
+from ..expression import UNDECIDED, ExpressionError, Formula, evaluate, operand
 
 
-def is_true(guard: Formula, values: Mapping[str, Any]) -> bool:
-    """Whether a guard holds; one that uses a name without a value does not."""
-    if len(values) == len(guard.names):
-        found = guard(values)
-    else:
+def is_true(guard: Formula, value_of: Callable[[str], Any]) -> bool:
+    """Whether a guard holds, over the tokens of names; one that uses a name whose token is ``ABSENT`` does not."""
+    tokens = [value_of(name) for name in guard.names]
+    try:
+        found = guard.function(*tokens)  # which cannot decide about what is absent
+    except UNDECIDED:
+        known = {name: operand(token) for name, token in zip(guard.names, tokens, strict=True) if token is not ABSENT}
         try:
-            found = evaluate(guard.source, _Silent(values, set(guard.names) - values.keys()))
+            found = evaluate(guard.source, _Silent(known, set(guard.names) - known.keys()))
         except _SilentError:
             return False
         except ExpressionError as error:
+            if len(known) == len(tokens):
+                return bool(guard.decided(known))  # which tells the values, too
             raise EpicycleError(f"{guard.source!r}: {error}") from None
     if not isinstance(found, (bool, int, float)):
         raise EpicycleError(f"the guard {guard} gives {found!r}, which is neither true nor false")

@@ -19,7 +19,7 @@ from ..core import (
     did_you_mean,
     to_seconds,
 )
-from ..expression import Formula, operand
+from ..expression import UNDECIDED, Formula, operand
 from ..integration import STEPPERS
 from ..trajectory import number_of
 from .borders import Borders
@@ -323,7 +323,10 @@ class StateMachine(ModalActor):
     def _result(self, name: str, formula: Formula) -> Any:
         if formula.source in self._tokens and name not in self.variables:
             return self._tokens[formula.source]  # unchanged
-        return formula(self._values(formula))
+        try:
+            return formula.function(*[self._value(name) for name in formula.names])
+        except UNDECIDED:
+            return formula.decided(self._values(formula))
 
     def begins(self) -> None:
         self._set()
@@ -362,9 +365,9 @@ class StateMachine(ModalActor):
             return True
         condition = self._conditions[self._current][rule].formula
         try:
-            return is_true(condition, self._values(condition))
+            return is_true(condition, self._value)
         except EpicycleError:
-            return is_true(rule.guard, self._values(rule.guard))  # which reports the error in the model's terms
+            return is_true(rule.guard, self._value)  # which reports the error in the model's terms
 
     def holds_alone(self, rule: Rule) -> bool:
         tokens, self._tokens = self._tokens, {}
@@ -376,11 +379,11 @@ class StateMachine(ModalActor):
     def _values(self, formula: Formula) -> dict[str, Any]:
         """The present values of the names in an expression, without inputs that have no token."""
         found = {name: self._value(name) for name in formula.names}
-        return {name: value for name, value in found.items() if value is not ABSENT}
+        return {name: operand(value) for name, value in found.items() if value is not ABSENT}
 
     def _value(self, name: str) -> Any:
         if name in self._tokens:
-            return operand(self._tokens[name])
+            return self._tokens[name]
         if name in self._known:
             return self._known[name]
         if name in self._borders.truths:

@@ -6,7 +6,7 @@ from collections import deque
 from typing import Any, ClassVar
 
 from ..core import EpicycleError, InputPort, OutputPort, Parameter
-from ..expression import FormulaParameter, number_of_token
+from ..expression import TokenFormulaParameter
 from .waiting import WaitingActor, check_channels
 
 
@@ -32,7 +32,11 @@ class WaitingLine(WaitingActor):
     reneged = OutputPort(depends_on=(), doc="tokens that lost their patience")
     waiting = OutputPort(int, depends_on=(), doc="number of waiting tokens, whenever it changes")
 
-    size = FormulaParameter("1", doc="room that a token takes: an expression over its fields, token, time, channel")
+    size = TokenFormulaParameter(
+        "1",
+        known=("time", "channel"),
+        doc="room that a token takes: an expression over its fields, token, time, channel",
+    )
     credits = Parameter(int, 0, min=0, doc="number of tokens released on each channel before its first trigger")
     persistent_trigger = Parameter(bool, True, doc="whether a trigger that finds no token waits for the next one")
 
@@ -57,7 +61,7 @@ class WaitingLine(WaitingActor):
         self._tell_count("waiting", len(self._waiting))
 
     def _size(self, token: Any, channel: int) -> float:
-        size = number_of_token(self.size, "a size", token, time=self.now, channel=channel)
+        size = self.size.number("a size", token, self.now, channel)
         if size < 0:
             raise EpicycleError(f"{self.size} gives {size:g}, but a size must be >= 0")
         return size

@@ -18,7 +18,7 @@ from ..core import (
     counted,
     did_you_mean,
 )
-from ..expression import Formula, FormulaParameter, number_of_token, of_token
+from ..expression import TokenFormula, TokenFormulaParameter
 from .waiting import Waiter, WaitingActor, check_channels
 
 
@@ -37,7 +37,7 @@ class _Pools(WaitingActor):
     waiting = OutputPort(int, depends_on=(), doc="number of waiting requests, whenever it changes")
 
     preemptive = Parameter(bool, False, doc="whether requests with a lower 'order' take units from others")
-    key: Parameter[Any] = FormulaParameter(
+    key: Parameter[Any] = TokenFormulaParameter(
         None, doc="a release and its request have this value in common: an expression over their fields, and token"
     )
 
@@ -96,19 +96,23 @@ class _Pools(WaitingActor):
         waiter.amounts = amounts
         return waiter
 
-    def _amount(self, formula: Formula, token: Any, channel: int, least: int) -> int:
-        amount = number_of_token(formula, "an amount", token, time=self.now, channel=channel)
+    def _amount(self, formula: TokenFormula, token: Any, channel: int, least: int) -> int:
+        amount = formula.number("an amount", token, self.now, channel)
         if amount != int(amount) or amount < least:
             raise EpicycleError(f"{formula} gives {amount:g}, but an amount must be a whole number >= {least}")
         return int(amount)
 
     def _return(self, token: Any, channel: int) -> None:
-        wanted = None if self.key is None else of_token(self.key, token)
+        wanted = None if self.key is None else self.key(token)
 
         def is_meant(request: Waiter) -> bool:
             if self.release.width == self.acquire.width and request.channel != channel:
                 return False
-            return self.key is None or bool(of_token(self.key, request.token) == wanted)
+            if self.key is None:
+                return True
+            if request.mark is None:
+                request.mark = (self.key(request.token),)
+            return bool(request.mark[0] == wanted)
 
         held = next(filter(is_meant, self._held), None)
         if held is not None:
@@ -145,13 +149,23 @@ class _Pools(WaitingActor):
 
     def _losers_to(self, request: Waiter, capacities: Sequence[int]) -> list[Waiter] | None:
         """Those that have to give up their units for a request; None if that is not enough."""
+        if self._are_free(request.amounts, capacities):
+            return []
+        if not self.preemptive:
+            return None
         lacking = [
             amount + used - there if amount else 0
             for amount, used, there in zip(request.amounts, self._in_use, capacities, strict=True)
         ]
-        later = [each for each in self._held if each.order > request.order] if self.preemptive else []
+        later = [each for each in self._held if each.order > request.order]
         losers, is_enough = self._last_of(later, lacking)
         return losers if is_enough else None
+
+    def _are_free(self, amounts: Sequence[int], capacities: Sequence[int]) -> bool:
+        for amount, used, there in zip(amounts, self._in_use, capacities, strict=True):
+            if amount and amount + used > there:
+                return False
+        return True
 
     def _last_of(self, holders: list[Waiter], lacking: list[int]) -> tuple[list[Waiter], bool]:
         """The last requests that together hold what is lacking of each kind, and whether they do."""
@@ -209,8 +223,10 @@ class Pool(_Pools):
     in_use = OutputPort(int, depends_on=(), doc="number of units held, whenever it changes")
 
     capacity = PortParameter(int, 1, min=0, doc="number of units")
-    amount = FormulaParameter(
-        "1", doc="number of units requested: an expression over the token's fields, token, time, channel"
+    amount = TokenFormulaParameter(
+        "1",
+        known=("time", "channel"),
+        doc="number of units requested: an expression over the token's fields, token, time, channel",
     )
 
     def _capacities(self) -> Sequence[int]:
@@ -253,8 +269,8 @@ class Pools(_Pools):
     """
 
     capacity: Parameter[dict[str, int]] = MappingParameter(Parameter(int, min=0), doc="number of units of each pool")
-    amount: Parameter[dict[str, Formula] | None] = MappingParameter(
-        FormulaParameter(),
+    amount: Parameter[dict[str, TokenFormula] | None] = MappingParameter(
+        TokenFormulaParameter(known=("time", "channel")),
         None,
         doc="number of units requested from pools, 0 from those left out: expressions over the token's fields, token, "
         "time, channel; a unit from each pool if left out",

@@ -5,38 +5,40 @@ from __future__ import annotations
 import math
 from bisect import bisect_left, insort
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from operator import attrgetter
 from typing import Any, ClassVar, Final
 
 from ..core import Actor, EpicycleError, Parameter, ParameterError, Pending, PortError, Wake
 from ..core.units import quantity
 from ..distributions import Distribution
-from ..expression import Formula, FormulaParameter, number_of_token, of_token
+from ..expression import Formula, TokenFormula, TokenFormulaParameter
 
 FIFO: Final = "fifo"
 LIFO: Final = "lifo"
 RANDOM: Final = "random"
+_KEY: Final = attrgetter("key")
 
 
-class PatienceParameter(Parameter[Distribution | Formula | None]):
+class PatienceParameter(Parameter[Distribution | TokenFormula | None]):
     """``2 min``, an expression over a token, or ``{type: Exponential, mean: 2 min}``."""
 
     def __init__(self, *, doc: str) -> None:
         super().__init__(float, None, unit="s", doc=doc)  # type: ignore[arg-type]
         self._time = Parameter(float, unit="s", min=0)
         self._law: Parameter[Distribution] = Parameter(Distribution, unit="s")
-        self._formula = FormulaParameter()
+        self._formula = TokenFormulaParameter(known=("time", "channel"))
         self.forms = (self._time, self._formula, self._law)
 
     def describe_type(self) -> str:
         return "time, expression, or distribution"
 
-    def convert(self, value: object) -> Distribution | Formula | None:
+    def convert(self, value: object) -> Distribution | TokenFormula | None:
         if value is None:
             return None
         if isinstance(value, (Mapping, Distribution)):
             return self._law.convert(value)
-        if isinstance(value, (str, Formula)):
+        if isinstance(value, (str, Formula, TokenFormula)):
             try:
                 return self._formula.convert(value)
             except ParameterError:
@@ -57,11 +59,11 @@ class Waiter:
     number: int  # unique
     amounts: tuple[int, ...] = ()  # of requested units, by kind
     patience: Wake | None = None
+    mark: tuple[Any] | None = None  # what it has in common with its release, once somebody has asked
+    key: tuple[float, float, int] = field(init=False)  # the lower one goes first
 
-    @property
-    def key(self) -> tuple[float, float, int]:
-        """The sort key: the lower one goes first."""
-        return self.order, self.place, self.number
+    def __post_init__(self) -> None:
+        self.key = self.order, self.place, self.number
 
 
 class Waiters:
@@ -78,11 +80,11 @@ class Waiters:
 
     def add(self, waiter: Waiter) -> None:
         """Insert one at its place."""
-        insort(self._all, waiter, key=lambda each: each.key)
+        insort(self._all, waiter, key=_KEY)
 
     def remove(self, waiter: Waiter) -> None:
         """Remove one."""
-        place = bisect_left(self._all, waiter.key, key=lambda each: each.key)
+        place = bisect_left(self._all, waiter.key, key=_KEY)
         del self._all[place]
         if waiter.patience is not None:
             waiter.patience.cancel()
@@ -92,7 +94,7 @@ class Waiters:
         return self._all[place]
 
     def __contains__(self, waiter: Waiter) -> bool:
-        place = bisect_left(self._all, waiter.key, key=lambda each: each.key)
+        place = bisect_left(self._all, waiter.key, key=_KEY)
         return place < len(self._all) and self._all[place] is waiter
 
     @property
@@ -113,12 +115,15 @@ class WaitingActor(Actor):
     discipline = Parameter(
         str, FIFO, choices=(FIFO, LIFO, RANDOM), doc="order among equals: first come, last come, or random"
     )
-    order = FormulaParameter(
-        "0", doc="the lowest value goes first: an expression over the token's fields, token, time, channel"
+    order = TokenFormulaParameter(
+        "0",
+        known=("time", "channel"),
+        doc="the lowest value goes first: an expression over the token's fields, token, time, channel",
     )
     room: Parameter[float | None] = Parameter(float, None, min=0, doc="how much may wait; unlimited if left out")
-    balking: Parameter[Any] = FormulaParameter(
+    balking: Parameter[Any] = TokenFormulaParameter(
         None,
+        known=("time", "channel", "waiting"),
         doc="when a token that would have to wait leaves: a condition or probability over its fields, and waiting (a "
         "number)",
     )
@@ -133,13 +138,17 @@ class WaitingActor(Actor):
 
     def initialize(self) -> None:
         self._waiting = Waiters()
-        self._told: Pending[tuple[str, Any, int | None]] = Pending(self)
+        self._told: Pending[list[tuple[str, Any, int | None]]] = Pending(self)
+        self._telling: list[tuple[str, Any, int | None]] | None = None  # by the present firing
         self._counts: dict[str, int] = {}  # the values sent last
         self._came = 0
 
     def _tell(self, port: str, token: Any, channel: int | None = None) -> None:
         """Send at the next microstep."""
-        self._told.put((port, token, channel), 0.0)
+        if self._telling is None:
+            self._telling = []
+            self._told.put(self._telling, 0.0)
+        self._telling.append((port, token, channel))
 
     def _tell_of(self, port: str, waiter: Waiter) -> None:
         output = self.outputs[port]
@@ -153,8 +162,10 @@ class WaitingActor(Actor):
 
     def _send(self) -> None:
         """Send the pending outputs."""
-        for port, token, channel in self._told.due():
-            self.outputs[port].send(token, channel)
+        self._telling = None
+        for told in self._told.due():
+            for port, token, channel in told:
+                self.outputs[port].send(token, channel)
 
     def _renege(self) -> None:
         """Remove those whose patience has run out."""
@@ -168,7 +179,7 @@ class WaitingActor(Actor):
         place = float(-number if self.discipline == LIFO else number)
         if self.discipline == RANDOM:
             place = self.random.random()
-        order = number_of_token(self.order, "an order", token, time=self.now, channel=channel)
+        order = self.order.number("an order", token, self.now, channel)
         return Waiter(token, channel, order, place, size, number)
 
     def _join(self, newcomers: list[Waiter], serve: Callable[[], None]) -> None:
@@ -176,7 +187,9 @@ class WaitingActor(Actor):
         for each in newcomers:
             self._waiting.add(each)
         serve()
-        new = [each for each in sorted(newcomers, key=lambda each: each.key) if each in self._waiting]
+        if not newcomers:
+            return
+        new = [each for each in sorted(newcomers, key=_KEY) if each in self._waiting]
         old = len(self._waiting) - len(new)
         sizes = [] if self.room is None or not new else [each.size for each in self._waiting if each not in new]
         stay = 0
@@ -203,7 +216,7 @@ class WaitingActor(Actor):
             return math.inf
         if isinstance(self.patience, Distribution):
             return self.patience.draw_time(self.random_stream("patience"), "a patience")
-        time = of_token(self.patience, waiter.token, time=self.now, channel=waiter.channel)
+        time = self.patience(waiter.token, self.now, waiter.channel)
         if isinstance(time, bool) or not isinstance(time, (int, float)) or not time >= 0:
             raise EpicycleError(f"{self.patience} gives {time!r}, but a patience must be a time >= 0 s, or inf")
         return time
@@ -211,8 +224,7 @@ class WaitingActor(Actor):
     def _turns_away(self, waiter: Waiter, waiting: int) -> bool:
         if self.balking is None:
             return False
-        known = {"time": self.now, "channel": waiter.channel, "waiting": waiting}
-        share = of_token(self.balking, waiter.token, **known)
+        share = self.balking(waiter.token, self.now, waiter.channel, waiting)
         if not isinstance(share, (bool, int, float)) or not 0 <= share <= 1:
             raise EpicycleError(
                 f"{self.balking} gives {share!r}, but balking must be true or false, or a probability from 0 to 1"

@@ -26,7 +26,7 @@ from functools import cached_property
 from typing import Any, ClassVar, Generic, Protocol, TypeVar
 
 from epicycle.actors import EpicycleError, Parameter, Stream, Streams, Tag, to_nanoseconds, to_seconds
-from epicycle.actors.expression import PortFormula, PortFormulaParameter, operand, value_at
+from epicycle.actors.expression import PortFormula, PortFormulaParameter, value_at
 
 from .aspect import Aspect
 
@@ -148,7 +148,7 @@ class JoinPoint:
             latest = self._context.latest(port)
             if latest is None:
                 return None
-            values.append(operand(value_at(latest, fields)))
+            values.append(value_at(latest, fields))
         return formula(values, **given)
 
     def selected(self, parameter: str) -> Selection:

@@ -30,7 +30,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from epicycle.actors import CORE_MODULES, NO_TOKENS, Actor, EpicycleError, Parameter
-from epicycle.actors.expression import Formula, PortFormula
+from epicycle.actors.expression import Formula, PortFormula, TokenFormula
 from epicycle.aspects import Aspect, JoinPoint
 
 from ..results import Past
@@ -345,7 +345,7 @@ _CONSTANT = frozenset(
         type(typing.Any), type(list[int] | T), type(typing.Annotated[int, 1]), np.float64, np.int64, np.bool_,
     }
 )  # fmt: skip
-_UNCHANGING = (type, enum.Enum, PurePath, np.dtype, np.generic, np.ufunc, Parameter, Formula, PortFormula)
+_UNCHANGING = (type, enum.Enum, PurePath, np.dtype, np.generic, np.ufunc, Parameter, Formula, PortFormula, TokenFormula)
 _MAKE: dict[type, Callable[[Copies, Any], Any]] = {
     list: Copies._list,
     deque: lambda copies, thing: copies._later(

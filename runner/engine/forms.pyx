@@ -21,7 +21,7 @@ from epicycle.runner.engine.way cimport Sender
 from epicycle.actors import (
     Clock, Constant, Expression, Exponential, Gamma, Normal, PoissonClock, Random, Scale, Server, TimeDelay, Uniform,
 )
-from epicycle.actors.expression.floats import UNDECIDED
+from epicycle.actors.expression import UNDECIDED
 
 
 cdef enum:
@@ -353,7 +353,7 @@ cdef class ExpressionForm(Native):
         self.output, self.latest, self.holds = self.sender("output"), actor._latest._tokens, actor.hold
         self.function, self.wants_number = actor.expression.function, actor._kind in ("number", "any value")
         is_whole = {"time", *self.inputs}.issuperset(self.names)
-        return self.output is not None and self.function is not None and is_whole
+        return self.output is not None and is_whole
 
     cpdef fire(self):
         cdef InputPort port
@@ -378,11 +378,10 @@ cdef class ExpressionForm(Native):
         try:
             value = self.function(*given)
         except UNDECIDED:
-            value = None
-        if value is None:
             value = self.actor._value(dict(self.latest))
-        elif type(value) is not float or not self.wants_number:
-            value = self.actor._checked(value)
+        else:
+            if type(value) is not float or not self.wants_number:
+                value = self.actor._checked(value)
         self.output.go(value)
 
 

@@ -10,7 +10,7 @@ from functools import lru_cache
 from typing import Any
 
 from epicycle.actors import Quantity, to_nanoseconds, to_seconds
-from epicycle.actors.expression import Formula, operand
+from epicycle.actors.expression import Formula
 
 from ..catalogue import MSER5, TIME, Measure
 from ..graph import Metric
@@ -135,7 +135,7 @@ def _measured(measure: Measure, token: Any) -> Any:
 def _holds(when: Formula, token: Any) -> float | _Unfit:
     """Whether a condition holds for a token: 1 or 0."""
     try:
-        return float(bool(when({"value": operand(token)})))
+        return float(bool(when({"value": token})))
     except Exception as error:
         return _Unfit(f"{short(token)}, for which {when.source!r} cannot be evaluated ({error}),")
 

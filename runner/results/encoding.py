@@ -14,8 +14,8 @@ import struct
 import threading
 from collections.abc import Callable, Iterator
 from enum import Enum
-from functools import cache
-from operator import attrgetter
+from functools import cache, lru_cache
+from operator import attrgetter, itemgetter
 from typing import Any
 
 import numpy as np
@@ -127,6 +127,15 @@ def _scalar(token: Any) -> bytes:
     return _other(token) if isinstance(item, np.generic) else canonical(item)
 
 
+def canonical_inside(token: Any, depth: int) -> bytes:
+    """A token as bytes that is within so many others that count."""
+    _level.depth += depth
+    try:
+        return canonical(token)
+    finally:
+        _level.depth -= depth
+
+
 class _Level(threading.local):
     """The present nesting depth of the encoder of this thread."""
 
@@ -162,7 +171,22 @@ def _sequence(token: Any) -> bytes:
 
 @_nested
 def _mapping(token: Any) -> bytes:
-    return b"m" + _COUNT(len(token)) + b"".join(sorted(canonical(k) + canonical(v) for k, v in token.items()))
+    head = b"m" + _COUNT(len(token))
+    names = sorted_names(tuple(token))
+    if names is None:
+        return head + b"".join(sorted(canonical(key) + canonical(value) for key, value in token.items()))
+    return head + b"".join([text + canonical(token[name]) for name, text in names])
+
+
+@lru_cache(maxsize=1024)  # tokens of one kind have the same keys
+def sorted_names(keys: tuple[Any, ...]) -> tuple[tuple[str, bytes], ...] | None:
+    """The keys of a mapping, each with its bytes, in the order of these; None if they are not all texts.
+
+    The bytes of no key begin with those of another, so the values have no say in the order.
+    """
+    if not all(type(key) is str for key in keys):
+        return None
+    return tuple(sorted(((key, canonical(key)) for key in keys), key=itemgetter(1)))
 
 
 @_nested

@@ -17,6 +17,7 @@ cdef class RecordHash:
     cdef long long time
     cdef long microstep
     cdef bint is_fixed
+    cdef int level  # of the lists and mappings around what is encoded
     cdef dict known
     cpdef bytes add(self, bytes number, bytes names, when, value)
     cdef int need(self, Py_ssize_t more) except -1
@@ -27,6 +28,8 @@ cdef class RecordHash:
     cdef int put_known(self, token) except -1
     cdef int put(self, token, int depth) except -1
     cdef int put_array(self, token) except -1
+    cdef int put_mapping(self, dict token, int depth) except -1
+    cdef int put_other(self, token) except -1
     cdef int update(self) except -1
 
 

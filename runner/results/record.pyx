@@ -1,5 +1,5 @@
 # cython: language_level=3, boundscheck=False, wraparound=False, cdivision=True
-"""What record.py does, in C: numbers, texts, arrays, tuples and dataclasses are encoded here, all else by encoding.py."""
+"""What record.py does, in C: what tokens mostly consist of is encoded here, all else by encoding.py."""
 
 cimport numpy
 from cpython cimport array
@@ -19,7 +19,7 @@ from array import array as new_array
 
 import numpy as np
 
-from .encoding import canonical, encoders, field_names, is_record
+from .encoding import canonical_inside, field_names, is_record, sorted_names
 
 numpy.import_array()
 
@@ -28,6 +28,8 @@ cdef bint IS_LITTLE = np.little_endian
 cdef uint64_t NAN_BITS = 0x7FF8000000000000
 cdef int DEEP = 32  # from here on Python continues, which knows how deep it may go
 cdef dict PLANS = {}  # by class: what all its tokens share
+cdef dict NAMES = {}  # by the keys of mappings: these in order, with their bytes
+cdef int MOST_NAMES = 1024
 
 
 cdef bytes text(str token):
@@ -87,6 +89,7 @@ cdef class RecordHash:
                 time, microstep = when.time, when.microstep
         is_later = time != self.time or microstep != self.microstep
         self.end = self.used
+        self.level = 0
         self.need(32)
         if is_later:
             self.put_little(0, 1)
@@ -194,8 +197,17 @@ cdef class RecordHash:
         elif cls is bool or token is None:
             self.put_little(b"n" if token is None else b"t" if token else b"u", 1)
         elif depth >= DEEP:
+            self.put_other(token)
+        elif cls is dict:
+            self.put_mapping(token, depth)
+        elif cls is list:
             self.is_fixed = False
-            self.put_bytes(canonical(token))
+            self.level += 1
+            self.put_little(b"l", 1)
+            self.put_little(len(<list>token), 4)
+            for item in <list>token:
+                self.put(item, depth + 1)
+            self.level -= 1
         elif cls is tuple:
             self.put_little(b"l", 1)
             self.put_little(len(<tuple>token), 4)
@@ -211,14 +223,37 @@ cdef class RecordHash:
             plan = PLANS.get(cls)
             if plan is None:
                 if not is_record(cls):
-                    self.is_fixed = False
-                    return self.put_bytes(encoders[cls](token))
+                    return self.put_other(token)
                 plan = PLANS[cls] = Plan(cls)
             self.is_fixed = self.is_fixed and plan.is_frozen
             self.put_bytes(plan.head)
             for place in range(len(plan.names)):
                 self.put_bytes(<bytes>plan.texts[place])
                 self.put(getattr(token, <str>plan.names[place]), depth + 1)
+        return 0
+
+    cdef int put_other(self, token) except -1:
+        self.is_fixed = False
+        return self.put_bytes(canonical_inside(token, self.level))
+
+    cdef int put_mapping(self, dict token, int depth) except -1:
+        cdef tuple keys = tuple(token), each
+        names = NAMES.get(keys)
+        if names is None:
+            names = sorted_names(keys)
+            if names is None:
+                return self.put_other(token)
+            if len(NAMES) >= MOST_NAMES:
+                NAMES.clear()
+            NAMES[keys] = names
+        self.is_fixed = False
+        self.level += 1
+        self.put_little(b"m", 1)
+        self.put_little(len(token), 4)
+        for each in <tuple>names:
+            self.put_bytes(<bytes>each[1])
+            self.put(token[each[0]], depth + 1)
+        self.level -= 1
         return 0
 
     cdef int put_array(self, token) except -1:
@@ -229,7 +264,7 @@ cdef class RecordHash:
             self.is_fixed = False
         if not (IS_LITTLE and numpy.PyArray_TYPE(numbers) == numpy.NPY_DOUBLE and numpy.PyArray_ISCARRAY_RO(numbers)):
             self.is_fixed = self.is_fixed and numbers.dtype.kind in "biuf"
-            return self.put_bytes(encoders[np.ndarray](numbers))
+            return self.put_bytes(canonical_inside(numbers, self.level))
         self.need(8 + 4 * numbers.ndim + 8 * count)
         memcpy(self.buffer + self.end, b"a<f8", 4)
         self.end += 4
