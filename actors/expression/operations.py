@@ -69,6 +69,7 @@ def handed(value: Any) -> Any:
 def _copied(value: Any, left: Left, depth: int) -> Any:
     """A checked copy of a list or dict of plain things; None if it is, or holds, anything else."""
     made: Any
+    items: Any
     if type(value) is dict:
         made, items = value.copy(), value.items()
         if not all(type(key) is str for key in value):
@@ -170,7 +171,8 @@ def part(whole: Any, index: Any) -> Any:
     if type(index) is str:
         if type(whole) is dict:
             return whole[index]
-        if index in _fields(type(whole)):
+        kind: type = type(whole)
+        if index in _fields(kind):
             return getattr(whole, index)
     elif type(index) is int and type(whole) in (list, tuple, str):
         return whole[index]
