@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import ast
 import dataclasses
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from functools import cache
 from typing import Any, Final, NoReturn
 
@@ -69,7 +69,7 @@ def handed(value: Any) -> Any:
 def _copied(value: Any, left: Left, depth: int) -> Any:
     """A checked copy of a list or dict of plain things; None if it is, or holds, anything else."""
     made: Any
-    items: Iterable[tuple[Any, Any]]
+    items: Any
     if type(value) is dict:
         made, items = value.copy(), value.items()
         if not all(type(key) is str for key in value):
@@ -171,7 +171,8 @@ def part(whole: Any, index: Any) -> Any:
     if type(index) is str:
         if type(whole) is dict:
             return whole[index]
-        if index in _fields(whole.__class__):
+        kind: type = type(whole)
+        if index in _fields(kind):
             return getattr(whole, index)
     elif type(index) is int and type(whole) in (list, tuple, str):
         return whole[index]

@@ -31,7 +31,7 @@ _GIVE_NUMBERS: Final = frozenset(
     ("abs", "atan2", "ceil", "cos", "degrees", "exp", "float", "floor", "hypot", "int", "log", "radians", "round",
      "sin", "sqrt", "sum", "tan")
 )  # fmt: skip
-# Kinds of values: a float that may be too large for one, a number, a truth value, any token as it came.
+# Kinds of values: a float that may be infinite or NaN, a number, a truth value, any token as it came.
 _FLOAT, _NUMBER, _TRUTH, _ANY = "float", "number", "truth value", "any"
 _SIMPLE: Final = (
     ast.Constant, ast.Name, ast.UnaryOp, ast.BinOp, ast.BoolOp, ast.Compare, ast.IfExp,
@@ -258,11 +258,8 @@ class _Writer:
         # Whole numbers have bounds of their own.
         tests, (one, two) = self._tests((left, right), "NUMBERS", {_FLOAT, _NUMBER})
         name = self._new()
-        text = (
-            f"({name} if {tests}{' and ' if tests else ''}"
-            f"-{_LARGEST} <= ({name} := {one}{_SIGNS[type(node.op)]}{two}) <= {_LARGEST} "
-            f"else {other}({one}, {two}, {self._left()}))"
-        )
+        is_bounded = f"-{_LARGEST} <= ({name} := {one}{_SIGNS[type(node.op)]}{two}) <= {_LARGEST}"
+        text = f"({name} if {tests}{' and ' if tests else ''}{is_bounded} else {other}({one}, {two}, {self._left()}))"
         may_be_list = isinstance(node.op, (ast.Add, ast.Mult)) and kinds.isdisjoint({_FLOAT, _NUMBER})
         may_be_list = may_be_list or (isinstance(node.op, ast.Mult) and _FLOAT not in kinds and _ANY in kinds)
         return text, _ANY if may_be_list else _NUMBER

@@ -22,7 +22,7 @@ def is_true(guard: Formula, value_of: Callable[[str], Any]) -> bool:
             return False
         except ExpressionError as error:
             if len(known) == len(tokens):
-                return bool(guard.decided(known))  # its message shows the values, too
+                return bool(guard.decided(known))  # raises an error that shows the values, too
             raise EpicycleError(f"{guard.source!r}: {error}") from None
     if not isinstance(found, (bool, int, float)):
         raise EpicycleError(f"the guard {guard} gives {found!r}, which is neither true nor false")

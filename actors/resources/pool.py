@@ -53,6 +53,7 @@ class _Pools(WaitingActor):
             )
         self._held: list[Waiter] = []  # in the order in which they were granted
         self._in_use = [0] * len(self._capacities())  # by kind
+        self._capacities_before: Sequence[int] = ()  # at the firing before
         self._has_begun_anew = False
 
     def restart(self) -> None:
@@ -61,7 +62,11 @@ class _Pools(WaitingActor):
 
     def fire(self) -> None:
         self._send()
-        self._renege()
+        has_lost = self._renege()
+        capacities = self._capacities()
+        if not (has_lost or self.release.present or self.acquire.present or capacities != self._capacities_before):
+            return  # it was only to send
+        self._capacities_before = capacities
         for channel, tokens in enumerate(self.release.by_channel()):
             for token in tokens:
                 self._return(token, channel)
@@ -133,18 +138,19 @@ class _Pools(WaitingActor):
         if self.preemptive:
             excess = [used - there for used, there in zip(self._in_use, capacities, strict=True)]
             self._take_back(self._last_of(self._held, excess)[0])
-        claimed = [False] * len(capacities)  # kinds for which a request waits
+        claimed: list[bool] = []  # kinds for which a request waits
         place = 0
-        while place < len(self._waiting) and not all(claimed):
+        while place < len(self._waiting) and not (claimed and all(claimed)):
             request = self._waiting[place]
-            if not any(each and amount for each, amount in zip(claimed, request.amounts, strict=True)):
+            if not any(each and amount for each, amount in zip(claimed, request.amounts, strict=False)):
                 losers = self._losers_to(request, capacities)
                 if losers is not None:
                     self._take_back(losers)  # which wait behind it
                     self._waiting.remove(request)
                     self._hold(request)
                     continue
-            claimed = [each or amount > 0 for each, amount in zip(claimed, request.amounts, strict=True)]
+            before = claimed or [False] * len(capacities)
+            claimed = [each or amount > 0 for each, amount in zip(before, request.amounts, strict=True)]
             place += 1
 
     def _losers_to(self, request: Waiter, capacities: Sequence[int]) -> list[Waiter] | None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_left, insort
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from operator import attrgetter
 from typing import Any, ClassVar, Final
@@ -66,41 +66,29 @@ class Waiter:
         self.key = self.order, self.place, self.number
 
 
-class Waiters:
+class Waiters(list[Waiter]):
     """The waiting tokens, in the order in which they leave."""
-
-    def __init__(self) -> None:
-        self._all: list[Waiter] = []
-
-    def __len__(self) -> int:
-        return len(self._all)
-
-    def __iter__(self) -> Iterator[Waiter]:
-        return iter(self._all)
 
     def add(self, waiter: Waiter) -> None:
         """Insert one at its place."""
-        insort(self._all, waiter, key=_KEY)
+        insort(self, waiter, key=_KEY)
 
     def remove(self, waiter: Waiter) -> None:
         """Remove one."""
-        place = bisect_left(self._all, waiter.key, key=_KEY)
-        del self._all[place]
+        del self[bisect_left(self, waiter.key, key=_KEY)]
         if waiter.patience is not None:
             waiter.patience.cancel()
             waiter.patience = None
 
-    def __getitem__(self, place: int) -> Waiter:
-        return self._all[place]
-
-    def __contains__(self, waiter: Waiter) -> bool:
-        place = bisect_left(self._all, waiter.key, key=_KEY)
-        return place < len(self._all) and self._all[place] is waiter
+    def __contains__(self, waiter: object) -> bool:
+        assert isinstance(waiter, Waiter)
+        place = bisect_left(self, waiter.key, key=_KEY)
+        return place < len(self) and self[place] is waiter
 
     @property
     def first(self) -> Waiter:
         """The next one to go."""
-        return self._all[0]
+        return self[0]
 
 
 class WaitingActor(Actor):
@@ -167,12 +155,15 @@ class WaitingActor(Actor):
             for port, token, channel in told:
                 self.outputs[port].send(token, channel)
 
-    def _renege(self) -> None:
-        """Remove those whose patience has run out."""
-        if self.patience is not None:
-            for each in [each for each in self._waiting if each.patience is not None and each.patience.due]:
-                self._waiting.remove(each)
-                self._tell_of("reneged", each)
+    def _renege(self) -> bool:
+        """Remove those whose patience has run out; returns whether there are any."""
+        if self.patience is None:
+            return False
+        over = [each for each in self._waiting if each.patience is not None and each.patience.due]
+        for each in over:
+            self._waiting.remove(each)
+            self._tell_of("reneged", each)
+        return bool(over)
 
     def _waiter(self, token: Any, channel: int, size: float) -> Waiter:
         number, self._came = self._came, self._came + 1

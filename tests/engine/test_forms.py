@@ -30,7 +30,7 @@ SOURCES = (
     ("distributions.py", "Gamma", "a02963690b8f422f"),
     ("distributions.py", "Normal", "41b7f712051a423b"),
     ("distributions.py", "Uniform", "6d1f653751253aab"),
-    ("functions.py", "Expression", "626b064f18a71310"),
+    ("functions.py", "Expression", "2d0d9517c8762b8d"),
     ("queues.py", "Server", "40505ceac74b629d"),
     ("sources.py", "Clock", "72b20d3d884177d4"),
     ("sources.py", "PoissonClock", "87a89c8375357743"),

@@ -37,7 +37,7 @@ import hypothesis
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 
-from epicycle.actors.expression.floats import KNOWN
+from epicycle.actors.expression.translation import KNOWN
 from epicycle.runner import Simulation
 from epicycle.runner.build import load_model
 from epicycle.runner.catalogue import built_in, model_folders
@@ -83,13 +83,12 @@ class Intrusion(KeyboardInterrupt):
 _watched: list[Path] = []  # the folder that may be read; empty while nobody is watched
 
 
-def _is_of_floats(code: Any) -> bool:
-    """Whether this is an expression as a function of floats, which can call nothing but what it is given."""
+def _is_expression(code: Any) -> bool:
+    """Whether this is an expression as a function, which can call nothing but what it is given."""
     if not isinstance(code, CodeType) or code.co_filename != "<expression>":
         return False
-    (function,) = (each for each in code.co_consts if isinstance(each, CodeType))
-    is_plain = not any(isinstance(each, CodeType) for each in function.co_consts)
-    return is_plain and not code.co_names and KNOWN.keys() >= set(function.co_names)
+    inner = [each for each in code.co_consts if isinstance(each, CodeType)]  # with those of its list comprehensions
+    return KNOWN.keys() >= set(code.co_names) and all(map(_is_expression, inner))
 
 
 def _audit(event: str, arguments: tuple[Any, ...]) -> None:
@@ -106,7 +105,7 @@ def _audit(event: str, arguments: tuple[Any, ...]) -> None:
             fine = isinstance(path, (str, bytes, Path)) and Path(os.fsdecode(path)).resolve().is_relative_to(folder)
             if not fine or writes:
                 raise Intrusion(f"{event} {arguments!r}")
-        elif event == "exec" and ("<class 'networkx" in str(arguments) or _is_of_floats(arguments[0])):
+        elif event == "exec" and ("<class 'networkx" in str(arguments) or _is_expression(arguments[0])):
             return  # networkx makes its wrappers with exec, each at its first use
         elif event not in HARMLESS:
             raise Intrusion(f"{event} {arguments!r}"[:500])
