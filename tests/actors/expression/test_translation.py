@@ -40,7 +40,7 @@ CONSTANTS = (
 )
 TOKENS = (1.5, -2.0, 0.0, -0.0, 3.0, 1e308, 5e-324, float("inf"), float("-inf"), float("nan"))
 WHOLE = (0, 1, 2, -7, 2**62, -(2**63), True, False)
-OTHERS = (
+OTHERS: tuple[Any, ...] = (
     "x", "", "a text of more than ten characters", None, [1.0], [], [[1], [2, "x"]], (1, 2), {"x": 1, "y": 2.5}, {},
     {"x": {"x": [3]}, "y": "x"}, {1: 2, "x": 3}, [{"x": 1.0}, {"x": 2.0}], np.float64(0.5), np.int64(3), np.bool_(True),
     np.array([1.0, float("nan")]), np.array(2.0), np.array([[1, 2], [3, 4]]), Position(1.0, [2.0]),
@@ -175,6 +175,7 @@ def test_budgets_are_those_of_the_evaluator(text: str, items: int, told: str) ->
 def test_the_fields_of_a_token() -> None:
     formula = TokenFormula("time - came if severity < 3 else token['came']", ("time", "channel"))
     assert formula(PATIENT, 4.0, 0) == 2.5
+    assert formula._translated()(PATIENT, 4.0, 0) == 2.5  # so the evaluator is not needed
     assert formula({"came": 1.0, "severity": 3}, 4.0, 0) == 1.0
     assert TokenFormula("x + y[0]")(Position(1.0, [2.0])) == 3.0
     assert TokenFormula("came + token", ("token", "time"))(PATIENT, 1, 0.0) == 2.5  # of which the token is another
@@ -185,6 +186,11 @@ def test_the_fields_of_a_token() -> None:
         "\"time - came if severity < 3 else token['came']\": the token {'came': 1.0, 'severe': 3} has no field "
         "'severity', did you mean 'severe'? it has came, severe, and token, time, channel are known"
     )
+
+
+def test_a_text_goes_before_other_keys_with_that_text() -> None:
+    tokens = {"1": "a", 1: "b"}
+    assert Formula("a['1']")({"a": tokens}) == operand(tokens)["1"] == "a"
 
 
 def test_fields_that_are_not_asked_for_must_be_there() -> None:
