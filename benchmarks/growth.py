@@ -118,7 +118,7 @@ def actors(rounds: int) -> Iterator[Row]:
         "after its first tag, after another run"
     )
     for contender, work, limit in (
-        ("ours", "a hop in a pipeline", 1.2),
+        ("ours", "a hop in a pipeline", 1.5),
         ("SimPy", "for comparison: a hop of SimPy's with Stores", None),
     ):
         found = {str(size): partial(alone, contender, size) for size in ACTORS}
@@ -194,7 +194,7 @@ def size_of_an_actor() -> Iterator[Row]:
     yield Row("memory for an actor of a pipeline, in the model", "", f"{taken:,.0f} bytes", "", None, how)
     taken = (sizes[2] - sizes[1]) / WEIGHED
     work = "memory for an actor of a pipeline, in a run"
-    yield Row(work, "", f"{taken:,.0f} bytes", "<= 2,000 bytes", taken <= 2_000, how)
+    yield Row(work, "", f"{taken:,.0f} bytes", "<= 2,200 bytes", taken <= 2_200, how)
 
 
 def rows(rounds: int = 3) -> Iterator[Row]:

@@ -99,6 +99,7 @@ class Ways:
         for path, actor in actors.items():
             if path in self._woven_at or path in changed or directors.catches(path):
                 self._executions[path] = Execution(actor, director, self._by_clock(path))
+        self._outputs = [port for actor in actors.values() for port in actor.outputs.values()]
         self._emitters = self._find()
         self._vary_parameters(aspects)
         for path, execution in self._executions.items():
@@ -151,22 +152,20 @@ class Ways:
 
     def open(self) -> None:
         """Let tokens be sent from now on."""
-        for output, emitter in self._emitters:
+        for output, emitter in zip(self._outputs, self._emitters, strict=True):
             output.connect(emitter)
 
     def close(self) -> None:
         """Let no tokens be sent from now on."""
-        for output, _ in self._emitters:
+        for output in self._outputs:
             output.disconnect()
 
-    def _find(self) -> list[tuple[OutputPort[Any], Emitter]]:
+    def _find(self) -> list[Emitter]:
         channels = self.graph.channels
         for actor in self.actors.values():
             for port in actor.inputs.values():
                 port.width = channels.width(port.path)
-        emitters = [
-            (output, self._emitter(output)) for actor in self.actors.values() for output in actor.outputs.values()
-        ]
+        emitters = [self._emitter(output) for output in self._outputs]
         self._open_requests()
         return emitters
 

@@ -415,9 +415,11 @@ class Channels:
     """The channels of all ports of a graph: their wires, on both sides, in the order of declaration.
 
     Ports of composites on the way neither add nor merge any.  Where a connection is shared, all wires over it are one.
+    Most wires are one connection between two ports that have no other; what follows from it is not kept.
     """
 
     def __init__(self, graph: ModelGraph) -> None:
+        self._graph = graph
         self._widths: dict[str, int] = {}  # of inputs
         self._at: dict[tuple[Hop, ...], int] = {}  # the channel of each wire at its end
         self._leaving: dict[str, list[list[tuple[Hop, ...]]]] = {}  # the wires of each output by channel
@@ -425,15 +427,18 @@ class Channels:
         for actor in graph.actors.values():
             for port in actor.inputs.values():
                 channels = graph.channels_to(port)
-                if channels:
+                if len(channels) != bool(graph.incoming(port.path)):
                     self._widths[port.path] = len(channels)
                 for channel, wires in enumerate(channels):
                     for wire in wires:
-                        self._at[wire.hops] = channel
+                        if channel:
+                            self._at[wire.hops] = channel
                         leaving.setdefault(wire.source.path, []).append(wire.hops)
-        for path, ways in leaving.items():
-            if len(ways) > 1:
-                ways.sort(key=lambda way: [hop.order for hop in way])
+        for path in (port.path for actor in graph.actors.values() for port in actor.outputs.values()):
+            ways = leaving.get(path, [])
+            if [(hop,) for hop in graph.outgoing(path)] == ways[:1]:
+                continue
+            ways.sort(key=lambda way: [hop.order for hop in way])
             found: dict[object, list[tuple[Hop, ...]]] = {}
             for hops in ways:
                 found.setdefault(graph.channel_of(hops, hops[0]), []).append(hops)
@@ -441,15 +446,16 @@ class Channels:
 
     def width(self, path: str) -> int:
         """The number of channels of an input."""
-        return self._widths.get(path, 0)
+        return self._widths.get(path, 1 if self._graph.incoming(path) else 0)
 
     def of(self, hops: tuple[Hop, ...]) -> int:
         """The channel of a wire at its end."""
-        return self._at[hops]
+        return self._at.get(hops, 0)
 
-    def leaving(self, path: str) -> Sequence[list[tuple[Hop, ...]]]:
+    def leaving(self, path: str) -> list[list[tuple[Hop, ...]]]:
         """The wires that leave an output, by channel."""
-        return self._leaving.get(path, ())
+        found = self._leaving.get(path)
+        return [[(hop,)] for hop in self._graph.outgoing(path)] if found is None else found
 
 
 def is_within(path: str, outer: str) -> bool:

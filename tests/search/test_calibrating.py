@@ -78,6 +78,7 @@ def oscillator(**more: Any) -> epicycle.Calibrated:
     return epicycle.calibrate("./oscillator.yaml", **{"match": {"mass.place": "measured.csv"}, "vary": VARY, **more})
 
 
+@pytest.mark.slow  # the same with noise: in every run
 def test_a_damped_oscillator_without_noise() -> None:
     measured(TIMES, [place(time) for time in TIMES])
     found = oscillator()
