@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import Any, Final
 
 from .core import NANOSECONDS_PER_SECOND, EpicycleError
 from .expression import Formula
 from .expression.enclosure import bounds_of
+from .expression.translation import UNDECIDED, all_translated
 from .integration import Bounds, State
 from .solution import Guard, Solution, sign_of
 
@@ -34,6 +35,8 @@ class Trajectory:
         self._held = held
         self._also = dict(also or {})
         self._solver = solver
+        self._function: Callable[..., Any] | None = None  # of time, the other times, the states and what is held
+        self._fixed: list[Any] = []
 
     def watch(self, formula: Formula, what: str, *, rising: bool = True, falling: bool = True) -> Guard:
         """Search for the zero crossings of a formula, called ``what`` in messages."""
@@ -49,6 +52,11 @@ class Trajectory:
         """Start a solution at ``time`` ns plus a fraction of a nanosecond in s, so that no rounding accumulates over
         crossings."""
         self.time, self.fraction = time, fraction
+        self._fixed = list(self._held.values())
+        self._function = None
+        if all(type(value) is float for value in (*state, *self._fixed)):
+            sources = tuple(formula.source for formula in self._formulas.values())
+            self._function = all_translated(sources, ("time", *self._also, *self.names, *self._held))
         self.solution = Solution(self._rates, self._bounds_of_rates, state, self.guards, **self._solver)
 
     def begin_at(self, at: float, state: State) -> None:
@@ -98,6 +106,15 @@ class Trajectory:
         return [sign_of(guard.value(at, state)) for guard in self.guards]
 
     def _rates(self, at: float, state: State) -> State:
+        if self._function is not None:
+            try:
+                since = [self._at(at, since) for since in self._also.values()] if self._also else ()
+                now = self.time / NANOSECONDS_PER_SECOND + (self.fraction + at)
+                found: State = self._function(now, *since, *state, *self._fixed)
+            except UNDECIDED:
+                pass
+            else:
+                return found
         names = self.values(at, state)
         return [number_of(formula, names, f"derivative of {name}") for name, formula in self._formulas.items()]
 

@@ -14,7 +14,7 @@ import math
 from collections.abc import Callable, Iterable
 from typing import Any, Final
 
-from ..core import Quantity
+from ..core import Quantity, elementary
 from . import operations
 from .evaluation import evaluate
 from .syntax import ExpressionError, free_names, parse
@@ -77,6 +77,32 @@ def translated(source: str, arguments: tuple[str, ...], fields: tuple[str, ...] 
     return eval(code, KNOWN)  # type: ignore[no-any-return]
 
 
+@functools.lru_cache(maxsize=256)
+def all_translated(sources: tuple[str, ...], names: tuple[str, ...]) -> Callable[..., Any] | None:
+    """A function of the values of all these names, which must be floats, to the values of the expressions, as floats.
+
+    It raises one of ``UNDECIDED`` where the evaluator must decide; None if an expression is not purely numeric.
+    """
+    places = {name: f"v{place}" for place, name in enumerate(names)}
+    if len(places) < len(names):
+        return None
+    parts = []
+    for source in sources:
+        writer = _Writer(source, places, _FLOAT)
+        try:
+            text, kind = writer.settled(parse(source))
+        except _UnfitError:
+            return None
+        if kind not in (_FLOAT, _NUMBER) or writer.weighs:
+            return None
+        parts.append(text if kind == _FLOAT else f"float({text})")
+    code = f"lambda {', '.join(places.values())}: [{', '.join(parts)}]"
+    try:
+        return eval(compile(code, "<expressions>", "eval"), KNOWN)  # type: ignore[no-any-return]
+    except (MemoryError, RecursionError, SyntaxError):
+        return None
+
+
 def undecided_by(*values: object) -> Any:
     """The function of an expression that the evaluator must decide in any case."""
     operations.undecided()
@@ -99,6 +125,7 @@ KNOWN: Final[dict[str, Any]] = {
     "__builtins__": {}, "type": type, "float": float, "dict": dict, "list": list, "str": str, "size": len,
     "NUMBERS": operations.NUMBERS, "LIGHT": operations.LIGHT, "power": BINARY[ast.Pow],
     "undecided": operations.undecided, "handed": operations.handed, "weighed": operations.weighed,
+    "sin": elementary.sin, "cos": elementary.cos,
     "plain": operations.plain, "part": operations.part, "cut": operations.cut, "turns": operations.turns,
     **{f"by_{kind.__name__}": function for kind, function in operations.OPERATORS.items()},
     **{f"f_{name}": function for name, function in FUNCTIONS.items()},
@@ -114,7 +141,7 @@ class _Writer:
         self._source = source
         self._held = 0  # values that have a name
         self._atoms = set(names.values())  # texts that can be repeated
-        self._weighs = False  # whether there is something to be paid for by its size
+        self.weighs = False  # whether there is something to be paid for by its size
 
     def whole(self, tree: ast.expr) -> str:
         """The text of the whole expression, whose value is checked; raises ``_UnfitError``."""
@@ -125,7 +152,7 @@ class _Writer:
             text = f"(r if -{_LARGEST} <= (r := {text}) <= {_LARGEST} else handed(r))"
         elif kind == _ANY:
             text = f"handed({text})"
-        return f"({text} if (left := [{MAX_STEPS - _SPENT}]) else None)" if self._weighs else text
+        return f"({text} if (left := [{MAX_STEPS - _SPENT}]) else None)" if self.weighs else text
 
     # -- texts ----------------------------------------------------------------------------------------------------
 
@@ -141,10 +168,10 @@ class _Writer:
         return f"({name} := {text})", name
 
     def _left(self) -> str:
-        self._weighs = True
+        self.weighs = True
         return "left"
 
-    def _settled(self, node: ast.expr, written: Written | None = None) -> Written:
+    def settled(self, node: ast.expr, written: Written | None = None) -> Written:
         """A part whose value may not show in the result: it must be finite, unless it is a name."""
         text, kind = written or self._write(node)
         if kind != _FLOAT or text in self._atoms:
@@ -153,7 +180,7 @@ class _Writer:
         return f"({name} if -1e999 < ({name} := {text}) < 1e999 else undecided())", kind
 
     def _tested(self, node: ast.expr) -> str:
-        return _test(self._settled(node))
+        return _test(self.settled(node))
 
     def _weighed(self, text: str) -> Written:
         return f"weighed({text}, {self._left()})", _ANY
@@ -171,7 +198,7 @@ class _Writer:
             case ast.Name(id=name) if name in self._names:
                 return self._names[name], self._kinds[name]
             case ast.List() | ast.Tuple():
-                parts = [self._settled(each) for each in node.elts]
+                parts = [self.settled(each) for each in node.elts]
                 text = f"[{', '.join(text for text, _ in parts)}]"
                 return self._weighed(text) if _ANY in {kind for _, kind in parts} else (text, _ANY)
             case ast.Dict():
@@ -183,14 +210,14 @@ class _Writer:
             case ast.BinOp():
                 return self._operation(node)
             case ast.BoolOp():
-                parts = [self._settled(each) for each in node.values]
+                parts = [self.settled(each) for each in node.values]
                 return f"({_SIGNS[type(node.op)].join(map(_test, parts))})", _common(parts)
             case ast.Compare():
                 return self._compared(node)
             case ast.IfExp():
                 branches = [self._write(node.body), self._write(node.orelse)]
                 if (kind := _common(branches)) != _FLOAT:
-                    branches = [self._settled(node.body, branches[0]), self._settled(node.orelse, branches[1])]
+                    branches = [self.settled(node.body, branches[0]), self.settled(node.orelse, branches[1])]
                 return f"({branches[0][0]} if {self._tested(node.test)} else {branches[1][0]})", kind
             case ast.Subscript():
                 return self._subscript(node)
@@ -227,7 +254,7 @@ class _Writer:
         keys = [each.value if isinstance(each, ast.Constant) else None for each in node.keys]
         if not all(isinstance(key, str) for key in keys) or len({*keys}) < len(keys):
             raise _UnfitError
-        items = zip(keys, map(self._settled, node.values), strict=True)
+        items = zip(keys, map(self.settled, node.values), strict=True)
         return self._weighed(f"{{{', '.join(f'{key!r}: {text}' for key, (text, _) in items)}}}")
 
     def _signed(self, node: ast.UnaryOp) -> Written:
@@ -245,9 +272,9 @@ class _Writer:
         kinds = {left[1], right[1]}
         is_of_floats = _FLOAT in kinds <= {_FLOAT, _NUMBER}
         if not (is_of_floats and keeps_left):
-            left = self._settled(node.left, left)
+            left = self.settled(node.left, left)
         if not (is_of_floats and keeps_right):
-            right = self._settled(node.right, right)
+            right = self.settled(node.right, right)
         if is_of_floats and isinstance(node.op, ast.Pow):
             return f"power({left[0]}, {right[0]})", _FLOAT
         if is_of_floats:
@@ -275,10 +302,10 @@ class _Writer:
         return " & ".join(tests), texts
 
     def _compared(self, node: ast.Compare) -> Written:
-        found, first = [], self._settled(node.left)
+        found, first = [], self.settled(node.left)
         nodes = [node.left, *node.comparators]
         for place, sign in enumerate(node.ops, 1):
-            second = self._settled(nodes[place])
+            second = self.settled(nodes[place])
             if place < len(node.ops):  # is compared again
                 text, again = self._named(second[0])
                 found.append(self._comparison(sign, first, (text, second[1]), nodes[place]))
@@ -310,9 +337,9 @@ class _Writer:
         if kind != _ANY:
             raise _UnfitError
         if isinstance(node.slice, ast.Slice):
-            bounds = [each and self._settled(each)[0] for each in (node.slice.lower, node.slice.upper, node.slice.step)]
+            bounds = [each and self.settled(each)[0] for each in (node.slice.lower, node.slice.upper, node.slice.step)]
             return f"cut({whole}, {', '.join(each or 'None' for each in bounds)}, {self._left()})", _ANY
-        index, kind = self._settled(node.slice)
+        index, kind = self.settled(node.slice)
         is_key = isinstance(node.slice, ast.Constant) and isinstance(node.slice.value, str)
         is_number = index in self._atoms and kind == _NUMBER and index not in self._names.values()
         if not (is_key or is_number) or isinstance(node.value, ast.Constant):
@@ -324,9 +351,10 @@ class _Writer:
         )
 
     def _called(self, name: str, arguments: list[ast.expr]) -> Written:
-        parts = [self._settled(each) for each in arguments]
+        parts = [self.settled(each) for each in arguments]
         if name in _OF_FLOATS and {kind for _, kind in parts} == {_FLOAT}:
-            return f"f_{name}({', '.join(text for text, _ in parts)})", _FLOAT
+            own = name if name in ("sin", "cos") else f"f_{name}"  # these check nothing, and take floats alone
+            return f"{own}({', '.join(text for text, _ in parts)})", _FLOAT
         if name == "len" and len(parts) == 1:
             first, again = self._named(parts[0][0])
             return f"(size({again}) if type({first}) is list else f_len({again}))", _NUMBER
@@ -353,7 +381,7 @@ class _Writer:
         )
         self._atoms.add(item)
         conditions = [f" if {self._tested(each)}" for each in generator.ifs]
-        text, kind = self._settled(node.elt)
+        text, kind = self.settled(node.elt)
         self._names, self._kinds = before
         steps = 2 + sum(1 for each in (node.elt, *generator.ifs) for _ in ast.walk(each)) + len(self._source) // 5
         text = (

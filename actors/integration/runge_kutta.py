@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import Final
+from functools import cached_property
+from typing import Any, Final, NamedTuple
 
-from .stepper import GROWTH_LIMIT, SHRINK_LIMIT, Derivative, Limits, Piece, State, Stepper, combined, norm, stretch
+from .stepper import GROWTH_LIMIT, SHRINK_LIMIT, Derivative, Limits, Piece, State, Stepper, norm, stretch
 
 _SAFETY: Final = 0.9
 Weights = tuple[tuple[int, float], ...]  # pairs of a stage and its weight; stages with weight 0 are left out
@@ -35,6 +36,51 @@ class Tableau:
         """The factors of the polynomial, each as slope and offset."""
         return [(-1.0, 1.0) if self.alternates and number % 2 else (1.0, 0.0) for number in range(len(self.dense))]
 
+    @cached_property
+    def sums(self) -> Sums:
+        """The weighted sums of this tableau, made once."""
+        return Sums(
+            [(share, _moved(weights)) for share, weights in self.stages],
+            [(share, _moved(weights)) for share, weights in self.extra],
+            [_sum(weights) for weights in self.errors],
+            [_sum(weights) for weights in self.dense],
+        )
+
+
+Sum = Callable[[list[State]], State]  # of the derivatives at stages
+Moved = Callable[[State, float, list[State]], State]  # a state, and a step times the sum added to it
+
+
+class Sums(NamedTuple):
+    """The weighted sums of a tableau as functions, with its weights in their code."""
+
+    stages: list[tuple[float, Moved]]
+    extra: list[tuple[float, Moved]]
+    errors: list[Sum]
+    dense: list[Sum]
+
+
+def _sum(weights: Weights) -> Sum:
+    text, names, stages = _written(weights)
+    made: Sum = _function(f"lambda rates: [{text} for {names}, in zip({stages})]")
+    return made
+
+
+def _moved(weights: Weights) -> Moved:
+    text, names, stages = _written(weights)
+    made: Moved = _function(f"lambda state, step, rates: [x + step * ({text}) for x, {names} in zip(state, {stages})]")
+    return made
+
+
+def _written(weights: Weights) -> tuple[str, str, str]:
+    """A sum in the order of its terms, beginning with 0; the names in it, and what they are of."""
+    text = "".join(f" + {weight!r} * v{stage}" for stage, weight in weights)
+    return f"0.0{text}", ", ".join(f"v{stage}" for stage, _ in weights), ", ".join(f"rates[{s}]" for s, _ in weights)
+
+
+def _function(text: str) -> Any:
+    return eval(text, {"__builtins__": {"zip": zip}})
+
 
 class RungeKutta(Stepper):
     """The explicit method of a tableau; the polynomial along a step is computed only on request."""
@@ -51,7 +97,7 @@ class RungeKutta(Stepper):
 
     def attempt(self, end: float, step: float) -> float | None:
         rates = [self.rates]
-        state = self._pass(self._tableau.stages, (self.time, self.state), step, rates)
+        state = self._pass(self._tableau.sums.stages, (self.time, self.state), step, rates)
         error = self._error(rates, step, self.scale(self.state, state))
         factor = stretch(error, _SAFETY, self._tableau.order)
         if error < 1.0:
@@ -62,17 +108,19 @@ class RungeKutta(Stepper):
         self._growth = 1.0
         return max(SHRINK_LIMIT, factor)  # also for NaN
 
-    def _pass(self, stages: Iterable[Stage], begin: tuple[float, State], step: float, rates: list[State]) -> State:
+    def _pass(
+        self, stages: Iterable[tuple[float, Moved]], begin: tuple[float, State], step: float, rates: list[State]
+    ) -> State:
         """Evaluate derivatives at stages, and append them to ``rates``; returns the state at the last one."""
         time, start = begin
-        state = start
-        for share, weights in stages:
-            state = [value + step * change for value, change in zip(start, _weighted(weights, rates), strict=True)]
-            rates.append(self.derivative(time + share * step, state))
+        state, derivative = start, self.derivative
+        for share, moved in stages:
+            state = moved(start, step, rates)
+            rates.append(derivative(time + share * step, state))
         return state
 
     def _error(self, rates: list[State], step: float, scale: list[float]) -> float:
-        errors = [norm(_weighted(weights, rates), scale) for weights in self._tableau.errors]
+        errors = [norm(each(rates), scale) for each in self._tableau.sums.errors]
         if len(errors) == 1 or errors[0] == 0.0:
             return step * errors[0]
         high, low = errors
@@ -81,13 +129,9 @@ class RungeKutta(Stepper):
     def piece(self) -> Piece:
         start, state = self._begin
         step, rates = self.time - start, list(self._latest)
-        self._pass(self._tableau.extra, self._begin, step, rates)
-        rows = [[step * value for value in _weighted(weights, rates)] for weights in self._tableau.dense]
+        self._pass(self._tableau.sums.extra, self._begin, step, rates)
+        rows = [[step * value for value in each(rates)] for each in self._tableau.sums.dense]
         return Piece(start, self.time, start, step, self._tableau.factors, [state, *rows])
-
-
-def _weighted(weights: Weights, rates: list[State]) -> State:
-    return combined([weight for _, weight in weights], [rates[stage] for stage, _ in weights])
 
 
 # fmt: off

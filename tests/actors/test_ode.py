@@ -10,7 +10,9 @@ import numpy as np
 import pytest
 import scipy.integrate
 
-from epicycle.actors.expression import Formula, evaluate
+from epicycle.actors import trajectory
+from epicycle.actors.core import EpicycleError
+from epicycle.actors.expression import ExpressionError, Formula, evaluate
 from epicycle.actors.integration import STEPPERS
 from epicycle.runner.engine import ActorError, Simulation
 from epicycle.runner.text import ModelError
@@ -343,6 +345,7 @@ def formulas_evaluated(monkeypatch: pytest.MonkeyPatch, actor: dict[str, Any], u
 
     with monkeypatch.context() as patch:
         patch.setattr(Formula, "__call__", counted)
+        patch.setattr(trajectory, "all_translated", lambda *_: None)
         feed(actor, {"trigger": ticks(until / 100, until)}, until=until)
     return count
 
@@ -431,3 +434,48 @@ run: {stop: 20 s, stop_when: ball.bounce}
     results = Simulation(load(text)).run()
     assert results.stopped == "stop_when"
     assert results.end == pytest.approx(math.sqrt(2 * 10 / 9.81), abs=1e-6)
+
+
+@pytest.mark.parametrize("method", ["DOP853", "RK23", "Radau"])
+@pytest.mark.parametrize(
+    ("angle", "speed"),
+    [
+        ("speed", "-9.81 * sin(angle) - 0.1 * speed + push"),
+        ("speed if angle < 0.9 else 0", "-max(angle, 0.2) / (1 + time ** 2) + min(push, 1)"),
+        ("-0.5", "1 - 1 * angle + 0 * push"),
+        ("speed / (push - 0.3)", "abs(angle) - push"),
+        ("speed", "1e308 * (1 + push) * 10"),
+    ],
+)
+def test_derivatives_in_one_function_are_those_of_the_evaluator(
+    monkeypatch: pytest.MonkeyPatch, method: str, angle: str, speed: str
+) -> None:
+    """To the bit, with what they refuse."""
+    actor = {
+        "type": "ODE",
+        "initial": {"angle": 0.5, "speed": 1.0},
+        "derivatives": {"angle": angle, "speed": speed},
+        "crossings": {"low": "angle + 0.1"},
+        "method": method,
+        "relative_tolerance": 1e-6,
+    }
+
+    def outcome() -> Any:
+        try:
+            return repr(feed(actor, {"trigger": ticks(0.25, 3.0), "push": [(0.6, 0.3), (1.2, 2)]}, until=3.0)[1])
+        except (ActorError, EpicycleError) as error:
+            return str(error).split("m.yaml")[-1]  # without the folder, which is a new one
+
+    found = outcome()
+    monkeypatch.setattr(trajectory, "all_translated", lambda *_: None)
+    monkeypatch.setattr(Formula, "__call__", evaluated)
+    assert outcome() == found
+
+
+def evaluated(formula: Formula, values: Any) -> Any:
+    """The value of a formula, node by node."""
+    try:
+        return evaluate(formula.source, values)
+    except ExpressionError as error:
+        given = ", ".join(f"{name} = {values[name]!r}" for name in formula.names if name in values)
+        raise EpicycleError(f"{formula.source!r}: {error}{f', with {given}' if given else ''}") from None
