@@ -4,32 +4,20 @@ from __future__ import annotations
 
 import gc
 import tracemalloc
-from pathlib import Path
 
 import pytest
 
+from benchmarks import growth
 from epicycle.actors import NO_TOKENS
-from epicycle.runner import Simulation, load_model
+from epicycle.runner import Simulation
 from epicycle.runner.build import Model
 
 ACTORS = 500
-PIPELINE = f"""
-model: pipeline
-actors:
-  clock: {{type: Clock, period: 1 s, values: [1.0]}}
-  scale: {{type: Scale, count: {ACTORS}, offset: 1}}
-connections:
-  - clock.output -> scale[0].input
-  - scale[..-2].output -> scale[1..].input
-run: {{stop: 3 s}}
-"""
 
 
 @pytest.fixture
-def model(tmp_path: Path) -> Model:
-    path = tmp_path / "pipeline.yaml"
-    path.write_text(PIPELINE)
-    return load_model(path)
+def model() -> Model:
+    return growth.model(growth.PIPELINE, actors=ACTORS, stop=3)
 
 
 def test_an_actor_of_a_pipeline_takes_at_most_2200_bytes_in_a_run(model: Model) -> None:
