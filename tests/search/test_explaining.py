@@ -193,7 +193,7 @@ def test_the_command(model: Path, tmp_path: Path, capsys: pytest.CaptureFixture[
 def test_the_command_that_is_saved_makes_the_run(
     model: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    types, out = tmp_path / "own.py", tmp_path / "out"
+    types, out = tmp_path / "types_of_the_explained.py", tmp_path / "out"
     types.write_text("from epicycle.actors import Scale\n\n\nclass OwnScale(Scale):\n    pass\n", encoding="utf-8")
     model.write_text(TEXT.replace("{type: Scale, factor: 1}", "{type: OwnScale, factor: 1}"), encoding="utf-8")
     further = ["--max-actors", "50", "--types", str(types)]
