@@ -1,7 +1,8 @@
 """``make portable``: is every digest the same under settings that stand for other machines and other versions?
 
 Each setting is a process of its own that computes all of ``digests``; the result is compared with ``golden.json``,
-which is in the repository.  ``--golden`` writes that file anew, from the first setting.
+which is in the repository, and what tutorials print with what they print under the first setting.  ``--golden`` writes
+that file anew, from the first setting.
 """
 
 from __future__ import annotations
@@ -19,7 +20,7 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from .digests import SMALL, parts
+from .digests import SMALL, parts, tutorials
 
 ROOT = Path(__file__).parents[2]
 GOLDEN = Path(__file__).with_name("golden.json")
@@ -140,7 +141,8 @@ def main() -> int:
         if wrong:
             print(wrong)
             return 1
-        GOLDEN.write_text(json.dumps(found, indent=2) + "\n")
+        kept = {name: digest for name, digest in found.items() if name not in tutorials()}
+        GOLDEN.write_text(json.dumps(kept, indent=2) + "\n")
         return 0
     wanted, bad = json.loads(GOLDEN.read_text()), 0
     with tempfile.TemporaryDirectory() as folder, ThreadPoolExecutor(os.cpu_count() or 1) as pool:
@@ -151,6 +153,8 @@ def main() -> int:
         for setting, (found, wrong, seconds) in zip(
             chosen, pool.map(outcome, chosen, [cache] * len(chosen)), strict=True
         ):
+            if setting is chosen[0]:  # pages are reworded now and then, and tests compare them with what they print
+                wanted |= {name: found[name] for name in found.keys() & tutorials().keys()}
             others = differences(found, wanted)
             missing = len(setting.parts or parts()) - len(found)
             said = (
@@ -164,7 +168,11 @@ def main() -> int:
             print(f"not tried: {', '.join(OLD)} cannot be installed here")
         if not any(setting.command for setting in chosen):
             print("not tried: an emulated processor (install qemu-user)")
-    print("every digest is that of tests/portable/golden.json" if not bad else f"{bad} settings differ")
+    print(
+        "every digest is that of tests/portable/golden.json, and tutorials print the same"
+        if not bad
+        else f"{bad} settings differ"
+    )
     return bool(bad)
 
 
