@@ -217,6 +217,8 @@ def settled(folder: str, names: tuple[str, ...]) -> Path:
         (home / "user").mkdir(exist_ok=True)
         os.environ[name] = str(home / "user")
     tempfile.tempdir = None
+    # Modules that a command imports first are compiled, and would be written beside their sources.
+    sys.dont_write_bytecode, os.environ["PYTHONDONTWRITEBYTECODE"] = True, "1"
     os.chdir(home / "user")
     for surface in SURFACES:
         if surface.name in names:
