@@ -188,7 +188,9 @@ def as_written(value: object) -> object:
         return ".nan" if math.isnan(value) else ".inf" if value > 0 else "-.inf"  # JSON has no such numbers
     if isinstance(value, float) and value.is_integer() and abs(value) < 1e15:
         return int(value)
-    return str(value) if isinstance(value, Path) else value
+    if value is None or isinstance(value, (bool, int, float, str)):
+        return value
+    return str(value) if isinstance(value, Path) else f"<{type(value).__name__}>"  # no file can say it
 
 
 def shown(value: object) -> str:

@@ -227,3 +227,17 @@ def test_replicas_are_shown_as_one(capsys: pytest.CaptureFixture[str]) -> None:
     told = " ".join(capsys.readouterr().out.split())
     assert "orders rate of robot[*].delivered (20) 1/h" in told
     assert "stops at 6 h" in told
+
+
+def test_a_default_that_no_file_can_say_is_shown_by_its_type(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    types = tmp_path / "odd_defaults.py"
+    defaults = {"one": "1j", "two": "object()", "three": "[b'a', 1.5]"}
+    lines = "".join(f"    {name} = Parameter(object, {default})\n" for name, default in defaults.items())
+    types.write_text(
+        f"from epicycle.actors import Actor, Parameter\nclass OddDefaults(Actor):\n    'A thing.'\n{lines}"
+    )
+    told = json.loads(printed(capsys, "actors", "OddDefaults", "--json", "--types", str(types)))
+    assert [each["default"] for each in told["parameters"]] == ["<complex>", "<object>", ["<bytes>", 1.5]]
+    assert '"default": "<complex>"' in printed(capsys, "schema", "--types", str(types))
