@@ -17,7 +17,7 @@ from itertools import pairwise
 from typing import Final, NamedTuple
 
 from .core import EpicycleError
-from .integration import STEPPERS, Bounds, Derivative, Limits, Piece, State
+from .integration import STEPPERS, Bounds, Derivative, Exact, Limits, Piece, State, Stepper
 
 WINDOW: Final = 1.0  # s, within which things may hide
 CELLS: Final = 8  # parts of a window in which changes of sign are searched
@@ -59,7 +59,8 @@ class Solution:
     """A solution that starts at time 0 and is extended on request, or searched up to the first crossing.
 
     ``rates`` gives the derivatives of the states at a time, ``bounds`` their bounds for times and states between
-    bounds.  Without ``max_step``, a step is longer than ``WINDOW`` only if nothing can hide in it.
+    bounds.  Without ``max_step``, a step is longer than ``WINDOW`` only if nothing can hide in it.  If the solution is
+    known, it is given as ``exact``.
     """
 
     def __init__(
@@ -72,16 +73,23 @@ class Solution:
         method: str,
         tolerance: tuple[float, float],
         max_step: float | None,
+        exact: Exact | None = None,
     ) -> None:
         self._rates, self._bounds = rates, bounds
-        self._watched = max_step is None
         self._window = WINDOW if max_step is None else max_step
         self._patience, self._taken = 1, 0  # steps to take before longer ones are tried; steps taken
-        self._stepper = STEPPERS[method](rates, state, Limits(*tolerance, LONGEST if max_step is None else max_step))
+        self._watched: Stepper | None = None  # the stepper, if it must not pass over anything
+        self._stepper: Stepper | Exact
+        if exact is not None:
+            self._stepper = exact
+        else:
+            limits = Limits(*tolerance, LONGEST if max_step is None else max_step)
+            self._stepper = stepper = STEPPERS[method](rates, state, limits)
+            self._watched = stepper if max_step is None else None
         self._guards = guards
         self._start = state
-        self._piece: Piece | None = None
-        self._before: Piece | None = None  # a request for the past may reach back by a fraction of a nanosecond
+        self._piece: Piece | Exact | None = None
+        self._before: Piece | Exact | None = None  # a request for the past may reach back by a fraction of a nanosecond
         self._ahead: list[
             tuple[float, float, list[int]]
         ] = []  # parts still to be searched, with their guards; the next one last
@@ -118,7 +126,7 @@ class Solution:
             piece = self._before
         return piece.at(time)
 
-    def _latest(self) -> Piece:
+    def _latest(self) -> Piece | Exact:
         """The solution along the latest step, computed on request because that takes time."""
         if self._piece is None:
             self._piece = self._stepper.piece()
@@ -128,26 +136,26 @@ class Solution:
 
     def _advance(self) -> bool:
         """Take one step, which is longer than the window only if nothing hides in it; False if there is none."""
+        stepper = self._watched
+        if stepper is None:
+            return self._stepper.step()
         while True:
-            before = copy.copy(self._stepper) if self._watched and self._stepper.next_step > WINDOW else None
-            if not self._stepper.step():
+            before = copy.copy(stepper) if stepper.next_step > WINDOW else None
+            if not stepper.step():
                 return False
             self._taken += 1
             if before is None or self.end - before.time <= WINDOW or not self._hides(before.time):
                 break
             # Then it is likely to stay so: a longer step is tried less and less often.
             length = self.end - before.time
-            self._stepper, self._piece = before, None
-            self._limit(length / 4.0)
+            self._stepper = self._watched = stepper = before
+            self._piece = None
+            _limit(stepper, length / 4.0)
             self._patience, self._taken = min(2 * self._patience, _MAX_PATIENCE), 0
-        if self._watched and self._taken >= self._patience:
-            self._limit(self._stepper.limits.max_step * 4.0)
+        if self._taken >= self._patience:
+            _limit(stepper, stepper.limits.max_step * 4.0)
             self._taken = 0
         return True
-
-    def _limit(self, longest: float) -> None:
-        longest = min(max(longest, WINDOW), LONGEST)
-        self._stepper.limits = replace(self._stepper.limits, max_step=longest)
 
     def _hides(self, start: float) -> bool:
         """Whether a derivative may be far from all its values in the latest step.
@@ -282,6 +290,11 @@ class Solution:
         if value(left) == 0.0 or value(left) * value(right) > 0.0:
             return left  # it was at zero already, or beyond by rounding
         return root(value, left, right)
+
+
+def _limit(stepper: Stepper, longest: float) -> None:
+    longest = min(max(longest, WINDOW), LONGEST)
+    stepper.limits = replace(stepper.limits, max_step=longest)
 
 
 def root(function: Callable[[float], float], left: float, right: float, least: float = 1e-15) -> float:

@@ -8,9 +8,10 @@ from typing import Any, Final
 
 from .core import NANOSECONDS_PER_SECOND, EpicycleError
 from .expression import Formula
+from .expression.affine import REST, factors_of
 from .expression.enclosure import bounds_of
 from .expression.translation import UNDECIDED, all_translated
-from .integration import Bounds, State
+from .integration import Bounds, Exact, State
 from .solution import Guard, Solution, sign_of
 
 _MAX_STEPS: Final = 10_000
@@ -57,7 +58,30 @@ class Trajectory:
         if all(type(value) is float for value in (*state, *self._fixed)):
             sources = tuple(formula.source for formula in self._formulas.values())
             self._function = all_translated(sources, ("time", *self._also, *self.names, *self._held))
-        self.solution = Solution(self._rates, self._bounds_of_rates, state, self.guards, **self._solver)
+        self.solution = Solution(
+            self._rates, self._bounds_of_rates, state, self.guards, **self._solver, exact=self._exact(state)
+        )
+
+    def _exact(self, state: State) -> Exact | None:
+        """The solution, if every derivative is linear in its own state and depends on nothing else that moves."""
+        moving = frozenset(("time", *self._also, *self.names))
+        rates, pulls = [], []
+        for name, formula in self._formulas.items():
+            factors = factors_of(formula.source, moving)
+            if factors is None or not factors.keys() <= {REST, name}:
+                return None
+            try:
+                rest, factor = (
+                    number_of(factors[each], self._held, "") if each in factors else 0.0 for each in (REST, name)
+                )
+            except EpicycleError:  # the derivative itself says what is wrong
+                return None
+            rates.append(rest)
+            pulls.append(factor)
+        try:
+            return Exact(state, rates, pulls)
+        except OverflowError:
+            return None
 
     def begin_at(self, at: float, state: State) -> None:
         """Start again at a time of the present solution."""
@@ -86,9 +110,10 @@ class Trajectory:
             parts += 1
             if parts > _MAX_STEPS:
                 raise EpicycleError(f"the solver took more than {_MAX_STEPS:,} steps within a nanosecond")
-        while solution.crossing is None and solution.searched < solution.end and parts < _AHEAD:
-            solution.look()
-            parts += 1
+        if parts:
+            while solution.crossing is None and solution.searched < solution.end and parts < _AHEAD:
+                solution.look()
+                parts += 1
         return self.moment(solution.searched if solution.crossing is None else solution.crossing.time)
 
     # -- values ---------------------------------------------------------------------------------------------------

@@ -5,6 +5,7 @@ from functools import partial
 from typing import Final
 
 from .bdf import BDF
+from .exact import Exact
 from .radau import Radau
 from .runge_kutta import DOP853, RK23, RK45, RungeKutta
 from .stepper import Bounds, Derivative, Limits, Piece, State, Stepper
@@ -17,4 +18,4 @@ STEPPERS: Final[Mapping[str, Callable[[Derivative, State, Limits], Stepper]]] = 
     "BDF": BDF,
 }
 
-__all__ = ["STEPPERS", "Bounds", "Derivative", "Limits", "Piece", "State", "Stepper"]
+__all__ = ["STEPPERS", "Bounds", "Derivative", "Exact", "Limits", "Piece", "State", "Stepper"]
