@@ -52,7 +52,8 @@ class ODE(Actor):
     Methods: ``RK23`` (Bogacki-Shampine), ``RK45`` (Dormand-Prince) and ``DOP853`` (Hairer) are explicit Runge-Kutta
     methods.  ``Radau`` (Radau IIA of order 5) and ``BDF`` (order 1 to 5) are for stiff systems: ``Radau`` is more exact
     at loose tolerances, ``BDF`` takes fewer evaluations at tight ones.  The steps are those of SciPy's solvers of these
-    names, but the arithmetic is our own.
+    names, but the arithmetic is our own.  No method is needed where each derivative is, by its form, linear in its own
+    state and depends on nothing else that moves: a line or an exponential is exact.
 
     Steps are as long as the tolerances allow, but longer than 1 s only where nothing can hide in them: bounds on the
     derivatives along the step (interval arithmetic) must show that they stay near the values that the step has
