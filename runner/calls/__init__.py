@@ -18,7 +18,8 @@ if TYPE_CHECKING:
     from .fitting import Fit, fit
     from .optimising import Optimised, optimise, optimised
     from .picturing import Picture, Pictures, draw, plot, save
-    from .running import Changes, Done, as_command, load, perform, run, seconds, watched
+    from .run_spec import Changes, OpenedRun, RunSpec, opened, seconds
+    from .running import Done, again, load, perform, run, watched
     from .studying import study
     from .viewing import Page, recorded, view
 
@@ -33,12 +34,14 @@ __all__ = [
     "Explained",
     "Falsified",
     "Fit",
+    "OpenedRun",
     "Optimised",
     "Page",
     "Picture",
     "Pictures",
     "RareEvent",
-    "as_command",
+    "RunSpec",
+    "again",
     "calibrate",
     "calibrated",
     "compare",
@@ -51,6 +54,7 @@ __all__ = [
     "falsify",
     "fit",
     "load",
+    "opened",
     "optimise",
     "optimised",
     "perform",
@@ -75,7 +79,8 @@ _HOMES = {
     "optimising": ("Optimised", "optimise", "optimised"),
     "fitting": ("Fit", "fit"),
     "picturing": ("Picture", "Pictures", "draw", "plot", "save"),
-    "running": ("Changes", "Done", "as_command", "load", "perform", "run", "seconds", "watched"),
+    "run_spec": ("Changes", "OpenedRun", "RunSpec", "opened", "seconds"),
+    "running": ("Done", "again", "load", "perform", "run", "watched"),
     "studying": ("study",),
     "viewing": ("Page", "recorded", "view"),
 }

@@ -29,7 +29,8 @@ from ..study import (
 )
 from ..tables import Table, Tabled, pandas_module
 from ..text import did_you_mean
-from .running import Changes, loaded, seconds
+from .run_spec import Changes, seconds
+from .running import loaded
 
 if TYPE_CHECKING:
     import pandas

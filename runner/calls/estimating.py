@@ -10,7 +10,8 @@ from typing import Unpack
 from ..build import Model
 from ..search import RareEvent, monitor_named
 from ..search import rare as search
-from .running import Changes, loaded, seconds
+from .run_spec import Changes, seconds
+from .running import loaded
 
 __all__ = ["RareEvent", "rare"]
 

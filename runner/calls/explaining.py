@@ -22,7 +22,8 @@ from ..search import INTERRUPT, RUNS, Effect, Explanation, monitors_named
 from ..search import explain as search
 from ..shown import finite, short
 from ..tables import Table, Tabled
-from .running import Changes, as_command, loaded, seconds
+from .run_spec import Changes, RunSpec, seconds
+from .running import loaded
 from .viewing import Page, recorded
 
 _SHOWN = 60  # characters of a token
@@ -179,7 +180,7 @@ def explain(
     if isinstance(model, Model):
         made, command = copy.copy(made), ["epicycle", "run", made.name, "--seed", str(seed)]
     else:
-        command = as_command(model, seed, until, changes)
+        command = RunSpec.of(model, seed, until, changes).command()
     if runs < 1:
         raise EpicycleError(f"runs: {runs} is not a whole number of at least 1")
     names = [only] if isinstance(only, str) else [*only]

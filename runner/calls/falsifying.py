@@ -25,7 +25,7 @@ from ..shown import finite, short
 from ..study import OK, StudyResults, open_study
 from ..tables import Table, Tabled
 from ..text import Node, Scalar, plain
-from .running import Changes, as_command, seconds
+from .run_spec import Changes, RunSpec, seconds
 from .studying import as_settings
 
 SHOWN = 5  # runs in the table
@@ -81,7 +81,7 @@ class Falsified(Tabled):
         own = [f"{path}={value}" for path, value in _settings(run)]
         changes: Changes = {"set": [*asked.set, *own], "disturb": asked.disturb}
         changes |= {"aspects": asked.aspects, "without_aspects": asked.without}
-        return as_command(asked.model, run.seed, asked.until, changes, asked.types)
+        return RunSpec.of(asked.model, run.seed, asked.until, changes, asked.types).command()
 
     @property
     def covered(self) -> str:

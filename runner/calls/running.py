@@ -2,43 +2,30 @@
 
 from __future__ import annotations
 
-import json
 import math
 import threading
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import TypedDict, Unpack, cast
+from typing import Unpack
 
-from epicycle.actors import EpicycleError, convert
+from epicycle.actors import EpicycleError
 
 from ..bars import SOON, bar
 from ..build import Model, figures_of, load_model
 from ..engine import ActorError, LogFilter, LoopError, Pace, Simulation
-from ..language import Setting
 from ..printing import complain, console, notices
 from ..results import LogFile, Results
 from ..shown import in_time
-from ..text import Problems, call_site, node_of, plain
+from ..text import Problems
+from .run_spec import Changes, RunSpec, seconds
 
 PATIENCE = 5.0  # s after which the length of a run can be judged
 LONG = 600.0  # s that are worth a notice
 NOTICEABLE = 0.05  # s by which a run may be late without a report: the operating system alone takes as much
 
 load = load_model
-
-
-class Changes(TypedDict, total=False):
-    """What ``load`` changes in a model."""
-
-    set: Iterable[str | Setting] | Mapping[str, object]
-    overrides: str | Path | Iterable[str | Path]
-    aspects: Iterable[str]
-    without_aspects: Iterable[str]
-    disturb: str | Path | Iterable[str | Path]
-    types: Iterable[type]
-    max_actors: int
 
 
 def loaded(model: Model | str | Path, changes: Changes) -> Model:
@@ -75,6 +62,7 @@ def run(
     >>> epicycle.run("mm1", seed=3, set={"load": 0.9}).metrics["mean_wait"]
     """
     made = loaded(model, changes)
+    spec = None if isinstance(model, Model) else RunSpec.of(model, seed, until, changes)
     done = perform(
         made,
         seed=seed,
@@ -83,35 +71,13 @@ def run(
         keep_log=keep_log or log is not None,
         log=None if log is None else LogFile(Path(log)),
         folder=None if out is None else Path(out),
-        given=("epicycle.run", made.name) if isinstance(model, Model) else as_command(model, seed, until, changes),
+        given=("epicycle.run", made.name) if spec is None else spec.command(),
+        spec=spec,
         progress=progress,
     )
     for error in done.failed:
         raise error
     return done.results
-
-
-FLAGS = {"overrides": "--overrides", "disturb": "--disturb", "aspects": "--aspect", "without_aspects": "--without"}
-
-
-def as_command(
-    model: str | Path, seed: int | None, until: float | str | None, changes: Changes, files: Iterable[str | Path] = ()
-) -> list[str]:
-    """The command that makes the same run, with these files of types; it cannot name classes that a program defines."""
-    words: list[object] = ["epicycle", "run", model]
-    for key, value in changes.items():
-        if key == "set" and isinstance(value, Mapping):
-            for path, each in value.items():
-                words += ["--set", f"{path}={json.dumps(plain(node_of(each, call_site())))}"]
-        elif key in FLAGS or key == "set":
-            each_of = [value] if isinstance(value, (str, Path)) else cast(Iterable[object], value)
-            words += [word for each in each_of for word in (FLAGS.get(key, "--set"), each)]
-    if "max_actors" in changes:
-        words += ["--max-actors", changes["max_actors"]]
-    words += [word for file in files for word in ("--types", file)]
-    words += [] if seed is None else ["--seed", seed]
-    words += [] if until is None else ["--until", until]
-    return list(map(str, words))
 
 
 @dataclass
@@ -133,10 +99,12 @@ def perform(
     log: LogFile | None = None,
     folder: Path | None = None,
     given: Sequence[str] = (),
+    spec: RunSpec | None = None,
     progress: bool = True,
     after: float = SOON,
 ) -> Done:
-    """Run a model and write what is requested; ``given`` is the command or call, for the manifest.
+    """Run a model and write what is requested; ``given`` is the command or call, and ``spec`` how to make the run
+    again, for the manifest.
 
     The records of a run that fails are written, too.  ``keep_log`` filters the ``log``, if there is one.
     """
@@ -159,11 +127,11 @@ def perform(
             interrupted = isinstance(error, KeyboardInterrupt)
             results = simulation.results("interrupted" if interrupted else "failed")
             if folder is not None:
-                write_folder(folder, results, given, "interrupted" if interrupted else str(error))
+                write_folder(folder, results, given, "interrupted" if interrupted else str(error), again(spec, results))
                 complain(f"what was recorded before is in {folder}")
             raise
         # Before the log is closed, which may fail.
-        saved = [] if folder is None else write_folder(folder, results, given)
+        saved = [] if folder is None else write_folder(folder, results, given, again=again(spec, results))
     if pace is not None and pace.worst > NOTICEABLE:
         complain(
             f"the run could not keep up with the wall clock: {pace.worst:.3g} s late at worst, "
@@ -175,14 +143,9 @@ def perform(
     return Done(results, [*drawn, *saved], failed)
 
 
-def seconds(what: str, given: float | str | None) -> float | None:
-    """A model time in seconds or with a unit."""
-    if given is None:
-        return None
-    time = convert(given, "s") if isinstance(given, str) else given
-    if not 0.0 <= time < 1e9:
-        raise EpicycleError(f"{what} {given}: expected a time from 0 s to 1e9 s")
-    return time
+def again(spec: RunSpec | None, results: Results) -> dict[str, object] | None:
+    """How to make a run again, for its manifest: with its seed, which the model may change."""
+    return None if spec is None else (spec if spec.study else replace(spec, seed=results.seed)).plain()
 
 
 def outlook(elapsed: float, now: float, end: float) -> str:

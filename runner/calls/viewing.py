@@ -18,7 +18,8 @@ from ..engine import ActorError, LoopError
 from ..printing import complain
 from ..show.view import Recording, page_of, write_page
 from ..text import Problems
-from .running import Changes, loaded, seconds, watched
+from .run_spec import Changes, seconds
+from .running import loaded, watched
 
 
 class Page:

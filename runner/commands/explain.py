@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
 from . import searching
-from .options import CHANGES, COUNT, DONE, INTERRUPTED, SEED, UNTIL, command, load, option, several
-from .past_run import as_before
+from .options import CHANGES, COUNT, DONE, INTERRUPTED, RUN, SEED, UNTIL, command, open_run, option, several
 
 
 @command(
     "find the smallest set of faults that breaks a property of a run",
-    option("model", metavar="MODEL or RESULTS", help="a model, or a folder that a run was written to"),
+    option("model", metavar="MODEL or RESULTS", help=RUN),
     *CHANGES,
     SEED,
     UNTIL,
@@ -40,21 +38,16 @@ def explain(options: argparse.Namespace) -> int:
     these acts, the facts as JSON, and a page that shows both runs.  Each run that was tried is noted there, so that the
     same command, or one with more runs, continues.
     """
+    from dataclasses import replace
+
     from ..bars import bar
-    from ..calls import Changes, Explained, as_command, explained, seconds
+    from ..calls import Explained, explained
     from ..search import INTERRUPT
 
-    if Path(options.model).is_dir():
-        as_before(options)
-    made = load(options)
+    spec, made, seed, until, _ = open_run(options)
     folder = searching.folder_of(options, made.name, "explanation")
-    seed = made.seed if options.seed is None else options.seed
-    changes: Changes = {"set": options.set, "overrides": options.overrides, "disturb": options.disturb}
-    changes |= {"aspects": options.aspect, "without_aspects": options.without}
-    if options.max_actors is not None:
-        changes["max_actors"] = options.max_actors
-    given = as_command(options.model, seed, options.until, changes, options.types)
-    until = seconds("--until", options.until)
+    seed = made.seed if seed is None else seed
+    given = (spec if spec.study else replace(spec, seed=seed)).command()
 
     def search() -> Explained:
         with bar(made.name) as show:

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from epicycle.actors import EpicycleError
 
     from ..build import Model
+    from ..calls import OpenedRun, RunSpec
 
 DONE, FAILED, BAD_INPUT, BROKEN, INTERRUPTED = 0, 1, 2, 3, 130
 
@@ -145,6 +146,7 @@ CHANGES = (  # to a model
     ),
     TYPES,
 )
+RUN = "a model, the results folder of a run, or a run of a study, such as results/table_1/3f9a0c"
 MODEL = (option("model", metavar="MODEL", help="a path to a YAML file, or the name of a packaged model"), *CHANGES)
 
 
@@ -153,6 +155,40 @@ def own_types(options: argparse.Namespace) -> list[type]:
     from ..catalogue import types_of_file
 
     return [each for file in options.types for each in types_of_file(Path(file))]
+
+
+def spec_of(options: argparse.Namespace) -> RunSpec:
+    """The run that the options describe."""
+    from ..calls import RunSpec
+
+    return RunSpec(
+        options.model,
+        set=tuple(options.set),
+        overrides=tuple(options.overrides),
+        disturb=tuple(options.disturb),
+        aspects=tuple(options.aspect),
+        without_aspects=tuple(options.without),
+        types=tuple(options.types),
+        max_actors=options.max_actors,
+        seed=options.seed,
+        until=getattr(options, "until", None),
+    )
+
+
+def open_run(options: argparse.Namespace) -> OpenedRun:
+    """The run that the options describe, whose model they may name by a results folder; warnings are printed."""
+    from ..calls import opened
+
+    run = opened(spec_of(options))
+    for warning in run.model.warnings:
+        complain(str(warning))
+    return run
+
+
+def complain_of_change(name: str, before: str, digest: str) -> None:
+    """Say so if a run that was made again is not the same."""
+    if before and before != digest:
+        complain(f"{name} was made by another version of the model or of Epicycle: the run is no longer the same")
 
 
 def load(options: argparse.Namespace, *, strict: bool = False) -> Model:

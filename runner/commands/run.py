@@ -5,9 +5,27 @@ from __future__ import annotations
 import argparse
 import math
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ..printing import console, tell, tell_json
-from .options import BROKEN, MODEL, SEED, UNTIL, command, complain_of, load, number, option, several
+from .options import (
+    BROKEN,
+    CHANGES,
+    RUN,
+    SEED,
+    UNTIL,
+    command,
+    complain_of,
+    complain_of_change,
+    number,
+    open_run,
+    option,
+    several,
+)
+
+if TYPE_CHECKING:
+    from ..build import Model
+    from ..calls import RunSpec
 
 
 def factor(text: str) -> float:
@@ -24,7 +42,8 @@ def factor(text: str) -> float:
 
 @command(
     "run a model",
-    *MODEL,
+    option("model", metavar="MODEL or RESULTS", help=RUN),
+    *CHANGES,
     SEED,
     UNTIL,
     option(
@@ -54,10 +73,13 @@ def factor(text: str) -> float:
     imports=("calls.running", "show"),
 )
 def run(options: argparse.Namespace) -> int:
-    """Run a model once and report the results."""
+    """Run a model once and report the results.
+
+    For a results folder, its run is repeated, with what else is said on top.
+    """
     from epicycle.actors import EpicycleError
 
-    from ..calls import perform, seconds
+    from ..calls import perform
     from ..engine import LogFilter, Pace
     from ..results import LogFile
     from ..show import summary_object, summary_table
@@ -66,17 +88,17 @@ def run(options: argparse.Namespace) -> int:
     if log is None and options.log_where:
         raise EpicycleError(f"--log-where {options.log_where[0]} needs --log FILE, the file to write the log to")
     log_filter = LogFilter.of(options.log_where)
-    until = seconds("--until", options.until)
-    model = load(options)
+    spec, model, seed, until, before = open_run(options)
     done = perform(
         model,
-        seed=options.seed,
+        seed=seed,
         until=until,
         pace=Pace(options.realtime) if options.realtime is not None else None,
         keep_log=False if log is None else log_filter,
         log=log,
-        folder=options.out or (None if options.json else Path("results") / model.name),
+        folder=options.out or (None if options.json else _folder_of(spec, model)),
         given=options.given,
+        spec=spec,
         after=0.0,
     )
     if options.json:
@@ -85,6 +107,11 @@ def run(options: argparse.Namespace) -> int:
         console().print(summary_table(model, done.results))
         for path in done.written:
             tell(f"wrote {path}")
+    complain_of_change(options.model, before, done.results.digest)
     code = complain_of(done.failed, options)
     broken = any(verdict.holds is False for verdict in done.results.monitors.values())
     return BROKEN if options.check and broken and not code else code
+
+
+def _folder_of(spec: RunSpec, model: Model) -> Path:
+    return Path(spec.study) / "replays" / spec.run if spec.study else Path("results") / model.name

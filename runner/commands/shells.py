@@ -13,7 +13,7 @@ HEAD = {
     "fish": "fish: epicycle completion fish > ~/.config/fish/completions/epicycle.fish",
 }
 
-ENDS = {"DIR": "folders", "FILE": "files", "MODEL": "files", "STUDY": "files", ".yaml": "files", ".xml": "files"}
+ENDS = dict.fromkeys(("FILE", "MODEL", "RESULTS", "STUDY", ".yaml", ".xml"), "files") | {"DIR": "folders"}
 
 
 class Given(NamedTuple):
@@ -42,6 +42,7 @@ def _commands() -> Iterator[tuple[str, str, list[Given]]]:
     models, studies = tuple(packaged_models()), tuple(packaged_studies())
     named = {
         "MODEL": models,
+        "MODEL or RESULTS": models,
         "STUDY": studies,
         "NAME or FILE": tuple(packaged_disturbances()),
         "NAME or MODEL": (*known.aspects, *models),

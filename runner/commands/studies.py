@@ -259,6 +259,7 @@ def status(options: argparse.Namespace) -> int:
 def replay(options: argparse.Namespace) -> int:
     """Repeat one run of a study, with its event log, all recorded signals and figures."""
     from ..build import figures_of
+    from ..calls import RunSpec
     from ..results import write_log
     from ..show import check_folder, draw_figures, summary_table, write_folder
     from ..study import again, open_study, plan_of_folder
@@ -272,7 +273,8 @@ def replay(options: argparse.Namespace) -> int:
     figures = {} if errors else figures_of(model, Problems())
     if replaced := check_folder(folder, model.name, options.given):
         complain(replaced)
-    written = write_folder(folder, results, options.given, "".join(map(str, errors)))
+    how = RunSpec(study=str(options.folder), run=row["run"][:12]).plain()
+    written = write_folder(folder, results, options.given, "".join(map(str, errors)), how)
     written.append(folder / "log.parquet")
     write_log(results.log.records, written[-1])
     drawn, failed = draw_figures(folder, results, figures)

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 from ..printing import console, notices, tell, tell_json_text
-from .options import DONE, MODEL, SEED, command, load, option, several
+from .options import CHANGES, DONE, RUN, SEED, command, open_run, option, several
 
 if TYPE_CHECKING:
     from epicycle.actors import Actor, Tag
@@ -22,7 +22,8 @@ WIDEST = 80  # characters of a token
 
 @command(
     "show which actors fired when, and why",
-    *MODEL,
+    option("model", metavar="MODEL or RESULTS", help=RUN),
+    *CHANGES,
     several(
         "--actor",
         metavar="PATTERN",
@@ -48,7 +49,7 @@ def trace(options: argparse.Namespace) -> int:
 
     start = to_nanoseconds(seconds("--from", options.start) or 0.0)
     end = seconds("--to", options.to)
-    model = load(options)
+    _, model, seed, until, _ = open_run(options)
     actors = _actors(options.actor, model)
     show = _as_json if options.json else _as_text(actors, model.graph)
     say = tell_json_text if options.json else tell
@@ -57,10 +58,10 @@ def trace(options: argparse.Namespace) -> int:
         if firing.tag.time >= start:
             say(show(firing))
 
-    if end is not None and model.stop is not None:
-        end = min(end, model.stop)
+    stop = model.stop if until is None else until
+    end = stop if end is None else end if stop is None else min(end, stop)
     with notices(console(stderr=True)):
-        Simulation(model, seed=options.seed, tracer=Tracer(actors, report)).run(until=end)
+        Simulation(model, seed=seed, tracer=Tracer(actors, report)).run(until=end)
     return DONE
 
 

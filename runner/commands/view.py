@@ -8,9 +8,8 @@ from copy import copy
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from ..printing import complain, tell
-from .options import CHANGES, DONE, SEED, UNTIL, check_path, command, load, option
-from .past_run import as_before
+from ..printing import tell
+from .options import CHANGES, DONE, RUN, SEED, UNTIL, check_path, command, complain_of_change, open_run, option
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -20,7 +19,7 @@ if TYPE_CHECKING:
 
 @command(
     "show a run in a browser: space, graph, signals, and what caused what",
-    option("model", metavar="MODEL or RESULTS", nargs="+", help="one or two models, or results folders of runs"),
+    option("model", metavar="MODEL or RESULTS", nargs="+", help=f"one or two of: {RUN}"),
     *CHANGES,
     SEED,
     UNTIL,
@@ -38,12 +37,12 @@ if TYPE_CHECKING:
 def view(options: argparse.Namespace) -> int:
     """Run a model and write a page that shows the run: it needs no network, and any browser opens it.
 
-    For a results folder, the run recorded in its manifest is repeated.  Two runs are shown side by side, with the first
-    difference between them.  --mcap and --rerun write the run for other viewers.
+    For a results folder, its run is repeated, with what else is said on top.  Two runs are shown side by side, with the
+    first difference between them.  --mcap and --rerun write the run for other viewers.
     """
     from epicycle.actors import EpicycleError
 
-    from ..calls import recorded, seconds
+    from ..calls import recorded
 
     if len(options.model) > 2:
         raise EpicycleError(f"a page shows one run or two, not {len(options.model)}: {', '.join(options.model)}")
@@ -51,19 +50,18 @@ def view(options: argparse.Namespace) -> int:
         check_path("--out", options.out)
     exports = _exports(options)
     each = [copy(options) for _ in options.model]
-    digests = []
     for one, name in zip(each, options.model, strict=True):
         one.model = name
-        digests.append(as_before(one) if Path(name).is_dir() else "")
+    runs = [open_run(one) for one in each]
     made = recorded(
-        [load(one) for one in each],
-        seed=[one.seed for one in each],
-        until=[seconds("--until", one.until) for one in each],
+        [run.model for run in runs],
+        seed=[run.seed for run in runs],
+        until=[run.until for run in runs],
         names=[Path(name).name.removesuffix(".yaml") for name in options.model],
     )
-    for name, digest, recording in zip(options.model, digests, made.recordings, strict=False):
-        if digest and not made.errors and recording.results is not None and digest != recording.results.digest:
-            complain(f"{name} was made by another version of the model or of Epicycle: the run is no longer the same")
+    for name, run, recording in zip(options.model, runs, made.recordings, strict=False):
+        if not made.errors and recording.results is not None:
+            complain_of_change(name, run.digest, recording.results.digest)
     for path, write in exports:
         write(made.recordings[0], path)
         tell(f"wrote {path}")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import shlex
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -103,15 +103,24 @@ def check_folder(folder: Path, model: str, command: list[str]) -> str:
     return "" if before == command else f"replacing the results of '{shown}' in {folder}"
 
 
-def write_folder(folder: Path, results: Results, command: Iterable[str], error: str = "") -> list[Path]:
+def write_folder(
+    folder: Path,
+    results: Results,
+    command: Iterable[str],
+    error: str = "",
+    again: Mapping[str, object] | None = None,
+) -> list[Path]:
     """Write ``manifest.json`` and ``signals.parquet``; returns the paths.
 
-    Each file is written aside and then moved into place, so a folder never holds half a file.
+    ``again`` says how the run is made, for programs.  Each file is written aside and then moved into place, so a folder
+    never holds half a file.
     """
     folder.mkdir(parents=True, exist_ok=True)
     signals, manifest = folder / "signals.parquet", folder / "manifest.json"
     write_signals(results, signals)
     told = {**summary_object(results), "command": list(command), "versions": versions()}
+    if again is not None:
+        told["run"] = again
     if error:
         told["error"] = error
     aside = folder / ".manifest.json"

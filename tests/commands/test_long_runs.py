@@ -34,7 +34,7 @@ ODE = """
 model: long
 actors:
   clock: {type: Clock, period: 10 s, offset: 10 s}
-  ode: {type: ODE, initial: {x: 1}, derivatives: {x: -x}, max_step: 1 ns}
+  ode: {type: ODE, initial: {x: 1}, derivatives: {x: -x * x}, max_step: 1 ns}
 connections: [clock.output -> ode.trigger]
 run: {stop: 10 s}
 """

@@ -95,20 +95,35 @@ def test_what_is_no_result_of_a_run(line: str, capsys: pytest.CaptureFixture[str
     (Path("empty") / "manifest.json").write_text("{", encoding="utf-8")
     broken = said(capsys, "empty", code=2)
     assert broken.startswith("error: empty/manifest.json is not the manifest of a run: Expecting property name")
-    told = {"command": ["epicycle", "study", "table_1"], "digest": ""}
-    (Path("empty") / "manifest.json").write_text(json.dumps(told), encoding="utf-8")
-    assert said(capsys, "empty", code=2) == "error: empty holds results of 'epicycle study', not of a run\n"
-    told = {"command": ["epicycle", "run", line, "--types", "own.py"], "digest": ""}
-    (Path("empty") / "manifest.json").write_text(json.dumps(told), encoding="utf-8")
+    manifest = Path("empty") / "manifest.json"
+    manifest.write_text(json.dumps({"command": ["epicycle.run", "mine"], "digest": ""}), encoding="utf-8")
+    assert said(capsys, "empty", code=2) == (
+        "error: empty/manifest.json does not say how to make the run again: 'epicycle.run mine' was made by another "
+        "version, or from a model that only a program knows\n"
+    )
+    told = {"run": {"model": line, "types": ["own.py"]}, "digest": ""}
+    manifest.write_text(json.dumps(told), encoding="utf-8")
     assert said(capsys, "empty", code=2) == (
         "error: the run in empty used types of its own\n   help: to let their code run, add --types own.py\n"
     )
-    told = {"command": ["epicycle", "run", line, "--unheard", "--seed"], "digest": ""}
-    (Path("empty") / "manifest.json").write_text(json.dumps(told), encoding="utf-8")
-    assert said(capsys, "empty", code=2) == (
-        "error: empty/manifest.json names a command that is unknown to this version: "
-        "epicycle run line.yaml --unheard --seed\n"
-    )
+
+
+@pytest.mark.parametrize(
+    ("run", "message"),
+    [
+        ({"model": "line.yaml", "unheard": 1}, "'run' cannot have 'unheard': 1"),
+        ({"model": "line.yaml", "seed": "3"}, "'run' cannot have 'seed': \"3\""),
+        ({"model": "line.yaml", "set": [1]}, "'run' cannot have 'set': [1]"),
+        ({"model": "line.yaml", "max_actors": True}, "'run' cannot have 'max_actors': true"),
+        ({"model": ["line.yaml"]}, "'run' cannot have 'model': [\"line.yaml\"]"),
+        ({"study": "there"}, "'run' names neither a model nor a run of a study"),
+        ([], "'run' names neither a model nor a run of a study"),
+    ],
+)
+def test_a_manifest_that_somebody_has_edited(run: object, message: str, capsys: pytest.CaptureFixture[str]) -> None:
+    Path("made").mkdir()
+    Path("made/manifest.json").write_text(json.dumps({"run": run, "digest": ""}), encoding="utf-8")
+    assert said(capsys, "made", code=2) == f"error: made/manifest.json is not the manifest of a run: {message}\n"
 
 
 def test_a_page_that_cannot_be_written(line: str, capsys: pytest.CaptureFixture[str]) -> None:

@@ -202,7 +202,7 @@ def test_the_command_that_is_saved_makes_the_run(
     words = ["explain", str(model), "--seed", str(seed), "--monitor", "alive", "--out", str(out), "--json", "--no-page"]
     assert main([*words, *further]) == 0
     said = json.loads(capsys.readouterr().out)["command"]
-    assert said == ["epicycle", "run", str(model), *further, "--seed", str(seed)]
+    assert said == ["epicycle", "run", str(model), "--types", str(types), "--max-actors", "50", "--seed", str(seed)]
     assert main([*said[1:], "--check"]) == 3
 
 
