@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
 import sys
 import tempfile
 from collections import Counter
 from typing import Any
 
 import hypothesis
+import pytest
 
 # The examples of a property are the same in every run and take the time they take, so that one that passes here passes
 # elsewhere; `make fuzz` tries others each time.
@@ -28,6 +30,24 @@ os.environ["XDG_STATE_HOME"] = _STATE.name
 # Started in the background of a shell, everything ignores Ctrl-C, and what tests start inherits that.
 if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
+
+
+# Each process that needs kernels would compile them all, and two that start together do so twice.
+KERNELS = (
+    "warm_up._call_solver(2); warm_up._call_tracking()",
+    "warm_up.call_others(); warm_up._call_solver(3); warm_up._call_retreats()",
+)
+
+
+def pytest_sessionstart(session: pytest.Session) -> None:
+    """Before all tests are divided among workers, the robots' kernels are compiled, if they are not yet."""
+    config = session.config
+    is_whole = config.args_source is pytest.Config.ArgsSource.TESTPATHS
+    if hasattr(config, "workerinput") or not config.getoption("numprocesses", None) or not is_whole:
+        return
+    head = "from epicycle.actors.robotics.numerics import warm_up; "
+    for each in [subprocess.Popen([sys.executable, "-c", head + program]) for program in KERNELS]:
+        each.wait()
 
 
 def pytest_terminal_summary(terminalreporter: Any) -> None:
