@@ -16,9 +16,8 @@ from epicycle.aspects import CompositeAspect, FiringTime, Request
 
 from ..graph import AspectModel, Detour, ModelGraph, WovenAspect, find_loop
 from ..language import PartText, PointcutText
-from ..text import PathIndex, Position, Problems, did_you_mean
+from ..text import PathIndex, Position, Problems, did_you_mean, place_in
 from .looks import without_port
-from .settle import place_of
 from .weave import Weaving
 
 BY_PLACE = "or name the input that takes the tokens: {at: ..., request: ...}"
@@ -98,10 +97,9 @@ class ModelWeaving(Weaving):
         if not pointcut.exclude:
             self._times.update(dict.fromkeys(outside, pointcut.firing_time))
             inside = [path for path in self.graph.actors if any(f"{path}.".startswith(f"{each}.") for each in outside)]
-            for message, keys, advice in without_port(("time",), pointcut.firing_time, inside, self.graph):
-                time = pointcut.time
-                where = pointcut.position if time is None else place_of(time, keys[1:], of_key=True)
-                self._problem(message, where, advice)
+            for fault in without_port("time", pointcut.firing_time, inside, self.graph):
+                where = pointcut.position if pointcut.time is None else place_in(pointcut.time, fault)
+                self._problem(fault.message, where, *fault.help)
         return outside
 
     def _of(self, pointcut: PointcutText) -> list[str]:

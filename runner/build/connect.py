@@ -7,25 +7,17 @@ from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
 from itertools import product
 
-from epicycle.actors import Actor, counted, declared_ports, has_own_ports
+from epicycle.actors import Actor, FaultError, counted, declared_ports, has_own_ports
 
 from ..graph import ModelGraph
-from ..language import CompositeText, ConnectionText, Values
-from ..text import RAISE_IT, Position, Problems, Scalar, Text, did_you_mean, split, within
+from ..language import CompositeText, ConnectionText, Locals, Values
+from ..text import POISON, RAISE_IT, Position, Problems, Scalar, Text, did_you_mean, split, within
 from .draft import Draft
-from .settle import converted, nanoseconds
+from .settle import nanoseconds
 
 _NUMBER = re.compile(r"-?\d{1,9}", re.ASCII)
 _EXPRESSION = re.compile(r"\$\{.*\}", re.DOTALL)
 MAX_INDICES = 1_000_000
-
-
-class BadIndexError(Exception):
-    """Text that names no instances, with the reason as its message; ``is_malformed`` means that it is not an index."""
-
-    def __init__(self, message: str, *, is_malformed: bool = False) -> None:
-        super().__init__(message)
-        self.is_malformed = is_malformed
 
 
 def indices_of(text: str, array: str, count: int, value: Callable[[str], object]) -> tuple[list[int], bool]:
@@ -34,12 +26,12 @@ def indices_of(text: str, array: str, count: int, value: Callable[[str], object]
     ``*`` is all, ``2`` one, ``-1`` the last, ``0..3`` a range with both ends, ``1..`` and ``..-2`` ranges up to an end
     of the array, ``1.., 0`` several in that order, and ``${...}`` a number, or a list of numbers, that ``value`` finds.
     In an empty array every index selects nothing, so that a model stays right when a count becomes zero.  Raises
-    ``BadIndexError``.
+    ``FaultError``.
     """
     items = [text[start:end].strip() for start, end in split(text, ",")]
     found: list[int] = []
     if len(items) * count > MAX_INDICES:
-        raise BadIndexError(f"too many instances: {len(items):,} times up to {count:,}")
+        raise FaultError(f"too many instances: {len(items):,} times up to {count:,}")
     several = len(items) > 1
     for item in items:
         ends = [item[start:end].strip() for start, end in split(item, "..")]
@@ -47,21 +39,23 @@ def indices_of(text: str, array: str, count: int, value: Callable[[str], object]
             several = True
             found += range(count) if item == "*" else _range(ends[0], ends[1], item, array, count, value)
             continue
-        number = _number(item, value)
+        number = _number(item, array, value)
         numbers: list[object] = number if isinstance(number, list) else [number]
         several = several or isinstance(number, list)
         for each in numbers if count else ():
             index = _whole(each, item)
             place = index + count if index < 0 and _NUMBER.fullmatch(item) else index
             if not 0 <= place < count:
-                raise BadIndexError(_missing(array, index, count))
+                raise FaultError(_missing(array, index, count))
             found.append(place)
     return found, several
 
 
 def _range(left: str, right: str, item: str, array: str, count: int, value: Callable[[str], object]) -> range:
     """Both ends included; an end that is omitted or counted from the end stays within the array."""
-    start, end = (_whole(_number(each, value), item) if each else default for each, default in ((left, 0), (right, -1)))
+    start, end = (
+        _whole(_number(each, array, value), item) if each else default for each, default in ((left, 0), (right, -1))
+    )
     from_end = [not each or bool(_NUMBER.fullmatch(each) and each.startswith("-")) for each in (left, right)]
     if not count:
         return range(0)
@@ -73,10 +67,10 @@ def _range(left: str, right: str, item: str, array: str, count: int, value: Call
     if end < start and (any(from_end) or (end == start - 1 and not is_written)):
         return range(0)
     if end < start:
-        raise BadIndexError(f"{array}[{item}]: the range {start}..{end} runs backwards")
+        raise FaultError(f"{array}[{item}]: the range {start}..{end} runs backwards")
     for bound in (start, end):
         if not 0 <= bound < count:
-            raise BadIndexError(_missing(array, bound, count))
+            raise FaultError(_missing(array, bound, count))
     return range(start, end + 1)
 
 
@@ -84,17 +78,19 @@ def _missing(array: str, index: int, count: int) -> str:
     return f"there is no {array}[{index}]: the array has {counted(count, 'instance')}, up to {array}[{count - 1}]"
 
 
-def _number(text: str, value: Callable[[str], object]) -> object:
+def _number(text: str, array: str, value: Callable[[str], object]) -> object:
     if _NUMBER.fullmatch(text):
         return int(text)
     if _EXPRESSION.fullmatch(text):
         return value(text)
-    raise BadIndexError(f"{text!r} is not an array index", is_malformed=True)
+    name = array.rpartition(".")[2]
+    forms = ", ".join(f"{name}[{each}]" for each in ("*", "0", "-1", "1..3", "1..", "0, 2", "${...}"))
+    raise FaultError(f"{text!r} is not an array index", help=[f"valid forms: {forms}"])
 
 
 def _whole(value: object, item: str) -> int:
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not float(value).is_integer():
-        raise BadIndexError(f"{item} is {value!r}, but an index is a whole number")
+        raise FaultError(f"{item} is {value!r}, but an index is a whole number")
     return int(value)
 
 
@@ -234,8 +230,8 @@ class Wiring:
         if connection.delay is None:
             return None
         label = f"{self._label(connection.sources[0])} -> {self._label(connection.destinations[0])}: delay"
-        delay = converted(self.values, connection.delay, names, label, self.path, nanoseconds)
-        return None if delay is self.values.missing else delay
+        delay = self.values.converted(connection.delay, Locals(self.path, names), label, nanoseconds)
+        return None if delay is POISON else delay
 
     def _endpoint(self, text: Text, wanted: str, names: dict[str, object]) -> End | None:
         """The port paths behind one end of a connection, as seen from inside the composite."""
@@ -312,19 +308,17 @@ class Wiring:
             return None
 
         def value(expression: str) -> object:
-            at = within(text, expression)
-            found = self.values.of(Scalar(expression, expression, True, at), names, label, self.path)
-            if found is self.values.missing:
-                raise _ToldError
+            at = within(text.position, expression)
+            found = self.values.of(Scalar(expression, expression, True, at), Locals(self.path, names), label)
+            if found is POISON:
+                raise FaultError.several(())  # which has been reported
             return found
 
         try:
             indices, several = indices_of(index, label, child.count, value)
-        except _ToldError:
-            return None
-        except BadIndexError as error:
-            forms = ", ".join(f"{name}[{each}]" for each in ("*", "0", "-1", "1..3", "1..", "0, 2", "${...}"))
-            self._problem(str(error), text, *((f"valid forms: {forms}",) if error.is_malformed else ()))
+        except FaultError as error:
+            for fault in error.faults:
+                self._problem(fault.message, text, *fault.help)
             return None
         return [child.paths[each] for each in indices], several
 
@@ -347,10 +341,6 @@ class Wiring:
             hints.append(f"{path} is declared as a {child.kind} at {at}")
         self._problem(message, text, *hints)
         return False
-
-
-class _ToldError(Exception):
-    """An expression that could not be evaluated, for a reason that has been reported."""
 
 
 def _ports(end: End) -> str:

@@ -12,6 +12,7 @@ from ..collection import without_collection
 from ..graph import ModelGraph, check_processors
 from ..language import (
     COMPOSITE_THERE,
+    Locals,
     ModelText,
     Setting,
     Settings,
@@ -28,7 +29,7 @@ from ..language import (
     settings_of,
     without,
 )
-from ..text import NORMAL, Limits, Problems, noting
+from ..text import NORMAL, POISON, Limits, Problems, noting
 from ..text import Mapping as MappingNode
 from .acts import acts_of
 from .checks import check
@@ -139,8 +140,9 @@ def _figures(text: ModelText, values: Values, names: dict[str, object]) -> dict[
     """The type of each figure, its values, and the values as written."""
     found = {}
     for name, part in text.figures.items():
-        given = {key: values.of(entry.value, names, f"figure {name}.{key}") for key, entry in part.values.items()}
-        if values.missing not in given.values():
+        local = Locals("", names)
+        given = {key: values.of(entry.value, local, f"figure {name}.{key}") for key, entry in part.values.items()}
+        if POISON not in given.values():
             in_si = {key: counted_in_si(value) for key, value in given.items()}
             found[name] = (part.type.text, in_si, MappingNode(part.values, part.type.position))
     return found

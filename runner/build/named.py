@@ -12,7 +12,7 @@ from epicycle.aspects import Aspect, FiringTime, FiringTimeParameter
 
 from ..graph import ModelGraph
 from ..language import ConnectionText, PointcutText, connection
-from ..text import ModelError, NodeReader, Position, Problem, Problems, Scalar, Text, node_of, within
+from ..text import ModelError, NodeReader, Position, Problem, Problems, Scalar, Text, blame, node_of, within
 from .settle import OF_DIRECTORS
 
 
@@ -58,7 +58,7 @@ def director_of(path: str, said: Mapping[str, object], position: Position, probl
             if value is not None:
                 found[key] = OF_DIRECTORS[key](value)
         except (ParameterError, ValueError) as error:
-            problems.add(f"{path}: director.{key}: {error}", position)
+            blame(problems, f"{path}: director.{key}", error, position)
     return found
 
 
@@ -76,7 +76,7 @@ def firing_time_of(time: object, aspect: object, position: Position, problems: P
     try:
         return None if time is None else FiringTimeParameter().convert(time)
     except ParameterError as error:
-        problems.add(f"time: {error}", position)
+        blame(problems, "time", error, position)
         return None
 
 
@@ -129,7 +129,7 @@ class Named:
         return found
 
     def _text(self, name: str) -> Text:
-        return Text(name, within(Text(name, self._position), name))
+        return Text(name, within(self._position, name))
 
     def _tell(self, message: str, *hints: str) -> None:
         self._problems.add(message, self._position, *hints)

@@ -12,17 +12,17 @@ from dataclasses import dataclass
 from functools import cache, partial
 from typing import Any
 
-from epicycle.actors import Actor, Parameter
+from epicycle.actors import Actor, FaultError, Parameter
 
-from ..catalogue import Catalogue, CatalogueError, PortTypeError, read_type, token_types
+from ..catalogue import Catalogue, CatalogueError, read_type, token_types
 from ..graph import Modal
-from ..language import CompositeText, PartText, PortText
-from ..text import RAISE_IT, Entry, Position, did_you_mean
+from ..language import CompositeText, Locals, PartText, PortText
+from ..text import POISON, RAISE_IT, Entry, Poison, Position, did_you_mean
 from .composite_aspect import as_actor
 from .connect import Child, Inside, Wiring, child_of_actors
 from .draft import Draft
 from .modes import connect_modes
-from .settle import OF_DIRECTORS, Settler, converted
+from .settle import OF_DIRECTORS, Settler
 
 MAX_DEPTH = 50
 MAX_SHOWN = 12  # types in one message
@@ -166,7 +166,7 @@ class Unfolding:
         try:
             found = known.catalogue.actors.get(wanted) if inner is None else inner
         except CatalogueError as error:
-            self._tell(f"{path}: {error.message}", part.type.position, path, *error.help)
+            self.values.blame(path, error, part.type.position, Locals(path))
             return None
         if wanted in known.broken:
             return None
@@ -191,8 +191,8 @@ class Unfolding:
         if part.count is None:
             return 1
         count = Parameter(int, min=0, max=self.draft.graph.limits.actors)
-        found = converted(self.values, part.count, names, f"{path}: count", path, count.convert)
-        return None if found is self.values.missing else found
+        found = self.values.converted(part.count, Locals(path, names), f"{path}: count", count.convert)
+        return None if found is POISON else found
 
     def _count_one(self, path: str, part: PartText) -> None:
         """Count one more instance; raises ``TooLargeError`` if there are too many."""
@@ -225,23 +225,24 @@ class Unfolding:
             hint = f"give the actors inside a priority, or give {kind.name} its own director: 'director: {{}}'"
             self._tell(message, part.priority.position, path, hint)
             return
-        found = converted(self.values, part.priority, names, f"{path}: priority", path, Parameter(int).convert)
-        if found is not self.values.missing:
+        local, convert = Locals(path, names), Parameter(int).convert
+        found = self.values.converted(part.priority, local, f"{path}: priority", convert)
+        if found is not POISON:
             self.draft.graph.priorities[path] = found or 0
 
     def _actor(self, path: str, actor_type: type[Actor], part: PartText, names: Names) -> None:
-        rules = self.draft.graph.rules_at(path)
-        values = self.settler.configuration(path, actor_type, part.values, names, part.position, path, rules)
-        if values is not None:
-            try:
-                actor = actor_type(path, **values)
-                self.draft.graph.add_actor(actor, part.position)
-                self.actors.append(actor)
-                return
-            except Exception as error:  # an actor's __init__ may raise anything
-                place = self.settler.place_in(part.values, error, part.position)
-                self.settler.blame(path, error, place, path)
-        self.draft.leave_out(path, actor_type)
+        rules, local = self.draft.graph.rules_at(path), Locals(path, names)
+
+        def make(**values: object) -> Actor:
+            made = actor_type(path, **values)
+            self.draft.graph.add_actor(made, part.position)
+            return made
+
+        actor = self.settler.configured(actor_type, part, local, path, rules, make)
+        if isinstance(actor, Poison):
+            self.draft.leave_out(path, actor_type)
+        else:
+            self.actors.append(actor)
 
     # -- composites -----------------------------------------------------------------------------------------------
 
@@ -278,11 +279,12 @@ class Unfolding:
 
     def _director(self, what: str, path: str, given: Mapping[str, Entry], names: Names) -> dict[str, Any]:
         """The settings of a director; wrong ones are left out."""
+        local = Locals(path, names)
         found = {
-            key: converted(self.values, entry.value, names, f"{what}: director.{key}", path, OF_DIRECTORS[key])
+            key: self.values.converted(entry.value, local, f"{what}: director.{key}", OF_DIRECTORS[key])
             for key, entry in given.items()
         }
-        return {key: value for key, value in found.items() if value is not self.values.missing}
+        return {key: value for key, value in found.items() if value is not POISON}
 
     def _port_type(self, composite: CompositeText, port: PortText) -> Any:
         """The type that a composite declares for a port; None if it declares none, or an unknown one."""
@@ -292,12 +294,11 @@ class Unfolding:
         if text not in self._port_types:
             try:
                 self._port_types[text] = read_type(text, self._tokens)
-            except PortTypeError as error:
+            except FaultError as error:
                 self._port_types[text] = error
         found = self._port_types[text]
-        if isinstance(found, PortTypeError):
-            hints = (found.help,) if found.help else ()
-            self._tell(f"port {port.name!r} of {composite.name}: {found.message}", port.type.position, "", *hints)
+        if isinstance(found, FaultError):
+            self.values.blame(f"port {port.name!r} of {composite.name}", found, port.type.position, Locals())
             return None
         return found
 
@@ -315,7 +316,7 @@ class Unfolding:
                 f"{full!r} is the name of both {clash} and an aspect that is a model", part.position, "", "rename one"
             )
             return None
-        if self.settler.is_enabled(full, path, part, names):
+        if self.settler.is_enabled(full, part, Locals(path, names)):
             return self.instances(full, as_actor(part), names, within)
         trial = copy(self)
         trial.draft, trial.aspects, trial.actors = self.draft.inside(graph.director_of(full)), [], []

@@ -7,8 +7,8 @@ from collections.abc import Collection
 from epicycle.actors import counted
 
 from ..graph import ModelGraph
-from ..language import CompositeText, Settings, Values
-from ..text import RAISE_IT, Limits, Problems
+from ..language import CompositeText, Locals, Settings, Values
+from ..text import POISON, RAISE_IT, Limits, Problems
 from .checks import check
 from .draft import Draft
 from .settle import Settler
@@ -59,12 +59,11 @@ def _try(composite: CompositeText, made: Unfolding) -> bool:
     names: dict[str, object] = {}
     for name, declared in composite.parameters.items():
         if declared.value is not None:
-            so_far = {**names, "index": values.missing}
-            value = values.of(declared.value, so_far, f"{path}.{name}", path, list(composite.parameters))
-            values.declared(f"{path}.{name}", declared, value, declared.value.position, path)
+            local = Locals(path, {**names, "index": POISON}, list(composite.parameters))
+            values.declared(declared, declared.value, local, f"{path}.{name}")
         # The default is one value of many: what is computed from it is not checked.
-        names[name] = values.missing
-    names.setdefault("index", values.missing)
+        names[name] = POISON
+    names.setdefault("index", POISON)
     try:
         made.composite(path, composite, names, None)
     except TooLargeError:

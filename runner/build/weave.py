@@ -8,7 +8,7 @@ actors in it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
 from epicycle.actors import declared_parameters
@@ -16,8 +16,8 @@ from epicycle.aspects import Aspect
 
 from ..graph import WovenAspect
 from ..language import PointcutText
-from ..text import PathIndex, PatternError, Position, did_you_mean, in_general, nearest
-from .looks import Looks, unknown_inputs
+from ..text import PathIndex, PatternError, did_you_mean, in_general, nearest
+from .looks import Looks, PlaceOf, unknown_inputs
 from .paths import View
 
 
@@ -34,12 +34,10 @@ class Weaving(View):
     def kind(self) -> str:
         return self.cls.__name__
 
-    def weave(
-        self, aspect: Aspect, pointcuts: Sequence[PointcutText], position_of: Callable[..., Position | None]
-    ) -> WovenAspect:
+    def weave(self, aspect: Aspect, pointcuts: Sequence[PointcutText], place_of: PlaceOf) -> WovenAspect:
         """The aspect with its places and everything it reads; a pointcut that selects nothing is a problem.
 
-        ``position_of`` returns where a parameter, or a key in it, is set in the model file.
+        ``place_of`` returns where something is wrong with its parameters in the model file.
         """
         before = len(self.problems)
         ports, connections, actors = self.select(pointcuts)
@@ -50,17 +48,17 @@ class Weaving(View):
             nowhere = "'at' has only exclusions" if only_out else "'at' excludes everything that it selects"
             self._problem(nowhere, pointcuts[0])
         looks = Looks(self.draft, self.paths, self.name, self.scope, self.problems)
-        readings, selections, reads = looks.of(aspect, ports, position_of)
+        readings, selections, reads = looks.of(aspect, ports, place_of)
         woven = WovenAspect(
             self.name, aspect, ports, connections, actors, readings, selections, reads, parameters=parameters
         )
-        self.check_times(woven, position_of)
+        self.check_times(woven, place_of)
         return woven
 
-    def check_times(self, woven: WovenAspect, position_of: Callable[..., Position | None]) -> None:
+    def check_times(self, woven: WovenAspect, place_of: PlaceOf) -> None:
         """Check that execution times by input port name ports that the actors have."""
-        for message, keys, advice in unknown_inputs(woven, self.graph):
-            self._problem(message, position_of(*keys), advice)
+        for fault in unknown_inputs(woven, self.graph):
+            self._problem(fault.message, place_of(fault), *fault.help)
 
     def select(self, pointcuts: Sequence[PointcutText]) -> tuple[list[str], list[tuple[str, str]], dict[str, str]]:
         """The ports, connections and actors that the pointcuts select."""

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
+from collections.abc import Mapping as AnyMapping
 from dataclasses import replace
 from functools import partial
 
@@ -19,12 +20,11 @@ from epicycle.aspects import (
 
 from ..catalogue import CatalogueError
 from ..graph import ModelGraph, WovenAspect
-from ..language import PartText, PointcutText
-from ..text import RAISE_IT, Position, Problems, Text, TooManyError, did_you_mean
+from ..language import Locals, PartText, PointcutText
+from ..text import RAISE_IT, Mapping, Poison, Position, Problems, Text, TooManyError, did_you_mean, place_in
 from .composite_aspect import OWN, ModelWeaving, check_nesting, detours
 from .draft import Draft
 from .paths import Paths
-from .settle import converted, place_of
 from .unfold import Names, Unfolding
 from .weave import Weaving
 
@@ -68,9 +68,9 @@ class _Weaver:
         if cls is None:
             return
         is_model = cls in (CompositeAspect, CompositeExecutionAspect)
-        given = {key: entry for key, entry in part.values.items() if not is_model or key in OWN}
-        rules = self.graph.rules_at(name)
-        values = self.settler.configuration(f"aspect {name}", cls, given, names, part.position, name, rules)
+        own = {key: entry for key, entry in part.values.items() if not is_model or key in OWN}
+        local, rules = Locals(name, names), self.graph.rules_at(name)
+        aspect = self.settler.configured(cls, replace(part, values=own), local, f"aspect {name}", rules, cls)
         if not part.at:
             hint = "add 'at:' with ports or patterns"
             self.problems.add(f"aspect {name} has no 'at'", part.position, hint, scope=scope)
@@ -79,18 +79,15 @@ class _Weaver:
         if is_model and name in self.graph.composites:
             weaving = ModelWeaving(self.draft, self.paths, name, scope, self.problems, cls, name, part.position)
             part = replace(part, at=tuple(self._timed(pointcut, name, scope, names) for pointcut in part.at))
-        is_enabled = name in self.graph.composites if is_model else self.settler.is_enabled(name, scope, part, names)
-        try:
-            aspect = None if values is None else cls(**values)
-        except Exception as error:  # an aspect's __init__ may raise anything
-            self.settler.blame(f"aspect {name}", error, part.position, scope)
-            aspect = None
-        if aspect is None:
+        is_enabled = (
+            name in self.graph.composites if is_model else self.settler.is_enabled(name, part, Locals(scope, names))
+        )
+        if isinstance(aspect, Poison):
             weaving.select(part.at)  # to report its problems
             if isinstance(weaving, ModelWeaving):
                 self.draft.leave_open(name)
             return
-        woven = weaving.weave(aspect, part.at, partial(_position, part))
+        woven = weaving.weave(aspect, part.at, partial(place_in, Mapping(part.values, part.position)))
         if isinstance(weaving, ModelWeaving):
             weaving.check(woven)
             woven = weaving.connect(woven)
@@ -109,7 +106,7 @@ class _Weaver:
         try:
             cls = known.catalogue.aspects.get(wanted)
         except CatalogueError as error:
-            self.problems.add(f"aspect {name}: {error.message}", part.type.position, *error.help, scope=scope)
+            self.settler.values.blame(f"aspect {name}", error, part.type.position, Locals(scope))
             return None
         if wanted in known.composites:
             return self._model_type(name, scope, part, cls)
@@ -144,17 +141,12 @@ class _Weaver:
     def _timed(self, pointcut: PointcutText, name: str, scope: str, names: dict[str, object]) -> PointcutText:
         if pointcut.time is None:
             return pointcut
-        values, convert = self.settler.values, FiringTimeParameter().convert
-        time = converted(values, pointcut.time, names, f"aspect {name}: time", scope, convert)
-        return replace(pointcut, firing_time=0.0 if time is values.missing else time or 0.0)
+        convert = FiringTimeParameter().convert
+        time = self.settler.values.converted(pointcut.time, Locals(scope, names), f"aspect {name}: time", convert)
+        return replace(pointcut, firing_time=time or 0.0)
 
 
-def _position(part: PartText, name: str, *keys: str) -> Position | None:
-    """Where a declaration sets a parameter, or a key in it."""
-    return place_of(part.values[name].value, keys, of_key=True) if name in part.values else None
-
-
-Change = Callable[[str, Aspect], Mapping[str, object]]
+Change = Callable[[str, Aspect], AnyMapping[str, object]]
 
 
 def weave_decorations(

@@ -56,7 +56,7 @@ from .settings import (
 from .study import MAX_REPLICATIONS, MAX_STUDY_SEED, RESERVED, Study, is_study, read_study, study_of_text
 from .study_metric import ASPECTS, NUMBERS, SIGNALS, StudyMetric, asks_for_none
 from .usage import check_usage
-from .values import Values
+from .values import OUTSIDE, Locals, Values
 
 __all__ = [
     "ALWAYS",
@@ -70,6 +70,7 @@ __all__ = [
     "MAX_STUDY_SEED",
     "MORRIS",
     "NUMBERS",
+    "OUTSIDE",
     "PARAMETER_THERE",
     "RANGE",
     "RESERVED",
@@ -88,6 +89,7 @@ __all__ = [
     "Guideline",
     "Level",
     "Listed",
+    "Locals",
     "MetricText",
     "ModelText",
     "MonitorText",

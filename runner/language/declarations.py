@@ -125,6 +125,10 @@ class MonitorText:
     values: dict[str, Entry]
     position: Position
 
+    def place(self, key: str) -> Position:
+        """Where one of its values is; its own place if that is a default."""
+        return self.values[key].value.position if key in self.values else self.position
+
 
 @dataclass(frozen=True)
 class ActText:

@@ -13,7 +13,7 @@ from typing import Any, TypeAlias
 
 from epicycle.actors import Quantity, UnitError, parse_unit
 
-from ..text import Entry, Mapping, Node, NodeReader, Position, Scalar, Sequence, is_empty, plain
+from ..text import Entry, Mapping, Node, NodeReader, Position, Scalar, Sequence, blame, is_empty, plain
 from .fields import QUANTITY_SCHEMA, Construct, Key, Schema, Shape, node_as, ref
 from .sampling import (
     HYPERCUBE,
@@ -317,7 +317,7 @@ class DimensionReader(NodeReader):
         try:
             is_distinct = found.is_distinct()
         except UnitError as error:
-            self.problems.add(f"the range of {name!r}: {error}", at)
+            blame(self.problems, f"the range of {name!r}", error, at)
             return None
         if not is_distinct:
             reach = f"from {start} to {end} in steps of {step}"
@@ -335,7 +335,7 @@ class DimensionReader(NodeReader):
             if found[1]:
                 parse_unit(found[1])
         except UnitError as error:
-            self.problems.add(f"{what}: {error}", node.position)
+            blame(self.problems, what, error, node)
             return None
         return found
 

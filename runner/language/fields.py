@@ -12,10 +12,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, TypeAlias
 
-from epicycle.actors import MappingParameter, Parameter, ParameterError
+from epicycle.actors import FaultError, MappingParameter, Parameter
 
 from ..catalogue import as_written, is_part, shown
-from ..text import Entry, Node, NodeReader, Position, Scalar, is_empty
+from ..text import POISON, Entry, Node, NodeReader, Position, Scalar, blame, is_empty
 
 Schema: TypeAlias = dict[str, Any]
 
@@ -101,9 +101,8 @@ def number(kind: type, low: float | None = None, high: float | None = None) -> S
     def read(reader: NodeReader, node: Node, what: str) -> Any:
         try:
             return parameter.convert(node.value if isinstance(node, Scalar) else "a list")
-        except ParameterError as error:
-            reader.problems.add(f"{what}: {error}", node.position)
-            return None
+        except FaultError as error:
+            return blame(reader.problems, what, error, node)
 
     return Shape(schema, read)
 
@@ -177,7 +176,7 @@ class Construct:
         for key, each in self.keys.items():
             if key in entries and not (each.missing and is_empty(entries[key].value)):
                 value = each.shape.read(reader, entries[key].value, each.called.format(what=what, key=key))
-                if value is not None:
+                if value is not None and value is not POISON:
                     found[each.name or key] = value
             elif each.missing:
                 message, *hints = (said.format(what=what, key=key) for said in each.missing)

@@ -6,7 +6,7 @@ from typing import Any
 
 from epicycle.actors import Parameter, declared_parameters
 
-from ..catalogue import TAKES, Measure, take_problem
+from ..catalogue import TAKES, Measure, take_fault
 from ..text import Entry, NodeReader, is_empty
 from .declarations import MetricText
 from .fields import AT, TEXTS, Construct, Key, about, named, node_as, one_or_more, ref, schema_of
@@ -57,8 +57,8 @@ def _metric(reader: NodeReader, name: str, entry: Entry) -> MetricText | None:
         hint = "add 'of: actor.port', or 'from: delivered / sent' over other metrics"
         reader.problems.add(f"{what} has no port", entry.key.position, hint)
     take = reader.text(said["take"], "take") if "take" in said else "last"
-    if take is not None and (problem := take_problem(name, take)):
-        reader.problems.add(problem[0], entries["take"].value.position, problem[1])
+    if take is not None and (fault := take_fault(name, take)):
+        reader.problems.add(fault.message, entries["take"].value.position, *fault.help)
     if not ports or take not in TAKES:
         return None
     return MetricText(

@@ -23,6 +23,7 @@ from ..text import (
     Problems,
     Scalar,
     Text,
+    blame,
     is_empty,
     nearest,
 )
@@ -102,7 +103,7 @@ def _unit(reader: NodeReader, node: Node, what: str) -> str | None:
         if unit:
             parse_unit(unit)
     except UnitError as error:
-        reader.problems.add(f"{what}: {error}", node.position)
+        blame(reader.problems, what, error, node)
     return unit
 
 
@@ -124,7 +125,7 @@ def _bound(reader: NodeReader, node: Node, what: str) -> float | str | None:
         if isinstance(value, str) and in_si(value) is not None:
             return value
     except UnitError as error:
-        reader.problems.add(f"{what}: {error}", node.position)
+        blame(reader.problems, what, error, node)
         return None
     found: float | None = _FREE_NUMBER.read(reader, node, what)
     return found
@@ -165,7 +166,7 @@ def _parameter(reader: NodeReader, name: str, entry: Entry) -> ParameterText:
             found.bounds()
         except UnitError as error:
             at = next(key for key in ("min", "max") if key in entries)
-            reader.problems.add(f"{what}: {error}", entries[at].value.position)
+            blame(reader.problems, what, error, entries[at].value)
     return replace(found, spoilt=len(reader.problems) > before)
 
 

@@ -10,7 +10,20 @@ from pathlib import Path
 
 from epicycle.actors.expression import ExpressionError, Formula
 
-from ..text import Entry, Node, NodeReader, Position, Problems, Scalar, Sequence, Text, did_you_mean, inside, parse
+from ..text import (
+    Entry,
+    Node,
+    NodeReader,
+    Position,
+    Problems,
+    Scalar,
+    Sequence,
+    Text,
+    blame,
+    did_you_mean,
+    inside,
+    parse,
+)
 from ..text import Mapping as MappingNode
 from .claims import ALWAYS, FALLS, FORMS, GREATER, LESS, RISES, Claim, Guideline, Questions, Selection, shown_level
 from .dimensions import Dimension, Factor, as_factor
@@ -161,8 +174,7 @@ class QuestionReader(NodeReader):
         try:
             formula = Formula(text)
         except ExpressionError as error:
-            part = text[error.offset : error.offset + max(error.length, 1)]
-            self.problems.add(f"{what}: {error}", inside(node, text, error.offset, part))
+            blame(self.problems, what, error, node)
             return "", []
         if not formula.is_condition or not formula.names:
             self.problems.add(

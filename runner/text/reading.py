@@ -112,9 +112,8 @@ def is_empty(node: Node) -> bool:
     return isinstance(node, Scalar) and node.value is None
 
 
-def within(text: Text, part: str) -> Position:
-    """The position of a part of a text; all of it if the part cannot be found in the file."""
-    at = text.position
+def within(at: Position, part: str) -> Position:
+    """The position of a part of a text at a place; all of it if the part cannot be found in the file."""
     start = at.source.find(part, at.column - 1)
     return at if start < 0 else replace(at, column=start + 1, length=len(part))
 

@@ -14,6 +14,7 @@ from jsonschema import Draft202012Validator
 
 from epicycle.actors import (
     EpicycleError,
+    FaultError,
     Parameter,
     ParameterError,
     array_parameter,
@@ -23,7 +24,6 @@ from epicycle.actors import (
 from epicycle.actors.core.units import quantity
 from epicycle.aspects import Aspect, MeasurementFailure, PacketLoss
 from epicycle.runner.build.connect import _ENDPOINT as ENDPOINT
-from epicycle.runner.build.connect import BadIndexError
 from epicycle.runner.build.connect import indices_of as resolve
 from epicycle.runner.catalogue import Catalogue, built_in, model_folders, own_figures, packaged_models
 from epicycle.runner.language import (
@@ -263,7 +263,7 @@ def is_endpoint(text: str) -> bool:
     try:
         # Two expressions with something between them come to a text, which is no index.
         resolve(found[2], "a", 9, lambda expression: 2 if expression.count("${") == 1 else "2].b[2")
-    except BadIndexError:
+    except FaultError:
         return False
     return True
 
