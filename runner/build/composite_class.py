@@ -73,9 +73,9 @@ def load_composite(file: str | Path, name: str, *, types: Iterable[type] = ()) -
     problems = Problems()
     declared = read_library(file, problems)
     catalogue = installed().with_types(types)
-    composites, broken = inherit(declared, catalogue.actors, problems)
-    if name not in composites and name not in broken:
+    composites = inherit(declared, catalogue.actors, problems)
+    if name not in composites:
         hint = f"its composites: {', '.join(composites) or 'none'}"
         problems.add(f"{file} has no composite {name!r}{did_you_mean(name, list(composites))}", call_site(), hint)
     problems.raise_if_any()
-    return CompositeClass(name, composites, catalogue)
+    return CompositeClass(name, {key: each for key, each in composites.items() if each}, catalogue)

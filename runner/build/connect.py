@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import product
 
@@ -11,7 +11,7 @@ from epicycle.actors import Actor, FaultError, counted, declared_ports, has_own_
 
 from ..graph import ModelGraph
 from ..language import CompositeText, ConnectionText, Locals, Values
-from ..text import POISON, RAISE_IT, Position, Problems, Scalar, Text, did_you_mean, split, within
+from ..text import POISON, RAISE_IT, Poison, Position, Problems, Scalar, Text, did_you_mean, split, within
 from .draft import Draft
 from .settle import nanoseconds
 
@@ -109,12 +109,12 @@ class End:
 
 @dataclass
 class Child:
-    """A name inside a composite: the instances behind it; ``count`` is None if their number is unknown."""
+    """A name inside a composite: the instances behind it, and their number."""
 
     kind: str  # the name of its type
     paths: list[str]
     array: bool
-    count: int | None
+    count: int | Poison
     inputs: list[str] = field(default_factory=list)
     outputs: list[str] = field(default_factory=list)
     is_known: bool = True  # whether it has no other ports: an instance that could not be made may have had some
@@ -124,7 +124,7 @@ class Child:
 
 
 def child_of_actors(
-    actor_type: type[Actor], paths: list[str], array: bool, count: int | None, graph: ModelGraph
+    actor_type: type[Actor], paths: list[str], array: bool, count: int | Poison, graph: ModelGraph
 ) -> Child:
     """Actors of one name, some of which perhaps could not be made."""
     child = Child(actor_type.__name__, paths, array, count)
@@ -163,19 +163,15 @@ class Link:
     shared: bool = False
 
 
-@dataclass(frozen=True)
-class Links:
-    """The links of a connection; ``is_whole`` is false if a part of it could not be understood."""
-
-    found: list[Link]
-    is_whole: bool
-
-    def make(self, draft: Draft) -> None:
-        first = draft.graph.next_order  # which distinguishes the connection from all others
-        for link in self.found:
+def make(links: Sequence[Link | Poison], draft: Draft) -> None:
+    """Make the links of one connection."""
+    first = draft.graph.next_order  # which distinguishes the connection from all others
+    for link in links:
+        if link is POISON:
+            draft.is_wired = False
+        else:
             shared = first if link.shared else None
             draft.graph.connect(link.source, link.destination, link.delay, link.position, shared)
-        draft.is_wired = draft.is_wired and self.is_whole
 
 
 class Wiring:
@@ -188,29 +184,27 @@ class Wiring:
         self.values = values
         self.problems = problems
 
-    def resolve(self, connection: ConnectionText, names: dict[str, object]) -> Links:
+    def resolve(self, connection: ConnectionText, names: dict[str, object]) -> list[Link | Poison]:
         """Every source to every destination; if both select several, the first to the first and so on."""
         delay = self._delay(connection, names)
         sources = [self._endpoint(text, "output", names) for text in connection.sources]
         targets = [self._endpoint(text, "input", names) for text in connection.destinations]
-        links: list[Link] = []
-        is_whole = None not in sources and None not in targets
+        links: list[Link | Poison] = [POISON] if POISON in (*sources, *targets) else []
         limit = self.graph.limits.connections
-        for source, target in product(filter(None, sources), filter(None, targets)):
+        for source, target in product((each for each in sources if each), (each for each in targets if each)):
             in_pairs = source.several and target.several and not connection.to_all
             count = len(source.ports) * (1 if in_pairs else len(target.ports))
             if self.graph.connections + len(links) + count > limit:
-                self._problem(f"the model has more than {limit:,} connections", source.text, RAISE_IT)
-                return Links(links, False)
+                return [*links, self._problem(f"the model has more than {limit:,} connections", source.text, RAISE_IT)]
             if in_pairs and len(source.ports) != len(target.ports):
-                is_whole = False
                 one, other = self._label(source.text), self._label(target.text)
-                self._problem(
+                wrong = self._problem(
                     f"{one} selects {_ports(source)}, but {other} selects {_ports(target)}",
                     target.text,
                     "'->' connects the first port to the first and so on, so both sides need the same number of ports",
                     "to connect all to all, write '=>'",
                 )
+                links.append(wrong)
                 continue
             pairs = zip(source.ports, target.ports, strict=True) if in_pairs else product(source.ports, target.ports)
             # '=>' within a group does not connect an actor to itself; '->' still does.
@@ -218,13 +212,13 @@ class Wiring:
             for one, other in pairs:
                 if not (spare_self and one.rpartition(".")[0] == other.rpartition(".")[0]):
                     links.append(Link(one, other, delay, source.text.position, connection.shared))
-        return Links(links, is_whole)
+        return links
 
     def _label(self, text: Text) -> str:
         return f"{self.path}.{text.text}" if self.path else text.text
 
-    def _problem(self, message: str, text: Text, *hints: str) -> None:
-        self.problems.add(message, text.position, *hints, scope=self.path)
+    def _problem(self, message: str, text: Text, *hints: str) -> Poison:
+        return self.problems.add(message, text.position, *hints, scope=self.path)
 
     def _delay(self, connection: ConnectionText, names: dict[str, object]) -> int | None:
         if connection.delay is None:
@@ -233,17 +227,16 @@ class Wiring:
         delay = self.values.converted(connection.delay, Locals(self.path, names), label, nanoseconds)
         return None if delay is POISON else delay
 
-    def _endpoint(self, text: Text, wanted: str, names: dict[str, object]) -> End | None:
+    def _endpoint(self, text: Text, wanted: str, names: dict[str, object]) -> End | Poison:
         """The port paths behind one end of a connection, as seen from inside the composite."""
         match = _ENDPOINT.match(text.text)
         if match is None:
             forms = "'actor.port', 'array[*].port', 'array[0].port', 'array[1..3].port' or a port of this composite"
-            self._problem(f"{text.text!r} is not a port that can be connected here", text, f"write {forms}")
-            return None
+            return self._problem(f"{text.text!r} is not a port that can be connected here", text, f"write {forms}")
         name, index, port = match.groups()
         if name is None:
             own = self._own(port, wanted, text)
-            return None if own is None else End(text, own, own=True)
+            return End(text, own, own=True) if own else POISON
         inside = self.inside
         child = inside.children.get(name)
         if child is None:
@@ -252,20 +245,20 @@ class Wiring:
                 message = f"{inside.name} has no actor {name!r}{did_you_mean(name, inside.names)}"
                 hint = f"valid actors: {', '.join(inside.names) or 'none'}"
                 self._problem(message, text, hint, *((f"it is removed at {gone}",) if gone is not None else ()))
-            return None
+            return POISON
         has_port = self._has_port(name, child, port, wanted, text)
         found = self._instances(name, index, child, port, text, names)
-        if not has_port or found is None:
-            return None
+        if not has_port or found is POISON:
+            return POISON
         paths, several = found
         ports = [f"{instance}.{port}" for instance in paths]
         if missing := [path for path in ports if path not in self.graph.ports]:
             if child.is_known:  # instances of one entry may differ in their own ports
                 self._problem(f"{child.kind} has no {wanted} port {missing[0]}, unlike others in its array", text)
-            return None
+            return POISON
         return End(text, ports, several)
 
-    def _own(self, port: str, wanted: str, text: Text) -> list[str] | None:
+    def _own(self, port: str, wanted: str, text: Text) -> list[str] | Poison:
         # Seen from inside, tokens come from an own input and go to an own output.
         inputs, outputs = self.inside.inputs, self.inside.outputs
         own, other = (inputs, outputs) if wanted == "output" else (outputs, inputs)
@@ -285,27 +278,24 @@ class Wiring:
         else:
             message = f"{where} has no {kind} port {port!r} of its own{did_you_mean(port, list(own))}"
             hints.append("a port of an actor is written 'actor.port'")
-        self._problem(message, text, *hints)
-        return None
+        return self._problem(message, text, *hints)
 
     def _instances(
         self, name: str, index: str | None, child: Child, port: str, text: Text, names: dict[str, object]
-    ) -> tuple[list[str], bool] | None:
+    ) -> tuple[list[str], bool] | Poison:
         """The paths of the instances that an endpoint names, and whether it may name several."""
         label = f"{self.path}.{name}" if self.path else name
         if not child.array:
             if index is None:
                 return child.paths, False
-            self._problem(f"{label} is a single actor, so it has no [{index}]", text, f"write {name}.{port}")
-            return None
-        if child.count is None:
-            return None  # the count is wrong, which has been reported
+            return self._problem(f"{label} is a single actor, so it has no [{index}]", text, f"write {name}.{port}")
+        if child.count is POISON:
+            return POISON
         if index == "*":
             return child.paths, True
         if index is None:
             hint = f"write {name}[*].{port} for all, or {name}[0].{port} for the first"
-            self._problem(f"{label} is an array of {child.count}: give an index", text, hint)
-            return None
+            return self._problem(f"{label} is an array of {child.count}: give an index", text, hint)
 
         def value(expression: str) -> object:
             at = within(text.position, expression)
@@ -319,7 +309,7 @@ class Wiring:
         except FaultError as error:
             for fault in error.faults:
                 self._problem(fault.message, text, *fault.help)
-            return None
+            return POISON
         return [child.paths[each] for each in indices], several
 
     def _has_port(self, name: str, child: Child, port: str, wanted: str, text: Text) -> bool:

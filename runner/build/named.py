@@ -12,7 +12,7 @@ from epicycle.aspects import Aspect, FiringTime, FiringTimeParameter
 
 from ..graph import ModelGraph
 from ..language import ConnectionText, PointcutText, connection
-from ..text import ModelError, NodeReader, Position, Problem, Problems, Scalar, Text, blame, node_of, within
+from ..text import ModelError, NodeReader, Poison, Position, Problem, Problems, Scalar, Text, blame, node_of, within
 from .settle import OF_DIRECTORS
 
 
@@ -105,14 +105,14 @@ class Named:
         """A connection as a model file would declare it; ``inside`` is the name of the scope."""
         if destination is not None:
             sources, destinations = self._ends(source, inside), self._ends(destination, inside)
-            made: ConnectionText | None = ConnectionText(sources, destinations, self._position)
+            made: ConnectionText | Poison = ConnectionText(sources, destinations, self._position)
         elif isinstance(source, str):
             made = connection(NodeReader(self._problems), Scalar(source, source, False, self._position))
         else:
             self._tell("the connection has no destination", "write connect(a.output, b.input)")
             return None
         # An empty list connects nothing: there may be no robots.
-        if made is None or not (made.sources and made.destinations):
+        if not made or not (made.sources and made.destinations):
             return None
         return made if delay is None else replace(made, delay=node_of(delay, self._position))
 

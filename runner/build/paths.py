@@ -36,7 +36,7 @@ class Paths:
     @cached_property
     def owners(self) -> PathIndex:
         """All composites and actors, including those that could not be made."""
-        unmade = sorted(set(map(self._graph.owner, self._draft.open)))
+        unmade = sorted(set(map(self._graph.owner, self._draft.fed)))
         return self._index(dict.fromkeys((*self._graph.composites, *self._graph.actors, *unmade)))
 
     @cached_property

@@ -19,8 +19,8 @@ from ..graph import Modal
 from ..language import CompositeText, Locals, PartText, PortText
 from ..text import POISON, RAISE_IT, Entry, Poison, Position, did_you_mean
 from .composite_aspect import as_actor
-from .connect import Child, Inside, Wiring, child_of_actors
-from .draft import Draft
+from .connect import Child, Inside, Wiring, child_of_actors, make
+from .draft import Draft, Gap
 from .modes import connect_modes
 from .settle import OF_DIRECTORS, Settler
 
@@ -39,9 +39,8 @@ class TooLargeError(Exception):
 class Known:
     """The possible types of parts: the composite classes of a model, and the installed types."""
 
-    composites: Mapping[str, CompositeText]
+    composites: Mapping[str, CompositeText | Poison]  # poison if the base is missing
     catalogue: Catalogue
-    broken: Collection[str] = ()  # composites whose base is missing
 
     def valid_types(self, kind: str, asked: str) -> tuple[str, ...]:
         """The valid types: their names, or how to list them if there are too many, and how to add more."""
@@ -88,7 +87,7 @@ class Unfolding:
             full = f"{path}.{name}" if path else name
             child = self.instances(full, part, names, within)
             if child is None:
-                self.draft.unknown.add(full)
+                self.draft.gaps[full] = Gap()
             else:
                 children[name] = child
         for name, part in composite.aspects.items():
@@ -100,9 +99,8 @@ class Unfolding:
             path, composite.name, composite.inputs, composite.outputs, composite.actors, children, composite
         )
         wiring = Wiring(inside, self.draft.graph, self.values, self.problems)
-        self.draft.is_wired = self.draft.is_wired and composite.is_wired
         for connection in composite.connections:
-            wiring.resolve(connection, names).make(self.draft)
+            make(wiring.resolve(connection, names) if connection else [POISON], self.draft)
         if composite.machine is not None:
             self._modes(path, composite, names, within)
         self.aspects += ((path, part, names) for part in composite.aspects.values())
@@ -134,11 +132,10 @@ class Unfolding:
         if kind is None:
             return None
         count, is_array = self._count(path, part, names), part.count is not None
-        if count is None:
-            self.draft.unknown.add(path)
+        if count is POISON:
+            self.draft.gaps[path] = Gap()
         elif count == 0:
-            self.draft.empty.add(path)
-            self.draft.kinds |= self._kinds(part)
+            self.draft.gaps[path] = Gap(frozenset(self._kinds(part)), is_empty=True)
         paths = [f"{path}[{index}]" if is_array else path for index in range(count or 0)]
         for index, instance in enumerate(paths):
             self._count_one(path, part)
@@ -168,7 +165,7 @@ class Unfolding:
         except CatalogueError as error:
             self.values.blame(path, error, part.type.position, Locals(path))
             return None
-        if wanted in known.broken:
+        if found is POISON:
             return None
         if found is None:
             near = did_you_mean(wanted, [*known.composites, *known.catalogue.actors])
@@ -186,13 +183,13 @@ class Unfolding:
     def _tell(self, message: str, position: Position | None, scope: str, *hints: str) -> None:
         self.problems.add(message, position, *hints, scope=scope)
 
-    def _count(self, path: str, part: PartText, names: Names) -> int | None:
-        """The number of instances; None if it is unknown."""
+    def _count(self, path: str, part: PartText, names: Names) -> int | Poison:
+        """The number of instances."""
         if part.count is None:
             return 1
         count = Parameter(int, min=0, max=self.draft.graph.limits.actors)
-        found = self.values.converted(part.count, Locals(path, names), f"{path}: count", count.convert)
-        return None if found is POISON else found
+        found: int | Poison = self.values.converted(part.count, Locals(path, names), f"{path}: count", count.convert)
+        return found
 
     def _count_one(self, path: str, part: PartText) -> None:
         """Count one more instance; raises ``TooLargeError`` if there are too many."""
@@ -211,7 +208,7 @@ class Unfolding:
         while waiting:
             each = waiting.pop()
             found |= {each.type.text, *(tag.text for tag in each.tags)}
-            if (inner := self.known.composites.get(each.type.text)) is not None and inner.name not in seen:
+            if (inner := self.known.composites.get(each.type.text)) and inner.name not in seen:
                 seen.add(inner.name)
                 waiting += inner.actors.values()
         return found
@@ -324,5 +321,5 @@ class Unfolding:
             trial.instances(full, as_actor(part), names, within)
         finally:
             self.cost = trial.cost
-        self.draft.unknown.add(full)
+        self.draft.gaps[full] = Gap()
         return None

@@ -27,10 +27,12 @@ from ..text import (
     Position,
     Problems,
     Scalar,
+    Sequence,
     Text,
     TooManyError,
     did_you_mean,
     entries_of,
+    is_empty,
     plain,
     within,
 )
@@ -62,10 +64,11 @@ class Watching:
             if key in ("record", "stop_when"):
                 watch = self.record if key == "record" else self.stop_when
                 seen: set[str] = set()  # each once: a pattern may select all of a model
-                for each in reader.texts(entry.value, key):
-                    if each.text not in seen:
-                        seen.add(each.text)
-                        watch(each)
+                for node in entry.value.items if isinstance(entry.value, Sequence) else (entry.value,):
+                    pattern = None if is_empty(node) else reader.placed(node, key)
+                    if pattern and pattern.text not in seen:
+                        seen.add(pattern.text)
+                        watch(pattern)
                 continue
             convert = nanoseconds if key == "stop" else checked_seed
             value = self.values.converted(entry.value, Locals("", names), key, convert)

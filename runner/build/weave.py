@@ -16,7 +16,7 @@ from epicycle.aspects import Aspect
 
 from ..graph import WovenAspect
 from ..language import PointcutText
-from ..text import PathIndex, PatternError, did_you_mean, in_general, nearest
+from ..text import PathIndex, PatternError, Poison, did_you_mean, in_general, nearest
 from .looks import Looks, PlaceOf, unknown_inputs
 from .paths import View
 
@@ -34,12 +34,14 @@ class Weaving(View):
     def kind(self) -> str:
         return self.cls.__name__
 
-    def weave(self, aspect: Aspect, pointcuts: Sequence[PointcutText], place_of: PlaceOf) -> WovenAspect:
+    def weave(self, aspect: Aspect, at: Sequence[PointcutText | Poison], place_of: PlaceOf) -> WovenAspect:
         """The aspect with its places and everything it reads; a pointcut that selects nothing is a problem.
 
         ``place_of`` returns where something is wrong with its parameters in the model file.
         """
         before = len(self.problems)
+        pointcuts = [each for each in at if each]
+        self._is_excused = len(pointcuts) < len(at)
         ports, connections, actors = self.select(pointcuts)
         parameters = [path for path, is_left_out in self._parameters.items() if not is_left_out]
         is_somewhere = ports or connections or actors or parameters
@@ -73,13 +75,7 @@ class Weaving(View):
         """The ports that the aspect can attach to, of those that one pointcut selects."""
         if self._stands_at_parameters(pointcut):
             return []
-        found: list[str] | None = None
-        if pointcut.text:
-            found = self._matching(pointcut)
-        elif pointcut.type is not None or pointcut.tag is not None:
-            found = self._chosen(pointcut)
-        else:
-            self._is_excused = self._is_excused or not pointcut.exclude  # it is malformed, which has been reported
+        found = self._matching(pointcut) if pointcut.text else self._chosen(pointcut)
         if found is None:
             return []
         fitting = [port for port in found if self._fits(port)]
@@ -171,7 +167,7 @@ class Weaving(View):
         ports = self.ports.in_order(path for path in of_owners if graph.owner(path) in owners)
         if pointcut.port is None:
             found = [path for path in ports if self._fits(path)]
-            if not found and not any(path in self.draft.unknown for path in owners):
+            if not found and not any(path in self.draft.gaps for path in owners):
                 wanting = " or ".join(sorted(self.cls.stands_at))
                 where = pointcut.type or pointcut.tag
                 self._problem(f"{self.kind} attaches to {wanting} ports, but no {_asked(pointcut)} has one", where)
@@ -200,8 +196,7 @@ class Weaving(View):
             wanted = pointcut.tag
             owners = {path for path in inside if wanted.text in graph.tags.get(path, ())}
             known = {tag for path in inside for tag in graph.tags.get(path, ())}
-        unknown = [path for path in self.draft.unknown if not self.scope or path.startswith(f"{self.scope}.")]
-        if not owners and (unknown or wanted.text in self.draft.kinds):
+        if not owners and self.draft.may_hold(wanted.text, self.scope):
             self._is_excused = True
             return None
         if not owners:
@@ -236,9 +231,6 @@ class Weaving(View):
         if pointcut.port is not None:
             self._problem(f"{name} attaches to actors, not to their ports", pointcut.port, "leave 'port' out")
         if not text:
-            if pointcut.type is None and pointcut.tag is None:
-                self._is_excused = self._is_excused or not pointcut.exclude  # it is malformed, which has been reported
-                return ()
             return self._chosen_owners(pointcut) or ()
         if "->" in text:
             receiver = text.rpartition("->")[2].strip().rpartition(".")[0]

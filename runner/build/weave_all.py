@@ -21,7 +21,7 @@ from epicycle.aspects import (
 from ..catalogue import CatalogueError
 from ..graph import ModelGraph, WovenAspect
 from ..language import Locals, PartText, PointcutText
-from ..text import RAISE_IT, Mapping, Poison, Position, Problems, Text, TooManyError, did_you_mean, place_in
+from ..text import POISON, RAISE_IT, Mapping, Poison, Position, Problems, Text, TooManyError, did_you_mean, place_in
 from .composite_aspect import OWN, ModelWeaving, check_nesting, detours
 from .draft import Draft
 from .paths import Paths
@@ -78,12 +78,12 @@ class _Weaver:
         weaving = Weaving(self.draft, self.paths, name, scope, self.problems, cls)
         if is_model and name in self.graph.composites:
             weaving = ModelWeaving(self.draft, self.paths, name, scope, self.problems, cls, name, part.position)
-            part = replace(part, at=tuple(self._timed(pointcut, name, scope, names) for pointcut in part.at))
+            part = replace(part, at=tuple(each and self._timed(each, name, scope, names) for each in part.at))
         is_enabled = (
             name in self.graph.composites if is_model else self.settler.is_enabled(name, part, Locals(scope, names))
         )
         if isinstance(aspect, Poison):
-            weaving.select(part.at)  # to report its problems
+            weaving.select([each for each in part.at if each])  # to report its problems
             if isinstance(weaving, ModelWeaving):
                 self.draft.leave_open(name)
             return
@@ -101,21 +101,19 @@ class _Weaver:
     def _type(self, name: str, scope: str, part: PartText) -> type[Aspect] | None:
         """The type of an aspect; None, and a problem, if it cannot have that type."""
         known, wanted = self.known, part.type.text
-        if wanted in known.broken:
-            return None
         try:
             cls = known.catalogue.aspects.get(wanted)
         except CatalogueError as error:
             self.settler.values.blame(f"aspect {name}", error, part.type.position, Locals(scope))
             return None
-        if wanted in known.composites:
-            return self._model_type(name, scope, part, cls)
+        if (inner := known.composites.get(wanted)) is not None:
+            return None if inner is POISON else self._model_type(name, scope, part, cls)
         if cls is None:
             near = did_you_mean(wanted, [*known.catalogue.aspects, *known.composites])
             message = f"aspect {name}: there is no aspect type {wanted!r}{near}"
             self.problems.add(message, part.type.position, *known.valid_types("aspect", wanted), scope=scope)
             return None
-        for pointcut in part.at:
+        for pointcut in (each for each in part.at if each):
             for key, said in (("request", pointcut.request), ("time", pointcut.time)):
                 if said is not None:
                     message = f"aspect {name}: {wanted} is not a composite, so its pointcuts have no {key!r}"
@@ -128,7 +126,7 @@ class _Weaver:
             message = f"aspect {name}: {part.type.text} is both an aspect type and a composite"
             self.problems.add(message, part.type.position, "give the composite another name", scope=scope)
             return None
-        aimed = [pointcut for pointcut in part.at if not pointcut.exclude]
+        aimed = [pointcut for pointcut in part.at if pointcut and not pointcut.exclude]
         at_ports = [pointcut for pointcut in aimed if pointcut.time is None]
         if at_ports and len(at_ports) < len(aimed):
             message = f"aspect {name}: it attaches to ports here, but to actors elsewhere"

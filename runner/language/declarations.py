@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from epicycle.actors import UnitError, convert
 from epicycle.aspects import FiringTime
 
-from ..text import Entry, Node, Position, Text
+from ..text import Entry, Node, Poison, Position, Text
 
 
 @dataclass(frozen=True)
@@ -16,13 +16,12 @@ class ParameterText:
 
     name: str
     position: Position
-    value: Node | None = None
+    value: Node | Poison | None = None  # poison if something is wrong with the declaration
     unit: str = ""
     min: float | str | None = None  # as written: a text has a unit of its own
     max: float | str | None = None
     choices: tuple[str, ...] = ()
     doc: str = ""
-    spoilt: bool = False  # the declaration is wrong, which has been reported: values are not checked against it
     given: tuple[str, ...] = ("value",)  # the keys of the declaration, which change those of an inherited one
 
     def bounds(self) -> tuple[float | None, float | None]:
@@ -48,8 +47,7 @@ class PointcutText:
     """Where an aspect attaches: a pattern, or a type or tag and perhaps a port; ``exclude``: where it does not.
 
     For an aspect that is a model, ``request`` is the port by which tokens or firings come in, ``time`` makes it attach
-    to actors and gives the time of their firings; ``firing_time`` is its value.  One without pattern, type and tag is
-    malformed, which has been reported.
+    to actors and gives the time of their firings; ``firing_time`` is its value.
     """
 
     text: str
@@ -83,7 +81,7 @@ class PartText:
     type: Text
     values: dict[str, Entry] = field(default_factory=dict)
     count: Node | None = None
-    at: tuple[PointcutText, ...] = ()
+    at: tuple[PointcutText | Poison, ...] = ()
     enabled: Node | None = None
     priority: Node | None = None
     removes: bool = False  # it removes the inherited part with that name
@@ -147,7 +145,7 @@ class CompositeText:
     name: str
     position: Position
     doc: str = ""
-    extends: Text | None = None
+    extends: Text | Poison | None = None
     parameters: dict[str, ParameterText] = field(default_factory=dict)
     inputs: dict[str, PortText] = field(default_factory=dict)
     outputs: dict[str, PortText] = field(default_factory=dict)
@@ -155,11 +153,10 @@ class CompositeText:
     machine: PartText | None = None  # of its modes
     refinements: dict[str, PartText] = field(default_factory=dict)  # by the mode
     actors: dict[str, PartText] = field(default_factory=dict)
-    connections: tuple[ConnectionText, ...] = ()
-    is_wired: bool = True  # whether all its connections could be read
+    connections: tuple[ConnectionText | Poison, ...] = ()
     aspects: dict[str, PartText] = field(default_factory=dict)
     removed: dict[str, Position] = field(default_factory=dict)  # inherited actors that it removes
-    spoilt: bool = False  # it could not be read as a whole, or made from its base: missing parts are not reported
+    written: tuple[Node | Poison, ...] = ()  # the values of its keys, as they are in the file
 
     def ports(self, direction: str) -> dict[str, PortText]:
         return self.inputs if direction == "input" else self.outputs

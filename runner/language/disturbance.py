@@ -7,9 +7,9 @@ from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
 from ..catalogue import find
-from ..text import Mapping, Node, NodeReader, Problems, read
+from ..text import POISON, Mapping, Node, NodeReader, Problems, read
 from .declarations import ActText, CompositeText, ModelText, ParameterText
-from .fields import AT, NAMED, Construct, Key, Shape, number, ref
+from .fields import AT, NAMED, Construct, Key, Shape, number, ref, sound
 from .models import ASPECTS, COMPOSITES, DOC, PARAMETERS, parts
 from .settings import Setting, put_aspect, settings_like
 from .usage import check_own_usage
@@ -51,9 +51,8 @@ ACT = Construct(
 def _acts(reader: NodeReader, node: Node, what: str) -> tuple[ActText, ...]:
     found = []
     for each in reader.items(node, what) or ():
-        before = len(reader.problems)
         said = ACT.read(reader, each, f"an act of {what!r}")
-        if said is not None and len(reader.problems) == before:
+        if said and POISON not in said.values():
             found.append(ActText(**said, position=each.position))
     return tuple(found)
 
@@ -100,14 +99,15 @@ def _declared(node: Node, problems: Problems) -> Disturbance | None:
         return None
     reader = NodeReader(problems)
     entries = DISTURBANCE.entries(reader, node, "the disturbance")
-    if entries is None:
+    if entries is POISON:
         return None
     before = len(problems)
-    said = DISTURBANCE.values(reader, entries, "the disturbance", node.position)
+    said = sound(DISTURBANCE.values(reader, entries, "the disturbance", node.position))
     composites, settings, exactly = said.pop("composites", {}), said.pop("set", ()), said.pop(EXACTLY, None)
-    text = CompositeText(said.pop("name", "disturbance"), node.position, **said)
-    if len(problems) == before:
-        check_own_usage(text, problems)
+    own = tuple(entry.value for key, entry in entries.items() if key != "composites")
+    written = (*own, POISON) if len(problems) > before else own
+    text = CompositeText(said.pop("name", "disturbance"), node.position, **said, written=written)
+    check_own_usage(text, problems)
     return Disturbance(text, composites, settings, exactly)
 
 

@@ -10,14 +10,15 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, TypeVar
 
 from epicycle.actors import FaultError, MappingParameter, Parameter
 
 from ..catalogue import as_written, is_part, shown
-from ..text import POISON, Entry, Node, NodeReader, Position, Scalar, blame, is_empty
+from ..text import POISON, Entry, Node, NodeReader, Poison, Position, Scalar, blame, is_empty
 
 Schema: TypeAlias = dict[str, Any]
+T = TypeVar("T")
 
 NAME = "[A-Za-z_][A-Za-z0-9_]*"
 EXPRESSION = r"\$\{"
@@ -68,8 +69,8 @@ def computed(kind: str, low: float | None = None, high: float | None = None, uni
 class Shape:
     """What a value may be.
 
-    ``read`` takes a reader, a node and its name in messages; it returns the value, or None if there is none or its
-    problem has been reported.
+    ``read`` takes a reader, a node and its name in messages; it returns the value, ``POISON`` if it is wrong, or None
+    if there is none.
     """
 
     schema: Schema
@@ -80,11 +81,10 @@ class Shape:
         return Shape(schema, self.read)
 
 
-def _flag(reader: NodeReader, node: Node, what: str) -> bool | None:
+def _flag(reader: NodeReader, node: Node, what: str) -> bool | Poison:
     if isinstance(node, Scalar) and isinstance(node.value, bool):
         return node.value
-    reader.problems.add(f"{what} is neither true nor false", node.position)
-    return None
+    return reader.problems.add(f"{what} is neither true nor false", node.position)
 
 
 def node_as(schema: Schema) -> Shape:
@@ -108,11 +108,11 @@ def number(kind: type, low: float | None = None, high: float | None = None) -> S
 
 
 def named(schema: Schema, read: Callable[[Any, str, Entry], Any]) -> Shape:
-    """A mapping from names to things, each read with its name; those that cannot be read are left out."""
+    """A mapping from names to things, each read with its name; those that are wrong are left out."""
 
-    def read_all(reader: NodeReader, node: Node, what: str) -> dict[str, Any]:
-        found = {name: read(reader, name, entry) for name, entry in reader.named(node, what)}
-        return {name: each for name, each in found.items() if each is not None}
+    def read_all(reader: NodeReader, node: Node, what: str) -> dict[str, Any] | Poison:
+        entries = reader.named(node, what)
+        return POISON if entries is POISON else sound({name: read(reader, name, entry) for name, entry in entries})
 
     return Shape(names_of(schema), read_all)
 
@@ -127,6 +127,11 @@ NAMED = Shape(ref("name"), NodeReader.name)
 AT = Shape(ref("text"), NodeReader.placed)
 TEXTS = Shape(one_or_more({"type": "string"}), NodeReader.texts)
 FLAG = Shape({"type": "boolean"}, _flag)
+
+
+def sound(found: Mapping[str, T | Poison]) -> dict[str, T]:
+    """What is not wrong."""
+    return {name: each for name, each in found.items() if each is not POISON}
 
 
 # -- constructs ---------------------------------------------------------------------------------------------------
@@ -166,27 +171,27 @@ class Construct:
         found: Schema = {"type": ["object", "null"], "properties": properties, "additionalProperties": False}
         return {**({"description": self.doc} if self.doc else {}), **found, **self.rules}
 
-    def entries(self, reader: NodeReader, node: Node, what: str) -> dict[str, Entry] | None:
-        """The entries under its keys, unknown keys reported; None if it is not a mapping."""
+    def entries(self, reader: NodeReader, node: Node, what: str) -> dict[str, Entry] | Poison:
+        """The entries under its keys, unknown keys reported."""
         return reader.entries(node, what, tuple(self.keys))
 
     def values(self, reader: NodeReader, entries: Mapping[str, Entry], what: str, at: Position) -> dict[str, Any]:
-        """The values of its keys, by attribute; missing ones are reported ``at`` a place, unreadable ones left out."""
+        """The values of its keys, by attribute, with ``POISON`` for those that are wrong or missing, as told ``at``."""
         found = {}
         for key, each in self.keys.items():
             if key in entries and not (each.missing and is_empty(entries[key].value)):
                 value = each.shape.read(reader, entries[key].value, each.called.format(what=what, key=key))
-                if value is not None and value is not POISON:
+                if value is not None:
                     found[each.name or key] = value
             elif each.missing:
                 message, *hints = (said.format(what=what, key=key) for said in each.missing)
-                reader.problems.add(message, at, *hints)
+                found[each.name or key] = reader.problems.add(message, at, *hints)
         return found
 
-    def read(self, reader: NodeReader, node: Node, what: str, at: Position | None = None) -> dict[str, Any] | None:
-        """The values in a node, by attribute; None if it is not a mapping."""
+    def read(self, reader: NodeReader, node: Node, what: str, at: Position | None = None) -> dict[str, Any] | Poison:
+        """The values in a node, by attribute."""
         entries = self.entries(reader, node, what)
-        return None if entries is None else self.values(reader, entries, what, at or node.position)
+        return POISON if entries is POISON else self.values(reader, entries, what, at or node.position)
 
 
 COMPUTED_FLAG: Schema = {"type": ["boolean", "string"], **looks_like(EXPRESSION, "expected true or false")}

@@ -41,7 +41,7 @@ def read_model(name: str, problems: Problems) -> tuple[ModelText, dict[str, Comp
         problems.add(f"{name} is a disturbance, not a model", None, f"add it to a model: MODEL --disturb {name}")
     elif node is not None:
         text = model_of(node, problems)
-    if path is None or text is None:
+    if path is None or not text:
         return problems.whole(None)
     return text, _composites(text, path, problems)
 
@@ -99,7 +99,7 @@ def _composites(text: ModelText, path: Path, problems: Problems) -> dict[str, Co
                 continue
             node = read(target, problems, str(where.parent / include.text))
             inner = library_of(node, problems) if node is not None else None
-            if inner is not None:
+            if inner:
                 waiting.append((inner, target))
     return composites
 

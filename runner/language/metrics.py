@@ -7,7 +7,7 @@ from typing import Any
 from epicycle.actors import Parameter, declared_parameters
 
 from ..catalogue import TAKES, Measure, take_fault
-from ..text import Entry, NodeReader, is_empty
+from ..text import POISON, Entry, NodeReader, Poison
 from .declarations import MetricText
 from .fields import AT, TEXTS, Construct, Key, about, named, node_as, one_or_more, ref, schema_of
 from .places import PATTERN_SCHEMA
@@ -36,12 +36,12 @@ METRIC = Construct(
 _WITH_FORMULA = ("from", "unit", "to", "doc", "label")
 
 
-def _metric(reader: NodeReader, name: str, entry: Entry) -> MetricText | None:
+def _metric(reader: NodeReader, name: str, entry: Entry) -> MetricText | Poison:
     """``name: {of: port, take: last, unit: s, doc: ...}``, or ``name: {from: delivered / sent, doc: ...}``."""
     what = f"metric {name!r}"
     entries = METRIC.entries(reader, entry.value, what)
-    if entries is None:
-        return None
+    if entries is POISON:
+        return POISON
     said = METRIC.values(reader, entries, what, entry.key.position)
     if "from" in said:
         for key in entries:
@@ -50,17 +50,16 @@ def _metric(reader: NodeReader, name: str, entry: Entry) -> MetricText | None:
                 reader.problems.add(message, entries[key].key.position, f"it can have {', '.join(_WITH_FORMULA[1:])}")
         formula = AT.read(reader, said["from"], "from")
         values = {key: each for key, each in entries.items() if key in _WITH_FORMULA[1:]}
-        return None if formula is None else MetricText(name, (), formula, values, entry.key.position)
-    before = len(reader.problems)
+        return POISON if formula is POISON else MetricText(name, (), formula, values, entry.key.position)
     ports = TEXTS.read(reader, said["of"], "of") if "of" in said else ()
-    if "of" not in entries or is_empty(entries["of"].value) or (not ports and len(reader.problems) == before):
+    if ports == ():
         hint = "add 'of: actor.port', or 'from: delivered / sent' over other metrics"
-        reader.problems.add(f"{what} has no port", entry.key.position, hint)
+        ports = reader.problems.add(f"{what} has no port", entry.key.position, hint)
     take = reader.text(said["take"], "take") if "take" in said else "last"
-    if take is not None and (fault := take_fault(name, take)):
-        reader.problems.add(fault.message, entries["take"].value.position, *fault.help)
-    if not ports or take not in TAKES:
-        return None
+    if take is not POISON and (fault := take_fault(name, take)):
+        take = reader.problems.add(fault.message, entries["take"].value.position, *fault.help)
+    if ports is POISON or take is POISON:
+        return POISON
     return MetricText(
         name, ports, None, {key: each for key, each in entries.items() if key != "of"}, entry.key.position
     )

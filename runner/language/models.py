@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from keyword import iskeyword, kwlist
+from typing import Any
 
 from epicycle.actors import Actor, UnitError, in_si, parse_unit
 from epicycle.actors.expression import CONSTANTS, FUNCTIONS
@@ -14,11 +15,13 @@ from ..text import (
     MAX_SEED,
     NAME,
     NORMAL,
+    POISON,
     SURE,
     Entry,
     Mapping,
     Node,
     NodeReader,
+    Poison,
     Position,
     Problems,
     Scalar,
@@ -48,6 +51,7 @@ from .fields import (
     one_or_more,
     ref,
     schema_of,
+    sound,
 )
 from .fields import NAME as NAME_PATTERN
 from .metrics import METRICS
@@ -76,7 +80,7 @@ def _ports(reader: NodeReader, node: Node, what: str) -> dict[str, PortText]:
     if isinstance(node, Mapping):
         found = [_port(reader, name, entry) for name, entry in node.entries.items()]
     else:
-        found = [PortText(text.text, text.position) for text in reader.texts(node, what)]
+        found = [PortText(text.text, text.position) for text in reader.texts(node, what) or ()]
     ports: dict[str, PortText] = {}
     for port in found:
         if not NAME.match(port.name):
@@ -94,40 +98,40 @@ def _port(reader: NodeReader, name: str, entry: Entry) -> PortText:
         said = PORT.read(reader, entry.value, what) or {}
     else:
         said = {} if is_empty(entry.value) else {"type": AT.read(reader, entry.value, f"the type of {what}")}
-    return PortText(name, entry.key.position, **said)
+    return PortText(name, entry.key.position, **sound(said))
 
 
-def _unit(reader: NodeReader, node: Node, what: str) -> str | None:
+def _unit(reader: NodeReader, node: Node, what: str) -> str | Poison:
     unit = reader.text(node, f"unit of {what}")
     try:
         if unit:
             parse_unit(unit)
     except UnitError as error:
-        blame(reader.problems, what, error, node)
+        return blame(reader.problems, what, error, node)
     return unit
 
 
-def _choices(reader: NodeReader, node: Node, what: str) -> tuple[str, ...]:
-    before = len(reader.problems)
-    found = tuple(text.text for text in reader.texts(node, "choices"))
-    if not found and len(reader.problems) == before:
-        reader.problems.add(f"{what} has an empty list of choices", node.position)
-    return found
+def _choices(reader: NodeReader, node: Node, what: str) -> tuple[str, ...] | Poison:
+    found = reader.texts(node, "choices")
+    if found is POISON:
+        return POISON
+    return tuple(text.text for text in found) or reader.problems.add(
+        f"{what} has an empty list of choices", node.position
+    )
 
 
 _FREE_NUMBER = number(float)
 
 
-def _bound(reader: NodeReader, node: Node, what: str) -> float | str | None:
+def _bound(reader: NodeReader, node: Node, what: str) -> float | str | Poison:
     """A number, or a text with a unit, which is converted once the parameter's own is known."""
     value = node.value if isinstance(node, Scalar) else None
     try:
         if isinstance(value, str) and in_si(value) is not None:
             return value
     except UnitError as error:
-        blame(reader.problems, what, error, node)
-        return None
-    found: float | None = _FREE_NUMBER.read(reader, node, what)
+        return blame(reader.problems, what, error, node)
+    found: float | Poison = _FREE_NUMBER.read(reader, node, what)
     return found
 
 
@@ -157,17 +161,17 @@ def _parameter(reader: NodeReader, name: str, entry: Entry) -> ParameterText:
         return ParameterText(name, entry.key.position, entry.value)
     what = f"parameter {name!r}"
     entries = PARAMETER.entries(reader, entry.value, what) or {}
-    before = len(reader.problems)
     said = PARAMETER.values(reader, entries, what, entry.key.position)
-    found = ParameterText(name, entry.key.position, **said, given=tuple(entries))
-    is_known = found.unit or not {type(found.min), type(found.max)} & {str}  # otherwise it may be inherited
-    if len(reader.problems) == before and is_known:
+    found = ParameterText(name, entry.key.position, **sound(said), given=tuple(entries))
+    if POISON in said.values():
+        return replace(found, value=POISON)
+    if found.unit or not {type(found.min), type(found.max)} & {str}:  # otherwise it may be inherited
         try:
             found.bounds()
         except UnitError as error:
             at = next(key for key in ("min", "max") if key in entries)
-            blame(reader.problems, what, error, entries[at].value)
-    return replace(found, spoilt=len(reader.problems) > before)
+            return replace(found, value=blame(reader.problems, what, error, entries[at].value))
+    return found
 
 
 _NO_PARAMETERS = {"index", *CONSTANTS, *FUNCTIONS}
@@ -194,7 +198,7 @@ BESIDE = {
 RESERVED = {"actor": Actor.reserved, "aspect": Aspect.reserved, "figure": frozenset({"type"})}
 
 
-def part(reader: NodeReader, name: str, entry: Entry, kind: str, *, derived: bool = False) -> PartText | None:
+def part(reader: NodeReader, name: str, entry: Entry, kind: str, *, derived: bool = False) -> PartText | Poison:
     """``name: {type: ..., ...}``; in a class that extends another, ``type`` may be missing, or ``name: null``."""
     problems = reader.problems
     if derived and is_empty(entry.value):
@@ -203,24 +207,23 @@ def part(reader: NodeReader, name: str, entry: Entry, kind: str, *, derived: boo
         said = entry.value.value if isinstance(entry.value, Scalar) else None
         type_said = said if isinstance(said, str) and NAME.match(said) else "..."
         hint = f"write '{name}: {{type: {type_said}}}' with the {kind}'s type and parameters"
-        problems.add(f"{kind} {name!r} is not a mapping", entry.value.position, hint)
-        return None
+        return problems.add(f"{kind} {name!r} is not a mapping", entry.value.position, hint)
     values = dict(entry.value.entries)
     kind_entry = values.pop("type", None)
     if (kind_entry is None and not derived) or (kind_entry is not None and is_empty(kind_entry.value)):
         meant = None if kind_entry is not None else nearest("type", values, SURE)
         near = f", did you mean 'type' by {meant!r}?" if meant is not None else ""
         at = entry.key if meant is None else values[meant].key
-        problems.add(f"{kind} {name!r} has no type{near}", at.position, *(() if near else ("add 'type: ...'",)))
-        return None
+        return problems.add(f"{kind} {name!r} has no type{near}", at.position, *(() if near else ("add 'type: ...'",)))
     type_name = Text("", entry.key.position)
     if kind_entry is not None:
-        type_name = AT.read(reader, kind_entry.value, f"the type of {name!r}")
-        if type_name is None:
-            return None
+        said_type: Text | Poison = AT.read(reader, kind_entry.value, f"the type of {name!r}")
+        if said_type is POISON:
+            return POISON
+        type_name = said_type
     beside = {key: values.pop(key).value for key in sorted(RESERVED[kind]) if key in values}
     read = {key: BESIDE[key].shape.read(reader, node, key) for key, node in beside.items()}
-    return PartText(name, entry.key.position, type_name, values, **read)
+    return PartText(name, entry.key.position, type_name, values, **sound(read))
 
 
 def parts(kind: str, definition: str = "", *, derived: bool = False) -> Shape:
@@ -276,9 +279,10 @@ ASPECTS = Key(
 )
 
 
-def _base(reader: NodeReader, node: Node, what: str) -> Text:
-    """The name of a class; empty if the node is not a name, which has been reported."""
-    return Text(reader.name(node, what) or "", node.position)
+def _base(reader: NodeReader, node: Node, what: str) -> Text | Poison:
+    """The name of a class."""
+    name = reader.name(node, what)
+    return POISON if name is POISON else Text(name, node.position)
 
 
 COMPOSITE = Construct(
@@ -294,7 +298,7 @@ COMPOSITE = Construct(
         "inputs": Key(_PORTS, f"The input ports: {_SAID_OF_PORTS}"),
         "outputs": Key(_PORTS, f"The output ports: {_SAID_OF_PORTS}"),
         "director": Key(
-            Shape(ref("director"), lambda reader, node, what: DIRECTOR.entries(reader, node, what) or {}),
+            Shape(ref("director"), DIRECTOR.entries),
             "Its own director: the composite fires as one actor, in local time.",
             "the director of {what}",
         ),
@@ -328,9 +332,9 @@ def composite_schema() -> Schema:
     }
 
 
-def _composite(reader: NodeReader, name: str, entry: Entry) -> CompositeText | None:
+def _composite(reader: NodeReader, name: str, entry: Entry) -> CompositeText | Poison:
     entries = COMPOSITE.entries(reader, entry.value, f"composite {name!r}")
-    return None if entries is None else composite(reader, name, entries, entry.key.position)
+    return POISON if entries is POISON else composite(reader, name, entries, entry.key.position)
 
 
 def composite(reader: NodeReader, name: str, entries: dict[str, Entry], position: Position) -> CompositeText:
@@ -338,7 +342,12 @@ def composite(reader: NodeReader, name: str, entries: dict[str, Entry], position
     problems = reader.problems
     before = len(problems)
     derived = "extends" in entries
-    said = (HEIR if derived else COMPOSITE).values(reader, entries, repr(name), position)
+    read = (HEIR if derived else COMPOSITE).values(reader, entries, repr(name), position)
+    declared = read.pop("connections", ())
+    connections: tuple[ConnectionText | Poison, ...] = (POISON,) if declared is POISON else declared
+    said = sound(read)
+    if read.get("extends") is POISON:
+        said["extends"] = POISON
     machine = {key: entries[key] for key in OF_MODES if said.pop(key, None) is not None and key in entries}
     if machine:
         said.setdefault("outputs", {}).setdefault(
@@ -352,19 +361,13 @@ def composite(reader: NodeReader, name: str, entries: dict[str, Entry], position
     for actor in said.get("actors", {}).values():
         if actor.name in inputs or actor.name in outputs:
             problems.add(f"{actor.name!r} is the name of both an actor and a port", actor.position, "rename one")
-    written: tuple[ConnectionText | None, ...] = said.pop("connections", (None,) if "connections" in entries else ())
-    connections = [each for each in written if each is not None]
     for each in connections:
-        if each.removes is not None and not derived:
+        if each and each.removes is not None and not derived:
             problems.add(f"{name} extends no class, so it has no connection to remove", each.removes)
-    return CompositeText(
-        name,
-        position,
-        **said,
-        connections=tuple(each for each in connections if derived or each.removes is None),
-        is_wired=None not in written,
-        spoilt=len(problems) > before or (derived and not said["extends"].text),
-    )
+    kept = tuple(each for each in connections if derived or not (each and each.removes))
+    written = tuple(entry.value for entry in entries.values())
+    wrong = (POISON,) if len(problems) > before else ()
+    return CompositeText(name, position, **said, connections=kept, written=(*written, *wrong))
 
 
 COMPOSITES = Key(named(ref("composite"), _composite), "Composite classes, for the types of actors.")
@@ -385,18 +388,21 @@ RUN = Construct(
 )
 
 
-def _model_director(reader: NodeReader, node: Node, what: str) -> dict[str, Entry]:
+def _model_director(reader: NodeReader, node: Node, what: str) -> dict[str, Entry] | Poison:
     """What a file declares about the model's director."""
     if isinstance(node, Scalar) and node.value == PTOLEMY:
-        reader.problems.add(f"{what} is not a mapping", node.position, f"write 'director: {{like: {PTOLEMY}}}'")
-        return {}
+        return reader.problems.add(f"{what} is not a mapping", node.position, f"write 'director: {{like: {PTOLEMY}}}'")
     if isinstance(node, Mapping):
         for key in [key for key in ("start", "drift") if key in node.entries]:
             message = f"{what} has no {key!r}: the time of a run begins at 0 and has no drift"
             hint = "give it to the director of a composite, which has local time"
             reader.problems.add(message, node.entries[key].key.position, hint)
         node = replace(node, entries={key: each for key, each in node.entries.items() if key not in ("start", "drift")})
-    return MODEL_DIRECTOR.entries(reader, node, what) or {}
+    return MODEL_DIRECTOR.entries(reader, node, what)
+
+
+def _all(found: dict[str, Any] | Poison) -> tuple[Any, ...]:
+    return tuple((found or {}).values())
 
 
 LIBRARY = Construct("", {"doc": DOC, "include": INCLUDE, "composites": COMPOSITES})
@@ -420,11 +426,11 @@ MODEL = Construct(
         "aspects": ASPECTS,
         "run": Key(Shape(ref("run"), RUN.entries), RUN.doc),
         "metrics": Key(
-            Shape(METRICS.schema, lambda reader, node, what: tuple(METRICS.read(reader, node, what).values())),
+            Shape(METRICS.schema, lambda reader, node, what: _all(METRICS.read(reader, node, what))),
             "Numbers computed from what ports send: 'name: {of, take, after, unit, ...}'.",
         ),
         "monitors": Key(
-            Shape(MONITORS.schema, lambda reader, node, what: tuple(MONITORS.read(reader, node, what).values())),
+            Shape(MONITORS.schema, lambda reader, node, what: _all(MONITORS.read(reader, node, what))),
             "Properties that a run must have: 'name: always port >= 2 m', or 'name: {property, between, stop, ...}'.",
         ),
         "figures": Key(parts("figure"), "Figures of a run: 'name: {type, ...}'."),
@@ -434,20 +440,24 @@ _OF_ROOT = {key for key, each in MODEL.keys.items() if COMPOSITE.keys.get(key) i
 _OF_FILE = Construct("", {key: each for key, each in MODEL.keys.items() if key not in _OF_ROOT})
 
 
-def model_of(node: Node, problems: Problems) -> ModelText | None:
+def model_of(node: Node, problems: Problems) -> ModelText | Poison:
     """The declarations of a model file: one with the key ``model``."""
     reader = NodeReader(problems)
     entries = MODEL.entries(reader, node, "the model")
-    if entries is None:
-        return None
-    said = _OF_FILE.values(reader, entries, "the model", node.position)
+    if entries is POISON:
+        return POISON
+    said = sound(_OF_FILE.values(reader, entries, "the model", node.position))
     own = {key: entry for key, entry in entries.items() if key in _OF_ROOT}
     director = said.pop("director", None)
     root = composite(reader, said.pop("name", "model"), own, node.position)
-    return ModelText(replace(root, director=director), **said)
+    others = tuple(entry.value for key, entry in entries.items() if key not in (*_OF_ROOT, "composites"))
+    return ModelText(replace(root, director=director, written=(*root.written, *others)), **said)
 
 
-def library_of(node: Node, problems: Problems) -> ModelText | None:
+def library_of(node: Node, problems: Problems) -> ModelText | Poison:
     """The declarations of a file of composite classes."""
-    said = LIBRARY.read(NodeReader(problems), node, "an included file")
-    return None if said is None else ModelText(CompositeText("", node.position, said.pop("doc", "")), **said)
+    read = LIBRARY.read(NodeReader(problems), node, "an included file")
+    if read is POISON:
+        return POISON
+    said = sound(read)
+    return ModelText(CompositeText("", node.position, said.pop("doc", "")), **said)

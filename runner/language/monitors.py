@@ -7,7 +7,7 @@ from typing import Any
 from epicycle.actors import Parameter, declared_parameters
 
 from ..temporal import Requirement
-from ..text import Entry, Mapping, NodeReader
+from ..text import POISON, Entry, Mapping, NodeReader, Poison
 from .declarations import MonitorText
 from .fields import Construct, Key, about, named, node_as, ref, schema_of
 
@@ -28,16 +28,15 @@ MONITOR = Construct(
 )
 
 
-def _monitor(reader: NodeReader, name: str, entry: Entry) -> MonitorText | None:
+def _monitor(reader: NodeReader, name: str, entry: Entry) -> MonitorText | Poison:
     """``name: always ...`` or ``name: {property: always ..., between: linear, unit: m, doc: ...}``."""
     if not isinstance(entry.value, Mapping):
         return MonitorText(name, {"property": entry}, entry.key.position)
     entries = MONITOR.entries(reader, entry.value, f"monitor {name!r}")
-    if entries is None:
-        return None
-    before = len(reader.problems)
-    MONITOR.values(reader, entries, f"monitor {name!r}", entry.key.position)
-    return MonitorText(name, entries, entry.key.position) if len(reader.problems) == before else None
+    if entries is POISON:
+        return POISON
+    said = MONITOR.values(reader, entries, f"monitor {name!r}", entry.key.position)
+    return POISON if POISON in said.values() else MonitorText(name, entries, entry.key.position)
 
 
 MONITORS = named(ref("monitor"), _monitor)

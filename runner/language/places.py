@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from ..text import Mapping, Node, NodeReader, Scalar, Sequence, Text, inside, split
+from ..text import POISON, Mapping, Node, NodeReader, Poison, Scalar, Sequence, Text, inside, split
 from .declarations import ConnectionText, PointcutText
 from .fields import (
     AT,
@@ -82,40 +82,37 @@ CONNECTION = Construct(
 )
 
 
-def connection(reader: NodeReader, node: Node, what: str = "") -> ConnectionText | None:
+def connection(reader: NodeReader, node: Node, what: str = "") -> ConnectionText | Poison:
     """``a.out -> b.in``, ``a[*].out => b[*].in``, ``{from: ..., to: ..., delay: ...}`` or ``{remove: ...}``."""
     problems = reader.problems
     if isinstance(node, Mapping) and list(node.entries) == ["remove"]:
         removed = connection(reader, node.entries["remove"].value)
-        return None if removed is None else replace(removed, removes=node.position)
+        return POISON if removed is POISON else replace(removed, removes=node.position)
     if isinstance(node, Scalar):
         return _arrow(reader, node)
     if not isinstance(node, Mapping):
         hint = "write 'actor.port -> actor.port' or {from: ..., to: ..., delay: ...}"
-        problems.add("this is not a connection", node.position, hint)
-        return None
+        return problems.add("this is not a connection", node.position, hint)
     entries = CONNECTION.entries(reader, node, "a connection") or {}
-    before = len(problems)
     said = CONNECTION.values(reader, entries, "a connection", node.position)
     for key in ("from", "to"):
-        if not said.setdefault(CONNECTION.keys[key].name, ()) and len(problems) == before:
-            problems.add(f"the connection has no {key!r}", node.position)
-    is_whole = said["sources"] and said["destinations"]
-    return ConnectionText(position=node.position, **said) if is_whole else None
+        if said.get(CONNECTION.keys[key].name, ()) == ():
+            said[key] = problems.add(f"the connection has no {key!r}", node.position)
+    return POISON if POISON in said.values() else ConnectionText(position=node.position, **said)
 
 
-def _arrow(reader: NodeReader, node: Scalar) -> ConnectionText | None:
+def _arrow(reader: NodeReader, node: Scalar) -> ConnectionText | Poison:
     text = node.value if isinstance(node.value, str) else node.text
     places = [(start, end) for arrow in ("->", "=>") for start, end in split(text, arrow)[1:]]
     if len(places) != 1:
-        reader.problems.add(f"{text!r} is not a connection", node.position, "write 'actor.port -> actor.port'")
-        return None
+        advice = "write 'actor.port -> actor.port'"
+        return reader.problems.add(f"{text!r} is not a connection", node.position, advice)
     right = places[0][0]
     sources, destinations = _endpoints(node, text, 0, right - 2), _endpoints(node, text, right, len(text))
     if not sources or not destinations:
         side = "right" if sources else "left"
-        reader.problems.add(f"{text!r} has no port on its {side}", node.position, "write 'actor.port -> actor.port'")
-        return None
+        advice = "write 'actor.port -> actor.port'"
+        return reader.problems.add(f"{text!r} has no port on its {side}", node.position, advice)
     return ConnectionText(sources, destinations, node.position, to_all=text[right - 2] == "=")
 
 
@@ -172,23 +169,28 @@ POINTCUT = Construct(
 )
 
 
-def pointcuts(reader: NodeReader, node: Node, what: str) -> tuple[PointcutText, ...]:
+def pointcuts(reader: NodeReader, node: Node, what: str) -> tuple[PointcutText | Poison, ...]:
     """A pattern, ``!pattern``, ``{at: ...}``, ``{type: ..., port: ...}`` or ``{tag: ...}``, or a list of these."""
-    found = []
+    found: list[PointcutText | Poison] = []
     for item in node.items if isinstance(node, Sequence) else (node,):
-        if not isinstance(item, Mapping):
-            found += [PointcutText.of(text) for text in reader.texts(item, what)]
-            continue
-        entries = POINTCUT.entries(reader, item, "a pointcut") or {}
-        said = POINTCUT.values(reader, entries, "a pointcut", item.position)
-        at = said.pop("at", None)
-        where = PointcutText("", item.position) if at is None else PointcutText.of(at)
-        if sum(key in entries for key in ("at", "type", "tag")) != 1 or (at is not None and "port" in said):
-            hint = "write {at: ...}, {type: ..., port: ...} or {tag: ...}"
-            reader.problems.add("a pointcut selects by pattern, type or tag", item.position, hint)
-            said = {}
-        found.append(replace(where, **said))
+        if isinstance(item, Mapping):
+            found.append(_pointcut(reader, item))
+        else:
+            texts = reader.texts(item, what)
+            found += [POISON] if texts is POISON else map(PointcutText.of, texts)
     return tuple(found)
+
+
+def _pointcut(reader: NodeReader, item: Mapping) -> PointcutText | Poison:
+    entries = POINTCUT.entries(reader, item, "a pointcut") or {}
+    said = POINTCUT.values(reader, entries, "a pointcut", item.position)
+    if sum(key in entries for key in ("at", "type", "tag")) != 1 or ("at" in entries and "port" in said):
+        hint = "write {at: ...}, {type: ..., port: ...} or {tag: ...}"
+        return reader.problems.add("a pointcut selects by pattern, type or tag", item.position, hint)
+    if POISON in said.values():
+        return POISON
+    at = said.pop("at", None)
+    return replace(PointcutText("", item.position) if at is None else PointcutText.of(at), **said)
 
 
 POINTCUTS_SCHEMA = one_or_more({"anyOf": [_POINTCUT_SCHEMA, POINTCUT.schema]})
@@ -197,6 +199,6 @@ POINTCUTS = Shape(ref("pointcuts"), pointcuts)
 CONNECTIONS = Shape(
     {"type": ["array", "null"], "items": ref("connection")},
     lambda reader, node, what: (
-        None if (items := reader.items(node, what)) is None else tuple(connection(reader, each) for each in items)
+        POISON if (items := reader.items(node, what)) is POISON else tuple(connection(reader, each) for each in items)
     ),
 )

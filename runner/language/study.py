@@ -10,6 +10,7 @@ from pathlib import Path
 from ..catalogue import find, is_path, unreadable
 from ..text import (
     MAX_SEED,
+    POISON,
     Entry,
     Mapping,
     Node,
@@ -39,6 +40,7 @@ from .fields import (
     number,
     one_or_more,
     ref,
+    sound,
 )
 from .files import named_file
 from .models import parts
@@ -192,9 +194,9 @@ class _StudyReader(NodeReader):
             )
             return None
         entries = STUDY.entries(self, node, "the study")
-        if entries is None:
+        if entries is POISON:
             return None
-        said = STUDY.values(self, entries, "the study", node.position)
+        said = sound(STUDY.values(self, entries, "the study", node.position))
         said.pop("claims", None), said.pop("guideline", None)  # which are read when everything else is known
         said["dimensions"] = (*said.get("dimensions", ()), *said.pop("disturb", ()))
         study = Study(said.pop("name", "study"), self.path, text, said.pop("model", ""), **said)
@@ -232,9 +234,9 @@ class _StudyReader(NodeReader):
     def disturb(self, node: Node, what: str) -> list[Dimension]:
         """Variants by name, ``{none: [], wifi: wifi_burst}``, or a list in which each entry is a variant."""
         if isinstance(node, Mapping):
-            variants = {name: self.texts(each.value, "a disturbance") for name, each in node.entries.items()}
+            variants = {name: self.texts(each.value, "a disturbance") or () for name, each in node.entries.items()}
         else:
-            texts = self.texts(node, what)
+            texts = self.texts(node, what) or ()
             variants = {Path(text.text).stem: (text,) for text in texts}
         levels = []
         for variant, texts in variants.items():
@@ -251,10 +253,10 @@ class _StudyReader(NodeReader):
         """A list of names, or a mapping from names to expressions."""
         found: list[StudyMetric | None] = []
         if isinstance(node, Mapping):
-            found += [self.metric(name, entry) for name, entry in self.named(node, what)]
+            found += [self.metric(name, entry) for name, entry in self.named(node, what) or ()]
         else:
             for item in self.items(node, what) or ():
-                if (name := self.name(item, "the metric")) is not None and isinstance(item, Scalar):
+                if (name := self.name(item, "the metric")) and isinstance(item, Scalar):
                     found.append(checked_metric(name, item, self.problems))
         return tuple(each for each in found if each is not None)
 
@@ -266,7 +268,7 @@ class _StudyReader(NodeReader):
         what, said, places = f"metric {name!r}", {}, {}
         if isinstance(entry.value, Mapping):
             entries = METRIC.entries(self, entry.value, what) or {}
-            said = METRIC.values(self, entries, what, entry.key.position)
+            said = sound(METRIC.values(self, entries, what, entry.key.position))
             places = {key: each.value.position for key, each in entries.items()}
             value = said.pop("value", None)
         if isinstance(value, Scalar):
@@ -278,7 +280,7 @@ class _StudyReader(NodeReader):
     def until(self, node: Node, what: str) -> Until | None:
         """``{metric: mean_wait, half_width: 0.1, batch: 10, at_most: 1000}``."""
         entries = UNTIL.entries(self, node, what) or {}
-        said = UNTIL.values(self, entries, what, node.position)
+        said = sound(UNTIL.values(self, entries, what, node.position))
         if not {"metric", "half_width"} <= entries.keys():
             return None
         least = said.get("batch", 10)

@@ -138,9 +138,11 @@ class Values:
         except (FaultError, ValueError) as error:
             return self.blame(label, error, node, local)
 
-    def declared(self, parameter: ParameterText, node: Node, local: Locals, label: str) -> Any:
+    def declared(self, parameter: ParameterText, node: Node | Poison, local: Locals, label: str) -> Any:
         """A value for a parameter that a model or composite declares, converted to its unit and checked."""
-        if parameter.spoilt:
+        if node is POISON:
+            return POISON
+        if parameter.value is POISON:
             self.of(node, local, label)
             return POISON
         return self.converted(node, local, label, lambda value: _converted(parameter, value))

@@ -250,7 +250,7 @@ def test_connections_are_those_that_can_be_read(text: str) -> None:
     node = parse(f"connection: {text!r}", "m.yaml", Problems())
     reader = NodeReader(problems := Problems())
     connection = places.connection(reader, node.entries["connection"].value)  # type: ignore[union-attr]
-    ports = [*connection.sources, *connection.destinations] if connection is not None else []
+    ports = [*connection.sources, *connection.destinations] if connection else []
     is_good = connection is not None and not len(problems) and all(is_endpoint(port.text) for port in ports)
     assert bool(re.search(CONNECTION_TEXT, text)) == is_good, text
 
