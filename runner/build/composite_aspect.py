@@ -15,7 +15,7 @@ from epicycle.actors import OutputPort, accepts, declared_parameters, type_name
 from epicycle.aspects import CompositeAspect, FiringTime, Request
 
 from ..graph import AspectModel, Detour, ModelGraph, WovenAspect, find_loop
-from ..language import PartText, PointcutText
+from ..language import PartText, PointcutText, beside
 from ..text import PathIndex, Position, Problems, did_you_mean, place_in
 from .looks import without_port
 from .weave import Weaving
@@ -27,7 +27,7 @@ OWN = frozenset(declared_parameters(CompositeAspect))  # when it acts: these are
 def as_actor(part: PartText) -> PartText:
     """The composite in an aspect's declaration, as it would be declared among the actors."""
     values = {name: entry for name, entry in part.values.items() if name not in OWN}
-    priority = values.pop("priority").value if "priority" in values else None
+    priority = beside("priority", values.pop("priority").value) if "priority" in values else None
     return replace(part, values=values, priority=priority)
 
 
@@ -98,7 +98,7 @@ class ModelWeaving(Weaving):
             self._times.update(dict.fromkeys(outside, pointcut.firing_time))
             inside = [path for path in self.graph.actors if any(f"{path}.".startswith(f"{each}.") for each in outside)]
             for fault in without_port("time", pointcut.firing_time, inside, self.graph):
-                where = pointcut.position if pointcut.time is None else place_in(pointcut.time, fault)
+                where = pointcut.position if pointcut.time is None else place_in(pointcut.time.node, fault)
                 self._problem(fault.message, where, *fault.help)
         return outside
 
@@ -108,8 +108,8 @@ class ModelWeaving(Weaving):
         self._ask(pointcut, outside, found)
         return outside
 
-    def _connections_of(self, pointcut: PointcutText) -> list[tuple[str, str]]:
-        found = super()._connections_of(pointcut)
+    def _connections_of(self, pointcut: PointcutText, left: str, right: str) -> list[tuple[str, str]]:
+        found = super()._connections_of(pointcut, left, right)
         outside = [ends for ends in found if not any(map(self._is_inside, ends))]
         self._ask(pointcut, [_place(*ends) for ends in outside], [_place(*ends) for ends in found])
         return outside

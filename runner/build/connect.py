@@ -10,10 +10,9 @@ from itertools import product
 from epicycle.actors import Actor, FaultError, counted, declared_ports, has_own_ports
 
 from ..graph import ModelGraph
-from ..language import CompositeText, ConnectionText, Locals, Values
-from ..text import POISON, RAISE_IT, Poison, Position, Problems, Scalar, Text, did_you_mean, split, within
+from ..language import CompositeText, ConnectionText, Endpoint, Locals, Values
+from ..text import POISON, RAISE_IT, Poison, Position, Problems, Scalar, did_you_mean, split, within
 from .draft import Draft
-from .settle import nanoseconds
 
 _NUMBER = re.compile(r"-?\d{1,9}", re.ASCII)
 _EXPRESSION = re.compile(r"\$\{.*\}", re.DOTALL)
@@ -94,14 +93,11 @@ def _whole(value: object, item: str) -> int:
     return int(value)
 
 
-_ENDPOINT = re.compile(r"(?:([A-Za-z_]\w*)(?:\[([^\[].*|)\])?\.)?([A-Za-z_]\w*)\Z", re.ASCII | re.DOTALL)
-
-
 @dataclass(frozen=True)
 class End:
     """The ports behind one end of a connection, and the text that names them."""
 
-    text: Text
+    text: Endpoint
     ports: list[str]
     several: bool = False  # whether it may select any number of ports
     own: bool = False  # whether it is a port of the composite itself
@@ -214,27 +210,23 @@ class Wiring:
                     links.append(Link(one, other, delay, source.text.position, connection.shared))
         return links
 
-    def _label(self, text: Text) -> str:
+    def _label(self, text: Endpoint) -> str:
         return f"{self.path}.{text.text}" if self.path else text.text
 
-    def _problem(self, message: str, text: Text, *hints: str) -> Poison:
+    def _problem(self, message: str, text: Endpoint, *hints: str) -> Poison:
         return self.problems.add(message, text.position, *hints, scope=self.path)
 
     def _delay(self, connection: ConnectionText, names: dict[str, object]) -> int | None:
         if connection.delay is None:
             return None
         label = f"{self._label(connection.sources[0])} -> {self._label(connection.destinations[0])}: delay"
-        delay = self.values.converted(connection.delay, Locals(self.path, names), label, nanoseconds)
+        delay = self.values.value(connection.delay, Locals(self.path, names), label)
         return None if delay is POISON else delay
 
-    def _endpoint(self, text: Text, wanted: str, names: dict[str, object]) -> End | Poison:
+    def _endpoint(self, text: Endpoint, wanted: str, names: dict[str, object]) -> End | Poison:
         """The port paths behind one end of a connection, as seen from inside the composite."""
-        match = _ENDPOINT.match(text.text)
-        if match is None:
-            forms = "'actor.port', 'array[*].port', 'array[0].port', 'array[1..3].port' or a port of this composite"
-            return self._problem(f"{text.text!r} is not a port that can be connected here", text, f"write {forms}")
-        name, index, port = match.groups()
-        if name is None:
+        name, index, port = text.actor, text.index, text.port
+        if not name:
             own = self._own(port, wanted, text)
             return End(text, own, own=True) if own else POISON
         inside = self.inside
@@ -258,7 +250,7 @@ class Wiring:
             return POISON
         return End(text, ports, several)
 
-    def _own(self, port: str, wanted: str, text: Text) -> list[str] | Poison:
+    def _own(self, port: str, wanted: str, text: Endpoint) -> list[str] | Poison:
         # Seen from inside, tokens come from an own input and go to an own output.
         inputs, outputs = self.inside.inputs, self.inside.outputs
         own, other = (inputs, outputs) if wanted == "output" else (outputs, inputs)
@@ -281,7 +273,7 @@ class Wiring:
         return self._problem(message, text, *hints)
 
     def _instances(
-        self, name: str, index: str | None, child: Child, port: str, text: Text, names: dict[str, object]
+        self, name: str, index: str | None, child: Child, port: str, text: Endpoint, names: dict[str, object]
     ) -> tuple[list[str], bool] | Poison:
         """The paths of the instances that an endpoint names, and whether it may name several."""
         label = f"{self.path}.{name}" if self.path else name
@@ -312,7 +304,7 @@ class Wiring:
             return POISON
         return [child.paths[each] for each in indices], several
 
-    def _has_port(self, name: str, child: Child, port: str, wanted: str, text: Text) -> bool:
+    def _has_port(self, name: str, child: Child, port: str, wanted: str, text: Endpoint) -> bool:
         """Check that the child's type has the port, in the direction that the connection needs."""
         path = f"{self.path}.{name}" if self.path else name
         valid = child.ports(wanted)

@@ -28,7 +28,7 @@ from ..graph import (
     is_within,
     postings,
 )
-from ..language import Locals, MetricText, MonitorText, ParameterText, Values
+from ..language import Locals, MetricText, MonitorText, ParameterText, Values, nanoseconds
 from ..shown import short
 from ..tables import Table, Tabled
 from ..temporal import Requirement, RequirementOptions
@@ -40,7 +40,6 @@ from .draft import Draft
 from .named import Port, director_of, raising
 from .origin import Origin
 from .scope import Composite, Scope
-from .settle import nanoseconds
 from .watch import Watching, checked_seed
 from .weave_all import arranged
 

@@ -11,8 +11,21 @@ from epicycle.actors import Actor, InputPort, OutputPort, ParameterError
 from epicycle.aspects import Aspect, FiringTime, FiringTimeParameter
 
 from ..graph import ModelGraph
-from ..language import ConnectionText, PointcutText, connection
-from ..text import ModelError, NodeReader, Poison, Position, Problem, Problems, Scalar, Text, blame, node_of, within
+from ..language import Computed, ConnectionText, PointcutText, connection, endpoints, nanoseconds
+from ..text import (
+    POISON,
+    ModelError,
+    NodeReader,
+    Poison,
+    Position,
+    Problem,
+    Problems,
+    Scalar,
+    Text,
+    blame,
+    node_of,
+    within,
+)
 from .settle import OF_DIRECTORS
 
 
@@ -104,8 +117,12 @@ class Named:
     ) -> ConnectionText | None:
         """A connection as a model file would declare it; ``inside`` is the name of the scope."""
         if destination is not None:
-            sources, destinations = self._ends(source, inside), self._ends(destination, inside)
-            made: ConnectionText | Poison = ConnectionText(sources, destinations, self._position)
+            reader = NodeReader(self._problems)
+            sources = endpoints(reader, self._ends(source, inside))
+            destinations = endpoints(reader, self._ends(destination, inside))
+            made: ConnectionText | Poison = POISON
+            if sources is not POISON and destinations is not POISON:
+                made = ConnectionText(self._position, sources, destinations)
         elif isinstance(source, str):
             made = connection(NodeReader(self._problems), Scalar(source, source, False, self._position))
         else:
@@ -114,7 +131,7 @@ class Named:
         # An empty list connects nothing: there may be no robots.
         if not made or not (made.sources and made.destinations):
             return None
-        return made if delay is None else replace(made, delay=node_of(delay, self._position))
+        return made if delay is None else replace(made, delay=Computed(node_of(delay, self._position), nanoseconds))
 
     def pointcuts(self, at: Places | Mapping[str, Places], cls: type[Aspect]) -> list[PointcutText]:
         """Pointcuts as a model file would declare them."""

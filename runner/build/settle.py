@@ -122,7 +122,7 @@ class Settler:
         """Whether an aspect is active; it is if that is unknown."""
         if part.enabled is None:
             return True
-        found = self.values.converted(part.enabled, local, f"aspect {name}.enabled", Parameter(bool).convert)
+        found = self.values.value(part.enabled, local, f"aspect {name}.enabled")
         return found is POISON or bool(found)
 
     def check_unused(self, draft: Draft) -> None:
@@ -157,12 +157,6 @@ def _in_terms_of(pattern: str, path: str) -> str:
         if bracket and (wanted == name or wanted.endswith("[*]")):
             parts[place] = f"{name}[*]"
     return ".".join(parts)
-
-
-def nanoseconds(duration: object) -> int:
-    """A time in seconds, or a text such as ``"500 ms"``, in ns; raises ``ParameterError`` or ``ValueError``."""
-    seconds: Any = Parameter(float, unit="s", min=0.0).convert(duration)
-    return to_nanoseconds(seconds or 0.0)
 
 
 def local_nanoseconds(start: object) -> int:

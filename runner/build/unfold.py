@@ -188,7 +188,8 @@ class Unfolding:
         if part.count is None:
             return 1
         count = Parameter(int, min=0, max=self.draft.graph.limits.actors)
-        found: int | Poison = self.values.converted(part.count, Locals(path, names), f"{path}: count", count.convert)
+        local, node = Locals(path, names), part.count.node
+        found: int | Poison = self.values.converted(node, local, f"{path}: count", count.convert)
         return found
 
     def _count_one(self, path: str, part: PartText) -> None:
@@ -222,8 +223,7 @@ class Unfolding:
             hint = f"give the actors inside a priority, or give {kind.name} its own director: 'director: {{}}'"
             self._tell(message, part.priority.position, path, hint)
             return
-        local, convert = Locals(path, names), Parameter(int).convert
-        found = self.values.converted(part.priority, local, f"{path}: priority", convert)
+        found = self.values.value(part.priority, Locals(path, names), f"{path}: priority")
         if found is not POISON:
             self.draft.graph.priorities[path] = found or 0
 

@@ -20,26 +20,22 @@ from ..text import (
     RAISE_IT,
     Entry,
     Node,
-    NodeReader,
     PathIndex,
     PatternError,
     Poison,
     Position,
     Problems,
     Scalar,
-    Sequence,
     Text,
     TooManyError,
     did_you_mean,
     entries_of,
-    is_empty,
     plain,
     within,
 )
 from .configure import configure
 from .draft import Draft
 from .monitors import monitor_of
-from .settle import nanoseconds
 
 
 class Watching:
@@ -59,22 +55,16 @@ class Watching:
 
     def read(self, text: ModelText, names: dict[str, object]) -> Watched:
         """Everything that the model file declares about it."""
-        reader = NodeReader(self.problems)
-        for key, entry in text.run.items():
-            if key in ("record", "stop_when"):
-                watch = self.record if key == "record" else self.stop_when
-                seen: set[str] = set()  # each once: a pattern may select all of a model
-                for node in entry.value.items if isinstance(entry.value, Sequence) else (entry.value,):
-                    pattern = None if is_empty(node) else reader.placed(node, key)
-                    if pattern and pattern.text not in seen:
-                        seen.add(pattern.text)
-                        watch(pattern)
-                continue
-            convert = nanoseconds if key == "stop" else checked_seed
-            value = self.values.converted(entry.value, Locals("", names), key, convert)
+        run, local = text.run, Locals("", names)
+        for watch, patterns in ((self.record, run.record), (self.stop_when, run.stop_when)):
+            seen: set[str] = set()  # each once: a pattern may select all of a model
+            for pattern in (each for each in patterns if each and each.text not in seen):
+                seen.add(pattern.text)
+                watch(pattern)
+        for key, computed in (("stop", run.stop), ("seed", run.seed)):
+            value = POISON if computed is None else self.values.value(computed, local, key)
             if value is not POISON:
                 setattr(self.found, "stop_time" if key == "stop" else "seed", value)
-        local = Locals("", names)
         for metric in text.metrics:
             self.metric(metric, local)
         for monitor in text.monitors:

@@ -66,7 +66,7 @@ class Weaving(View):
         """The ports, connections and actors that the pointcuts select."""
         if not self.cls.at_ports:
             return [], [], self._select_actors(pointcuts)
-        of_ports = [pointcut for pointcut in pointcuts if "->" not in pointcut.text]
+        of_ports = [pointcut for pointcut in pointcuts if pointcut.ends is None]
         chosen = {port for pointcut in of_ports if not pointcut.exclude for port in self._of(pointcut)}
         self._left_out = {port for pointcut in of_ports if pointcut.exclude for port in self._of(pointcut)}
         return self.ports.in_order(chosen - self._left_out), self._select_connections(pointcuts), {}
@@ -232,8 +232,8 @@ class Weaving(View):
             self._problem(f"{name} attaches to actors, not to their ports", pointcut.port, "leave 'port' out")
         if not text:
             return self._chosen_owners(pointcut) or ()
-        if "->" in text:
-            receiver = text.rpartition("->")[2].strip().rpartition(".")[0]
+        if pointcut.ends is not None:
+            receiver = pointcut.ends[1].rpartition(".")[0]
             hint = f"write {receiver!r} for the receiving actor"
             self._problem(f"{name} attaches to actors, not to connections", pointcut, hint)
             return ()
@@ -263,9 +263,9 @@ class Weaving(View):
         """The single connections that pointcuts of the form ``a.out -> b.in`` select."""
         chosen: dict[tuple[str, str], None] = {}
         for pointcut in sorted(pointcuts, key=lambda each: each.exclude):
-            if "->" not in pointcut.text:
+            if pointcut.ends is None:
                 continue
-            found = self._connections_of(pointcut)
+            found = self._connections_of(pointcut, *pointcut.ends)
             if not pointcut.exclude:
                 chosen |= dict.fromkeys(found)
             elif found and not chosen.keys() & found:
@@ -275,12 +275,11 @@ class Weaving(View):
                 chosen = {each: None for each in chosen if each not in found}
         return [each for each in chosen if each[1] not in self._left_out]
 
-    def _connections_of(self, pointcut: PointcutText) -> list[tuple[str, str]]:
+    def _connections_of(self, pointcut: PointcutText, left: str, right: str) -> list[tuple[str, str]]:
         """The connections that one pointcut selects."""
         if "input" not in self.cls.stands_at:
             self._problem(f"{self.kind} attaches to output ports, not to connections", pointcut)
             return []
-        left, _, right = (part.strip() for part in pointcut.text.partition("->"))
         try:
             ends = set(self.ports.select(self._full(right)))
             found = [

@@ -13,7 +13,6 @@ from epicycle.aspects import (
     CompositeAspect,
     CompositeExecutionAspect,
     Decoration,
-    FiringTimeParameter,
     class_decorations,
     decorations,
 )
@@ -139,8 +138,7 @@ class _Weaver:
     def _timed(self, pointcut: PointcutText, name: str, scope: str, names: dict[str, object]) -> PointcutText:
         if pointcut.time is None:
             return pointcut
-        convert = FiringTimeParameter().convert
-        time = self.settler.values.converted(pointcut.time, Locals(scope, names), f"aspect {name}: time", convert)
+        time = self.settler.values.value(pointcut.time, Locals(scope, names), f"aspect {name}: time")
         return replace(pointcut, firing_time=time or 0.0)
 
 

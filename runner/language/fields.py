@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any, TypeAlias, TypeVar
 
-from epicycle.actors import FaultError, MappingParameter, Parameter
+from epicycle.actors import FaultError, MappingParameter, Parameter, to_nanoseconds
 
 from ..catalogue import as_written, is_part, shown
 from ..text import POISON, Entry, Node, NodeReader, Poison, Position, Scalar, blame, is_empty
@@ -88,8 +88,37 @@ def _flag(reader: NodeReader, node: Node, what: str) -> bool | Poison:
 
 
 def node_as(schema: Schema) -> Shape:
-    """A node as it is, for a value that may be computed, or that others read."""
+    """A node as it is: one of the values of a part, which are read when its class is known."""
     return Shape(schema, lambda reader, node, what: node)
+
+
+@dataclass(frozen=True)
+class Computed:
+    """A value that may be an expression, and how it is converted once it is known."""
+
+    node: Node
+    convert: Callable[[Any], Any]
+
+    @property
+    def position(self) -> Position:
+        return self.node.position
+
+
+def computed_as(
+    parameter: Parameter[Any], convert: Callable[[Any], Any] | None = None, schema: Schema | None = None
+) -> Shape:
+    """A value like that of a parameter, which may be computed; ``convert`` makes something else of it."""
+    conversion = convert or parameter.convert
+    return Shape(schema or _scalar(parameter), lambda reader, node, what: Computed(node, conversion))
+
+
+def nanoseconds(duration: object) -> int:
+    """A time in seconds, or a text such as ``"500 ms"``, in ns; raises ``ParameterError`` or ``ValueError``."""
+    seconds: Any = TIME.convert(duration)
+    return to_nanoseconds(seconds or 0.0)
+
+
+TIME = Parameter(float, unit="s", min=0.0)
 
 
 def number(kind: type, low: float | None = None, high: float | None = None) -> Shape:
@@ -157,6 +186,13 @@ class Key:
         return {**self.shape.schema, "description": self.doc}
 
 
+def keyed(
+    shape: Shape, doc: str, *, key: str = "", called: str = "{key}", missing: tuple[str, ...] = (), **default: Any
+) -> Any:
+    """A field of a declaration that is a key of the language, with its name unless ``key`` is another."""
+    return field(metadata={"key": (key, Key(shape, doc, called, missing))}, **default)
+
+
 class Construct:
     """A mapping with these keys and no others; ``rules`` are further conditions in its schema."""
 
@@ -164,6 +200,16 @@ class Construct:
         self.doc = doc
         self.keys = dict(keys)
         self.rules = rules
+
+    @classmethod
+    def of(cls, declaration: type, doc: str = "", **rules: Any) -> Construct:
+        """The mapping from which a declaration is read, by the keys that its fields say."""
+        keys: dict[str, Key] = {}
+        for each in fields(declaration):
+            if "key" in each.metadata:
+                name, said = each.metadata["key"]
+                keys[name or each.name] = replace(said, name=each.name)
+        return cls(doc, keys, **rules)
 
     @property
     def schema(self) -> Schema:

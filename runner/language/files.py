@@ -8,8 +8,7 @@ from epicycle.actors import irregular
 
 from ..catalogue import find, is_path, model_folders, packaged_files, packaged_ones, unreadable
 from ..text import Mapping, Problems, Text, did_you_mean, read
-from .declarations import CompositeText, ModelText
-from .models import library_of, model_of
+from .models import CompositeText, ModelText, library_of, model_of
 
 MAX_INCLUDES = 200
 

@@ -16,8 +16,11 @@ from dataclasses import replace
 
 from epicycle.actors import UnitError
 
-from ..text import NORMAL, POISON, RAISE_IT, Limits, Poison, Position, Problems, Text, did_you_mean
-from .declarations import CompositeText, ConnectionText, PartText, PointcutText, PortText
+from ..text import NORMAL, POISON, RAISE_IT, Limits, Poison, Position, Problems, did_you_mean
+from .models import CompositeText
+from .parts import PartText
+from .places import ConnectionText
+from .ports import PortText
 
 MAX_BASES = 50
 
@@ -186,7 +189,7 @@ class _Heir:
         """The base's aspects without the pointcuts at removed actors, and without those that lose all of them."""
         aspects = {}
         for name, part in self.base.aspects.items():
-            at = tuple(each for each in part.at if not each or _head(each) not in removed)
+            at = tuple(each for each in part.at if not each or each.head not in removed)
             if at or not part.at or name in self.text.aspects:
                 aspects[name] = replace(part, at=at)
         return aspects
@@ -213,7 +216,7 @@ def _kept(
     left = []
     for source in connection.sources:
         ends = [end for end in connection.destinations if (source.text, end.text) not in cut]
-        ends = [end for end in ends if _head(source) not in removed and _head(end) not in removed]
+        ends = [end for end in ends if source.actor not in removed and end.actor not in removed]
         if ends:
             left.append(replace(connection, sources=(source,), destinations=tuple(ends)))
     return [connection] if sum(map(len, map(_pairs, left))) == len(_pairs(connection)) else left
@@ -221,9 +224,3 @@ def _kept(
 
 def _pairs(connection: ConnectionText) -> list[tuple[str, str]]:
     return [(source.text, end.text) for source in connection.sources for end in connection.destinations]
-
-
-def _head(text: Text | PointcutText) -> str:
-    """The actor that an endpoint or pointcut names first; nothing for an own port."""
-    first, dot, _ = text.text.partition(".")
-    return first.partition("[")[0] if dot or isinstance(text, PointcutText) else ""

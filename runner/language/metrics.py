@@ -2,15 +2,26 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 from epicycle.actors import Parameter, declared_parameters
 
 from ..catalogue import TAKES, Measure, take_fault
-from ..text import POISON, Entry, NodeReader, Poison
-from .declarations import MetricText
+from ..text import POISON, Entry, NodeReader, Poison, Position, Text
 from .fields import AT, TEXTS, Construct, Key, about, named, node_as, one_or_more, ref, schema_of
 from .places import PATTERN_SCHEMA
+
+
+@dataclass(frozen=True)
+class MetricText:
+    """A number computed from what ports send, or from other metrics; ``values`` are those of a ``Measure``."""
+
+    name: str
+    ports: tuple[Text, ...]
+    formula: Text | None
+    values: dict[str, Entry]
+    position: Position
 
 
 def _of_metric(key: str, parameter: Parameter[Any]) -> Key:
@@ -24,10 +35,10 @@ METRIC = Construct(
     "A number computed from what ports send, or from other metrics.",
     {
         "of": Key(
-            node_as(one_or_more(PATTERN_SCHEMA)),
+            TEXTS.described(one_or_more(PATTERN_SCHEMA)),
             "The output port, a pattern for several, or a list of these.",
         ),
-        "from": Key(node_as(ref("text")), "An expression over other metrics of the model, such as 'delivered / sent'."),
+        "from": Key(AT, "An expression over other metrics of the model, such as 'delivered / sent'."),
         **{key: _of_metric(key, each) for key, each in declared_parameters(Measure).items()},
     },
     type="object",
@@ -48,10 +59,10 @@ def _metric(reader: NodeReader, name: str, entry: Entry) -> MetricText | Poison:
             if key not in _WITH_FORMULA:
                 message = f"{what}: {key!r} cannot be used with 'from'"
                 reader.problems.add(message, entries[key].key.position, f"it can have {', '.join(_WITH_FORMULA[1:])}")
-        formula = AT.read(reader, said["from"], "from")
+        formula = said["from"]
         values = {key: each for key, each in entries.items() if key in _WITH_FORMULA[1:]}
         return POISON if formula is POISON else MetricText(name, (), formula, values, entry.key.position)
-    ports = TEXTS.read(reader, said["of"], "of") if "of" in said else ()
+    ports = said.get("of", ())
     if ports == ():
         hint = "add 'of: actor.port', or 'from: delivered / sent' over other metrics"
         ports = reader.problems.add(f"{what} has no port", entry.key.position, hint)

@@ -8,8 +8,8 @@ from typing import Any
 from epicycle.actors import declared_parameters
 
 from ..text import POISON, Entry, Mapping, NodeReader, Poison, Position, Text
-from .declarations import PartText
 from .fields import AT, Key, Schema, names_of, node_as, one_or_more, ref
+from .parts import PartText
 
 _VALUES: Schema = {"type": ["object", "string"]}
 _MODE: Schema = {"type": ["object", "null"], "properties": {"refinement": {"type": ["string", "object"]}}}

@@ -2,14 +2,28 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 from epicycle.actors import Parameter, declared_parameters
 
 from ..temporal import Requirement
-from ..text import POISON, Entry, Mapping, NodeReader, Poison
-from .declarations import MonitorText
+from ..text import POISON, Entry, Mapping, NodeReader, Poison, Position
 from .fields import Construct, Key, about, named, node_as, ref, schema_of
+
+
+@dataclass(frozen=True)
+class MonitorText:
+    """A property that a run must have; ``values`` are those of a ``Requirement``."""
+
+    name: str
+    values: dict[str, Entry]
+    position: Position
+
+    def place(self, key: str) -> Position:
+        """Where one of its values is; its own place if that is a default."""
+        return self.values[key].value.position if key in self.values else self.position
+
 
 _WRITTEN = ("property", "unit", "doc", "label")  # texts, in which numbers need no quotes
 

@@ -10,7 +10,8 @@ from epicycle.actors.expression import ExpressionError, names_in
 
 from ..catalogue import CatalogueError
 from ..text import POISON, Node, Poison, Problems, Scalar, Sequence, nearest
-from .declarations import CompositeText, ModelText, PartText
+from .models import CompositeText, ModelText
+from .parts import PartText
 
 _WORD = re.compile(r"[A-Za-z_]\w*")
 _MAX_STRANGE = 50  # comparing names takes time

@@ -30,7 +30,8 @@ from ..text import (
     inside,
 )
 from ..text import Mapping as MappingNode
-from .declarations import ParameterText
+from .fields import Computed
+from .ports import ParameterText
 
 MAX_STEPS = 500_000
 
@@ -137,6 +138,10 @@ class Values:
             return convert(value)
         except (FaultError, ValueError) as error:
             return self.blame(label, error, node, local)
+
+    def value(self, computed: Computed, local: Locals, label: str) -> Any:
+        """A value that may be computed."""
+        return self.converted(computed.node, local, label, computed.convert)
 
     def declared(self, parameter: ParameterText, node: Node | Poison, local: Locals, label: str) -> Any:
         """A value for a parameter that a model or composite declares, converted to its unit and checked."""
