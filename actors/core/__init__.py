@@ -4,7 +4,7 @@ from . import elementary, paths
 from .actor import Actor, Context, declared_ports, has_own_ports
 from .authoring import ABSENT, Latest, Pending, present, rounds
 from .environment import Environment
-from .errors import EpicycleError
+from .errors import EpicycleError, Fault, FaultError, Span
 from .files import irregular, open_regular, read_regular, read_table
 from .laws import normal_quantile, normal_share
 from .messages import (
@@ -48,13 +48,14 @@ from .units import UnitError, convert, in_si, parse_unit
 
 __all__ = [
     "ABSENT", "MAX_DEPTH", "NANOSECONDS_PER_SECOND", "NEVER", "NO_TOKENS", "REQUIRED", "SAME", "Actor", "Configurable",
-    "Context", "Emitter", "Environment", "EpicycleError", "InputPort", "Latest", "Line", "MappingParameter", "Moment",
-    "OutputPort", "Parameter", "ParameterError", "Pending", "Place", "PortError", "PortParameter", "Posts", "Process",
-    "Quantity", "Ranks", "Stream", "Streams", "Tag", "Times", "UnitError", "Wake", "Way", "When", "abridged", "accepts",
-    "array_parameter", "bounds_text", "brief", "convert", "counted", "counted_in_si", "cut", "declared_parameters",
-    "declared_ports", "did_you_mean", "digits", "elementary", "has_own_ports", "in_si", "irregular", "is_alone",
-    "is_too_deep", "nearest", "new_tag", "new_wake", "normal_quantile", "normal_share", "open_regular", "parse_unit",
-    "paths", "plain", "present", "random_stream", "read_regular", "read_table", "readable", "rounds", "shaped",
-    "shortened", "texts_parameter", "to_nanoseconds", "to_seconds", "token_type", "type_name", "unknown_parameter",
-    "variants", "visible", "visible_character", "visible_lines",
+    "Context", "Emitter", "Environment", "EpicycleError", "Fault", "FaultError", "InputPort", "Latest", "Line",
+    "MappingParameter", "Moment", "OutputPort", "Parameter", "ParameterError", "Pending", "Place", "PortError",
+    "PortParameter", "Posts", "Process", "Quantity", "Ranks", "Span", "Stream", "Streams", "Tag", "Times", "UnitError",
+    "Wake", "Way", "When", "abridged", "accepts", "array_parameter", "bounds_text", "brief", "convert", "counted",
+    "counted_in_si", "cut", "declared_parameters", "declared_ports", "did_you_mean", "digits", "elementary",
+    "has_own_ports", "in_si", "irregular", "is_alone", "is_too_deep", "nearest", "new_tag", "new_wake",
+    "normal_quantile", "normal_share", "open_regular", "parse_unit", "paths", "plain", "present", "random_stream",
+    "read_regular", "read_table", "readable", "rounds", "shaped", "shortened", "texts_parameter", "to_nanoseconds",
+    "to_seconds", "token_type", "type_name", "unknown_parameter", "variants", "visible", "visible_character",
+    "visible_lines",
 ]  # fmt: skip

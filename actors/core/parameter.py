@@ -14,7 +14,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import NDArray
 
-from .errors import EpicycleError
+from .errors import Fault, FaultError
 from .messages import brief, did_you_mean, digits
 from .quantity import MAX_DEPTH, Quantity, counted_in_si, is_too_deep
 from .units import UnitError, convert, in_si, quantity
@@ -22,16 +22,8 @@ from .units import UnitError, convert, in_si, quantity
 T = TypeVar("T")
 
 
-class ParameterError(EpicycleError):
-    """A value that a parameter does not accept; the message says what it accepts.
-
-    ``keys`` lead to the wrong part of a mapping or list; ``of_key``: the last key itself is wrong.
-    """
-
-    def __init__(self, message: str, keys: tuple[str | int, ...] = (), *, of_key: bool = False) -> None:
-        super().__init__(message)
-        self.keys = keys
-        self.of_key = of_key
+class ParameterError(FaultError):
+    """A value that a parameter does not accept; the message says what it accepts."""
 
 
 class _Required:
@@ -362,17 +354,20 @@ class Configurable:
                 mark = "" if message.endswith("?") else ";"
                 valid = ", ".join(declared) or "none"
                 raise ParameterError(f"{message}{mark} valid parameters: {valid}", (name,), of_key=True)
+        faults: list[Fault] = []
         for name, parameter in declared.items():
-            if name in values:
-                try:
-                    value = parameter.convert(values[name])
-                except ParameterError as error:
-                    raise _within(type(self), name, error) from None
-            elif parameter.required:
-                raise ParameterError(f"{type(self).__name__} needs a value for {name!r}")
-            else:
-                value = parameter.default_value
-            parameter.store(self, value)
+            if name not in values:
+                if parameter.required:
+                    faults.append(Fault(f"{type(self).__name__} needs a value for {name!r}"))
+                else:
+                    parameter.store(self, parameter.default_value)
+                continue
+            try:
+                parameter.store(self, parameter.convert(values[name]))
+            except ParameterError as error:
+                faults += _within(type(self), name, error)
+        if faults:
+            raise ParameterError.several(faults)
 
     def __init_subclass__(cls, **keywords: object) -> None:
         super().__init_subclass__(**keywords)
@@ -445,13 +440,13 @@ def build_variant(base: type, value: object, unit: str = "") -> object:
         try:
             values[key] = declared[key].in_unit(unit).convert(values[key])
         except ParameterError as error:
-            raise _within(known[name], key, error) from None
+            raise ParameterError.several(_within(known[name], key, error)) from None
     return known[name](**values)
 
 
-def _within(cls: type, name: str, error: ParameterError) -> ParameterError:
-    """The error of a parameter of something that is itself a value."""
-    return ParameterError(f"{cls.__name__}.{name}: {error}", (name, *error.keys), of_key=error.of_key)
+def _within(cls: type, name: str, error: ParameterError) -> list[Fault]:
+    """The faults of a parameter of something that is itself a value."""
+    return error.within(name, prefix=f"{cls.__name__}.{name}: ")
 
 
 def bounds_text(least: float | None, above: float | None, most: float | None, written: Callable[[float], str]) -> str:

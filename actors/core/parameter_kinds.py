@@ -8,6 +8,7 @@ from typing import Any, cast
 import numpy as np
 from numpy.typing import NDArray
 
+from .errors import Fault
 from .parameter import REQUIRED, SAME, Parameter, ParameterError
 
 
@@ -54,10 +55,12 @@ class MappingParameter(Parameter[Any]):
             return None
         if not isinstance(value, Mapping) or not all(isinstance(name, str) for name in value):
             raise ParameterError(f"{value!r} is not a {self.describe_type()}")
-        converted = {}
+        converted, faults = {}, list[Fault]()
         for name, each in value.items():
             try:
                 converted[name] = self.item.convert(each)
             except ParameterError as error:
-                raise ParameterError(f"{name}: {error}", (name, *error.keys), of_key=error.of_key) from None
+                faults += error.within(name, prefix=f"{name}: ")
+        if faults:
+            raise ParameterError.several(faults)
         return converted

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Final
 
-from .errors import EpicycleError
+from .errors import FaultError
 from .messages import brief, nearest
 
 MAX_TEXT = 100
@@ -23,7 +23,7 @@ _AXES: Final = ("m", "kg", "s", "A", "K", "bit")
 _NONE: Final = (0,) * len(_AXES)
 
 
-class UnitError(EpicycleError):
+class UnitError(FaultError):
     """A unit that is unknown, or not of the required kind."""
 
 

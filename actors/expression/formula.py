@@ -25,7 +25,7 @@ DOTTED = re.compile(
     r"""|(?<![\w.])(?P<path>[A-Za-z_]\w*(?:\[\d+\](?=\.))?(?:\.[A-Za-z_]\w*(?:\[\d+\](?=\.[A-Za-z_]))?)+)""",
     re.ASCII,
 )
-_STAND_IN = re.compile(r"\bport_(\d+)\b", re.ASCII)
+_STAND_IN = re.compile(r"\b_(\d+)_*\b", re.ASCII)
 
 
 class Formula:
@@ -122,16 +122,23 @@ class PortFormula:
 
         def stand_in(match: re.Match[str]) -> str:
             path = match["path"]
-            return match[0] if path is None else names.setdefault(path, f"port_{len(names)}")
+            # As long as the path, so that the places of errors stay right.
+            return match[0] if path is None else names.setdefault(path, f"_{len(names)}".ljust(len(path), "_"))
 
-        self._formula = Formula(DOTTED.sub(stand_in, source))
+        code = DOTTED.sub(stand_in, source)
+        self._formula = Formula(code)
         self._paths = tuple(names)
         for name in self._formula.names:
             if name in given:
                 names[name] = name
             elif name not in names.values():
                 also = "".join(f", and {each!r} is known" for each in given)
-                raise ExpressionError(f"unknown name {name!r}: a port is written 'actor.port'{also}")
+                places = [
+                    each.col_offset for each in ast.walk(parse(code)) if isinstance(each, ast.Name) and each.id == name
+                ]
+                raise ExpressionError(
+                    f"unknown name {name!r}: a port is written 'actor.port'{also}", min(places), len(name)
+                )
         if not names:
             what = " or ".join([*map(repr, given), "a port as 'actor.port'"])
             raise ExpressionError(f"it names {'nothing' if given else 'no port'}: write {what}")
@@ -176,7 +183,8 @@ class ExpressionParameter(Parameter[T]):
         try:
             return self._made(value)
         except ExpressionError as error:
-            raise ParameterError(f"{value!r} is not an {self.words}: {error}") from None
+            prefix = f"{value!r} is not an {self.words}: "
+            raise ParameterError.several(error.within(prefix=prefix)) from None
 
 
 class FormulaParameter(ExpressionParameter[Formula]):

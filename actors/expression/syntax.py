@@ -6,7 +6,7 @@ import re
 import warnings
 from typing import Any, Final, NoReturn
 
-from ..core import EpicycleError, did_you_mean
+from ..core import FaultError, did_you_mean
 from .values import FUNCTIONS, MAX_INT
 
 MAX_SOURCE = 2_000
@@ -18,17 +18,14 @@ _ALLOWED: Final = (
 )
 
 
-class ExpressionError(EpicycleError):
+class ExpressionError(FaultError):
     """An expression that cannot be evaluated; `offset` and `length` locate the part at fault."""
 
     def __init__(self, message: str, offset: int = 0, length: int = 0) -> None:
-        super().__init__(message, offset, length)
-        self.message = message
+        super().__init__(message, span=(offset, length))
+        self.args = (message, offset, length)  # what pickle rebuilds the error from
         self.offset = offset
         self.length = length
-
-    def __str__(self) -> str:
-        return self.message
 
 
 _NODES: Final = (

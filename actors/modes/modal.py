@@ -28,7 +28,7 @@ from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Final, TypeVar
 
-from ..core import Actor, EpicycleError, OutputPort, Parameter, ParameterError, Tag, Wake, did_you_mean
+from ..core import Actor, EpicycleError, Fault, OutputPort, Parameter, ParameterError, Tag, Wake, did_you_mean
 
 MOST_IMMEDIATE: Final = 1_000
 _ROUNDING: Final = 1e-9  # of probabilities that add up to 1
@@ -78,10 +78,16 @@ class Chart:
         self.initial = self._known("initial", modes[0] if initial is None else initial, "initial")
         self.final = frozenset(self._known("final", mode, "final") for mode in final)
         self.leaving: dict[str, tuple[Rule, ...]] = dict.fromkeys(modes, ())
+        faults: list[Fault] = []
         for rule in rules:
-            self._known(str(rule), rule.target, "transitions", rule.place)
-            for mode in self._sources(rule):
-                self.leaving[mode] += (rule,)
+            try:
+                self._known(str(rule), rule.target, "transitions", rule.place)
+                for mode in self._sources(rule):
+                    self.leaving[mode] += (rule,)
+            except ParameterError as error:
+                faults += error.faults
+        if faults:
+            raise ParameterError.several(faults)
         self.immediate = self._those(lambda rule: rule.immediate)
         self.phases = self._those(lambda rule: rule.preemptive), self._those(lambda rule: not rule.preemptive)
         self._check_reach()

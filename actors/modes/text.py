@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from typing import Any, ClassVar, Final
 
-from ..core import Configurable, MappingParameter, Parameter, ParameterError, brief, texts_parameter
+from ..core import Configurable, Fault, MappingParameter, Parameter, ParameterError, Span, brief, texts_parameter
 from ..core.units import quantity
 from ..expression import Formula, FormulaParameter
 
@@ -49,31 +50,55 @@ class _ActionsParameter(Parameter[Any]):
     def convert(self, value: object) -> tuple[Action, ...]:
         if isinstance(value, tuple) or value is None:
             return value or ()
-        given = value.items() if isinstance(value, Mapping) else self._actions(value)
+        faults: list[Fault] = []
+        given: list[tuple[str, Any, int | None]]
+        if isinstance(value, Mapping):
+            given = [(name, formula, None) for name, formula in value.items()]
+        elif isinstance(value, str):
+            given = list(self._actions(value, faults))
+        else:
+            raise ParameterError(f"{brief(value)} is not a {self.describe_type()}")
         found = []
-        for name, formula in given:
+        for name, formula, offset in given:
             try:
                 read = FormulaParameter().convert(
                     _TRUTHS.get(formula, formula) if isinstance(formula, str) else formula
                 )
             except ParameterError as error:
-                raise ParameterError(f"{name} = {error}", (name,)) from None
+                new = error.within(*(() if offset is not None else (name,)), prefix=f"{name} = ")
+                faults += new if offset is None else [_moved(each, offset, str(formula)) for each in new]
+                continue
             assert read is not None
             found.append((name, read))
+        if faults:
+            raise ParameterError.several(faults)
         return tuple(found)
 
-    def _actions(self, text: object) -> Iterator[tuple[str, str]]:
-        if not isinstance(text, str):
-            raise ParameterError(f"{brief(text)} is not a {self.describe_type()}")
+    def _actions(self, text: str, faults: list[Fault]) -> Iterator[tuple[str, str, int]]:
+        """The name, the expression and its place, of each action."""
         start = 0
         for end in [*(found.start() for found in re.finditer(";", _masked(text))), len(text)]:
-            part, start = text[start:end], end + 1
+            part, first, start = text[start:end], start, end + 1
             if not part.strip():
                 continue
             match = _ASSIGNMENT.fullmatch(part)
             if match is None:
-                raise ParameterError(f"{part.strip()!r} is not an action: write 'name = expression'")
-            yield match["name"], match["formula"].strip()
+                message = f"{part.strip()!r} is not an action: write 'name = expression'"
+                faults.append(Fault(message, span=_stripped(part, first)))
+                continue
+            offset, _ = _stripped(match["formula"], first + match.start("formula"))
+            yield match["name"], match["formula"].strip(), offset
+
+
+def _stripped(part: str, offset: int) -> Span:
+    """Where a part of a text is, without the blanks around it."""
+    return offset + len(part) - len(part.lstrip()), len(part.strip())
+
+
+def _moved(fault: Fault, offset: int, part: str) -> Fault:
+    """A fault in a part of a text, by its place in the whole text."""
+    start, length = fault.span or (0, len(part))
+    return replace(fault, span=(offset + start, length))
 
 
 class Mode(Configurable):
@@ -126,14 +151,17 @@ class ModesParameter(Parameter[Any]):
             value = dict.fromkeys(value)
         if not isinstance(value, Mapping):
             raise ParameterError(f"{brief(value)} is not a {self.describe_type()}")
-        found = {}
+        found, faults = {}, list[Fault]()
         for name, said in value.items():
             if not isinstance(name, str) or not name.isidentifier():
-                raise ParameterError(f"{name!r} is not a name", (str(name),), of_key=True)
+                faults.append(Fault(f"{name!r} is not a name", (str(name),), of_key=True))
+                continue
             try:
                 found[name] = said if isinstance(said, Mode) else _made(Mode, {} if said is None else said, name)
             except ParameterError as error:
-                raise ParameterError(str(error), (name, *error.keys), of_key=error.of_key) from None
+                faults += error.within(name)
+        if faults:
+            raise ParameterError.several(faults)
         return found
 
 
@@ -146,14 +174,18 @@ class TransitionsParameter(Parameter[Any]):
     def convert(self, value: object) -> tuple[Transition, ...]:
         if not isinstance(value, (list, tuple)):
             raise ParameterError(f"{brief(value)} is not a {self.describe_type()}")
-        found = []
+        found, faults = [], list[Fault]()
         for place, each in enumerate(value):
-            what = each if isinstance(each, str) else f"transition {place + 1}"
             try:
-                said = read_transition(each) if isinstance(each, str) else each
-                found.append(said if isinstance(said, Transition) else _made(Transition, said, what))
+                if isinstance(each, str):
+                    found.append(read_transition(each))
+                else:
+                    what = f"transition {place + 1}"
+                    found.append(each if isinstance(each, Transition) else _made(Transition, each, what))
             except ParameterError as error:
-                raise ParameterError(str(error), (place, *error.keys), of_key=error.of_key) from None
+                faults += error.within(place)
+        if faults:
+            raise ParameterError.several(faults)
         return tuple(found)
 
 
@@ -163,37 +195,63 @@ def _made(kind: type[Any], said: object, what: str) -> Any:
     try:
         return kind(**said)
     except ParameterError as error:
-        raise ParameterError(f"{what}: {error}", error.keys, of_key=error.of_key) from None
+        raise ParameterError.several(error.within(prefix=f"{what}: ")) from None
 
 
-def read_transition(text: str) -> dict[str, object]:
+def read_transition(text: str) -> Transition:
     """Read a one-line transition; raises ``ParameterError`` if it is not one."""
+    said, places = _clauses(text)
+    try:
+        made: Transition = _made(Transition, said, text)
+    except ParameterError as error:
+        raise ParameterError.several(_in_line(fault, text, places) for fault in error.faults) from None
+    return made
+
+
+def _in_line(fault: Fault, text: str, places: Mapping[str, Span]) -> Fault:
+    """A fault of a transition by its place in the line that declares it."""
+    if not fault.keys or fault.keys[0] not in places:
+        return replace(fault, keys=())
+    offset, length = places[str(fault.keys[0])]
+    return replace(_moved(fault, offset, text[offset : offset + length]), keys=())
+
+
+def _clauses(text: str) -> tuple[dict[str, object], dict[str, Span]]:
+    """What a one-line transition gives, and where in it."""
     arrow = _ARROW.fullmatch(text)
     if arrow is None:
         raise ParameterError(f"{text!r} is not a transition: write {_FORM}")
     said: dict[str, object] = {"to": arrow["target"], "from": [each.strip() for each in arrow["sources"].split(",")]}
-    rest = arrow["rest"]
-    while (flag := _FLAG.match(rest)) is not None:
+    places: dict[str, Span] = {}
+    start = arrow.start("rest")
+    while (flag := _FLAG.match(text, start)) is not None:
         if flag["probability"] is not None:
             said["probability"] = flag["probability"]
+            places["probability"] = flag.start("probability"), len(flag["probability"])
         elif flag["priority"] is not None:
             said["priority"] = int(flag["priority"])
         else:
             said[flag["flag"]] = True
-        rest = rest[flag.end() :]
+        start = flag.end()
+    rest = text[start:]
     masked = _masked(rest)
     clauses = list(_CLAUSE.finditer(masked))
     actions = next((number for number, clause in enumerate(clauses) if clause[0] == "do"), len(clauses))
     clauses = clauses[: actions + 1]
     if masked[: clauses[0].start() if clauses else None].strip():
-        raise ParameterError(f"{text!r}: unexpected {rest.split()[0]!r}: write {_FORM}")
+        first = rest.split()[0]
+        span = start + rest.index(first), len(first)
+        raise ParameterError(f"{text!r}: unexpected {first!r}: write {_FORM}", span=span)
     for number, clause in enumerate(clauses):
         end = clauses[number + 1].start() if number + 1 < len(clauses) else len(rest)
-        value = rest[clause.end() : end].strip()
+        value = rest[clause.end() : end]
         if clause[0] in said:
-            raise ParameterError(f"{text!r}: {clause[0]!r} is given twice")
+            span = start + clause.start(), len(clause[0])
+            raise ParameterError(f"{text!r}: {clause[0]!r} is given twice", span=span)
+        places[clause[0]] = _stripped(value, start + clause.end())
+        value = value.strip()
         said[clause[0]] = [each.strip() for each in value.split(",")] if clause[0] == "on" else value
-    return said
+    return said, places
 
 
 def _masked(text: str) -> str:

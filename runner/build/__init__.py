@@ -2,14 +2,13 @@
 
 from .composite_class import CompositeClass, load_composite
 from .disturbance import disturb_ports
-from .figures import Complaint, figures_of, made_figure, place_in_figure, tell_of_figure
+from .figures import figures_of, made_figure, tell_of_figure
 from .load import load_model
 from .model import Model
 from .named import CompositePort
 from .scope import Composite
 
 __all__ = [
-    "Complaint",
     "Composite",
     "CompositeClass",
     "CompositePort",
@@ -19,6 +18,5 @@ __all__ = [
     "load_composite",
     "load_model",
     "made_figure",
-    "place_in_figure",
     "tell_of_figure",
 ]

@@ -146,15 +146,12 @@ def check_connections(draft: Draft, problems: Problems) -> None:
 
 def _may_be_connected(draft: Draft, path: str) -> bool:
     """Whether a missing connection may be due to another problem: a wrong connection, or a missing actor."""
-    if not draft.is_wired or not draft.open:
-        return not draft.is_wired
-    before = [path]
-    known = {path}
+    known, before = {path}, [path] if draft.fed else []
     while before:
         sources = {hop.source for hop in draft.graph.incoming(before.pop())} - known
         known |= sources
         before += sources
-    return not draft.open.isdisjoint(known)
+    return draft.may_be_fed(known)
 
 
 def _open_end(graph: ModelGraph, path: str) -> tuple[str, ...]:

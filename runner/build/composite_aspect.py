@@ -15,10 +15,9 @@ from epicycle.actors import OutputPort, accepts, declared_parameters, type_name
 from epicycle.aspects import CompositeAspect, FiringTime, Request
 
 from ..graph import AspectModel, Detour, ModelGraph, WovenAspect, find_loop
-from ..language import PartText, PointcutText
-from ..text import PathIndex, Position, Problems, did_you_mean
+from ..language import PartText, PointcutText, beside
+from ..text import PathIndex, Position, Problems, did_you_mean, place_in
 from .looks import without_port
-from .settle import place_of
 from .weave import Weaving
 
 BY_PLACE = "or name the input that takes the tokens: {at: ..., request: ...}"
@@ -28,7 +27,7 @@ OWN = frozenset(declared_parameters(CompositeAspect))  # when it acts: these are
 def as_actor(part: PartText) -> PartText:
     """The composite in an aspect's declaration, as it would be declared among the actors."""
     values = {name: entry for name, entry in part.values.items() if name not in OWN}
-    priority = values.pop("priority").value if "priority" in values else None
+    priority = beside("priority", values.pop("priority").value) if "priority" in values else None
     return replace(part, values=values, priority=priority)
 
 
@@ -98,10 +97,9 @@ class ModelWeaving(Weaving):
         if not pointcut.exclude:
             self._times.update(dict.fromkeys(outside, pointcut.firing_time))
             inside = [path for path in self.graph.actors if any(f"{path}.".startswith(f"{each}.") for each in outside)]
-            for message, keys, advice in without_port(("time",), pointcut.firing_time, inside, self.graph):
-                time = pointcut.time
-                where = pointcut.position if time is None else place_of(time, keys[1:], of_key=True)
-                self._problem(message, where, advice)
+            for fault in without_port("time", pointcut.firing_time, inside, self.graph):
+                where = pointcut.position if pointcut.time is None else place_in(pointcut.time.node, fault)
+                self._problem(fault.message, where, *fault.help)
         return outside
 
     def _of(self, pointcut: PointcutText) -> list[str]:
@@ -110,8 +108,8 @@ class ModelWeaving(Weaving):
         self._ask(pointcut, outside, found)
         return outside
 
-    def _connections_of(self, pointcut: PointcutText) -> list[tuple[str, str]]:
-        found = super()._connections_of(pointcut)
+    def _connections_of(self, pointcut: PointcutText, left: str, right: str) -> list[tuple[str, str]]:
+        found = super()._connections_of(pointcut, left, right)
         outside = [ends for ends in found if not any(map(self._is_inside, ends))]
         self._ask(pointcut, [_place(*ends) for ends in outside], [_place(*ends) for ends in found])
         return outside

@@ -9,7 +9,7 @@ from pathlib import Path
 
 from ..catalogue import Catalogue, installed
 from ..graph import WovenAspect
-from ..language import CompositeText, PartText, Settings, inherit, read_library
+from ..language import CompositeText, PartText, Settings, beside, inherit, read_library
 from ..text import Position, Problems, Text, call_site, did_you_mean, entries_of
 from .draft import Draft
 from .settle import Settler
@@ -45,7 +45,7 @@ class CompositeInstance:
         cls, problems = self.composite, Problems()
         part = PartText(self.path, position, Text(cls.name, position), entries_of(self.parameters, position))
         if "priority" in part.values:  # which is given like a parameter, as in a model file
-            part = replace(part, priority=part.values.pop("priority").value)
+            part = replace(part, priority=beside("priority", part.values.pop("priority").value))
         settler = Settler(Settings(limits=draft.graph.limits), problems)
         inside = draft.inside(draft.graph.director_of(path))
         made = Unfolding(Known(cls.composites, cls.catalogue), settler, inside)
@@ -73,9 +73,9 @@ def load_composite(file: str | Path, name: str, *, types: Iterable[type] = ()) -
     problems = Problems()
     declared = read_library(file, problems)
     catalogue = installed().with_types(types)
-    composites, broken = inherit(declared, catalogue.actors, problems)
-    if name not in composites and name not in broken:
+    composites = inherit(declared, catalogue.actors, problems)
+    if name not in composites:
         hint = f"its composites: {', '.join(composites) or 'none'}"
         problems.add(f"{file} has no composite {name!r}{did_you_mean(name, list(composites))}", call_site(), hint)
     problems.raise_if_any()
-    return CompositeClass(name, composites, catalogue)
+    return CompositeClass(name, {key: each for key, each in composites.items() if each}, catalogue)

@@ -3,29 +3,20 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import product
 
-from epicycle.actors import Actor, counted, declared_ports, has_own_ports
+from epicycle.actors import Actor, FaultError, counted, declared_ports, has_own_ports
 
 from ..graph import ModelGraph
-from ..language import CompositeText, ConnectionText, Values
-from ..text import RAISE_IT, Position, Problems, Scalar, Text, did_you_mean, split, within
+from ..language import CompositeText, ConnectionText, Endpoint, Locals, Values
+from ..text import POISON, RAISE_IT, Poison, Position, Problems, Scalar, did_you_mean, split, within
 from .draft import Draft
-from .settle import converted, nanoseconds
 
 _NUMBER = re.compile(r"-?\d{1,9}", re.ASCII)
 _EXPRESSION = re.compile(r"\$\{.*\}", re.DOTALL)
 MAX_INDICES = 1_000_000
-
-
-class BadIndexError(Exception):
-    """Text that names no instances, with the reason as its message; ``is_malformed`` means that it is not an index."""
-
-    def __init__(self, message: str, *, is_malformed: bool = False) -> None:
-        super().__init__(message)
-        self.is_malformed = is_malformed
 
 
 def indices_of(text: str, array: str, count: int, value: Callable[[str], object]) -> tuple[list[int], bool]:
@@ -34,12 +25,12 @@ def indices_of(text: str, array: str, count: int, value: Callable[[str], object]
     ``*`` is all, ``2`` one, ``-1`` the last, ``0..3`` a range with both ends, ``1..`` and ``..-2`` ranges up to an end
     of the array, ``1.., 0`` several in that order, and ``${...}`` a number, or a list of numbers, that ``value`` finds.
     In an empty array every index selects nothing, so that a model stays right when a count becomes zero.  Raises
-    ``BadIndexError``.
+    ``FaultError``.
     """
     items = [text[start:end].strip() for start, end in split(text, ",")]
     found: list[int] = []
     if len(items) * count > MAX_INDICES:
-        raise BadIndexError(f"too many instances: {len(items):,} times up to {count:,}")
+        raise FaultError(f"too many instances: {len(items):,} times up to {count:,}")
     several = len(items) > 1
     for item in items:
         ends = [item[start:end].strip() for start, end in split(item, "..")]
@@ -47,21 +38,23 @@ def indices_of(text: str, array: str, count: int, value: Callable[[str], object]
             several = True
             found += range(count) if item == "*" else _range(ends[0], ends[1], item, array, count, value)
             continue
-        number = _number(item, value)
+        number = _number(item, array, value)
         numbers: list[object] = number if isinstance(number, list) else [number]
         several = several or isinstance(number, list)
         for each in numbers if count else ():
             index = _whole(each, item)
             place = index + count if index < 0 and _NUMBER.fullmatch(item) else index
             if not 0 <= place < count:
-                raise BadIndexError(_missing(array, index, count))
+                raise FaultError(_missing(array, index, count))
             found.append(place)
     return found, several
 
 
 def _range(left: str, right: str, item: str, array: str, count: int, value: Callable[[str], object]) -> range:
     """Both ends included; an end that is omitted or counted from the end stays within the array."""
-    start, end = (_whole(_number(each, value), item) if each else default for each, default in ((left, 0), (right, -1)))
+    start, end = (
+        _whole(_number(each, array, value), item) if each else default for each, default in ((left, 0), (right, -1))
+    )
     from_end = [not each or bool(_NUMBER.fullmatch(each) and each.startswith("-")) for each in (left, right)]
     if not count:
         return range(0)
@@ -73,10 +66,10 @@ def _range(left: str, right: str, item: str, array: str, count: int, value: Call
     if end < start and (any(from_end) or (end == start - 1 and not is_written)):
         return range(0)
     if end < start:
-        raise BadIndexError(f"{array}[{item}]: the range {start}..{end} runs backwards")
+        raise FaultError(f"{array}[{item}]: the range {start}..{end} runs backwards")
     for bound in (start, end):
         if not 0 <= bound < count:
-            raise BadIndexError(_missing(array, bound, count))
+            raise FaultError(_missing(array, bound, count))
     return range(start, end + 1)
 
 
@@ -84,28 +77,27 @@ def _missing(array: str, index: int, count: int) -> str:
     return f"there is no {array}[{index}]: the array has {counted(count, 'instance')}, up to {array}[{count - 1}]"
 
 
-def _number(text: str, value: Callable[[str], object]) -> object:
+def _number(text: str, array: str, value: Callable[[str], object]) -> object:
     if _NUMBER.fullmatch(text):
         return int(text)
     if _EXPRESSION.fullmatch(text):
         return value(text)
-    raise BadIndexError(f"{text!r} is not an array index", is_malformed=True)
+    name = array.rpartition(".")[2]
+    forms = ", ".join(f"{name}[{each}]" for each in ("*", "0", "-1", "1..3", "1..", "0, 2", "${...}"))
+    raise FaultError(f"{text!r} is not an array index", help=[f"valid forms: {forms}"])
 
 
 def _whole(value: object, item: str) -> int:
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not float(value).is_integer():
-        raise BadIndexError(f"{item} is {value!r}, but an index is a whole number")
+        raise FaultError(f"{item} is {value!r}, but an index is a whole number")
     return int(value)
-
-
-_ENDPOINT = re.compile(r"(?:([A-Za-z_]\w*)(?:\[([^\[].*|)\])?\.)?([A-Za-z_]\w*)\Z", re.ASCII | re.DOTALL)
 
 
 @dataclass(frozen=True)
 class End:
     """The ports behind one end of a connection, and the text that names them."""
 
-    text: Text
+    text: Endpoint
     ports: list[str]
     several: bool = False  # whether it may select any number of ports
     own: bool = False  # whether it is a port of the composite itself
@@ -113,12 +105,12 @@ class End:
 
 @dataclass
 class Child:
-    """A name inside a composite: the instances behind it; ``count`` is None if their number is unknown."""
+    """A name inside a composite: the instances behind it, and their number."""
 
     kind: str  # the name of its type
     paths: list[str]
     array: bool
-    count: int | None
+    count: int | Poison
     inputs: list[str] = field(default_factory=list)
     outputs: list[str] = field(default_factory=list)
     is_known: bool = True  # whether it has no other ports: an instance that could not be made may have had some
@@ -128,7 +120,7 @@ class Child:
 
 
 def child_of_actors(
-    actor_type: type[Actor], paths: list[str], array: bool, count: int | None, graph: ModelGraph
+    actor_type: type[Actor], paths: list[str], array: bool, count: int | Poison, graph: ModelGraph
 ) -> Child:
     """Actors of one name, some of which perhaps could not be made."""
     child = Child(actor_type.__name__, paths, array, count)
@@ -167,19 +159,15 @@ class Link:
     shared: bool = False
 
 
-@dataclass(frozen=True)
-class Links:
-    """The links of a connection; ``is_whole`` is false if a part of it could not be understood."""
-
-    found: list[Link]
-    is_whole: bool
-
-    def make(self, draft: Draft) -> None:
-        first = draft.graph.next_order  # which distinguishes the connection from all others
-        for link in self.found:
+def make(links: Sequence[Link | Poison], draft: Draft) -> None:
+    """Make the links of one connection."""
+    first = draft.graph.next_order  # which distinguishes the connection from all others
+    for link in links:
+        if link is POISON:
+            draft.is_wired = False
+        else:
             shared = first if link.shared else None
             draft.graph.connect(link.source, link.destination, link.delay, link.position, shared)
-        draft.is_wired = draft.is_wired and self.is_whole
 
 
 class Wiring:
@@ -192,29 +180,27 @@ class Wiring:
         self.values = values
         self.problems = problems
 
-    def resolve(self, connection: ConnectionText, names: dict[str, object]) -> Links:
+    def resolve(self, connection: ConnectionText, names: dict[str, object]) -> list[Link | Poison]:
         """Every source to every destination; if both select several, the first to the first and so on."""
         delay = self._delay(connection, names)
         sources = [self._endpoint(text, "output", names) for text in connection.sources]
         targets = [self._endpoint(text, "input", names) for text in connection.destinations]
-        links: list[Link] = []
-        is_whole = None not in sources and None not in targets
+        links: list[Link | Poison] = [POISON] if POISON in (*sources, *targets) else []
         limit = self.graph.limits.connections
-        for source, target in product(filter(None, sources), filter(None, targets)):
+        for source, target in product((each for each in sources if each), (each for each in targets if each)):
             in_pairs = source.several and target.several and not connection.to_all
             count = len(source.ports) * (1 if in_pairs else len(target.ports))
             if self.graph.connections + len(links) + count > limit:
-                self._problem(f"the model has more than {limit:,} connections", source.text, RAISE_IT)
-                return Links(links, False)
+                return [*links, self._problem(f"the model has more than {limit:,} connections", source.text, RAISE_IT)]
             if in_pairs and len(source.ports) != len(target.ports):
-                is_whole = False
                 one, other = self._label(source.text), self._label(target.text)
-                self._problem(
+                wrong = self._problem(
                     f"{one} selects {_ports(source)}, but {other} selects {_ports(target)}",
                     target.text,
                     "'->' connects the first port to the first and so on, so both sides need the same number of ports",
                     "to connect all to all, write '=>'",
                 )
+                links.append(wrong)
                 continue
             pairs = zip(source.ports, target.ports, strict=True) if in_pairs else product(source.ports, target.ports)
             # '=>' within a group does not connect an actor to itself; '->' still does.
@@ -222,32 +208,27 @@ class Wiring:
             for one, other in pairs:
                 if not (spare_self and one.rpartition(".")[0] == other.rpartition(".")[0]):
                     links.append(Link(one, other, delay, source.text.position, connection.shared))
-        return Links(links, is_whole)
+        return links
 
-    def _label(self, text: Text) -> str:
+    def _label(self, text: Endpoint) -> str:
         return f"{self.path}.{text.text}" if self.path else text.text
 
-    def _problem(self, message: str, text: Text, *hints: str) -> None:
-        self.problems.add(message, text.position, *hints, scope=self.path)
+    def _problem(self, message: str, text: Endpoint, *hints: str) -> Poison:
+        return self.problems.add(message, text.position, *hints, scope=self.path)
 
     def _delay(self, connection: ConnectionText, names: dict[str, object]) -> int | None:
         if connection.delay is None:
             return None
         label = f"{self._label(connection.sources[0])} -> {self._label(connection.destinations[0])}: delay"
-        delay = converted(self.values, connection.delay, names, label, self.path, nanoseconds)
-        return None if delay is self.values.missing else delay
+        delay = self.values.value(connection.delay, Locals(self.path, names), label)
+        return None if delay is POISON else delay
 
-    def _endpoint(self, text: Text, wanted: str, names: dict[str, object]) -> End | None:
+    def _endpoint(self, text: Endpoint, wanted: str, names: dict[str, object]) -> End | Poison:
         """The port paths behind one end of a connection, as seen from inside the composite."""
-        match = _ENDPOINT.match(text.text)
-        if match is None:
-            forms = "'actor.port', 'array[*].port', 'array[0].port', 'array[1..3].port' or a port of this composite"
-            self._problem(f"{text.text!r} is not a port that can be connected here", text, f"write {forms}")
-            return None
-        name, index, port = match.groups()
-        if name is None:
+        name, index, port = text.actor, text.index, text.port
+        if not name:
             own = self._own(port, wanted, text)
-            return None if own is None else End(text, own, own=True)
+            return End(text, own, own=True) if own else POISON
         inside = self.inside
         child = inside.children.get(name)
         if child is None:
@@ -256,20 +237,20 @@ class Wiring:
                 message = f"{inside.name} has no actor {name!r}{did_you_mean(name, inside.names)}"
                 hint = f"valid actors: {', '.join(inside.names) or 'none'}"
                 self._problem(message, text, hint, *((f"it is removed at {gone}",) if gone is not None else ()))
-            return None
+            return POISON
         has_port = self._has_port(name, child, port, wanted, text)
         found = self._instances(name, index, child, port, text, names)
-        if not has_port or found is None:
-            return None
+        if not has_port or found is POISON:
+            return POISON
         paths, several = found
         ports = [f"{instance}.{port}" for instance in paths]
         if missing := [path for path in ports if path not in self.graph.ports]:
             if child.is_known:  # instances of one entry may differ in their own ports
                 self._problem(f"{child.kind} has no {wanted} port {missing[0]}, unlike others in its array", text)
-            return None
+            return POISON
         return End(text, ports, several)
 
-    def _own(self, port: str, wanted: str, text: Text) -> list[str] | None:
+    def _own(self, port: str, wanted: str, text: Endpoint) -> list[str] | Poison:
         # Seen from inside, tokens come from an own input and go to an own output.
         inputs, outputs = self.inside.inputs, self.inside.outputs
         own, other = (inputs, outputs) if wanted == "output" else (outputs, inputs)
@@ -289,46 +270,41 @@ class Wiring:
         else:
             message = f"{where} has no {kind} port {port!r} of its own{did_you_mean(port, list(own))}"
             hints.append("a port of an actor is written 'actor.port'")
-        self._problem(message, text, *hints)
-        return None
+        return self._problem(message, text, *hints)
 
     def _instances(
-        self, name: str, index: str | None, child: Child, port: str, text: Text, names: dict[str, object]
-    ) -> tuple[list[str], bool] | None:
+        self, name: str, index: str | None, child: Child, port: str, text: Endpoint, names: dict[str, object]
+    ) -> tuple[list[str], bool] | Poison:
         """The paths of the instances that an endpoint names, and whether it may name several."""
         label = f"{self.path}.{name}" if self.path else name
         if not child.array:
             if index is None:
                 return child.paths, False
-            self._problem(f"{label} is a single actor, so it has no [{index}]", text, f"write {name}.{port}")
-            return None
-        if child.count is None:
-            return None  # the count is wrong, which has been reported
+            return self._problem(f"{label} is a single actor, so it has no [{index}]", text, f"write {name}.{port}")
+        if child.count is POISON:
+            return POISON
         if index == "*":
             return child.paths, True
         if index is None:
             hint = f"write {name}[*].{port} for all, or {name}[0].{port} for the first"
-            self._problem(f"{label} is an array of {child.count}: give an index", text, hint)
-            return None
+            return self._problem(f"{label} is an array of {child.count}: give an index", text, hint)
 
         def value(expression: str) -> object:
-            at = within(text, expression)
-            found = self.values.of(Scalar(expression, expression, True, at), names, label, self.path)
-            if found is self.values.missing:
-                raise _ToldError
+            at = within(text.position, expression)
+            found = self.values.of(Scalar(expression, expression, True, at), Locals(self.path, names), label)
+            if found is POISON:
+                raise FaultError.several(())  # which has been reported
             return found
 
         try:
             indices, several = indices_of(index, label, child.count, value)
-        except _ToldError:
-            return None
-        except BadIndexError as error:
-            forms = ", ".join(f"{name}[{each}]" for each in ("*", "0", "-1", "1..3", "1..", "0, 2", "${...}"))
-            self._problem(str(error), text, *((f"valid forms: {forms}",) if error.is_malformed else ()))
-            return None
+        except FaultError as error:
+            for fault in error.faults:
+                self._problem(fault.message, text, *fault.help)
+            return POISON
         return [child.paths[each] for each in indices], several
 
-    def _has_port(self, name: str, child: Child, port: str, wanted: str, text: Text) -> bool:
+    def _has_port(self, name: str, child: Child, port: str, wanted: str, text: Endpoint) -> bool:
         """Check that the child's type has the port, in the direction that the connection needs."""
         path = f"{self.path}.{name}" if self.path else name
         valid = child.ports(wanted)
@@ -347,10 +323,6 @@ class Wiring:
             hints.append(f"{path} is declared as a {child.kind} at {at}")
         self._problem(message, text, *hints)
         return False
-
-
-class _ToldError(Exception):
-    """An expression that could not be evaluated, for a reason that has been reported."""
 
 
 def _ports(end: End) -> str:

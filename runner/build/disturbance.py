@@ -110,11 +110,12 @@ def _of_ports(
 
 def _matched(part: PartText, ports: PathIndex) -> tuple[PartText, list[str]]:
     """An aspect without the patterns that match no port, if others do; and these patterns."""
-    aimed = [each for each in part.at if not each.exclude]
+    aimed = [each for each in part.at if each and not each.exclude]
     unmatched = [each for each in aimed if each.text and not _matches(each.text, ports)]
     if len(unmatched) == len(aimed):
         return part, []
-    return replace(part, at=tuple(each for each in part.at if each not in unmatched)), [each.text for each in unmatched]
+    left = tuple(each for each in part.at if not each or each not in unmatched)
+    return replace(part, at=left), [each.text for each in unmatched]
 
 
 def _matches(pattern: str, ports: PathIndex) -> bool:
@@ -148,8 +149,8 @@ def _woven(
             problems.add(f"there is already an aspect {part.name!r}", part.position, "unweave it first")
     problems.raise_if_any()
     settler = Settler(Settings(settings), problems)
-    composites, broken = inherit(disturbance.composites, catalogue.actors, problems)
-    made = Unfolding(Known(composites, catalogue, broken), settler, model.draft.copy())
+    composites = inherit(disturbance.composites, catalogue.actors, problems)
+    made = Unfolding(Known(composites, catalogue), settler, model.draft.copy())
     made.body("", root, settler.parameters("", root, {}, {}, None))
     found = weave_all(made)
     settler.check_unused(made.draft)

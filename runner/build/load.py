@@ -12,6 +12,7 @@ from ..collection import without_collection
 from ..graph import ModelGraph, check_processors
 from ..language import (
     COMPOSITE_THERE,
+    Locals,
     ModelText,
     Setting,
     Settings,
@@ -28,7 +29,7 @@ from ..language import (
     settings_of,
     without,
 )
-from ..text import NORMAL, Limits, Problems, noting
+from ..text import NORMAL, POISON, Limits, Problems, noting
 from ..text import Mapping as MappingNode
 from .acts import acts_of
 from .checks import check
@@ -78,7 +79,7 @@ def load_model(
         disturbances = load_disturbances(map(str, _several(disturb)), problems)
         for disturbance in disturbances:
             declared = joined(declared, disturbance.composites, COMPOSITE_THERE, problems)
-        composites, broken = inherit(declared, catalogue.actors, problems, limits)
+        composites = inherit(declared, catalogue.actors, problems, limits)
         check_usage(text, declared, composites, catalogue.actors, problems)
         # What is changed from outside; settings of disturbances come first, because the last one wins.
         text, set_by_them = add_disturbances(text, disturbances, problems)
@@ -88,7 +89,7 @@ def load_model(
         for change in aspects:
             text = change_aspect(text, change, problems)
         # What results.
-        known = Known(composites, catalogue, broken)
+        known = Known(composites, catalogue)
         settler = Settler(Settings(settings, limits), problems)
         model = build(text, known, settler, limits)
         if model.figures:
@@ -106,7 +107,8 @@ def build(text: ModelText, known: Known, settler: Settler, limits: Limits) -> Mo
     model = Model(root.name, doc=root.doc)
     # Without a composite, nothing needs the types of all packages.
     for name in sorted(known.composites.keys() & known.catalogue.actors.keys() if known.composites else ()):
-        at = known.composites[name].position
+        composite = known.composites[name]
+        at = composite.position if composite else None
         # Not an error: a model stays valid when a later version adds an actor with that name.
         problems.warn(f"composite {name!r} hides the actor type with the same name", at, "rename it if you need both")
     values.of_model = root.parameters
@@ -139,8 +141,9 @@ def _figures(text: ModelText, values: Values, names: dict[str, object]) -> dict[
     """The type of each figure, its values, and the values as written."""
     found = {}
     for name, part in text.figures.items():
-        given = {key: values.of(entry.value, names, f"figure {name}.{key}") for key, entry in part.values.items()}
-        if values.missing not in given.values():
+        local = Locals("", names)
+        given = {key: values.of(entry.value, local, f"figure {name}.{key}") for key, entry in part.values.items()}
+        if POISON not in given.values():
             in_si = {key: counted_in_si(value) for key, value in given.items()}
             found[name] = (part.type.text, in_si, MappingNode(part.values, part.type.position))
     return found

@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
 
-from epicycle.actors import declared_parameters
+from epicycle.actors import Fault, declared_parameters
 from epicycle.actors.expression import PortFormula
 from epicycle.aspects import (
     Aspect,
@@ -21,27 +21,27 @@ from epicycle.aspects import (
 )
 
 from ..graph import ModelGraph, WovenAspect
-from ..text import PatternError, Position, did_you_mean
+from ..text import PatternError, Position, did_you_mean, within
 from .paths import View
 
-Found = tuple[str, tuple[str, ...], str]  # the message, the keys that lead to the place, and advice
+PlaceOf = Callable[[Fault], Position]  # where a fault of an aspect's parameters is
 
 
 class Looks(View):
     """Finds what one aspect reads."""
 
     def of(
-        self, aspect: Aspect, ports: list[str], position_of: Callable[..., Position | None]
+        self, aspect: Aspect, ports: list[str], place_of: PlaceOf
     ) -> tuple[dict[PortFormula, list[Reading]], dict[str, Selection], list[str]]:
         """What its expressions ask for, what its patterns select, and the other ports that it reads.
 
-        ``ports`` are those that it attaches to; ``position_of`` returns where a parameter is set in the model file.
+        ``ports`` are those that it attaches to; ``place_of`` returns where a parameter is set in the model file.
         """
         readings: dict[PortFormula, list[Reading]] = {}
         selections: dict[str, Selection] = {}
         reads: list[str] = []
         for name, parameter in declared_parameters(type(aspect)).items():
-            value, position = getattr(aspect, name), position_of(name)
+            value, position = getattr(aspect, name), place_of(Fault("", (name,)))
             if isinstance(parameter, SelectionParameter):
                 patterns = parameter.patterns(value)
                 found = selections[name] = {each: self._selected(name, each, parameter, position) for each in patterns}
@@ -56,18 +56,17 @@ class Looks(View):
         reads += self.ports.in_order({port for port in chosen if self.graph.direction(port) == "output"})
         return readings, selections, reads
 
-    def _selected(
-        self, name: str, pattern: str, parameter: SelectionParameter[Any], position: Position | None
-    ) -> list[str]:
+    def _selected(self, name: str, pattern: str, parameter: SelectionParameter[Any], position: Position) -> list[str]:
         """What a pattern in the parameter ``name`` selects."""
         of_ports = isinstance(parameter, PortsParameter)
         paths = self.ports if of_ports else self.paths.holders
         try:
             found = paths.select(self._full(pattern))
         except PatternError as error:
-            self._problem(f"{name}: {pattern!r} is not a pattern: {error}", position)
+            self._problem(f"{name}: {pattern!r} is not a pattern: {error}", within(position, pattern))
             return []
         fitting = [path for path in found if not of_ports or self._sends(path)]
+        position = within(position, pattern)
         if found and not fitting:
             self._problem(f"{name}: {found[0]} is an input port, but an output port is needed", position)
         elif not found and not self.draft.excuses(self._full(pattern) + ("" if of_ports else ".*")):
@@ -77,8 +76,9 @@ class Looks(View):
             self._problem(f"{name}: {pattern!r} selects {fitting[0]} and {fitting[1]}, but must select one", position)
         return fitting
 
-    def reading(self, name: str, reference: str, position: Position | None) -> Reading:
+    def reading(self, name: str, reference: str, position: Position) -> Reading:
         """The port that a dotted name in the parameter ``name`` begins with, and the fields that follow."""
+        position = within(position, reference)
         parts = self._full(reference).split(".")
         for length in range(len(parts), 1, -1):
             port = ".".join(parts[:length])
@@ -96,16 +96,15 @@ class Looks(View):
         return reference, ()
 
     def _check_given(
-        self, name: str, reference: str, fields: tuple[str, ...], ports: list[str], position: Position | None
+        self, name: str, reference: str, fields: tuple[str, ...], ports: list[str], position: Position
     ) -> None:
         """Check that the tokens that pass the aspect have the field; the first port that lacks it is reported."""
         for port in ports:
-            if not self._check_fields(name, f"{reference} at {port}", port, fields, position):
+            at = within(position, reference)
+            if not self._check_fields(name, f"{reference} at {port}", port, fields, at):
                 return
 
-    def _check_fields(
-        self, name: str, reference: str, port: str, fields: tuple[str, ...], position: Position | None
-    ) -> bool:
+    def _check_fields(self, name: str, reference: str, port: str, fields: tuple[str, ...], position: Position) -> bool:
         """Check that the tokens of a port have the field, if their type is known."""
         for source in self.graph.source_of(port) if fields else ():
             if isinstance(source.type, type) and dataclasses.is_dataclass(source.type):
@@ -121,24 +120,25 @@ class Looks(View):
         return self.graph.direction(port) == "output"
 
 
-def unknown_inputs(woven: WovenAspect, graph: ModelGraph) -> Iterator[Found]:
+def unknown_inputs(woven: WovenAspect, graph: ModelGraph) -> Iterator[Fault]:
     """Ports that an aspect's parameters name but that no actor has to which they apply."""
     for name, parameter in declared_parameters(type(woven.aspect)).items():
         value = getattr(woven.aspect, name)
         if isinstance(parameter, FiringTimeParameter):
-            yield from without_port((name,), value, woven.actors, graph)
+            yield from (each.within(name) for each in without_port(name, value, woven.actors, graph))
         elif isinstance(parameter, ByActorParameter) and isinstance(parameter.item, FiringTimeParameter):
             for pattern, each in value.items():
                 chosen = {pattern: woven.selections[name].get(pattern, ())}
                 actors = [path for path in woven.actors if ByActorParameter.of({pattern: True}, chosen, path)]
-                yield from without_port((name, pattern), each, actors, graph)
+                faults = without_port(f"{name}: {pattern}", each, actors, graph)
+                yield from (fault.within(name, pattern) for fault in faults)
 
 
-def without_port(keys: tuple[str, ...], times: FiringTime, actors: Iterable[str], graph: ModelGraph) -> Iterator[Found]:
+def without_port(name: str, times: FiringTime, actors: Iterable[str], graph: ModelGraph) -> Iterator[Fault]:
     """The ports in execution times that none of these actors has."""
     inputs = dict.fromkeys(port for path in actors for port in graph.actors[path].inputs)
     for port in times if isinstance(times, Mapping) and inputs else ():
         if port not in inputs:
             near = did_you_mean(port, inputs)
-            message = f"{': '.join(keys)}: no actor that this applies to has an input {port!r}{near}"
-            yield message, (*keys, port), f"their inputs: {', '.join(inputs)}"
+            message = f"{name}: no actor that this applies to has an input {port!r}{near}"
+            yield Fault(message, (port,), of_key=True, help=(f"their inputs: {', '.join(inputs)}",))

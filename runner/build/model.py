@@ -10,7 +10,7 @@ from typing import Unpack
 
 from epicycle.actors import EpicycleError, Stop, Tag, counted, declared_parameters, visible
 
-from ..catalogue import MetricOptions, TakeName, take_problem
+from ..catalogue import Measure, MetricOptions, TakeName, take_fault
 from ..collection import without_collection
 from ..graph import (
     ActName,
@@ -28,10 +28,10 @@ from ..graph import (
     is_within,
     postings,
 )
-from ..language import ParameterText, Values
+from ..language import Locals, MetricText, MonitorText, ParameterText, Values, nanoseconds
 from ..shown import short
 from ..tables import Table, Tabled
-from ..temporal import RequirementOptions
+from ..temporal import Requirement, RequirementOptions
 from ..text import NAME, NAMES_HAVE, Position, Problem, Problems, Text, call_site, within
 from ..text import Mapping as MappingNode
 from .checks import check
@@ -40,7 +40,6 @@ from .draft import Draft
 from .named import Port, director_of, raising
 from .origin import Origin
 from .scope import Composite, Scope
-from .settle import nanoseconds
 from .watch import Watching, checked_seed
 from .weave_all import arranged
 
@@ -194,8 +193,8 @@ class Model(Scope, Tabled):
             problems.add(f"{name!r} is not a name", position, NAMES_HAVE)
         if any(metric.name == name for metric in self.metrics):
             problems.add(f"there is already a metric {name!r}", position, "give this another name")
-        if problem := take_problem(name, take):
-            problems.add(problem[0], position, problem[1])
+        if fault := take_fault(name, take):
+            problems.add(fault.message, position, *fault.help)
         problems.raise_if_any()
         ports = list(of) if isinstance(of, Iterable) and not isinstance(of, str) else [of]
         if bool(ports) == bool(formula):
@@ -207,15 +206,13 @@ class Model(Scope, Tabled):
         problems.raise_if_any()
         with raising() as problems:
             watching = Watching(self.draft, Values(problems), problems)
-            if formula:
-                watching.computed(
-                    name, Text(formula, within(Text(formula, position), formula)), dict(options), position
-                )
-                watching.check_formulas(each.name for each in self.metrics)
-            else:
-                texts = (each if isinstance(each, str) else each.path for each in ports)
-                of_ports = [Text(each, within(Text(each, position), each)) for each in texts]
-                watching.metric(name, of_ports, {"take": take, **options}, position)
+            texts = (each if isinstance(each, str) else each.path for each in ports)
+            of_ports = tuple(Text(each, within(position, each)) for each in texts)
+            source = Text(formula, within(position, formula)) if formula else None
+            given: dict[str, object] = {"take": take, **options}
+            entries = watching.options(Measure, f"metric {name}", given, position)
+            watching.metric(MetricText(name, of_ports, source, entries, position), Locals(), given)
+            watching.check_formulas(each.name for each in self.metrics)
         self._add(watching.found)
 
     def monitor(self, name: str, property: str, **options: Unpack[RequirementOptions]) -> None:
@@ -231,7 +228,9 @@ class Model(Scope, Tabled):
             for metric in (name, f"{name}_robustness"):
                 if any(each.name == metric for each in self.metrics):
                     problems.add(f"there is already a metric {metric!r}", position, "give the monitor another name")
-            watching.monitor(name, {"property": property, **options}, position)
+            given: dict[str, object] = {"property": property, **options}
+            entries = watching.options(Requirement, f"monitor {name}", given, position)
+            watching.monitor(MonitorText(name, entries, position), Locals(), given)
         self._add(watching.found)
 
     def outputs(self, pattern: str, what: str, position: Position, problems: Problems) -> list[str]:
@@ -245,7 +244,7 @@ class Model(Scope, Tabled):
             watching = Watching(self.draft, Values(problems), problems, self.recorded)
             for port in ports:
                 path = port if isinstance(port, str) else port.path
-                ask(watching, Text(path, within(Text(path, position), path)))
+                ask(watching, Text(path, within(position, path)))
         self._add(watching.found)
 
     # -- the whole ------------------------------------------------------------------------------------------------

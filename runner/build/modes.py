@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from ..language import CompositeText
-from ..text import Problems, did_you_mean
-from .draft import Draft
+from ..text import Poison, Problems, did_you_mean
+from .draft import Draft, Gap
 
 
 def connect_modes(
-    path: str, composite: CompositeText, classes: Mapping[str, CompositeText], draft: Draft, problems: Problems
+    path: str, composite: CompositeText, classes: Mapping[str, CompositeText | Poison], draft: Draft, problems: Problems
 ) -> None:
     """Connect what has the same name, and report what cannot be connected.
 
@@ -26,7 +26,7 @@ def connect_modes(
     machine = graph.actors.get(f"{path}.{part.name}")
     if not isinstance(machine, StateMachine):  # which has been reported
         draft.leave_open(path)
-        draft.unknown.add(path)
+        draft.gaps[path] = Gap()
         return
 
     at = part.values["transitions"].key.position if "transitions" in part.values else part.position
@@ -38,7 +38,7 @@ def connect_modes(
         problems.add(f"{path}: {message}", at, *hints, scope=path)
 
     refinements = {
-        mode: classes[each.type.text] for mode, each in composite.refinements.items() if each.type.text in classes
+        mode: found for mode, each in composite.refinements.items() if (found := classes.get(each.type.text))
     }
     heard = {port for each in refinements.values() for port in each.outputs}
     read, handed = set[str](), list[str]()

@@ -11,8 +11,21 @@ from epicycle.actors import Actor, InputPort, OutputPort, ParameterError
 from epicycle.aspects import Aspect, FiringTime, FiringTimeParameter
 
 from ..graph import ModelGraph
-from ..language import ConnectionText, PointcutText, connection
-from ..text import ModelError, NodeReader, Position, Problem, Problems, Scalar, Text, node_of, within
+from ..language import Computed, ConnectionText, PointcutText, connection, endpoints, nanoseconds
+from ..text import (
+    POISON,
+    ModelError,
+    NodeReader,
+    Poison,
+    Position,
+    Problem,
+    Problems,
+    Scalar,
+    Text,
+    blame,
+    node_of,
+    within,
+)
 from .settle import OF_DIRECTORS
 
 
@@ -58,7 +71,7 @@ def director_of(path: str, said: Mapping[str, object], position: Position, probl
             if value is not None:
                 found[key] = OF_DIRECTORS[key](value)
         except (ParameterError, ValueError) as error:
-            problems.add(f"{path}: director.{key}: {error}", position)
+            blame(problems, f"{path}: director.{key}", error, position)
     return found
 
 
@@ -76,7 +89,7 @@ def firing_time_of(time: object, aspect: object, position: Position, problems: P
     try:
         return None if time is None else FiringTimeParameter().convert(time)
     except ParameterError as error:
-        problems.add(f"time: {error}", position)
+        blame(problems, "time", error, position)
         return None
 
 
@@ -104,17 +117,21 @@ class Named:
     ) -> ConnectionText | None:
         """A connection as a model file would declare it; ``inside`` is the name of the scope."""
         if destination is not None:
-            sources, destinations = self._ends(source, inside), self._ends(destination, inside)
-            made: ConnectionText | None = ConnectionText(sources, destinations, self._position)
+            reader = NodeReader(self._problems)
+            sources = endpoints(reader, self._ends(source, inside))
+            destinations = endpoints(reader, self._ends(destination, inside))
+            made: ConnectionText | Poison = POISON
+            if sources is not POISON and destinations is not POISON:
+                made = ConnectionText(self._position, sources, destinations)
         elif isinstance(source, str):
             made = connection(NodeReader(self._problems), Scalar(source, source, False, self._position))
         else:
             self._tell("the connection has no destination", "write connect(a.output, b.input)")
             return None
         # An empty list connects nothing: there may be no robots.
-        if made is None or not (made.sources and made.destinations):
+        if not made or not (made.sources and made.destinations):
             return None
-        return made if delay is None else replace(made, delay=node_of(delay, self._position))
+        return made if delay is None else replace(made, delay=Computed(node_of(delay, self._position), nanoseconds))
 
     def pointcuts(self, at: Places | Mapping[str, Places], cls: type[Aspect]) -> list[PointcutText]:
         """Pointcuts as a model file would declare them."""
@@ -129,7 +146,7 @@ class Named:
         return found
 
     def _text(self, name: str) -> Text:
-        return Text(name, within(Text(name, self._position), name))
+        return Text(name, within(self._position, name))
 
     def _tell(self, message: str, *hints: str) -> None:
         self._problems.add(message, self._position, *hints)

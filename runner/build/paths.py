@@ -6,9 +6,11 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
 
+from epicycle.actors import FaultError
+
 from ..graph import ModelGraph
-from ..language import PointcutText
-from ..text import PathIndex, Position, Problems, Text
+from ..language import Locals, PointcutText, Values
+from ..text import Node, PathIndex, Poison, Position, Problems, Text
 from .draft import Draft
 
 
@@ -34,7 +36,7 @@ class Paths:
     @cached_property
     def owners(self) -> PathIndex:
         """All composites and actors, including those that could not be made."""
-        unmade = sorted(set(map(self._graph.owner, self._draft.open)))
+        unmade = sorted(set(map(self._graph.owner, self._draft.fed)))
         return self._index(dict.fromkeys((*self._graph.composites, *self._graph.actors, *unmade)))
 
     @cached_property
@@ -70,3 +72,7 @@ class View:
     ) -> None:
         position = where.position if isinstance(where, (PointcutText, Text)) else where
         self.problems.add(f"{self.called} {self.name}: {message}", position, *hints, scope=self.scope, about=about)
+
+    def blame(self, error: FaultError, where: Node | Position) -> Poison:
+        """Report what is wrong with a node, or with something at a position."""
+        return Values(self.problems).blame(f"{self.called} {self.name}", error, where, Locals(self.scope))

@@ -20,7 +20,7 @@ from ..language import Values
 from ..text import NAME, NAMES_HAVE, Position, Problems, call_site, did_you_mean
 from .composite_aspect import ModelWeaving, check_nesting
 from .composite_class import CompositeInstance
-from .connect import Child, Inside, Link, Links, Wiring, child_of_actors
+from .connect import Child, Inside, Link, Wiring, child_of_actors, make
 from .draft import Draft
 from .named import (
     CompositePort,
@@ -254,14 +254,14 @@ class Scope:
         with raising() as problems:
             links = self._links(source, destination, delay, position, problems)
             self._judge(links, problems)
-        links.make(self._model.edit())
+        make(links, self._model.edit())
 
     def disconnect(self, source: Ends, destination: Ends | None = None) -> None:
         """Remove the connections between ports, given as for ``connect``; there must be at least one."""
         position, graph = call_site(), self._model.graph
         with raising() as problems:
             links = self._links(source, destination, None, position, problems)
-        pairs = dict.fromkeys((link.source, link.destination) for link in links.found)
+        pairs = dict.fromkeys((link.source, link.destination) for link in links)
         found = [hop for one, other in pairs for hop in graph.outgoing(one) if hop.destination == other]
         if not found:
             with raising() as problems:
@@ -276,19 +276,20 @@ class Scope:
 
     def _links(
         self, source: Ends, destination: Ends | None, delay: float | str | None, position: Position, problems: Problems
-    ) -> Links:
+    ) -> list[Link]:
         inside = self._inside
         connection = Named(self._model.graph, self.path, position, problems).connection(
             source, destination, delay, inside.name
         )
         if connection is None:
-            return Links([], True)
-        return Wiring(inside, self._model.graph, Values(problems), problems).resolve(connection, {})
+            return []
+        found = Wiring(inside, self._model.graph, Values(problems), problems).resolve(connection, {})
+        return [link for link in found if link]
 
-    def _judge(self, links: Links, problems: Problems) -> None:
+    def _judge(self, links: list[Link], problems: Problems) -> None:
         """Check what can be checked of new connections now; the rest is checked when the model is complete."""
         graph, new = self._model.graph, dict[str, Link]()
-        for link in links.found:
+        for link in links:
             source, target = (graph.ports[path].port for path in (link.source, link.destination))
             if source is not None and target is not None and not accepts(target.type, source.type):
                 taken = f"{target.path} takes {type_name(target.type)}"

@@ -3,41 +3,29 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection
-from dataclasses import replace
-from pathlib import Path
-from typing import Any
+from collections.abc import Callable, Mapping
+from typing import Any, TypeVar
 
-from epicycle.actors import (
-    Configurable,
-    EpicycleError,
-    Parameter,
-    ParameterError,
-    declared_parameters,
-    to_nanoseconds,
-    unknown_parameter,
-)
+from epicycle.actors import Configurable, Parameter, declared_parameters, to_nanoseconds
 
 from ..graph import LIKE, TIES, Rules
-from ..language import CompositeText, PartText, Setting, Settings, Values
+from ..language import OUTSIDE, CompositeText, Locals, PartText, Setting, Settings, Values
 from ..text import (
+    POISON,
     RAISE_IT,
     Entry,
-    Mapping,
-    Node,
+    Poison,
     Position,
     Problems,
-    Sequence,
+    Scalar,
     TooManyError,
-    data_file,
-    describe,
     did_you_mean,
-    in_general,
     nearest,
-    node_of,
-    raised_at,
 )
+from .configure import Chosen, as_meant, configure, tell_missing
 from .draft import Draft
+
+T = TypeVar("T")
 
 _INDEX = re.compile(r"\[(\d+|\*)\]")
 # What users may try to set, and how to do it.
@@ -59,148 +47,83 @@ class Settler:
         self.problems = problems
         self.values = values or Values(problems)
         self._settable: dict[str, None] = {}
-        self._wrong: set[tuple[Position, str]] = set()  # settings that are wrong for a parameter, in all of an array
 
     def parameters(
         self,
         path: str,
         composite: CompositeText,
-        given: dict[str, Entry],
-        outer: dict[str, object],
+        given: Mapping[str, Entry],
+        outer: Mapping[str, object],
         position: Position | None,
     ) -> dict[str, object]:
         """The values of a composite's parameters: set from outside, else given, else the default."""
         names: dict[str, object] = {}
         label, valid = path or composite.name, composite.parameters
         kind = f"{label}: {composite.name}"
-        given = self._as_meant(
-            given, valid, path, lambda key: f"{kind} has no parameter {key!r}{did_you_mean(key, valid)}"
-        )
-        later: Collection[str]
+
+        def unknown(key: str) -> str:
+            return f"{kind} has no parameter {key!r}{did_you_mean(key, valid)}"
+
+        given = as_meant(given, valid, self.problems, unknown, path)
         for name, declared in valid.items():
             full = f"{path}.{name}" if path else name
-            node, known, later, scope = declared.value, names, valid.keys(), path
+            node, local = declared.value, Locals(path, names, valid.keys())
             if name in given:
-                node, known, later = given[name].value, outer, ()
+                node, local = given[name].value, Locals(path, outer)
             if (setting := self._setting(full)) is not None:
-                node, known, later, scope = setting.node, self.values.outside, (), ""
+                node, local = setting[0].value, OUTSIDE
             if node is None:
-                self._tell_missing(kind if path else label, name, declared.doc, position or declared.position, path)
-                names[name] = self.values.missing
+                who, at = kind if path else label, position or declared.position
+                names[name] = tell_missing(who, name, declared.doc, at, self.problems, path)
             else:
-                value = self.values.of(node, known, full, scope, later)
-                names[name] = self.values.declared(full, declared, value, node.position, scope)
-                if setting is not None and names[name] is self.values.missing:
-                    self._wrong.add((setting.position, in_general(full)))
+                names[name] = self.values.declared(declared, node, local, full)
         return names
 
-    def _as_meant(
-        self, given: dict[str, Entry], valid: Collection[str], path: str, unknown: Callable[[str], str]
-    ) -> dict[str, Entry]:
-        """The values, with wrong names reported and corrected; otherwise they would seem to be missing as well."""
-        result = {name: entry for name, entry in given.items() if name in valid}
-        for name in (each for each in given if each not in valid):
-            hint = f"valid parameters: {', '.join(valid) or 'none'}"
-            self.problems.add(unknown(name), given[name].key.position, hint, scope=path)
-            if (meant := nearest(name, valid)) is not None:
-                result.setdefault(meant, given[name])
-        return result
-
-    def _tell_missing(self, who: str, name: str, doc: str, position: Position, path: str) -> None:
-        hints = [f"{name}: {doc}"] if doc else []
-        self.problems.add(f"{who} needs a value for {name!r}", position, *hints, scope=path)
-
-    def _setting(self, full: str) -> Setting | None:
-        """The setting for a parameter, if there is one; its errors are reported for one instance of an array."""
+    def _setting(self, full: str) -> Chosen | None:
+        """The setting for a parameter, if there is one."""
         self._settable[full] = None
         try:
             found = self.settings.find(full)
-            if found is not None and (found.position, in_general(full)) in self._wrong:
-                return replace(found, node=node_of(self.values.missing, found.position))
-            return found
         except TooManyError as error:
             self.problems.stop(f"{full}: {error}", self.settings.position, RAISE_IT)
+        if found is None:
+            return None
+        return Entry(Scalar(found.path, found.path, False, found.position), found.node), OUTSIDE
 
     def set_from_outside(self, path: str, part: Configurable) -> dict[str, object]:
         """The new values of the parameters that are set from outside, of a part that already exists."""
         changed: dict[str, object] = {}
         for name, parameter in declared_parameters(type(part)).items():
-            setting = self._setting(f"{path}.{name}")
-            if setting is not None:
-                label = f"{path}.{name}"
-                value = converted(self.values, setting.node, self.values.outside, label, "", parameter.convert)
-                changed |= {} if value is self.values.missing else {name: value}
+            label = f"{path}.{name}"
+            if (setting := self._setting(label)) is not None:
+                value = self.values.converted(setting[0].value, OUTSIDE, label, parameter.convert)
+                changed |= {} if value is POISON else {name: value}
         return changed
 
-    def configuration(
-        self,
-        label: str,
-        cls: type,
-        given: dict[str, Entry],
-        names: dict[str, object],
-        position: Position,
-        path: str,
-        rules: Rules,
-    ) -> dict[str, object] | None:
-        """Converted values for a Configurable class, with defaults by the rules; None if some are wrong."""
-        declared = declared_parameters(cls)
-        before, complete = len(self.problems), True
-        result: dict[str, object] = {}
-        outside: dict[str, Position] = {}  # what is set from there
-        given = self._as_meant(given, declared, path, lambda key: f"{label}: {unknown_parameter(cls, key)}")
-        for name, parameter in declared.items():
-            node, known, scope = given[name].value if name in given else None, names, path
-            if (setting := self._setting(f"{path}.{name}")) is not None:
-                node, known, scope = setting.node, self.values.outside, ""
-                outside[name] = setting.position
-            if node is None:
-                if parameter.differs and rules.are_ptolemys:
-                    result[name] = parameter.ptolemy_value
-                elif parameter.required:
-                    self._tell_missing(f"{label}: {cls.__name__}", name, parameter.doc, position, path)
-                continue
-            value = self.values.of(node, known, f"{label}.{name}", scope)
-            if value is self.values.missing:
-                complete = False
-                continue
-            try:
-                found = parameter.convert(value)
-                is_file = parameter.type is Path and found is not None
-                result[name] = data_file(Path(value), node.position) if is_file else found
-            except ParameterError as error:
-                place = place_of(node, error.keys, of_key=error.of_key)
-                self.problems.add(f"{label}.{name}: {error}", place, scope=scope)
-            except Exception as error:  # of a user's class
-                self.blame(f"{label}.{name}", error, node.position, scope)
-        self._wrong |= {(at, in_general(f"{path}.{name}")) for name, at in outside.items() if name not in result}
-        return result if complete and len(self.problems) == before else None
+    def configured(
+        self, cls: type, part: PartText, local: Locals, label: str, rules: Rules, make: Callable[..., T]
+    ) -> T | Poison:
+        """An object of the class with the values of a part, and with defaults by the rules."""
+        declared = declared_parameters(cls).items()
+        defaults = {name: each.ptolemy_value for name, each in declared if each.differs and name not in part.values}
+        return configure(
+            cls,
+            part.values,
+            local,
+            label,
+            part.position,
+            self.values,
+            make=make,
+            outside=lambda name: self._setting(f"{local.path}.{name}"),
+            evaluated=defaults if rules.are_ptolemys else {},
+        )
 
-    def is_enabled(self, name: str, scope: str, part: PartText, names: dict[str, object]) -> bool:
+    def is_enabled(self, name: str, part: PartText, local: Locals) -> bool:
         """Whether an aspect is active; it is if that is unknown."""
         if part.enabled is None:
             return True
-        convert = Parameter(bool).convert
-        found = converted(self.values, part.enabled, names, f"aspect {name}.enabled", scope, convert)
-        return found is self.values.missing or bool(found)
-
-    def place_in(self, given: dict[str, Entry], error: Exception, position: Position) -> Position:
-        """The place, if known, of a value of a part that does not fit the others."""
-        if not isinstance(error, ParameterError) or not error.keys or str(error.keys[0]) not in given:
-            return position
-        entry = given[str(error.keys[0])]
-        return (
-            entry.key.position if len(error.keys) == 1 else place_of(entry.value, error.keys[1:], of_key=error.of_key)
-        )
-
-    def blame(self, label: str, error: Exception, position: Position, scope: str) -> None:
-        """Report why the code of a class rejects its values, or how it failed."""
-        if isinstance(error, EpicycleError):
-            self.problems.add(f"{label}: {error}", position, scope=scope)
-            return
-        told = str(error) if isinstance(error, ValueError) else ""
-        self.problems.add(
-            f"{label}: {told or describe(error)}", position, scope=scope, raised=raised_at(error), cause=error
-        )
+        found = self.values.value(part.enabled, local, f"aspect {name}.enabled")
+        return found is POISON or bool(found)
 
     def check_unused(self, draft: Draft) -> None:
         """Add a problem for every setting that no parameter took, unless it is for an array that is empty now."""
@@ -236,12 +159,6 @@ def _in_terms_of(pattern: str, path: str) -> str:
     return ".".join(parts)
 
 
-def nanoseconds(duration: object) -> int:
-    """A time in seconds, or a text such as ``"500 ms"``, in ns; raises ``ParameterError`` or ``ValueError``."""
-    seconds: Any = Parameter(float, unit="s", min=0.0).convert(duration)
-    return to_nanoseconds(seconds or 0.0)
-
-
 def local_nanoseconds(start: object) -> int:
     """The same for the start of a composite's local time, which may be negative."""
     return to_nanoseconds(Parameter(float, unit="s").convert(start) or 0.0)
@@ -259,33 +176,3 @@ OF_DIRECTORS: dict[str, Callable[[Any], Any]] = {
     "ties": TIES.convert,
     "like": LIKE.convert,
 }
-
-
-def converted(
-    values: Values, node: Node, names: dict[str, object], label: str, scope: str, convert: Callable[[Any], Any]
-) -> Any:
-    """A value as ``convert`` makes it; ``missing``, and a problem, if that fails."""
-    value = values.of(node, names, label, scope)
-    if value is not values.missing:
-        try:
-            return convert(value)
-        except ParameterError as error:
-            place = place_of(node, error.keys, of_key=error.of_key)
-            values.problems.add(f"{label}: {error}", place, scope=scope)
-        except ValueError as error:
-            values.problems.add(f"{label}: {error}", node.position, scope=scope)
-    return values.missing
-
-
-def place_of(node: Node, keys: tuple[str | int, ...], *, of_key: bool) -> Position:
-    """Where ``keys`` lead in a value, as far as it is written out; with ``of_key``, the last key itself."""
-    for number, key in enumerate(keys, start=1):
-        if isinstance(node, Sequence) and isinstance(key, int):
-            node = node.items[key]
-            continue
-        if not isinstance(node, Mapping) or key not in node.entries:
-            break
-        if of_key and number == len(keys):
-            return node.entries[key].key.position
-        node = node.entries[key].value
-    return node.position

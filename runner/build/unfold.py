@@ -12,17 +12,17 @@ from dataclasses import dataclass
 from functools import cache, partial
 from typing import Any
 
-from epicycle.actors import Actor, Parameter
+from epicycle.actors import Actor, FaultError, Parameter
 
-from ..catalogue import Catalogue, CatalogueError, PortTypeError, read_type, token_types
+from ..catalogue import Catalogue, CatalogueError, read_type, token_types
 from ..graph import Modal
-from ..language import CompositeText, PartText, PortText
-from ..text import RAISE_IT, Entry, Position, did_you_mean
+from ..language import CompositeText, Locals, PartText, PortText
+from ..text import POISON, RAISE_IT, Entry, Poison, Position, did_you_mean
 from .composite_aspect import as_actor
-from .connect import Child, Inside, Wiring, child_of_actors
-from .draft import Draft
+from .connect import Child, Inside, Wiring, child_of_actors, make
+from .draft import Draft, Gap
 from .modes import connect_modes
-from .settle import OF_DIRECTORS, Settler, converted
+from .settle import OF_DIRECTORS, Settler
 
 MAX_DEPTH = 50
 MAX_SHOWN = 12  # types in one message
@@ -39,9 +39,8 @@ class TooLargeError(Exception):
 class Known:
     """The possible types of parts: the composite classes of a model, and the installed types."""
 
-    composites: Mapping[str, CompositeText]
+    composites: Mapping[str, CompositeText | Poison]  # poison if the base is missing
     catalogue: Catalogue
-    broken: Collection[str] = ()  # composites whose base is missing
 
     def valid_types(self, kind: str, asked: str) -> tuple[str, ...]:
         """The valid types: their names, or how to list them if there are too many, and how to add more."""
@@ -88,7 +87,7 @@ class Unfolding:
             full = f"{path}.{name}" if path else name
             child = self.instances(full, part, names, within)
             if child is None:
-                self.draft.unknown.add(full)
+                self.draft.gaps[full] = Gap()
             else:
                 children[name] = child
         for name, part in composite.aspects.items():
@@ -100,9 +99,8 @@ class Unfolding:
             path, composite.name, composite.inputs, composite.outputs, composite.actors, children, composite
         )
         wiring = Wiring(inside, self.draft.graph, self.values, self.problems)
-        self.draft.is_wired = self.draft.is_wired and composite.is_wired
         for connection in composite.connections:
-            wiring.resolve(connection, names).make(self.draft)
+            make(wiring.resolve(connection, names) if connection else [POISON], self.draft)
         if composite.machine is not None:
             self._modes(path, composite, names, within)
         self.aspects += ((path, part, names) for part in composite.aspects.values())
@@ -134,11 +132,10 @@ class Unfolding:
         if kind is None:
             return None
         count, is_array = self._count(path, part, names), part.count is not None
-        if count is None:
-            self.draft.unknown.add(path)
+        if count is POISON:
+            self.draft.gaps[path] = Gap()
         elif count == 0:
-            self.draft.empty.add(path)
-            self.draft.kinds |= self._kinds(part)
+            self.draft.gaps[path] = Gap(frozenset(self._kinds(part)), is_empty=True)
         paths = [f"{path}[{index}]" if is_array else path for index in range(count or 0)]
         for index, instance in enumerate(paths):
             self._count_one(path, part)
@@ -166,9 +163,9 @@ class Unfolding:
         try:
             found = known.catalogue.actors.get(wanted) if inner is None else inner
         except CatalogueError as error:
-            self._tell(f"{path}: {error.message}", part.type.position, path, *error.help)
+            self.values.blame(path, error, part.type.position, Locals(path))
             return None
-        if wanted in known.broken:
+        if found is POISON:
             return None
         if found is None:
             near = did_you_mean(wanted, [*known.composites, *known.catalogue.actors])
@@ -186,13 +183,14 @@ class Unfolding:
     def _tell(self, message: str, position: Position | None, scope: str, *hints: str) -> None:
         self.problems.add(message, position, *hints, scope=scope)
 
-    def _count(self, path: str, part: PartText, names: Names) -> int | None:
-        """The number of instances; None if it is unknown."""
+    def _count(self, path: str, part: PartText, names: Names) -> int | Poison:
+        """The number of instances."""
         if part.count is None:
             return 1
         count = Parameter(int, min=0, max=self.draft.graph.limits.actors)
-        found = converted(self.values, part.count, names, f"{path}: count", path, count.convert)
-        return None if found is self.values.missing else found
+        local, node = Locals(path, names), part.count.node
+        found: int | Poison = self.values.converted(node, local, f"{path}: count", count.convert)
+        return found
 
     def _count_one(self, path: str, part: PartText) -> None:
         """Count one more instance; raises ``TooLargeError`` if there are too many."""
@@ -211,7 +209,7 @@ class Unfolding:
         while waiting:
             each = waiting.pop()
             found |= {each.type.text, *(tag.text for tag in each.tags)}
-            if (inner := self.known.composites.get(each.type.text)) is not None and inner.name not in seen:
+            if (inner := self.known.composites.get(each.type.text)) and inner.name not in seen:
                 seen.add(inner.name)
                 waiting += inner.actors.values()
         return found
@@ -225,23 +223,23 @@ class Unfolding:
             hint = f"give the actors inside a priority, or give {kind.name} its own director: 'director: {{}}'"
             self._tell(message, part.priority.position, path, hint)
             return
-        found = converted(self.values, part.priority, names, f"{path}: priority", path, Parameter(int).convert)
-        if found is not self.values.missing:
+        found = self.values.value(part.priority, Locals(path, names), f"{path}: priority")
+        if found is not POISON:
             self.draft.graph.priorities[path] = found or 0
 
     def _actor(self, path: str, actor_type: type[Actor], part: PartText, names: Names) -> None:
-        rules = self.draft.graph.rules_at(path)
-        values = self.settler.configuration(path, actor_type, part.values, names, part.position, path, rules)
-        if values is not None:
-            try:
-                actor = actor_type(path, **values)
-                self.draft.graph.add_actor(actor, part.position)
-                self.actors.append(actor)
-                return
-            except Exception as error:  # an actor's __init__ may raise anything
-                place = self.settler.place_in(part.values, error, part.position)
-                self.settler.blame(path, error, place, path)
-        self.draft.leave_out(path, actor_type)
+        rules, local = self.draft.graph.rules_at(path), Locals(path, names)
+
+        def make(**values: object) -> Actor:
+            made = actor_type(path, **values)
+            self.draft.graph.add_actor(made, part.position)
+            return made
+
+        actor = self.settler.configured(actor_type, part, local, path, rules, make)
+        if isinstance(actor, Poison):
+            self.draft.leave_out(path, actor_type)
+        else:
+            self.actors.append(actor)
 
     # -- composites -----------------------------------------------------------------------------------------------
 
@@ -278,11 +276,12 @@ class Unfolding:
 
     def _director(self, what: str, path: str, given: Mapping[str, Entry], names: Names) -> dict[str, Any]:
         """The settings of a director; wrong ones are left out."""
+        local = Locals(path, names)
         found = {
-            key: converted(self.values, entry.value, names, f"{what}: director.{key}", path, OF_DIRECTORS[key])
+            key: self.values.converted(entry.value, local, f"{what}: director.{key}", OF_DIRECTORS[key])
             for key, entry in given.items()
         }
-        return {key: value for key, value in found.items() if value is not self.values.missing}
+        return {key: value for key, value in found.items() if value is not POISON}
 
     def _port_type(self, composite: CompositeText, port: PortText) -> Any:
         """The type that a composite declares for a port; None if it declares none, or an unknown one."""
@@ -292,12 +291,11 @@ class Unfolding:
         if text not in self._port_types:
             try:
                 self._port_types[text] = read_type(text, self._tokens)
-            except PortTypeError as error:
+            except FaultError as error:
                 self._port_types[text] = error
         found = self._port_types[text]
-        if isinstance(found, PortTypeError):
-            hints = (found.help,) if found.help else ()
-            self._tell(f"port {port.name!r} of {composite.name}: {found.message}", port.type.position, "", *hints)
+        if isinstance(found, FaultError):
+            self.values.blame(f"port {port.name!r} of {composite.name}", found, port.type.position, Locals())
             return None
         return found
 
@@ -315,7 +313,7 @@ class Unfolding:
                 f"{full!r} is the name of both {clash} and an aspect that is a model", part.position, "", "rename one"
             )
             return None
-        if self.settler.is_enabled(full, path, part, names):
+        if self.settler.is_enabled(full, part, Locals(path, names)):
             return self.instances(full, as_actor(part), names, within)
         trial = copy(self)
         trial.draft, trial.aspects, trial.actors = self.draft.inside(graph.director_of(full)), [], []
@@ -323,5 +321,5 @@ class Unfolding:
             trial.instances(full, as_actor(part), names, within)
         finally:
             self.cost = trial.cost
-        self.draft.unknown.add(full)
+        self.draft.gaps[full] = Gap()
         return None

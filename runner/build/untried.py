@@ -7,8 +7,8 @@ from collections.abc import Collection
 from epicycle.actors import counted
 
 from ..graph import ModelGraph
-from ..language import CompositeText, Settings, Values
-from ..text import RAISE_IT, Limits, Problems
+from ..language import CompositeText, Locals, Settings, Values
+from ..text import POISON, RAISE_IT, Limits, Problems
 from .checks import check
 from .draft import Draft
 from .settle import Settler
@@ -24,22 +24,23 @@ def try_classes(known: Known, used: Collection[str], values: Values, limits: Lim
     All trials together may cost as much as a model of half the maximum size; a warning names what remains.
     """
     tried = set(used)
+    composites = {name: composite for name, composite in known.composites.items() if composite}
     inner = {
         part.type.text
-        for composite in known.composites.values()
+        for composite in composites.values()
         for part in (*composite.actors.values(), *composite.aspects.values())
     }
     most = left = limits.actors // 2
     untried: list[str] = []
     # Classes that no other contains come first; the others are then tried as their parts.
-    for name in sorted(known.composites, key=lambda name: name in inner):
+    for name in sorted(composites, key=lambda name: name in inner):
         if name in tried:
             continue
         is_whole = False
         if left > 0:
             settler = Settler(Settings(), problems, Values(problems, values.budget))
             made = Unfolding(known, settler, Draft(ModelGraph(limits)), left)
-            is_whole = _try(known.composites[name], made)
+            is_whole = _try(composites[name], made)
             left -= _OVERHEAD + made.cost + (made.draft.graph.connections + made.places) // 5
             tried |= made.classes
         if not is_whole:
@@ -50,7 +51,7 @@ def try_classes(known: Known, used: Collection[str], values: Values, limits: Lim
         )
         why = f"checking all such classes takes more than {most:,} actors and composites"
         message = f"{names} not fully checked: the model has no instance of such a class, and {why}"
-        problems.warn(message, known.composites[untried[0]].position, RAISE_IT)
+        problems.warn(message, composites[untried[0]].position, RAISE_IT)
 
 
 def _try(composite: CompositeText, made: Unfolding) -> bool:
@@ -59,18 +60,17 @@ def _try(composite: CompositeText, made: Unfolding) -> bool:
     names: dict[str, object] = {}
     for name, declared in composite.parameters.items():
         if declared.value is not None:
-            so_far = {**names, "index": values.missing}
-            value = values.of(declared.value, so_far, f"{path}.{name}", path, list(composite.parameters))
-            values.declared(f"{path}.{name}", declared, value, declared.value.position, path)
+            local = Locals(path, {**names, "index": POISON}, list(composite.parameters))
+            values.declared(declared, declared.value, local, f"{path}.{name}")
         # The default is one value of many: what is computed from it is not checked.
-        names[name] = values.missing
-    names.setdefault("index", values.missing)
+        names[name] = POISON
+    names.setdefault("index", POISON)
     try:
         made.composite(path, composite, names, None)
     except TooLargeError:
         return False
     inputs, outputs = draft.graph.borders(path)
-    draft.open.update(inputs, outputs)  # anything may be connected to them
+    draft.fed.update(inputs, outputs)  # anything may be connected to them
     weave_all(made)
     check(draft, made.problems, whole=False)
     return True

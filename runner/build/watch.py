@@ -2,37 +2,40 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping
 from graphlib import CycleError, TopologicalSorter
+from types import MappingProxyType
 from typing import Any
 
-from epicycle.actors import Parameter, ParameterError, accepts, declared_parameters, type_name
+from epicycle.actors import Parameter, accepts, declared_parameters, type_name
 from epicycle.actors.expression import ExpressionError, Formula
 
 from ..catalogue import Measure
 from ..graph import Metric, Watched
-from ..language import MetricText, ModelText, MonitorText, Values
+from ..language import Locals, MetricText, ModelText, MonitorText, Values
+from ..temporal import Requirement
 from ..text import (
     MAX_SEED,
+    POISON,
     RAISE_IT,
+    Entry,
     Node,
-    NodeReader,
     PathIndex,
     PatternError,
+    Poison,
     Position,
     Problems,
     Scalar,
     Text,
     TooManyError,
     did_you_mean,
+    entries_of,
     plain,
     within,
 )
+from .configure import configure
 from .draft import Draft
 from .monitors import monitor_of
-from .settle import converted, nanoseconds
-
-# Larger seeds would not fit the int64 columns of result files.
 
 
 class Watching:
@@ -52,49 +55,22 @@ class Watching:
 
     def read(self, text: ModelText, names: dict[str, object]) -> Watched:
         """Everything that the model file declares about it."""
-        reader = NodeReader(self.problems)
-        for key, entry in text.run.items():
-            if key in ("record", "stop_when"):
-                watch = self.record if key == "record" else self.stop_when
-                seen: set[str] = set()  # each once: a pattern may select all of a model
-                for each in reader.texts(entry.value, key):
-                    if each.text not in seen:
-                        seen.add(each.text)
-                        watch(each)
-                continue
-            convert = nanoseconds if key == "stop" else checked_seed
-            value = converted(self.values, entry.value, names, key, "", convert)
-            if value is not self.values.missing:
+        run, local = text.run, Locals("", names)
+        for watch, patterns in ((self.record, run.record), (self.stop_when, run.stop_when)):
+            seen: set[str] = set()  # each once: a pattern may select all of a model
+            for pattern in (each for each in patterns if each and each.text not in seen):
+                seen.add(pattern.text)
+                watch(pattern)
+        for key, computed in (("stop", run.stop), ("seed", run.seed)):
+            value = POISON if computed is None else self.values.value(computed, local, key)
+            if value is not POISON:
                 setattr(self.found, "stop_time" if key == "stop" else "seed", value)
         for metric in text.metrics:
-            self._read_metric(metric, names)
+            self.metric(metric, local)
         for monitor in text.monitors:
-            self._read_monitor(monitor, names)
+            self.monitor(monitor, local)
         self.check_formulas()
         return self.found
-
-    def _read_metric(self, text: MetricText, names: dict[str, object]) -> None:
-        values: dict[str, object] = {}
-        for key, entry in text.values.items():
-            # Text for people holds no expressions.
-            if key in ("take", "unit", "to", "doc", "label"):
-                values[key] = _words(entry.value)
-            else:
-                values[key] = self.values.of(entry.value, names, f"metric {text.name}, {key}")
-        places = {key: entry.value.position for key, entry in text.values.items()}
-        if self.values.missing not in values.values():
-            if text.formula is None:
-                self.metric(text.name, text.ports, values, text.position, places)
-            else:
-                self.computed(text.name, text.formula, values, text.position, places)
-
-    def _read_monitor(self, text: MonitorText, names: dict[str, object]) -> None:
-        values: dict[str, object] = {}
-        for key, entry in text.values.items():
-            values[key] = self.values.of(entry.value, names, f"monitor {text.name}, {key}")
-        places = {key: entry.value.position for key, entry in text.values.items()}
-        if self.values.missing not in values.values():
-            self.monitor(text.name, values, text.position, places)
 
     def record(self, text: Text) -> None:
         """Record what the ports behind a pattern send."""
@@ -114,26 +90,28 @@ class Watching:
                     self.problems.add(message, text.position, hint)
                     return
 
-    def metric(
-        self,
-        name: str,
-        of: Sequence[Text],
-        options: Mapping[str, object],
-        position: Position,
-        places: Mapping[str, Position] | None = None,
-    ) -> None:
-        """Take one number from what the ports behind a pattern send; ``places``: where its options are written."""
-        what = f"metric {name}"
-        measure = self._measure(what, options, position, places or {})
-        if measure is None:
+    def metric(self, text: MetricText, local: Locals, given: Mapping[str, object] | None = None) -> None:
+        """Take one number from what the ports behind a pattern send, or compute it from other metrics.
+
+        ``given`` are the values that a program gives for its options.
+        """
+        what = f"metric {text.name}"
+        if given is None:  # text for people holds no expressions
+            given = {key: _words(text.values[key].value) for key in _WORDS if key in text.values}
+        make, at = Measure.fitting, text.position
+        measure = configure(Measure, text.values, local, what, at, self.values, make=make, evaluated=given)
+        if text.formula is not None:
+            self._compute(text, text.formula, measure)
             return
-        chosen = {path: each for each in reversed(of) for path in self.select(each, what)}
+        if not measure:
+            return
+        chosen = {path: each for each in reversed(text.ports) for path in self.select(each, what)}
         paths = self._outputs.in_order(chosen)
         self._watched += len(paths)
         limit = self.graph.limits.watched
         if self._watched > limit:
-            self.problems.stop(f"{what}: metrics are taken from more than {limit:,} ports", position, RAISE_IT)
-        self.found.metrics.append(Metric(name, paths, measure))
+            self.problems.stop(f"{what}: metrics are taken from more than {limit:,} ports", text.position, RAISE_IT)
+        self.found.metrics.append(Metric(text.name, paths, measure))
         if measure.kind.of == "any":
             return
         wanted: Any = float | bool if measure.kind.of == "numbers" else float | bool | str
@@ -146,27 +124,19 @@ class Watching:
                     self.problems.add(message, chosen[path].position, "name a port that sends numbers, or take 'count'")
                     return
 
-    def computed(
-        self,
-        name: str,
-        source: Text,
-        options: Mapping[str, object],
-        position: Position,
-        places: Mapping[str, Position] | None = None,
-    ) -> None:
+    def _compute(self, text: MetricText, source: Text, measure: Measure | Poison) -> None:
         """Compute a number from other metrics; ``check_formulas`` says whether there are such."""
-        what = f"metric {name}"
-        measure = self._measure(what, options, position, places or {})
+        name, what = text.name, f"metric {text.name}"
         try:
             formula = Formula(source.text)
         except ExpressionError as error:
             wrong = source.text[error.offset : error.offset + max(error.length, 1)]
-            self.problems.add(f"{what}: {error}", within(source, wrong) if wrong else source.position)
+            self.problems.add(f"{what}: {error}", within(source.position, wrong) if wrong else source.position)
             return
         if not formula.names:
             hint = "write an expression over others, such as 'delivered / sent'"
             self.problems.add(f"{what}: {source.text!r} names no metric", source.position, hint)
-        elif measure is not None:
+        elif measure:
             self._formulas[name] = source
             self.found.metrics.append(Metric(name, [], measure, formula=formula))
 
@@ -184,7 +154,7 @@ class Watching:
                     near = did_you_mean(each, [other for other in names if other != name])
                     hint = f"metrics of the model: {', '.join(other for other in names if other != name) or 'none'}"
                     message = f"metric {name}: there is no metric {each!r}{near}"
-                    self.problems.add(message, within(source, each), hint)
+                    self.problems.add(message, within(source.position, each), hint)
         try:
             sorter.prepare()
         except CycleError as error:
@@ -192,41 +162,29 @@ class Watching:
             message = f"metric {circle[0]}: it is computed from itself: {' <- '.join(circle)}"
             self.problems.add(message, self._formulas[circle[0]].position)
 
-    def monitor(
-        self, name: str, values: Mapping[str, object], position: Position, places: Mapping[str, Position] | None = None
-    ) -> None:
-        """Judge the runs by a property; ``places``: where its options are written."""
-        found = monitor_of(self.draft, name, values, places or {}, position, self.problems)
-        if found is None:
+    def monitor(self, text: MonitorText, local: Locals, given: Mapping[str, object] = MappingProxyType({})) -> None:
+        """Judge the runs by a property."""
+        name, what, at = text.name, f"monitor {text.name}", text.position
+        requirement = configure(
+            Requirement, text.values, local, what, at, self.values, make=Requirement, evaluated=given
+        )
+        found = requirement and monitor_of(self.draft, text, requirement, self.problems)
+        if not found:
             return
         self._watched += len(found.ports)
         for metric in found.metrics:
             if any(each.name == metric.name for each in self.found.metrics):
                 message = f"monitor {name}: its result needs the name {metric.name!r}, which a metric has"
-                self.problems.add(message, position, "rename one of the two")
+                self.problems.add(message, text.position, "rename one of the two")
         self.found.monitors.append(found)
         self.found.metrics += found.metrics
 
-    def _measure(
-        self, what: str, options: Mapping[str, object], position: Position, places: Mapping[str, Position]
-    ) -> Measure | None:
-        before = len(self.problems)
-        values: dict[str, object] = {}
-        declared = declared_parameters(Measure)
-        for key, value in options.items():
-            if key not in declared:
-                self.problems.add(f"{what}: there is no option {key!r}{did_you_mean(key, declared)}", position)
-                continue
-            try:
-                values[key] = declared[key].convert(value)
-            except ParameterError as error:
-                self.problems.add(f"{what}, {key}: {error}", places.get(key, position))
-        if len(self.problems) > before:
-            return None
-        measure = Measure(**values)
-        for option, problem, advice in measure.misfits():
-            self.problems.add(f"{what}: {problem}", places.get(option, position), *([advice] if advice else []))
-        return measure
+    def options(self, cls: type, what: str, given: Mapping[str, object], position: Position) -> dict[str, Entry]:
+        """The options that a program gives; unknown ones are reported."""
+        declared = declared_parameters(cls)
+        for key in given.keys() - declared.keys():
+            self.problems.add(f"{what}: there is no option {key!r}{did_you_mean(key, declared)}", position)
+        return entries_of({key: value for key, value in given.items() if key in declared}, position)
 
     def select(self, text: Text, what: str) -> list[str]:
         """The output ports that a pattern selects, including those of composites."""
@@ -251,12 +209,15 @@ class Watching:
         return []
 
 
+_WORDS = ("take", "unit", "to", "doc", "label")
+
+
 def _words(node: Node) -> object:
     """A text, which may look like something else: ``unit: 1``."""
     return node.text if isinstance(node, Scalar) and node.value is not None else plain(node)
 
 
 def checked_seed(value: object) -> int:
-    """A seed as a whole number; raises ``ParameterError``."""
+    """A seed as a whole number; raises ``ParameterError``.  Larger ones would not fit the columns of result files."""
     seed: Any = Parameter(int, min=0, max=MAX_SEED).convert(value)
     return int(seed)

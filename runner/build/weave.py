@@ -8,7 +8,7 @@ actors in it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 
 from epicycle.actors import declared_parameters
@@ -16,8 +16,8 @@ from epicycle.aspects import Aspect
 
 from ..graph import WovenAspect
 from ..language import PointcutText
-from ..text import PathIndex, PatternError, Position, did_you_mean, in_general, nearest
-from .looks import Looks, unknown_inputs
+from ..text import PathIndex, PatternError, Poison, did_you_mean, in_general, nearest
+from .looks import Looks, PlaceOf, unknown_inputs
 from .paths import View
 
 
@@ -34,14 +34,14 @@ class Weaving(View):
     def kind(self) -> str:
         return self.cls.__name__
 
-    def weave(
-        self, aspect: Aspect, pointcuts: Sequence[PointcutText], position_of: Callable[..., Position | None]
-    ) -> WovenAspect:
+    def weave(self, aspect: Aspect, at: Sequence[PointcutText | Poison], place_of: PlaceOf) -> WovenAspect:
         """The aspect with its places and everything it reads; a pointcut that selects nothing is a problem.
 
-        ``position_of`` returns where a parameter, or a key in it, is set in the model file.
+        ``place_of`` returns where something is wrong with its parameters in the model file.
         """
         before = len(self.problems)
+        pointcuts = [each for each in at if each]
+        self._is_excused = len(pointcuts) < len(at)
         ports, connections, actors = self.select(pointcuts)
         parameters = [path for path, is_left_out in self._parameters.items() if not is_left_out]
         is_somewhere = ports or connections or actors or parameters
@@ -50,23 +50,23 @@ class Weaving(View):
             nowhere = "'at' has only exclusions" if only_out else "'at' excludes everything that it selects"
             self._problem(nowhere, pointcuts[0])
         looks = Looks(self.draft, self.paths, self.name, self.scope, self.problems)
-        readings, selections, reads = looks.of(aspect, ports, position_of)
+        readings, selections, reads = looks.of(aspect, ports, place_of)
         woven = WovenAspect(
             self.name, aspect, ports, connections, actors, readings, selections, reads, parameters=parameters
         )
-        self.check_times(woven, position_of)
+        self.check_times(woven, place_of)
         return woven
 
-    def check_times(self, woven: WovenAspect, position_of: Callable[..., Position | None]) -> None:
+    def check_times(self, woven: WovenAspect, place_of: PlaceOf) -> None:
         """Check that execution times by input port name ports that the actors have."""
-        for message, keys, advice in unknown_inputs(woven, self.graph):
-            self._problem(message, position_of(*keys), advice)
+        for fault in unknown_inputs(woven, self.graph):
+            self._problem(fault.message, place_of(fault), *fault.help)
 
     def select(self, pointcuts: Sequence[PointcutText]) -> tuple[list[str], list[tuple[str, str]], dict[str, str]]:
         """The ports, connections and actors that the pointcuts select."""
         if not self.cls.at_ports:
             return [], [], self._select_actors(pointcuts)
-        of_ports = [pointcut for pointcut in pointcuts if "->" not in pointcut.text]
+        of_ports = [pointcut for pointcut in pointcuts if pointcut.ends is None]
         chosen = {port for pointcut in of_ports if not pointcut.exclude for port in self._of(pointcut)}
         self._left_out = {port for pointcut in of_ports if pointcut.exclude for port in self._of(pointcut)}
         return self.ports.in_order(chosen - self._left_out), self._select_connections(pointcuts), {}
@@ -75,13 +75,7 @@ class Weaving(View):
         """The ports that the aspect can attach to, of those that one pointcut selects."""
         if self._stands_at_parameters(pointcut):
             return []
-        found: list[str] | None = None
-        if pointcut.text:
-            found = self._matching(pointcut)
-        elif pointcut.type is not None or pointcut.tag is not None:
-            found = self._chosen(pointcut)
-        else:
-            self._is_excused = self._is_excused or not pointcut.exclude  # it is malformed, which has been reported
+        found = self._matching(pointcut) if pointcut.text else self._chosen(pointcut)
         if found is None:
             return []
         fitting = [port for port in found if self._fits(port)]
@@ -173,7 +167,7 @@ class Weaving(View):
         ports = self.ports.in_order(path for path in of_owners if graph.owner(path) in owners)
         if pointcut.port is None:
             found = [path for path in ports if self._fits(path)]
-            if not found and not any(path in self.draft.unknown for path in owners):
+            if not found and not any(path in self.draft.gaps for path in owners):
                 wanting = " or ".join(sorted(self.cls.stands_at))
                 where = pointcut.type or pointcut.tag
                 self._problem(f"{self.kind} attaches to {wanting} ports, but no {_asked(pointcut)} has one", where)
@@ -202,8 +196,7 @@ class Weaving(View):
             wanted = pointcut.tag
             owners = {path for path in inside if wanted.text in graph.tags.get(path, ())}
             known = {tag for path in inside for tag in graph.tags.get(path, ())}
-        unknown = [path for path in self.draft.unknown if not self.scope or path.startswith(f"{self.scope}.")]
-        if not owners and (unknown or wanted.text in self.draft.kinds):
+        if not owners and self.draft.may_hold(wanted.text, self.scope):
             self._is_excused = True
             return None
         if not owners:
@@ -238,12 +231,9 @@ class Weaving(View):
         if pointcut.port is not None:
             self._problem(f"{name} attaches to actors, not to their ports", pointcut.port, "leave 'port' out")
         if not text:
-            if pointcut.type is None and pointcut.tag is None:
-                self._is_excused = self._is_excused or not pointcut.exclude  # it is malformed, which has been reported
-                return ()
             return self._chosen_owners(pointcut) or ()
-        if "->" in text:
-            receiver = text.rpartition("->")[2].strip().rpartition(".")[0]
+        if pointcut.ends is not None:
+            receiver = pointcut.ends[1].rpartition(".")[0]
             hint = f"write {receiver!r} for the receiving actor"
             self._problem(f"{name} attaches to actors, not to connections", pointcut, hint)
             return ()
@@ -273,9 +263,9 @@ class Weaving(View):
         """The single connections that pointcuts of the form ``a.out -> b.in`` select."""
         chosen: dict[tuple[str, str], None] = {}
         for pointcut in sorted(pointcuts, key=lambda each: each.exclude):
-            if "->" not in pointcut.text:
+            if pointcut.ends is None:
                 continue
-            found = self._connections_of(pointcut)
+            found = self._connections_of(pointcut, *pointcut.ends)
             if not pointcut.exclude:
                 chosen |= dict.fromkeys(found)
             elif found and not chosen.keys() & found:
@@ -285,12 +275,11 @@ class Weaving(View):
                 chosen = {each: None for each in chosen if each not in found}
         return [each for each in chosen if each[1] not in self._left_out]
 
-    def _connections_of(self, pointcut: PointcutText) -> list[tuple[str, str]]:
+    def _connections_of(self, pointcut: PointcutText, left: str, right: str) -> list[tuple[str, str]]:
         """The connections that one pointcut selects."""
         if "input" not in self.cls.stands_at:
             self._problem(f"{self.kind} attaches to output ports, not to connections", pointcut)
             return []
-        left, _, right = (part.strip() for part in pointcut.text.partition("->"))
         try:
             ends = set(self.ports.select(self._full(right)))
             found = [

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
+from collections.abc import Mapping as AnyMapping
 from dataclasses import replace
 from functools import partial
 
@@ -12,19 +13,17 @@ from epicycle.aspects import (
     CompositeAspect,
     CompositeExecutionAspect,
     Decoration,
-    FiringTimeParameter,
     class_decorations,
     decorations,
 )
 
 from ..catalogue import CatalogueError
 from ..graph import ModelGraph, WovenAspect
-from ..language import PartText, PointcutText
-from ..text import RAISE_IT, Position, Problems, Text, TooManyError, did_you_mean
+from ..language import Locals, PartText, PointcutText
+from ..text import POISON, RAISE_IT, Mapping, Poison, Position, Problems, Text, TooManyError, did_you_mean, place_in
 from .composite_aspect import OWN, ModelWeaving, check_nesting, detours
 from .draft import Draft
 from .paths import Paths
-from .settle import converted, place_of
 from .unfold import Names, Unfolding
 from .weave import Weaving
 
@@ -68,9 +67,9 @@ class _Weaver:
         if cls is None:
             return
         is_model = cls in (CompositeAspect, CompositeExecutionAspect)
-        given = {key: entry for key, entry in part.values.items() if not is_model or key in OWN}
-        rules = self.graph.rules_at(name)
-        values = self.settler.configuration(f"aspect {name}", cls, given, names, part.position, name, rules)
+        own = {key: entry for key, entry in part.values.items() if not is_model or key in OWN}
+        local, rules = Locals(name, names), self.graph.rules_at(name)
+        aspect = self.settler.configured(cls, replace(part, values=own), local, f"aspect {name}", rules, cls)
         if not part.at:
             hint = "add 'at:' with ports or patterns"
             self.problems.add(f"aspect {name} has no 'at'", part.position, hint, scope=scope)
@@ -78,19 +77,16 @@ class _Weaver:
         weaving = Weaving(self.draft, self.paths, name, scope, self.problems, cls)
         if is_model and name in self.graph.composites:
             weaving = ModelWeaving(self.draft, self.paths, name, scope, self.problems, cls, name, part.position)
-            part = replace(part, at=tuple(self._timed(pointcut, name, scope, names) for pointcut in part.at))
-        is_enabled = name in self.graph.composites if is_model else self.settler.is_enabled(name, scope, part, names)
-        try:
-            aspect = None if values is None else cls(**values)
-        except Exception as error:  # an aspect's __init__ may raise anything
-            self.settler.blame(f"aspect {name}", error, part.position, scope)
-            aspect = None
-        if aspect is None:
-            weaving.select(part.at)  # to report its problems
+            part = replace(part, at=tuple(each and self._timed(each, name, scope, names) for each in part.at))
+        is_enabled = (
+            name in self.graph.composites if is_model else self.settler.is_enabled(name, part, Locals(scope, names))
+        )
+        if isinstance(aspect, Poison):
+            weaving.select([each for each in part.at if each])  # to report its problems
             if isinstance(weaving, ModelWeaving):
                 self.draft.leave_open(name)
             return
-        woven = weaving.weave(aspect, part.at, partial(_position, part))
+        woven = weaving.weave(aspect, part.at, partial(place_in, Mapping(part.values, part.position)))
         if isinstance(weaving, ModelWeaving):
             weaving.check(woven)
             woven = weaving.connect(woven)
@@ -104,21 +100,19 @@ class _Weaver:
     def _type(self, name: str, scope: str, part: PartText) -> type[Aspect] | None:
         """The type of an aspect; None, and a problem, if it cannot have that type."""
         known, wanted = self.known, part.type.text
-        if wanted in known.broken:
-            return None
         try:
             cls = known.catalogue.aspects.get(wanted)
         except CatalogueError as error:
-            self.problems.add(f"aspect {name}: {error.message}", part.type.position, *error.help, scope=scope)
+            self.settler.values.blame(f"aspect {name}", error, part.type.position, Locals(scope))
             return None
-        if wanted in known.composites:
-            return self._model_type(name, scope, part, cls)
+        if (inner := known.composites.get(wanted)) is not None:
+            return None if inner is POISON else self._model_type(name, scope, part, cls)
         if cls is None:
             near = did_you_mean(wanted, [*known.catalogue.aspects, *known.composites])
             message = f"aspect {name}: there is no aspect type {wanted!r}{near}"
             self.problems.add(message, part.type.position, *known.valid_types("aspect", wanted), scope=scope)
             return None
-        for pointcut in part.at:
+        for pointcut in (each for each in part.at if each):
             for key, said in (("request", pointcut.request), ("time", pointcut.time)):
                 if said is not None:
                     message = f"aspect {name}: {wanted} is not a composite, so its pointcuts have no {key!r}"
@@ -131,7 +125,7 @@ class _Weaver:
             message = f"aspect {name}: {part.type.text} is both an aspect type and a composite"
             self.problems.add(message, part.type.position, "give the composite another name", scope=scope)
             return None
-        aimed = [pointcut for pointcut in part.at if not pointcut.exclude]
+        aimed = [pointcut for pointcut in part.at if pointcut and not pointcut.exclude]
         at_ports = [pointcut for pointcut in aimed if pointcut.time is None]
         if at_ports and len(at_ports) < len(aimed):
             message = f"aspect {name}: it attaches to ports here, but to actors elsewhere"
@@ -144,17 +138,11 @@ class _Weaver:
     def _timed(self, pointcut: PointcutText, name: str, scope: str, names: dict[str, object]) -> PointcutText:
         if pointcut.time is None:
             return pointcut
-        values, convert = self.settler.values, FiringTimeParameter().convert
-        time = converted(values, pointcut.time, names, f"aspect {name}: time", scope, convert)
-        return replace(pointcut, firing_time=0.0 if time is values.missing else time or 0.0)
+        time = self.settler.values.value(pointcut.time, Locals(scope, names), f"aspect {name}: time")
+        return replace(pointcut, firing_time=time or 0.0)
 
 
-def _position(part: PartText, name: str, *keys: str) -> Position | None:
-    """Where a declaration sets a parameter, or a key in it."""
-    return place_of(part.values[name].value, keys, of_key=True) if name in part.values else None
-
-
-Change = Callable[[str, Aspect], Mapping[str, object]]
+Change = Callable[[str, Aspect], AnyMapping[str, object]]
 
 
 def weave_decorations(

@@ -121,7 +121,7 @@ def _figures(results: Results) -> dict[str, Figure]:
     problems, known = Problems(), figure_types()
     found = {name: made_figure(name, known, declared, problems) for name, declared in results.figures.items()}
     problems.raise_if_any()
-    return {name: figure for name, figure in found.items() if figure is not None}
+    return {name: figure for name, figure in found.items() if figure}
 
 
 def _of_run(name: str, figure: Figure, results: Results) -> Picture:

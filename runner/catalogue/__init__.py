@@ -10,8 +10,8 @@ from .measure import (
     Measure,
     MetricOptions,
     TakeName,
-    conversion_problem,
-    take_problem,
+    conversion_fault,
+    take_fault,
     unit_before,
 )
 from .packaged import (
@@ -25,7 +25,7 @@ from .packaged import (
     packaged_studies,
     unreadable,
 )
-from .port_types import PortTypeError, read_type, token_types
+from .port_types import read_type, token_types
 from .reference import (
     ParameterReference,
     PortReference,
@@ -64,7 +64,6 @@ __all__ = [
     "MetricOptions",
     "ParameterReference",
     "PortReference",
-    "PortTypeError",
     "Shape",
     "TakeName",
     "TypeReference",
@@ -72,7 +71,7 @@ __all__ = [
     "as_written",
     "built_in",
     "code_of",
-    "conversion_problem",
+    "conversion_fault",
     "describe",
     "doc_of",
     "figure_types",
@@ -92,7 +91,7 @@ __all__ = [
     "parts_of",
     "read_type",
     "shown",
-    "take_problem",
+    "take_fault",
     "token_types",
     "topic_order",
     "types_of_file",

@@ -6,7 +6,16 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal, TypeAlias, TypedDict
 
-from epicycle.actors import Configurable, Parameter, ParameterError, Quantity, UnitError, did_you_mean, parse_unit
+from epicycle.actors import (
+    Configurable,
+    Fault,
+    Parameter,
+    ParameterError,
+    Quantity,
+    UnitError,
+    did_you_mean,
+    parse_unit,
+)
 from epicycle.actors.expression import Formula, FormulaParameter
 
 MSER5 = "mser5"
@@ -147,40 +156,49 @@ class Measure(Configurable):
         """Its unit before conversion."""
         return self.kind.unit or unit_before(self.unit, self.to)
 
-    def misfits(self) -> Iterator[tuple[str, str, str]]:
-        """Options that do not fit: the option, what is wrong, and what to do."""
+    @classmethod
+    def fitting(cls, **values: object) -> Measure:
+        """A measure whose options fit together; raises ``ParameterError``."""
+        made = cls(**values)
+        if faults := list(made.misfits()):
+            raise ParameterError.several(faults)
+        return made
+
+    def misfits(self) -> Iterator[Fault]:
+        """Options that do not fit together."""
         kind = self.kind
         for option in ("p", "when", "initial", "interval"):
             if getattr(self, option) is not None and option not in kind.options:
                 others = ", ".join(name for name, each in TAKES.items() if option in each.options)
-                yield option, f"{option!r} cannot be used with {self.take!r}", f"it can be used with {others}"
+                message = f"{option!r} cannot be used with {self.take!r}"
+                yield Fault(message, (option,), help=(f"it can be used with {others}",))
         if self.across is not None and self.interval is not None:
-            yield "interval", "'interval' cannot be used with 'across'", "leave out one of the two"
+            message = "'interval' cannot be used with 'across'"
+            yield Fault(message, ("interval",), help=("leave out one of the two",))
         if kind.needs and getattr(self, kind.needs) is None:
             example = "p: 0.9" if kind.needs == "p" else "when: value > 0"
-            yield "take", f"{self.take!r} needs {kind.needs!r}", f"for example, add '{example}'"
+            yield Fault(f"{self.take!r} needs {kind.needs!r}", ("take",), help=(f"for example, add '{example}'",))
         if self.when is not None and self.when.names != ("value",):
-            yield (
-                "when",
-                f"{self.when.source!r} is not a condition on 'value'",
-                "write a comparison such as 'value > 0'",
-            )
+            message = f"{self.when.source!r} is not a condition on 'value'"
+            yield Fault(message, ("when",), help=("write a comparison such as 'value > 0'",))
         if self.after == MSER5 and not kind.settles:
-            yield "after", f"{MSER5} cannot detect when {self.take!r} has settled", "give the warm-up as a time"
+            message = f"{MSER5} cannot detect when {self.take!r} has settled"
+            yield Fault(message, ("after",), help=("give the warm-up as a time",))
         is_number = isinstance(self.initial, (bool, int, float))
         if self.initial is not None and kind.of == "numbers" and not is_number:
-            yield "initial", f"initial: {self.initial!r} is not a number", ""
+            yield Fault(f"initial: {self.initial!r} is not a number", ("initial",))
         if kind.unit and self.unit not in ("", kind.unit):
-            yield "unit", f"the unit of {self.take!r} is {kind.unit}", f"write 'to: {self.unit}'"
-        elif problem := conversion_problem(self.own_unit, self.to):
-            yield "to", *problem
+            yield Fault(f"the unit of {self.take!r} is {kind.unit}", ("unit",), help=(f"write 'to: {self.unit}'",))
+        elif fault := conversion_fault(self.own_unit, self.to):
+            yield fault.within("to")
 
 
-def take_problem(metric: str, take: str) -> tuple[str, str] | None:
-    """The message about an unknown kind of metric, and what to do; None if the kind is known."""
+def take_fault(metric: str, take: str) -> Fault | None:
+    """What is wrong with a kind of metric; None if it is known."""
     if take in TAKES:
         return None
-    return f"metric {metric!r} cannot take {take!r}{did_you_mean(take, TAKES)}", f"valid: {', '.join(TAKES)}"
+    message = f"metric {metric!r} cannot take {take!r}{did_you_mean(take, TAKES)}"
+    return Fault(message, help=(f"valid: {', '.join(TAKES)}",))
 
 
 def unit_before(unit: str, to: str) -> str:
@@ -188,15 +206,16 @@ def unit_before(unit: str, to: str) -> str:
     return unit or ("1" if to in ("1", "%") else "")
 
 
-def conversion_problem(unit: str, to: str) -> tuple[str, str] | None:
-    """Why numbers cannot be converted from one unit to another, and what to do; None if they can."""
+def conversion_fault(unit: str, to: str) -> Fault | None:
+    """Why numbers cannot be converted from one unit to another; None if they can."""
     if not to:
         return None
     if not unit:
-        return f"without a unit, it cannot be converted to {to}", "add 'unit: ...', the unit of the tokens"
+        message = f"without a unit, it cannot be converted to {to}"
+        return Fault(message, help=("add 'unit: ...', the unit of the tokens",))
     try:
         parse_unit(to)  # an unknown unit is reported as such
         Quantity(1.0, unit).to(to)
     except UnitError as error:
-        return str(error), ""
+        return error.faults[0]
     return None

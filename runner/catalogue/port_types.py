@@ -12,7 +12,7 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from epicycle.actors import declared_ports, shaped
+from epicycle.actors import FaultError, declared_ports, shaped
 from epicycle.aspects import Request
 
 from ..text import did_you_mean, split
@@ -33,19 +33,10 @@ MAX_TEXT = 200
 _TYPE = re.compile(r"([A-Za-z_]\w*)\s*(?:\[(.*)\])?\Z", re.ASCII | re.DOTALL)
 
 
-class PortTypeError(Exception):
-    """Text that is not a type; ``help`` describes a valid one."""
-
-    def __init__(self, message: str, help: str = "") -> None:
-        super().__init__(message, help)
-        self.message = message
-        self.help = help
-
-
 def read_type(text: str, tokens: Callable[[], Mapping[str, type]]) -> Any:
-    """The type that a text names; ``tokens`` gives the token classes by name.  Raises ``PortTypeError``."""
+    """The type that a text names; ``tokens`` gives the token classes by name.  Raises ``FaultError``."""
     if len(text) > MAX_TEXT:
-        raise PortTypeError(f"a type has at most {MAX_TEXT} characters")
+        raise FaultError(f"a type has at most {MAX_TEXT} characters")
     choices = [_one(text[start:end].strip(), tokens) for start, end in split(text, "|")]
     return Any if Any in choices else reduce(or_, choices) if len(choices) > 1 else choices[0]
 
@@ -53,11 +44,12 @@ def read_type(text: str, tokens: Callable[[], Mapping[str, type]]) -> Any:
 def _one(text: str, tokens: Callable[[], Mapping[str, type]]) -> Any:
     match = _TYPE.match(text)
     if match is None:
-        raise PortTypeError(f"{text!r} is not a type", "write a name such as float, 'float | int' or array[2]")
+        raise FaultError(f"{text!r} is not a type", help=["write a name such as float, 'float | int' or array[2]"])
     name, inside = match.groups()
     if name not in BUILT_IN and name not in tokens():
         known = [*BUILT_IN, *sorted(tokens())]
-        raise PortTypeError(f"there is no type {name!r}{did_you_mean(name, known)}", f"types: {', '.join(known)}")
+        near = did_you_mean(name, known)
+        raise FaultError(f"there is no type {name!r}{near}", help=[f"types: {', '.join(known)}"])
     found: Any = BUILT_IN.get(name) or tokens()[name]
     if inside is None:
         return found
@@ -65,9 +57,8 @@ def _one(text: str, tokens: Callable[[], Mapping[str, type]]) -> Any:
     if name == "array":
         return shaped(np.ndarray, tuple(_size(part) for part in parts))
     if len(parts) != {"list": 1, "dict": 2}.get(name, len(parts) if name == "tuple" else 0):
-        raise PortTypeError(
-            f"{text!r} is not a type", "array[...], list[...], dict[..., ...] and tuple[...] take brackets"
-        )
+        advice = "array[...], list[...], dict[..., ...] and tuple[...] take brackets"
+        raise FaultError(f"{text!r} is not a type", help=[advice])
     arguments = tuple(read_type(part, tokens) for part in parts)
     return found[arguments if len(arguments) > 1 else arguments[0]]
 
@@ -77,7 +68,7 @@ def _size(text: str) -> int | None:
         return None
     if re.fullmatch(r"\d{1,9}", text, re.ASCII):
         return int(text)
-    raise PortTypeError(f"{text!r} is not an array size", "write a number, or n for any")
+    raise FaultError(f"{text!r} is not an array size", help=["write a number, or n for any"])
 
 
 def token_types(catalogue: Catalogue) -> dict[str, type]:

@@ -24,7 +24,7 @@ from typing import Any, Generic, TypeVar
 
 import epicycle.actors
 import epicycle.aspects
-from epicycle.actors import Actor, Configurable, EpicycleError, Process
+from epicycle.actors import Actor, Configurable, EpicycleError, FaultError, Process
 from epicycle.aspects import Aspect, CompositeAspect, CompositeExecutionAspect, JoinPointAspect
 
 from ..text import note_package
@@ -41,16 +41,15 @@ def _words(base: type) -> str:
     return re.sub(r"(?<=[a-z])(?=[A-Z])", " ", base.__name__).lower()
 
 
-class CatalogueError(EpicycleError):
-    """A type that is not available, or an ambiguous name; ``help`` says what to do."""
+class CatalogueError(FaultError):
+    """A type that is not available, or an ambiguous name."""
 
     def __init__(self, message: str, *help: str) -> None:
-        self.message = message
-        self.help = help
-        super().__init__(message, *help)
+        super().__init__(message, help=help)
+        self.args = (message, *help)  # what pickle rebuilds the error from
 
     def __str__(self) -> str:
-        return "\n   help: ".join((self.message, *self.help))
+        return "\n   help: ".join(self.args)
 
 
 @dataclass(frozen=True)

@@ -1,18 +1,7 @@
 """What files declare: models, composites, disturbances, studies and settings from outside, as constructs."""
 
+from .acts import ActText
 from .claims import ALWAYS, FALLS, GREATER, RISES, Claim, Guideline, Selection
-from .declarations import (
-    ActText,
-    CompositeText,
-    ConnectionText,
-    MetricText,
-    ModelText,
-    MonitorText,
-    ParameterText,
-    PartText,
-    PointcutText,
-    PortText,
-)
 from .dimensions import (
     RANGE,
     Dimension,
@@ -37,9 +26,15 @@ from .disturbance import (
     load_disturbances,
     only_acts,
 )
+from .fields import Computed, nanoseconds
 from .files import read_library, read_model
 from .inheritance import inherit
-from .places import connection
+from .metrics import MetricText
+from .models import CompositeText, ModelText
+from .monitors import MonitorText
+from .parts import PartText, beside
+from .places import ConnectionText, Endpoint, PointcutText, connection, endpoints
+from .ports import ParameterText, PortText
 from .sampling import MORRIS, SOBOL, Design
 from .schema import CONSTRUCTS, json_schema, schema_text
 from .settings import (
@@ -56,7 +51,7 @@ from .settings import (
 from .study import MAX_REPLICATIONS, MAX_STUDY_SEED, RESERVED, Study, is_study, read_study, study_of_text
 from .study_metric import ASPECTS, NUMBERS, SIGNALS, StudyMetric, asks_for_none
 from .usage import check_usage
-from .values import Values
+from .values import OUTSIDE, Locals, Values
 
 __all__ = [
     "ALWAYS",
@@ -70,6 +65,7 @@ __all__ = [
     "MAX_STUDY_SEED",
     "MORRIS",
     "NUMBERS",
+    "OUTSIDE",
     "PARAMETER_THERE",
     "RANGE",
     "RESERVED",
@@ -79,15 +75,18 @@ __all__ = [
     "ActText",
     "Claim",
     "CompositeText",
+    "Computed",
     "ConnectionText",
     "Design",
     "Dimension",
     "DimensionReader",
     "Disturbance",
+    "Endpoint",
     "Factor",
     "Guideline",
     "Level",
     "Listed",
+    "Locals",
     "MetricText",
     "ModelText",
     "MonitorText",
@@ -104,9 +103,11 @@ __all__ = [
     "add_disturbances",
     "as_factor",
     "asks_for_none",
+    "beside",
     "change_aspect",
     "check_usage",
     "connection",
+    "endpoints",
     "in_si",
     "inherit",
     "is_study",
@@ -115,6 +116,7 @@ __all__ = [
     "kind_of",
     "load_disturbance",
     "load_disturbances",
+    "nanoseconds",
     "number_node",
     "only_acts",
     "parse_setting",

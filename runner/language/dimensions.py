@@ -13,8 +13,8 @@ from typing import Any, TypeAlias
 
 from epicycle.actors import Quantity, UnitError, parse_unit
 
-from ..text import Entry, Mapping, Node, NodeReader, Position, Scalar, Sequence, is_empty, plain
-from .fields import QUANTITY_SCHEMA, Construct, Key, Schema, Shape, node_as, ref
+from ..text import POISON, Entry, Mapping, Node, NodeReader, Poison, Position, Scalar, Sequence, blame, is_empty, plain
+from .fields import QUANTITY_SCHEMA, Construct, Key, Schema, Shape, node_as, ref, sound
 from .sampling import (
     HYPERCUBE,
     LATIN,
@@ -209,9 +209,9 @@ class DimensionReader(NodeReader):
             self.problems.add(f"{what} is not a mapping", node.position, "write lines like 'load: [0.5, 0.75, 0.9]'")
             return ()
         found = (self.dimension(name, entry) for name, entry in node.entries.items())
-        return tuple(dimension for dimension in found if dimension is not None)
+        return tuple(dimension for dimension in found if dimension is not POISON)
 
-    def dimension(self, name: str, entry: Entry) -> Dimension | None:
+    def dimension(self, name: str, entry: Entry) -> Dimension | Poison:
         """A list, a range, or a mapping with the key zip, cases, latin_hypercube, sobol or morris."""
         node, position = entry.value, entry.key.position
         if isinstance(node, Sequence):
@@ -228,24 +228,21 @@ class DimensionReader(NodeReader):
                 return self.ranged(name, position, node)
         forms = ", ".join(f"{{{form}: ...}}" for form in ("zip", "cases", LATIN, SOBOL))
         hint = f"give a list, {{from, to, step}}, {forms} or {{{MORRIS}: ...}}"
-        self.problems.add(f"{name!r} has no values", node.position, hint)
-        return None
+        return self.problems.add(f"{name!r} has no values", node.position, hint)
 
-    def listed(self, name: str, position: Position, lists: dict[str, Entry]) -> Dimension | None:
+    def listed(self, name: str, position: Position, lists: dict[str, Entry]) -> Dimension | Poison:
         """One list for each path, all of the same length."""
-        before = len(self.problems)
         items = {path: entry.value.items for path, entry in lists.items() if isinstance(entry.value, Sequence)}
         keys = {path: entry.key.position for path, entry in lists.items()}
-        for path, key in keys.items():
-            is_pattern(path, key, self.problems)
+        are_patterns = [is_pattern(path, key, self.problems) for path, key in keys.items()]
         sizes = {len(each) for each in items.values()}
         if 0 in sizes:
-            self.problems.add(f"{name!r} has an empty list", position, "give at least one value")
-        elif len(sizes) > 1:
+            return self.problems.add(f"{name!r} has an empty list", position, "give at least one value")
+        if len(sizes) > 1:
             shown = ", ".join(f"{path}: {len(each)}" for path, each in items.items())
-            self.problems.add(f"the lists of {name!r} differ in length", position, shown)
-        if len(self.problems) > before:
-            return None
+            return self.problems.add(f"the lists of {name!r} differ in length", position, shown)
+        if not all(are_patterns):
+            return POISON
         kinds = {path: kind_of(each) for path, each in items.items()}
         levels: list[Level] = []
         seen: dict[str, Node] = {}
@@ -259,21 +256,19 @@ class DimensionReader(NodeReader):
             levels.append(Level(tuple(Setting(path, node, keys[path]) for path, node in pairs), values))
         return Listed(name, position, kinds, levels)
 
-    def zipped(self, name: str, position: Position, node: Node) -> Dimension | None:
+    def zipped(self, name: str, position: Position, node: Node) -> Dimension | Poison:
         """Parameters that vary together: the first values of all lists, then the second ones, and so on."""
         if not isinstance(node, Mapping) or not node.entries:
-            self.problems.add(f"the zip of {name!r} is not a mapping from parameters to lists", node.position)
-            return None
+            return self.problems.add(f"the zip of {name!r} is not a mapping from parameters to lists", node.position)
         wrong = {path: each for path, each in node.entries.items() if not isinstance(each.value, Sequence)}
         for path, entry in wrong.items():
             self.problems.add(f"{path!r} is not a list", entry.value.position, "begin each entry with '- '")
-        return None if wrong else self.listed(name, position, node.entries)
+        return POISON if wrong else self.listed(name, position, node.entries)
 
-    def cases(self, name: str, position: Position, node: Node) -> Dimension | None:
+    def cases(self, name: str, position: Position, node: Node) -> Dimension | Poison:
         """Named sets of values; the column holds the names."""
         if not isinstance(node, Mapping) or not node.entries:
-            self.problems.add(f"the cases of {name!r} are not a mapping from names to settings", node.position)
-            return None
+            return self.problems.add(f"the cases of {name!r} are not a mapping from names to settings", node.position)
         levels = []
         for case, entry in node.entries.items():
             settings: list[Setting] = []
@@ -284,87 +279,75 @@ class DimensionReader(NodeReader):
             levels.append(Level(tuple(settings), {name: case}))
         return Listed(name, position, {name: "text"}, levels)
 
-    def ranged(self, name: str, position: Position, node: Mapping) -> Dimension | None:
+    def ranged(self, name: str, position: Position, node: Mapping) -> Dimension | Poison:
         """``{from: 0, to: 0.5, step: 0.1}``; the end counts if a step falls on it."""
-        before = len(self.problems)
-        is_pattern(name, position, self.problems)
-        entries = RANGE.entries(self, node, f"the range of {name!r}") or {}
-        numbers: dict[str, Decimal] = {}
-        units: dict[str, None] = {}
+        what = f"the range of {name!r}"
+        found: list[tuple[Decimal, str] | Poison] = [] if is_pattern(name, position, self.problems) else [POISON]
+        entries = RANGE.entries(self, node, what) or {}
         for key in RANGE.keys:
-            if key not in entries:
-                self.problems.add(f"the range of {name!r} has no {key!r}", node.position)
-            elif (number := self.quantity(entries[key].value, f"{key} of {name!r}")) is not None:
-                numbers[key] = number[0]
-                units[number[1]] = None
-        if len(self.problems) > before:
-            return None
-        start, end, step = (numbers[key] for key in RANGE.keys)
+            if key in entries:
+                found.append(self.quantity(entries[key].value, f"{key} of {name!r}"))
+            else:
+                found.append(self.problems.add(f"{what} has no {key!r}", node.position))
+        numbers = [each for each in found if each]
+        if len(numbers) < len(found):
+            return POISON
+        (start, unit), (end, _), (step, _) = numbers
         at = entries["step"].value.position
-        if len(units) > 1:
-            self.problems.add(
-                f"the range of {name!r} has more than one unit", node.position, "use the same unit for all"
-            )
-            return None
+        if len({each for _, each in numbers}) > 1:
+            return self.problems.add(f"{what} has more than one unit", node.position, "use the same unit for all")
         if step == 0 or (end - start) / step < 0:
-            self.problems.add(f"the range of {name!r} never reaches {end} from {start} in steps of {step}", at)
-            return None
+            return self.problems.add(f"{what} never reaches {end} from {start} in steps of {step}", at)
         size = int((end - start) / step) + 1
         if size > MAX_LEVELS:
-            self.problems.add(f"the range of {name!r} has more than {MAX_LEVELS:,} values", at)
-            return None
-        found = Ranged(name, position, start, step, size, next(iter(units)), node.position)
+            return self.problems.add(f"{what} has more than {MAX_LEVELS:,} values", at)
+        made = Ranged(name, position, start, step, size, unit, node.position)
         try:
-            is_distinct = found.is_distinct()
+            is_distinct = made.is_distinct()
         except UnitError as error:
-            self.problems.add(f"the range of {name!r}: {error}", at)
-            return None
+            return blame(self.problems, what, error, at)
         if not is_distinct:
             reach = f"from {start} to {end} in steps of {step}"
-            self.problems.add(f"the range of {name!r} has values that cannot be told apart as floats: {reach}", at)
-            return None
-        return found
+            return self.problems.add(f"{what} has values that cannot be told apart as floats: {reach}", at)
+        return made
 
-    def quantity(self, node: Node, what: str) -> tuple[Decimal, str] | None:
+    def quantity(self, node: Node, what: str) -> tuple[Decimal, str] | Poison:
         """A number, perhaps with a unit."""
         found = split_number(node)
         if found is None:
-            self.problems.add(f"{what} is not a number", node.position, "write 5, 0.1 or '5 m'")
-            return None
+            return self.problems.add(f"{what} is not a number", node.position, "write 5, 0.1 or '5 m'")
         try:
             if found[1]:
                 parse_unit(found[1])
         except UnitError as error:
-            self.problems.add(f"{what}: {error}", node.position)
-            return None
+            return blame(self.problems, what, error, node)
         return found
 
-    def sampled(self, name: str, position: Position, form: str, node: Node) -> Dimension | None:
+    def sampled(self, name: str, position: Position, form: str, node: Node) -> Dimension | Poison:
         """Points of a box: a Latin hypercube, or the design of a sensitivity analysis."""
-        before = len(self.problems)
         entries = SAMPLINGS[form].entries(self, node, f"{form} of {name!r}") or {}
         if "size" not in entries or "ranges" not in entries:
             hint = f"write {{size: {16 if form == SOBOL else 20}, seed: 1, ranges: {{load: [0.1, 0.9]}}}}"
-            self.problems.add(f"{form} of {name!r} needs 'size' and 'ranges'", position, hint)
-            return None
+            return self.problems.add(f"{form} of {name!r} needs 'size' and 'ranges'", position, hint)
         said = SAMPLINGS[form].values(self, entries, "", position)
-        size, seed, steps = said.get("size", 1), said.get("seed", 0), said.get("levels", 4)
         box = self.box(name, entries["ranges"].value)
+        if box is POISON or POISON in said.values():
+            return POISON
+        size, seed, steps = said["size"], said.get("seed", 0), said.get("levels", 4)
+        at = entries["size"].value.position
         if form == SOBOL and size.bit_count() != 1:
             near = 1 << size.bit_length()
             hint = f"a Sobol sequence fills the box evenly only then: take {near // 2:,} or {near:,}"
-            self.problems.add(f"the size {size} of {name!r} is not a power of 2", entries["size"].value.position, hint)
+            return self.problems.add(f"the size {size} of {name!r} is not a power of 2", at, hint)
         if steps % 2:
             hint = f"steps go over half of the grid: take {steps - 1 or 2} or {steps + 1}"
-            self.problems.add(f"the levels {steps} of {name!r} are not even", entries["levels"].value.position, hint)
+            return self.problems.add(
+                f"the levels {steps} of {name!r} are not even", entries["levels"].value.position, hint
+            )
         most = MAX_SAMPLES // {SOBOL: len(box) + 2, MORRIS: len(box) + 1}.get(form, 1)
         if size > most:
-            told = f"{form} of {name!r} has more than {MAX_SAMPLES:,} points"
-            self.problems.add(
-                told, entries["size"].value.position, f"with {len(box)} parameters, take at most {most:,}"
-            )
-        if len(self.problems) > before:
-            return None
+            told, hint = f"{form} of {name!r} has more than {MAX_SAMPLES:,} points", f"with {len(box)} parameters, take"
+            return self.problems.add(told, at, f"{hint} at most {most:,}")
         taken: tuple[tuple[tuple[int, float], ...], ...] = ()
         if form == SOBOL:
             blocks = sobol_blocks(size, seed, list(box))
@@ -379,23 +362,25 @@ class DimensionReader(NodeReader):
         design = Design(form, tuple(box), numbers, taken) if form in (SOBOL, MORRIS) else None
         return Listed(name, position, dict.fromkeys(box, "float"), levels, design)
 
-    def box(self, name: str, node: Node) -> dict[str, Bounds]:
+    def box(self, name: str, node: Node) -> dict[str, Bounds] | Poison:
         """``path: [low, high]`` for each parameter."""
-        bounds: dict[str, Bounds] = {}
         if not isinstance(node, Mapping) or not node.entries:
-            self.problems.add(f"the ranges of {name!r} are not a mapping from parameters to [low, high]", node.position)
-            return bounds
+            message = f"the ranges of {name!r} are not a mapping from parameters to [low, high]"
+            return self.problems.add(message, node.position)
+        bounds: dict[str, Bounds | Poison] = {}
         for path, entry in node.entries.items():
-            is_pattern(path, entry.key.position, self.problems)
+            is_path = is_pattern(path, entry.key.position, self.problems)
             items = entry.value.items if isinstance(entry.value, Sequence) else ()
-            ends = [end for item in items if (end := self.quantity(item, f"a bound of {path!r}")) is not None]
-            if len(items) == 2 and len(ends) < 2:
-                continue  # which has been reported
-            if len(ends) != 2 or ends[0][1] != ends[1][1] or not ends[0][0] < ends[1][0]:
-                self.problems.add(f"{path!r} is not [low, high] in one unit", entry.value.position)
+            read = [self.quantity(item, f"a bound of {path!r}") for item in items]
+            ends = [end for end in read if end]
+            if (len(items) == 2 and len(ends) < 2) or not is_path:
+                bounds[path] = POISON
+            elif len(ends) != 2 or ends[0][1] != ends[1][1] or not ends[0][0] < ends[1][0]:
+                bounds[path] = self.problems.add(f"{path!r} is not [low, high] in one unit", entry.value.position)
             else:
                 bounds[path] = float(ends[0][0]), float(ends[1][0]), ends[0][1], entry.key.position
-        return bounds
+        whole = sound(bounds)
+        return whole if len(whole) == len(bounds) else POISON
 
 
 def _level_at(point: Point, box: AnyMapping[str, Bounds]) -> Level:

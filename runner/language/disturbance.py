@@ -7,10 +7,12 @@ from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
 from ..catalogue import find
-from ..text import Mapping, Node, NodeReader, Problems, read
-from .declarations import ActText, CompositeText, ModelText, ParameterText
-from .fields import AT, NAMED, Construct, Key, Shape, number, ref
-from .models import ASPECTS, COMPOSITES, DOC, PARAMETERS, parts
+from ..text import POISON, Mapping, Node, NodeReader, Problems, read
+from .acts import ACTS, ActText, acts
+from .fields import NAMED, Construct, Key, sound
+from .models import ASPECTS, COMPOSITES, DOC, PARAMETERS, CompositeText, ModelText
+from .parts import parts
+from .ports import ParameterText
 from .settings import Setting, put_aspect, settings_like
 from .usage import check_own_usage
 
@@ -28,35 +30,6 @@ class Disturbance:
 EXACTLY = "exactly"
 T = TypeVar("T", CompositeText, ParameterText)
 PARAMETER_THERE, COMPOSITE_THERE = "the model already has a parameter {!r}", "there is already a composite {!r}"
-
-ACT = Construct(
-    "A single act of an aspect.",
-    {
-        "aspect": Key(AT, "The name of the aspect.", missing=("an act names no aspect", "add 'aspect: NAME'")),
-        "at": Key(
-            AT,
-            "Its place: a port, a connection or an actor.",
-            missing=("an act names no place", "add 'at: PATH'"),
-        ),
-        "token": Key(
-            number(int, 1),
-            "The number of the token, or firing, that passes it there: 1 is the first.",
-            missing=("an act names no token", "add 'token: 1' for the first"),
-        ),
-    },
-    type="object",
-)
-
-
-def _acts(reader: NodeReader, node: Node, what: str) -> tuple[ActText, ...]:
-    found = []
-    for each in reader.items(node, what) or ():
-        before = len(reader.problems)
-        said = ACT.read(reader, each, f"an act of {what!r}")
-        if said is not None and len(reader.problems) == before:
-            found.append(ActText(**said, position=each.position))
-    return tuple(found)
-
 
 # Its aspects may take over the ports of the aspects that they replace.
 DISTURBANCE = Construct(
@@ -78,7 +51,7 @@ DISTURBANCE = Construct(
         "composites": COMPOSITES,
         "aspects": Key(parts("aspect", "added_aspect"), ASPECTS.doc),
         EXACTLY: Key(
-            Shape({"type": ["array", "null"], "items": ref("act")}, _acts),
+            ACTS,
             "The only acts of aspects that happen, these and the model's own: a list of {aspect, at, token}.",
         ),
     },
@@ -100,14 +73,15 @@ def _declared(node: Node, problems: Problems) -> Disturbance | None:
         return None
     reader = NodeReader(problems)
     entries = DISTURBANCE.entries(reader, node, "the disturbance")
-    if entries is None:
+    if entries is POISON:
         return None
     before = len(problems)
-    said = DISTURBANCE.values(reader, entries, "the disturbance", node.position)
+    said = sound(DISTURBANCE.values(reader, entries, "the disturbance", node.position))
     composites, settings, exactly = said.pop("composites", {}), said.pop("set", ()), said.pop(EXACTLY, None)
-    text = CompositeText(said.pop("name", "disturbance"), node.position, **said)
-    if len(problems) == before:
-        check_own_usage(text, problems)
+    own = tuple(entry.value for key, entry in entries.items() if key != "composites")
+    written = (*own, POISON) if len(problems) > before else own
+    text = CompositeText(said.pop("name", "disturbance"), node.position, **said, written=written)
+    check_own_usage(text, problems)
     return Disturbance(text, composites, settings, exactly)
 
 
@@ -149,7 +123,7 @@ def only_acts(text: ModelText, settings: list[Setting], problems: Problems) -> t
     """
     found = [] if EXACTLY in text.root.parameters else [each for each in settings if each.path == EXACTLY]
     if found:
-        text = replace(text, exactly=_acts(NodeReader(problems), found[-1].node, EXACTLY))
+        text = replace(text, exactly=acts(NodeReader(problems), found[-1].node, EXACTLY))
         settings = [each for each in settings if each.path != EXACTLY]
     return text, settings
 

@@ -8,16 +8,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, fields, replace
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import Any, TypeAlias, TypeVar
 
-from epicycle.actors import MappingParameter, Parameter, ParameterError
+from epicycle.actors import FaultError, MappingParameter, Parameter, to_nanoseconds
 
 from ..catalogue import as_written, is_part, shown
-from ..text import Entry, Node, NodeReader, Position, Scalar, is_empty
+from ..text import POISON, Entry, Node, NodeReader, Poison, Position, Scalar, blame, is_empty
 
 Schema: TypeAlias = dict[str, Any]
+T = TypeVar("T")
 
 NAME = "[A-Za-z_][A-Za-z0-9_]*"
 EXPRESSION = r"\$\{"
@@ -68,8 +69,8 @@ def computed(kind: str, low: float | None = None, high: float | None = None, uni
 class Shape:
     """What a value may be.
 
-    ``read`` takes a reader, a node and its name in messages; it returns the value, or None if there is none or its
-    problem has been reported.
+    ``read`` takes a reader, a node and its name in messages; it returns the value, ``POISON`` if it is wrong, or None
+    if there is none.
     """
 
     schema: Schema
@@ -80,16 +81,44 @@ class Shape:
         return Shape(schema, self.read)
 
 
-def _flag(reader: NodeReader, node: Node, what: str) -> bool | None:
+def _flag(reader: NodeReader, node: Node, what: str) -> bool | Poison:
     if isinstance(node, Scalar) and isinstance(node.value, bool):
         return node.value
-    reader.problems.add(f"{what} is neither true nor false", node.position)
-    return None
+    return reader.problems.add(f"{what} is neither true nor false", node.position)
 
 
 def node_as(schema: Schema) -> Shape:
-    """A node as it is, for a value that may be computed, or that others read."""
+    """A node as it is: one of the values of a part, which are read when its class is known."""
     return Shape(schema, lambda reader, node, what: node)
+
+
+@dataclass(frozen=True)
+class Computed:
+    """A value that may be an expression, and how it is converted once it is known."""
+
+    node: Node
+    convert: Callable[[Any], Any]
+
+    @property
+    def position(self) -> Position:
+        return self.node.position
+
+
+def computed_as(
+    parameter: Parameter[Any], convert: Callable[[Any], Any] | None = None, schema: Schema | None = None
+) -> Shape:
+    """A value like that of a parameter, which may be computed; ``convert`` makes something else of it."""
+    conversion = convert or parameter.convert
+    return Shape(schema or _scalar(parameter), lambda reader, node, what: Computed(node, conversion))
+
+
+def nanoseconds(duration: object) -> int:
+    """A time in seconds, or a text such as ``"500 ms"``, in ns; raises ``ParameterError`` or ``ValueError``."""
+    seconds: Any = TIME.convert(duration)
+    return to_nanoseconds(seconds or 0.0)
+
+
+TIME = Parameter(float, unit="s", min=0.0)
 
 
 def number(kind: type, low: float | None = None, high: float | None = None) -> Shape:
@@ -101,19 +130,18 @@ def number(kind: type, low: float | None = None, high: float | None = None) -> S
     def read(reader: NodeReader, node: Node, what: str) -> Any:
         try:
             return parameter.convert(node.value if isinstance(node, Scalar) else "a list")
-        except ParameterError as error:
-            reader.problems.add(f"{what}: {error}", node.position)
-            return None
+        except FaultError as error:
+            return blame(reader.problems, what, error, node)
 
     return Shape(schema, read)
 
 
 def named(schema: Schema, read: Callable[[Any, str, Entry], Any]) -> Shape:
-    """A mapping from names to things, each read with its name; those that cannot be read are left out."""
+    """A mapping from names to things, each read with its name; those that are wrong are left out."""
 
-    def read_all(reader: NodeReader, node: Node, what: str) -> dict[str, Any]:
-        found = {name: read(reader, name, entry) for name, entry in reader.named(node, what)}
-        return {name: each for name, each in found.items() if each is not None}
+    def read_all(reader: NodeReader, node: Node, what: str) -> dict[str, Any] | Poison:
+        entries = reader.named(node, what)
+        return POISON if entries is POISON else sound({name: read(reader, name, entry) for name, entry in entries})
 
     return Shape(names_of(schema), read_all)
 
@@ -128,6 +156,11 @@ NAMED = Shape(ref("name"), NodeReader.name)
 AT = Shape(ref("text"), NodeReader.placed)
 TEXTS = Shape(one_or_more({"type": "string"}), NodeReader.texts)
 FLAG = Shape({"type": "boolean"}, _flag)
+
+
+def sound(found: Mapping[str, T | Poison]) -> dict[str, T]:
+    """What is not wrong."""
+    return {name: each for name, each in found.items() if each is not POISON}
 
 
 # -- constructs ---------------------------------------------------------------------------------------------------
@@ -153,6 +186,13 @@ class Key:
         return {**self.shape.schema, "description": self.doc}
 
 
+def keyed(
+    shape: Shape, doc: str, *, key: str = "", called: str = "{key}", missing: tuple[str, ...] = (), **default: Any
+) -> Any:
+    """A field of a declaration that is a key of the language, with its name unless ``key`` is another."""
+    return field(metadata={"key": (key, Key(shape, doc, called, missing))}, **default)
+
+
 class Construct:
     """A mapping with these keys and no others; ``rules`` are further conditions in its schema."""
 
@@ -161,18 +201,28 @@ class Construct:
         self.keys = dict(keys)
         self.rules = rules
 
+    @classmethod
+    def of(cls, declaration: type, doc: str = "", **rules: Any) -> Construct:
+        """The mapping from which a declaration is read, by the keys that its fields say."""
+        keys: dict[str, Key] = {}
+        for each in fields(declaration):
+            if "key" in each.metadata:
+                name, said = each.metadata["key"]
+                keys[name or each.name] = replace(said, name=each.name)
+        return cls(doc, keys, **rules)
+
     @property
     def schema(self) -> Schema:
         properties = {key: each.schema for key, each in self.keys.items()}
         found: Schema = {"type": ["object", "null"], "properties": properties, "additionalProperties": False}
         return {**({"description": self.doc} if self.doc else {}), **found, **self.rules}
 
-    def entries(self, reader: NodeReader, node: Node, what: str) -> dict[str, Entry] | None:
-        """The entries under its keys, unknown keys reported; None if it is not a mapping."""
+    def entries(self, reader: NodeReader, node: Node, what: str) -> dict[str, Entry] | Poison:
+        """The entries under its keys, unknown keys reported."""
         return reader.entries(node, what, tuple(self.keys))
 
     def values(self, reader: NodeReader, entries: Mapping[str, Entry], what: str, at: Position) -> dict[str, Any]:
-        """The values of its keys, by attribute; missing ones are reported ``at`` a place, unreadable ones left out."""
+        """The values of its keys, by attribute, with ``POISON`` for those that are wrong or missing, as told ``at``."""
         found = {}
         for key, each in self.keys.items():
             if key in entries and not (each.missing and is_empty(entries[key].value)):
@@ -181,13 +231,13 @@ class Construct:
                     found[each.name or key] = value
             elif each.missing:
                 message, *hints = (said.format(what=what, key=key) for said in each.missing)
-                reader.problems.add(message, at, *hints)
+                found[each.name or key] = reader.problems.add(message, at, *hints)
         return found
 
-    def read(self, reader: NodeReader, node: Node, what: str, at: Position | None = None) -> dict[str, Any] | None:
-        """The values in a node, by attribute; None if it is not a mapping."""
+    def read(self, reader: NodeReader, node: Node, what: str, at: Position | None = None) -> dict[str, Any] | Poison:
+        """The values in a node, by attribute."""
         entries = self.entries(reader, node, what)
-        return None if entries is None else self.values(reader, entries, what, at or node.position)
+        return POISON if entries is POISON else self.values(reader, entries, what, at or node.position)
 
 
 COMPUTED_FLAG: Schema = {"type": ["boolean", "string"], **looks_like(EXPRESSION, "expected true or false")}

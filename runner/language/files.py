@@ -8,8 +8,7 @@ from epicycle.actors import irregular
 
 from ..catalogue import find, is_path, model_folders, packaged_files, packaged_ones, unreadable
 from ..text import Mapping, Problems, Text, did_you_mean, read
-from .declarations import CompositeText, ModelText
-from .models import library_of, model_of
+from .models import CompositeText, ModelText, library_of, model_of
 
 MAX_INCLUDES = 200
 
@@ -41,7 +40,7 @@ def read_model(name: str, problems: Problems) -> tuple[ModelText, dict[str, Comp
         problems.add(f"{name} is a disturbance, not a model", None, f"add it to a model: MODEL --disturb {name}")
     elif node is not None:
         text = model_of(node, problems)
-    if path is None or text is None:
+    if path is None or not text:
         return problems.whole(None)
     return text, _composites(text, path, problems)
 
@@ -99,7 +98,7 @@ def _composites(text: ModelText, path: Path, problems: Problems) -> dict[str, Co
                 continue
             node = read(target, problems, str(where.parent / include.text))
             inner = library_of(node, problems) if node is not None else None
-            if inner is not None:
+            if inner:
                 waiting.append((inner, target))
     return composites
 

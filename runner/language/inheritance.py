@@ -11,46 +11,49 @@ base's connections and pointcuts to it;
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 
 from epicycle.actors import UnitError
 
-from ..text import NORMAL, RAISE_IT, Limits, Position, Problems, Text, did_you_mean
-from .declarations import CompositeText, ConnectionText, PartText, PointcutText, PortText
+from ..text import NORMAL, POISON, RAISE_IT, Limits, Poison, Position, Problems, did_you_mean
+from .models import CompositeText
+from .parts import PartText
+from .places import ConnectionText
+from .ports import PortText
 
 MAX_BASES = 50
 
 
 def inherit(
-    composites: dict[str, CompositeText], actor_types: Collection[str], problems: Problems, limits: Limits = NORMAL
-) -> tuple[dict[str, CompositeText], set[str]]:
-    """The classes with what they inherit, and the names of those that cannot be made because a base is missing."""
-    whole = {name: text for name, text in composites.items() if text.extends is None}
-    broken: set[str] = set()
+    composites: Mapping[str, CompositeText], actor_types: Collection[str], problems: Problems, limits: Limits = NORMAL
+) -> dict[str, CompositeText | Poison]:
+    """The classes with what they inherit; poison, if a base is missing."""
+    whole: dict[str, CompositeText | Poison] = {}
     inherited = 0
-    for each in composites:
-        name = each
+    for name, text in composites.items():
         # From the class up to the first finished base, then back down: no recursion, however long the chain.
-        way: list[tuple[CompositeText, Text]] = []
-        while name not in whole and name not in broken:
-            base = composites[name].extends
-            assert base is not None, "what extends nothing is whole"
-            way.append((composites[name], base))
-            if not _is_sound(way, composites, actor_types, problems):
-                broken.update(text.name for text, _ in way)
+        way: list[CompositeText] = []
+        found: CompositeText | Poison | None = None
+        while (found := whole.get(name)) is None:
+            way.append(text := composites[name])
+            if text.extends is None:
+                found = whole[name] = way.pop()
                 break
-            name = base.text
-        for text, base in reversed(way):
-            if base.text in broken:
-                broken.add(text.name)
-            if text.name not in broken:
-                inherited += _size(whole[base.text])
+            if text.extends is POISON or not _is_sound(way, composites, actor_types, problems):
+                found = POISON
+                break
+            name = text.extends.text
+        for text in reversed(way):
+            if found is not POISON:
+                inherited += _size(found)
                 if inherited > limits.inherited:
                     most = f"{limits.inherited:,} actors, aspects, connections, ports and parameters"
-                    problems.stop(f"{text.name}: the classes inherit more than {most}", base.position, RAISE_IT)
-                whole[text.name] = _Heir(whole[base.text], text, problems).composite()
-    return {name: whole[name] for name in composites if name in whole}, broken
+                    at = text.extends.position if text.extends else text.position
+                    problems.stop(f"{text.name}: the classes inherit more than {most}", at, RAISE_IT)
+                found = _Heir(found, text, problems).composite()
+            whole[text.name] = found
+    return {name: whole[name] for name in composites}
 
 
 def _size(text: CompositeText) -> int:
@@ -60,16 +63,12 @@ def _size(text: CompositeText) -> int:
 
 
 def _is_sound(
-    way: list[tuple[CompositeText, Text]],
-    composites: dict[str, CompositeText],
-    actor_types: Collection[str],
-    problems: Problems,
+    way: list[CompositeText], composites: Mapping[str, CompositeText], actor_types: Collection[str], problems: Problems
 ) -> bool:
     """Whether the last class of the chain extends one that exists and is not already in the chain."""
-    last, base = way[-1]
-    names = [text.name for text, _ in way]
-    if not base.text:
-        return False  # reported when it was read
+    last, names = way[-1], [text.name for text in way]
+    assert last.extends
+    base = last.extends
     if base.text not in composites:
         known = [name for name in composites if name != last.name]
         message = f"there is no composite {base.text!r} to extend{did_you_mean(base.text, known)}"
@@ -78,11 +77,11 @@ def _is_sound(
             message, hint = f"{base.text} is an actor type, and only composites can be extended", "use it as an actor"
         problems.add(f"{last.name}: {message}", base.position, hint)
     elif base.text in names:
-        loop = way[names.index(base.text) :]
+        loop = [(text.name, text.extends) for text in way[names.index(base.text) :] if text.extends]
         problems.add(
-            f"{base.text} extends itself: {' -> '.join([*(text.name for text, _ in loop), base.text])}",
+            f"{base.text} extends itself: {' -> '.join([*(name for name, _ in loop), base.text])}",
             loop[0][1].position,
-            *(f"{text.name} extends {extended.text} at {extended.position}" for text, extended in loop),
+            *(f"{name} extends {extended.text} at {extended.position}" for name, extended in loop),
         )
     elif len(way) > MAX_BASES:
         problems.add(f"{names[0]} has a chain of more than {MAX_BASES} bases", base.position)
@@ -107,13 +106,15 @@ class _Heir:
             old = base.parameters.get(name)
             given = {key: getattr(parameter, key) for key in parameter.given}
             found = parameter if old is None else replace(old, position=parameter.position, **given)
-            try:
-                found.bounds()
-            except UnitError as error:
-                self._problem(f"parameter {name!r}: {error}", parameter.position)
-                found = replace(found, spoilt=True)
+            if POISON in (parameter.value, None if old is None else old.value):
+                found = replace(found, value=POISON)
+            else:
+                try:
+                    found.bounds()
+                except UnitError as error:
+                    self._problem(f"parameter {name!r}: {error}", parameter.position)
+                    found = replace(found, value=POISON)
             parameters[name] = found
-        kept = [each for old in base.connections for each in self._kept(old, removed)]
         result = replace(
             text,
             doc=text.doc or base.doc,
@@ -125,17 +126,14 @@ class _Heir:
             refinements={**base.refinements, **text.refinements},
             actors=self._parts("actor", base.actors, text.actors),
             aspects=self._parts("aspect", self._still_aimed(removed), text.aspects),
-            connections=(*kept, *(each for each in text.connections if not each.removes)),
-            is_wired=text.is_wired and base.is_wired,
+            connections=self._connections(removed),
             removed={**{name: at for name, at in base.removed.items() if name not in text.actors}, **removed},
-            spoilt=text.spoilt or base.spoilt,
         )
         for name, part in result.actors.items():
             is_port = name in result.inputs or name in result.outputs
             # If both are new, it was reported when the class was read.
             if is_port and (name in text.actors) != (name in text.inputs or name in text.outputs):
                 self._problem(f"{name!r} is the name of both an actor and a port", part.position, "rename one")
-        self._check_removals()
         return result
 
     def _machine(self) -> PartText | None:
@@ -191,46 +189,38 @@ class _Heir:
         """The base's aspects without the pointcuts at removed actors, and without those that lose all of them."""
         aspects = {}
         for name, part in self.base.aspects.items():
-            at = tuple(pointcut for pointcut in part.at if _head(pointcut) not in removed)
+            at = tuple(each for each in part.at if not each or each.head not in removed)
             if at or not part.at or name in self.text.aspects:
                 aspects[name] = replace(part, at=at)
         return aspects
 
-    def _kept(self, connection: ConnectionText, removed: Collection[str]) -> list[ConnectionText]:
-        """What is left of a connection of the base, in parts if only some of its pairs are removed."""
-        cut = {pair for each in self.text.connections if each.removes for pair in _pairs(each)}
-        left = [
-            replace(connection, sources=(source,), destinations=destinations)
-            for source in connection.sources
-            if (
-                destinations := tuple(
-                    end
-                    for end in connection.destinations
-                    if (source.text, end.text) not in cut and _head(source) not in removed and _head(end) not in removed
-                )
-            )
-        ]
-        return [connection] if sum(map(len, map(_pairs, left))) == len(_pairs(connection)) else left
-
-    def _check_removals(self) -> None:
-        """Report removals of connections that do not exist."""
-        known = {pair for each in self.base.connections for pair in _pairs(each)}
+    def _connections(self, removed: Collection[str]) -> tuple[ConnectionText | Poison, ...]:
+        """The connections of the base that are left, and those that the class adds."""
+        removals = [each for each in self.text.connections if each and each.removes]
+        known = {pair for each in self.base.connections if each for pair in _pairs(each)}
         written = [f"{source} -> {end}" for source, end in sorted(known)]
-        for connection in self.text.connections:
-            if not connection.removes:
-                continue
-            for source, end in _pairs(connection):
-                if (source, end) not in known:
-                    wanted = f"{source} -> {end}"
-                    message = f"{self.base.name} has no connection {wanted!r} to remove{did_you_mean(wanted, written)}"
-                    self._problem(message, connection.position, f"write both ends as {self.base.name} does")
+        for removal in removals:
+            for source, end in (pair for pair in _pairs(removal) if pair not in known):
+                wanted = f"{source} -> {end}"
+                message = f"{self.base.name} has no connection {wanted!r} to remove{did_you_mean(wanted, written)}"
+                self._problem(message, removal.position, f"write both ends as {self.base.name} does")
+        cut = {pair for each in removals for pair in _pairs(each)}
+        kept = [each for old in self.base.connections for each in (_kept(old, cut, removed) if old else [old])]
+        return (*kept, *(each for each in self.text.connections if not (each and each.removes)))
+
+
+def _kept(
+    connection: ConnectionText, cut: Collection[tuple[str, str]], removed: Collection[str]
+) -> list[ConnectionText]:
+    """What is left of a connection, in parts if only some of its pairs are removed."""
+    left = []
+    for source in connection.sources:
+        ends = [end for end in connection.destinations if (source.text, end.text) not in cut]
+        ends = [end for end in ends if source.actor not in removed and end.actor not in removed]
+        if ends:
+            left.append(replace(connection, sources=(source,), destinations=tuple(ends)))
+    return [connection] if sum(map(len, map(_pairs, left))) == len(_pairs(connection)) else left
 
 
 def _pairs(connection: ConnectionText) -> list[tuple[str, str]]:
     return [(source.text, end.text) for source in connection.sources for end in connection.destinations]
-
-
-def _head(text: Text | PointcutText) -> str:
-    """The actor that an endpoint or pointcut names first; nothing for an own port."""
-    first, dot, _ = text.text.partition(".")
-    return first.partition("[")[0] if dot or isinstance(text, PointcutText) else ""

@@ -2,15 +2,26 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 from epicycle.actors import Parameter, declared_parameters
 
-from ..catalogue import TAKES, Measure, take_problem
-from ..text import Entry, NodeReader, is_empty
-from .declarations import MetricText
+from ..catalogue import TAKES, Measure, take_fault
+from ..text import POISON, Entry, NodeReader, Poison, Position, Text
 from .fields import AT, TEXTS, Construct, Key, about, named, node_as, one_or_more, ref, schema_of
 from .places import PATTERN_SCHEMA
+
+
+@dataclass(frozen=True)
+class MetricText:
+    """A number computed from what ports send, or from other metrics; ``values`` are those of a ``Measure``."""
+
+    name: str
+    ports: tuple[Text, ...]
+    formula: Text | None
+    values: dict[str, Entry]
+    position: Position
 
 
 def _of_metric(key: str, parameter: Parameter[Any]) -> Key:
@@ -24,10 +35,10 @@ METRIC = Construct(
     "A number computed from what ports send, or from other metrics.",
     {
         "of": Key(
-            node_as(one_or_more(PATTERN_SCHEMA)),
+            TEXTS.described(one_or_more(PATTERN_SCHEMA)),
             "The output port, a pattern for several, or a list of these.",
         ),
-        "from": Key(node_as(ref("text")), "An expression over other metrics of the model, such as 'delivered / sent'."),
+        "from": Key(AT, "An expression over other metrics of the model, such as 'delivered / sent'."),
         **{key: _of_metric(key, each) for key, each in declared_parameters(Measure).items()},
     },
     type="object",
@@ -36,31 +47,30 @@ METRIC = Construct(
 _WITH_FORMULA = ("from", "unit", "to", "doc", "label")
 
 
-def _metric(reader: NodeReader, name: str, entry: Entry) -> MetricText | None:
+def _metric(reader: NodeReader, name: str, entry: Entry) -> MetricText | Poison:
     """``name: {of: port, take: last, unit: s, doc: ...}``, or ``name: {from: delivered / sent, doc: ...}``."""
     what = f"metric {name!r}"
     entries = METRIC.entries(reader, entry.value, what)
-    if entries is None:
-        return None
+    if entries is POISON:
+        return POISON
     said = METRIC.values(reader, entries, what, entry.key.position)
     if "from" in said:
         for key in entries:
             if key not in _WITH_FORMULA:
                 message = f"{what}: {key!r} cannot be used with 'from'"
                 reader.problems.add(message, entries[key].key.position, f"it can have {', '.join(_WITH_FORMULA[1:])}")
-        formula = AT.read(reader, said["from"], "from")
+        formula = said["from"]
         values = {key: each for key, each in entries.items() if key in _WITH_FORMULA[1:]}
-        return None if formula is None else MetricText(name, (), formula, values, entry.key.position)
-    before = len(reader.problems)
-    ports = TEXTS.read(reader, said["of"], "of") if "of" in said else ()
-    if "of" not in entries or is_empty(entries["of"].value) or (not ports and len(reader.problems) == before):
+        return POISON if formula is POISON else MetricText(name, (), formula, values, entry.key.position)
+    ports = said.get("of", ())
+    if ports == ():
         hint = "add 'of: actor.port', or 'from: delivered / sent' over other metrics"
-        reader.problems.add(f"{what} has no port", entry.key.position, hint)
+        ports = reader.problems.add(f"{what} has no port", entry.key.position, hint)
     take = reader.text(said["take"], "take") if "take" in said else "last"
-    if take is not None and (problem := take_problem(name, take)):
-        reader.problems.add(problem[0], entries["take"].value.position, problem[1])
-    if not ports or take not in TAKES:
-        return None
+    if take is not POISON and (fault := take_fault(name, take)):
+        take = reader.problems.add(fault.message, entries["take"].value.position, *fault.help)
+    if ports is POISON or take is POISON:
+        return POISON
     return MetricText(
         name, ports, None, {key: each for key, each in entries.items() if key != "of"}, entry.key.position
     )

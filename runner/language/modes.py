@@ -7,9 +7,9 @@ from typing import Any
 
 from epicycle.actors import declared_parameters
 
-from ..text import Entry, Mapping, NodeReader, Position, Text
-from .declarations import PartText
+from ..text import POISON, Entry, Mapping, NodeReader, Poison, Position, Text
 from .fields import AT, Key, Schema, names_of, node_as, one_or_more, ref
+from .parts import PartText
 
 _VALUES: Schema = {"type": ["object", "string"]}
 _MODE: Schema = {"type": ["object", "null"], "properties": {"refinement": {"type": ["string", "object"]}}}
@@ -50,8 +50,7 @@ def machine_of(
                 valid = (*declared_parameters(_mode()), "refinement")
                 inner = dict(reader.entries(entry.value, f"mode {mode!r}", valid) or {})
                 said = inner.pop("refinement", None)
-                refinement = None if said is None else _refinement(reader, mode, said)
-                if refinement is not None:
+                if said is not None and (refinement := _refinement(reader, mode, said)):
                     refinements[mode] = refinement
                 left[mode] = replace(entry, value=replace(entry.value, entries=inner))
         machine["modes"] = replace(modes, value=replace(modes.value, entries=left))
@@ -65,12 +64,11 @@ def _mode() -> type:
     return Mode
 
 
-def _refinement(reader: NodeReader, mode: str, entry: Entry) -> PartText | None:
+def _refinement(reader: NodeReader, mode: str, entry: Entry) -> PartText | Poison:
     """A composite class by its name, or as ``{type: ..., <parameter>: ...}``."""
     values = dict(entry.value.entries) if isinstance(entry.value, Mapping) else {}
     said = values.pop("type", None) if isinstance(entry.value, Mapping) else entry
     if said is None:
-        reader.problems.add(f"the refinement of {mode!r} has no type", entry.key.position, "add 'type: ...'")
-        return None
-    kind: Text | None = AT.read(reader, said.value, f"the refinement of {mode!r}")
-    return None if kind is None else PartText(mode, entry.key.position, kind, values)
+        return reader.problems.add(f"the refinement of {mode!r} has no type", entry.key.position, "add 'type: ...'")
+    kind: Text | Poison = AT.read(reader, said.value, f"the refinement of {mode!r}")
+    return POISON if kind is POISON else PartText(mode, entry.key.position, kind, values)

@@ -2,14 +2,28 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 from epicycle.actors import Parameter, declared_parameters
 
 from ..temporal import Requirement
-from ..text import Entry, Mapping, NodeReader
-from .declarations import MonitorText
+from ..text import POISON, Entry, Mapping, NodeReader, Poison, Position
 from .fields import Construct, Key, about, named, node_as, ref, schema_of
+
+
+@dataclass(frozen=True)
+class MonitorText:
+    """A property that a run must have; ``values`` are those of a ``Requirement``."""
+
+    name: str
+    values: dict[str, Entry]
+    position: Position
+
+    def place(self, key: str) -> Position:
+        """Where one of its values is; its own place if that is a default."""
+        return self.values[key].value.position if key in self.values else self.position
+
 
 _WRITTEN = ("property", "unit", "doc", "label")  # texts, in which numbers need no quotes
 
@@ -28,16 +42,15 @@ MONITOR = Construct(
 )
 
 
-def _monitor(reader: NodeReader, name: str, entry: Entry) -> MonitorText | None:
+def _monitor(reader: NodeReader, name: str, entry: Entry) -> MonitorText | Poison:
     """``name: always ...`` or ``name: {property: always ..., between: linear, unit: m, doc: ...}``."""
     if not isinstance(entry.value, Mapping):
         return MonitorText(name, {"property": entry}, entry.key.position)
     entries = MONITOR.entries(reader, entry.value, f"monitor {name!r}")
-    if entries is None:
-        return None
-    before = len(reader.problems)
-    MONITOR.values(reader, entries, f"monitor {name!r}", entry.key.position)
-    return MonitorText(name, entries, entry.key.position) if len(reader.problems) == before else None
+    if entries is POISON:
+        return POISON
+    said = MONITOR.values(reader, entries, f"monitor {name!r}", entry.key.position)
+    return POISON if POISON in said.values() else MonitorText(name, entries, entry.key.position)
 
 
 MONITORS = named(ref("monitor"), _monitor)

@@ -2,22 +2,27 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
 
-from ..text import Mapping, Node, NodeReader, Scalar, Sequence, Text, inside, split
-from .declarations import ConnectionText, PointcutText
+from epicycle.aspects import FiringTime, FiringTimeParameter
+
+from ..text import POISON, Mapping, Node, NodeReader, Poison, Position, Scalar, Sequence, Text, inside, is_empty, split
 from .fields import (
     AT,
     FLAG,
     NAME,
-    TEXTS,
+    TIME,
+    Computed,
     Construct,
     Key,
     Schema,
     Shape,
-    computed,
+    computed_as,
+    keyed,
     looks_like,
-    node_as,
+    nanoseconds,
     one_or_more,
     ref,
 )
@@ -57,69 +62,110 @@ _POINTCUT_SCHEMA: Schema = {
 
 # -- connections --------------------------------------------------------------------------------------------------
 
-_ENDS = TEXTS.described(ref("ports"))
-CONNECTION = Construct(
-    "From ports, to ports.",
-    {
-        "from": Key(_ENDS, "The sending ports.", name="sources"),
-        "to": Key(_ENDS, "The receiving ports.", name="destinations"),
-        "all": Key(
-            FLAG,
-            "Connect each to all, as '=>' does; otherwise several on both sides are connected in pairs.",
-            called="'all' of a connection",
-            name="to_all",
-        ),
-        "shared": Key(
-            FLAG,
-            "Make it one channel at each port, like a relation in Ptolemy; otherwise each pair is one.",
-            called="'shared' of a connection",
-        ),
-        "delay": Key(
-            node_as(computed("number", 0.0, unit="s")),
-            "How long a token takes, such as 100 ms; 0 is the next microstep.",
-        ),
-    },
-)
+_END = re.compile(r"(?:([A-Za-z_]\w*)(?:\[([^\[].*|)\])?\.)?([A-Za-z_]\w*)\Z", re.ASCII | re.DOTALL)
+_FORMS = "'actor.port', 'array[*].port', 'array[0].port', 'array[1..3].port' or a port of this composite"
 
 
-def connection(reader: NodeReader, node: Node, what: str = "") -> ConnectionText | None:
+@dataclass(frozen=True)
+class Endpoint:
+    """One end of a connection: a port of an actor, or of one or several of an array, or of the composite itself."""
+
+    text: str
+    position: Position
+    actor: str  # "" for a port of the composite itself
+    index: str | None
+    port: str
+
+
+def endpoint(reader: NodeReader, text: Text) -> Endpoint | Poison:
+    """What a text names as one end of a connection."""
+    match = _END.match(text.text)
+    if match is None:
+        message = f"{text.text!r} is not a port that can be connected here"
+        return reader.problems.add(message, text.position, f"write {_FORMS}")
+    return Endpoint(text.text, text.position, match[1] or "", match[2], match[3])
+
+
+def endpoints(reader: NodeReader, texts: Iterable[Text] | Poison) -> tuple[Endpoint, ...] | Poison:
+    """What several texts name; poison if one of them is none."""
+    found = [endpoint(reader, text) for text in texts or ()]
+    sound = tuple(each for each in found if each)
+    return POISON if texts is POISON or len(sound) < len(found) else sound
+
+
+_ENDS = Shape(ref("ports"), lambda reader, node, what: endpoints(reader, reader.texts(node, what)))
+
+
+@dataclass(frozen=True)
+class ConnectionText:
+    """One entry of ``connections``; with ``to_all``, each source leads to all destinations, otherwise they are paired.
+
+    If it is ``shared``, it is one channel at each port.
+    """
+
+    position: Position
+    sources: tuple[Endpoint, ...] = keyed(_ENDS, "The sending ports.", key="from")
+    destinations: tuple[Endpoint, ...] = keyed(_ENDS, "The receiving ports.", key="to")
+    to_all: bool = keyed(
+        FLAG,
+        "Connect each to all, as '=>' does; otherwise several on both sides are connected in pairs.",
+        key="all",
+        called="'all' of a connection",
+        default=False,
+    )
+    shared: bool = keyed(
+        FLAG,
+        "Make it one channel at each port, like a relation in Ptolemy; otherwise each pair is one.",
+        called="'shared' of a connection",
+        default=False,
+    )
+    delay: Computed | None = keyed(
+        computed_as(TIME, nanoseconds),
+        "How long a token takes, such as 100 ms; 0 is the next microstep.",
+        default=None,
+    )
+    removes: Position | None = None  # where the file removes these from the inherited ones
+
+
+CONNECTION = Construct.of(ConnectionText, "From ports, to ports.")
+
+
+def connection(reader: NodeReader, node: Node, what: str = "") -> ConnectionText | Poison:
     """``a.out -> b.in``, ``a[*].out => b[*].in``, ``{from: ..., to: ..., delay: ...}`` or ``{remove: ...}``."""
     problems = reader.problems
     if isinstance(node, Mapping) and list(node.entries) == ["remove"]:
         removed = connection(reader, node.entries["remove"].value)
-        return None if removed is None else replace(removed, removes=node.position)
+        return POISON if removed is POISON else replace(removed, removes=node.position)
     if isinstance(node, Scalar):
         return _arrow(reader, node)
     if not isinstance(node, Mapping):
         hint = "write 'actor.port -> actor.port' or {from: ..., to: ..., delay: ...}"
-        problems.add("this is not a connection", node.position, hint)
-        return None
+        return problems.add("this is not a connection", node.position, hint)
     entries = CONNECTION.entries(reader, node, "a connection") or {}
-    before = len(problems)
     said = CONNECTION.values(reader, entries, "a connection", node.position)
     for key in ("from", "to"):
-        if not said.setdefault(CONNECTION.keys[key].name, ()) and len(problems) == before:
-            problems.add(f"the connection has no {key!r}", node.position)
-    is_whole = said["sources"] and said["destinations"]
-    return ConnectionText(position=node.position, **said) if is_whole else None
+        if said.get(CONNECTION.keys[key].name, ()) == ():
+            said[key] = problems.add(f"the connection has no {key!r}", node.position)
+    return POISON if POISON in said.values() else ConnectionText(position=node.position, **said)
 
 
-def _arrow(reader: NodeReader, node: Scalar) -> ConnectionText | None:
-    text = node.value if isinstance(node.value, str) else node.text
+def _arrow(reader: NodeReader, node: Scalar) -> ConnectionText | Poison:
+    text, advice = node.value if isinstance(node.value, str) else node.text, "write 'actor.port -> actor.port'"
     places = [(start, end) for arrow in ("->", "=>") for start, end in split(text, arrow)[1:]]
     if len(places) != 1:
-        reader.problems.add(f"{text!r} is not a connection", node.position, "write 'actor.port -> actor.port'")
-        return None
+        return reader.problems.add(f"{text!r} is not a connection", node.position, advice)
     right = places[0][0]
-    sources, destinations = _endpoints(node, text, 0, right - 2), _endpoints(node, text, right, len(text))
-    if not sources or not destinations:
-        side = "right" if sources else "left"
-        reader.problems.add(f"{text!r} has no port on its {side}", node.position, "write 'actor.port -> actor.port'")
-        return None
-    return ConnectionText(sources, destinations, node.position, to_all=text[right - 2] == "=")
+    left, behind = _side(node, text, 0, right - 2), _side(node, text, right, len(text))
+    if not left or not behind:
+        side = "right" if left else "left"
+        return reader.problems.add(f"{text!r} has no port on its {side}", node.position, advice)
+    sources, destinations = endpoints(reader, left), endpoints(reader, behind)
+    if sources is POISON or destinations is POISON:
+        return POISON
+    return ConnectionText(node.position, sources, destinations, to_all=text[right - 2] == "=")
 
 
-def _endpoints(node: Scalar, text: str, start: int, end: int) -> tuple[Text, ...]:
+def _side(node: Scalar, text: str, start: int, end: int) -> list[Text]:
     """The comma-separated ports of one side of a connection; brackets around the list are allowed."""
     side = text[start:end]
     if side.strip().startswith("[") and side.strip().endswith("]"):
@@ -130,7 +176,7 @@ def _endpoints(node: Scalar, text: str, start: int, end: int) -> tuple[Text, ...
         if name := part.strip():
             offset = start + first + len(part) - len(part.lstrip())
             found.append(Text(name, inside(node, text, offset, name)))
-    return tuple(found)
+    return found
 
 
 def connection_schema() -> Schema:
@@ -151,52 +197,111 @@ def connection_schema() -> Schema:
 # -- pointcuts ----------------------------------------------------------------------------------------------------
 
 _OF_POINTCUT = "{key} of a pointcut"
-POINTCUT = Construct(
-    "",
-    {
-        "at": Key(
-            AT.described(_POINTCUT_SCHEMA), "Ports or actors, as a pattern, or a connection.", called=_OF_POINTCUT
-        ),
-        "type": Key(
-            AT, "The type of the actors and composites that it attaches to, directly or at their ports.", _OF_POINTCUT
-        ),
-        "tag": Key(
-            AT, "A tag of the actors and composites that it attaches to, directly or at their ports.", _OF_POINTCUT
-        ),
-        "port": Key(AT, "The name of the port (default: all ports that it can attach to).", _OF_POINTCUT),
-        "parameter": Key(AT, "The name of a parameter of the actors, for an aspect that alters numbers.", _OF_POINTCUT),
-        "request": Key(AT, "For an aspect that is a composite: the input that receives these tokens.", _OF_POINTCUT),
-        "time": Key(node_as(ref("firing_time")), "For a composite at actors: how long their firings take."),
-    },
-    type="object",
-)
 
 
-def pointcuts(reader: NodeReader, node: Node, what: str) -> tuple[PointcutText, ...]:
+@dataclass(frozen=True)
+class PointcutText:
+    """Where an aspect attaches: a pattern, or a type or tag and perhaps a port; ``exclude``: where it does not.
+
+    A pattern of single connections has ``ends``.  For an aspect that is a model, ``request`` is the port by which
+    tokens or firings come in, ``time`` makes it attach to actors and gives the time of their firings.
+    """
+
+    text: str
+    position: Position
+    exclude: bool = False
+    ends: tuple[str, str] | None = None
+    type: Text | None = keyed(
+        AT,
+        "The type of the actors and composites that it attaches to, directly or at their ports.",
+        called=_OF_POINTCUT,
+        default=None,
+    )
+    tag: Text | None = keyed(
+        AT,
+        "A tag of the actors and composites that it attaches to, directly or at their ports.",
+        called=_OF_POINTCUT,
+        default=None,
+    )
+    port: Text | None = keyed(
+        AT, "The name of the port (default: all ports that it can attach to).", called=_OF_POINTCUT, default=None
+    )
+    parameter: Text | None = keyed(
+        AT,
+        "The name of a parameter of the actors, for an aspect that alters numbers.",
+        called=_OF_POINTCUT,
+        default=None,
+    )
+    request: Text | None = keyed(
+        AT,
+        "For an aspect that is a composite: the input that receives these tokens.",
+        called=_OF_POINTCUT,
+        default=None,
+    )
+    time: Computed | None = keyed(
+        computed_as(FiringTimeParameter(), schema=ref("firing_time")),
+        "For a composite at actors: how long their firings take.",
+        default=None,
+    )
+    firing_time: FiringTime = 0.0  # the value of ``time``
+
+    @classmethod
+    def of(cls, text: Text) -> PointcutText:
+        """``pattern``, or ``!pattern`` for where an aspect does not attach."""
+        pattern = text.text.strip()
+        exclude = pattern.startswith("!")
+        pattern = pattern[1:].strip() if exclude else pattern
+        left, arrow, right = pattern.partition("->")
+        return cls(pattern, text.position, exclude, (left.strip(), right.strip()) if arrow else None)
+
+    @property
+    def head(self) -> str:
+        """The actor that it names first."""
+        return self.text.partition(".")[0].partition("[")[0]
+
+
+_AT = AT.described(_POINTCUT_SCHEMA)
+POINTCUT = Construct.of(PointcutText, type="object")
+POINTCUT.keys = {"at": Key(_AT, "Ports or actors, as a pattern, or a connection.", _OF_POINTCUT), **POINTCUT.keys}
+
+
+def pointcuts(reader: NodeReader, node: Node, what: str) -> tuple[PointcutText | Poison, ...]:
     """A pattern, ``!pattern``, ``{at: ...}``, ``{type: ..., port: ...}`` or ``{tag: ...}``, or a list of these."""
-    found = []
+    found: list[PointcutText | Poison] = []
     for item in node.items if isinstance(node, Sequence) else (node,):
-        if not isinstance(item, Mapping):
-            found += [PointcutText.of(text) for text in reader.texts(item, what)]
-            continue
-        entries = POINTCUT.entries(reader, item, "a pointcut") or {}
-        said = POINTCUT.values(reader, entries, "a pointcut", item.position)
-        at = said.pop("at", None)
-        where = PointcutText("", item.position) if at is None else PointcutText.of(at)
-        if sum(key in entries for key in ("at", "type", "tag")) != 1 or (at is not None and "port" in said):
-            hint = "write {at: ...}, {type: ..., port: ...} or {tag: ...}"
-            reader.problems.add("a pointcut selects by pattern, type or tag", item.position, hint)
-            said = {}
-        found.append(replace(where, **said))
+        if isinstance(item, Mapping):
+            found.append(_pointcut(reader, item))
+        else:
+            texts = reader.texts(item, what)
+            found += [POISON] if texts is POISON else map(PointcutText.of, texts)
     return tuple(found)
 
 
+def _pointcut(reader: NodeReader, item: Mapping) -> PointcutText | Poison:
+    entries = POINTCUT.entries(reader, item, "a pointcut") or {}
+    said = POINTCUT.values(reader, entries, "a pointcut", item.position)
+    if sum(key in entries for key in ("at", "type", "tag")) != 1 or ("at" in entries and "port" in said):
+        hint = "write {at: ...}, {type: ..., port: ...} or {tag: ...}"
+        return reader.problems.add("a pointcut selects by pattern, type or tag", item.position, hint)
+    if POISON in said.values():
+        return POISON
+    at = said.pop("at", None)
+    return replace(PointcutText("", item.position) if at is None else PointcutText.of(at), **said)
+
+
 POINTCUTS_SCHEMA = one_or_more({"anyOf": [_POINTCUT_SCHEMA, POINTCUT.schema]})
-PATTERNS = node_as(ref("patterns"))
+PATTERNS = Shape(
+    ref("patterns"),
+    lambda reader, node, what: tuple(
+        reader.placed(item, what)
+        for item in (node.items if isinstance(node, Sequence) else (node,))
+        if not is_empty(item)
+    ),
+)
 POINTCUTS = Shape(ref("pointcuts"), pointcuts)
 CONNECTIONS = Shape(
     {"type": ["array", "null"], "items": ref("connection")},
     lambda reader, node, what: (
-        None if (items := reader.items(node, what)) is None else tuple(connection(reader, each) for each in items)
+        POISON if (items := reader.items(node, what)) is POISON else tuple(connection(reader, each) for each in items)
     ),
 )

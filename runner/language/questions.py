@@ -10,7 +10,22 @@ from pathlib import Path
 
 from epicycle.actors.expression import ExpressionError, Formula
 
-from ..text import Entry, Node, NodeReader, Position, Problems, Scalar, Sequence, Text, did_you_mean, inside, parse
+from ..text import (
+    POISON,
+    Entry,
+    Node,
+    NodeReader,
+    Poison,
+    Position,
+    Problems,
+    Scalar,
+    Sequence,
+    Text,
+    blame,
+    did_you_mean,
+    inside,
+    parse,
+)
 from ..text import Mapping as MappingNode
 from .claims import ALWAYS, FALLS, FORMS, GREATER, LESS, RISES, Claim, Guideline, Questions, Selection, shown_level
 from .dimensions import Dimension, Factor, as_factor
@@ -66,7 +81,7 @@ class QuestionReader(NodeReader):
                 asked[0].key.position,
             )
             return Questions()
-        guideline = self.guideline(entries["guideline"]) if "guideline" in entries else None
+        guideline = (self.guideline(entries["guideline"]) or None) if "guideline" in entries else None
         node = entries["claims"].value if "claims" in entries else None
         if node is None:
             return Questions(guideline=guideline)
@@ -112,83 +127,76 @@ class QuestionReader(NodeReader):
 
     def claims(self, node: Node) -> tuple[Claim, ...]:
         """A mapping from names to claims."""
-        found = (self.claim(name, entry) for name, entry in self.named(node, "claims"))
-        return tuple(claim for claim in found if claim is not None)
+        found = (self.claim(name, entry) for name, entry in self.named(node, "claims") or ())
+        return tuple(claim for claim in found if claim)
 
-    def claim(self, name: str, entry: Entry) -> Claim | None:
+    def claim(self, name: str, entry: Entry) -> Claim | Poison:
         """One claim: one of the forms, and what belongs to it."""
-        before = len(self.problems)
         what, position = f"claim {name}", entry.key.position
         entries = CLAIM.entries(self, entry.value, what)
-        if entries is None:
-            return None
+        if entries is POISON:
+            return POISON
         forms = [form for form in FORMS if form in entries]
         if len(forms) != 1:
             reason = f"has more than one form: {', '.join(forms)}" if forms else "claims nothing"
-            self.problems.add(f"{what} {reason}", position, f"give one of {', '.join(FORMS)}")
-            return None
-        form = forms[0]
+            return self.problems.add(f"{what} {reason}", position, f"give one of {', '.join(FORMS)}")
+        form, wrong = forms[0], list[Poison]()
         for key in entries.keys() - {"doc", form, *FORMS[form]}:
-            takes = ", ".join(FORMS[form])
-            self.problems.add(
-                f"{what}: {key!r} cannot be used with {form!r}", entries[key].key.position, f"{form!r} takes: {takes}"
-            )
+            message, takes = f"{what}: {key!r} cannot be used with {form!r}", ", ".join(FORMS[form])
+            wrong.append(self.problems.add(message, entries[key].key.position, f"{form!r} takes: {takes}"))
         for key in {"at", "over"} & set(FORMS[form]) - entries.keys():
             example = "at: {load: 0.5}" if key == "at" else "over: load"
-            self.problems.add(f"{what} has no {key!r}", position, f"for example, add {example!r}")
-        if len(self.problems) > before:
-            return None
+            wrong.append(self.problems.add(f"{what} has no {key!r}", position, f"for example, add {example!r}"))
+        if wrong:
+            return POISON
         said = CLAIM.values(self, entries, what, position)
-        condition, metrics = ("", said.pop(form, ())) if form != ALWAYS else said.pop(form)
-        if not metrics and len(self.problems) == before:
-            self.problems.add(f"{what} names no metric", entries[form].value.position)
+        if said[form] in ((), ("", ())):
+            said[form] = self.problems.add(f"{what} names no metric", entries[form].value.position)
+        if POISON in said.values():
+            return POISON
+        condition, metrics = said.pop(form) if form == ALWAYS else ("", said.pop(form))
         at, than = said.get("at", {}), said.get("than")
-        if than is not None and than.keys() != at.keys() and len(self.problems) == before:
+        if than is not None and than.keys() != at.keys():
             message = f"{what}: 'at' and 'than' name different factors"
             hint = f"at: {', '.join(at)}; than: {', '.join(than) or 'none'}"
-            self.problems.add(message, entries["than"].key.position, hint)
-        if len(self.problems) > before:
-            return None
-        claim = Claim(name, form, tuple(metrics), position, condition=condition, **said)
+            return self.problems.add(message, entries["than"].key.position, hint)
+        claim = Claim(name, form, metrics, position, condition=condition, **said)
         self.compares(claim)
-        return claim if len(self.problems) == before else None
+        return claim
 
-    def condition(self, node: Node, what: str) -> tuple[str, list[Text]]:
+    def condition(self, node: Node, what: str) -> tuple[str, tuple[Text, ...]] | Poison:
         """An expression over metrics that is true or false."""
         text = self.text(node, what)
-        if text is None or not isinstance(node, Scalar):
-            return "", []
+        if text is POISON or not isinstance(node, Scalar):
+            return POISON
         try:
             formula = Formula(text)
         except ExpressionError as error:
-            part = text[error.offset : error.offset + max(error.length, 1)]
-            self.problems.add(f"{what}: {error}", inside(node, text, error.offset, part))
-            return "", []
+            return blame(self.problems, what, error, node)
         if not formula.is_condition or not formula.names:
-            self.problems.add(
-                f"{what}: {text!r} is not a condition on metrics",
-                node.position,
-                "write a comparison such as 'longest_wait < 30'",
-            )
-        return text, [Text(name, inside(node, text, max(text.find(name), 0), name)) for name in formula.names]
+            advice = "write a comparison such as 'longest_wait < 30'"
+            return self.problems.add(f"{what}: {text!r} is not a condition on metrics", node.position, advice)
+        return text, tuple(Text(name, inside(node, text, max(text.find(name), 0), name)) for name in formula.names)
 
-    def selection(self, node: Node, what: str, key: str) -> Selection:
+    def selection(self, node: Node, what: str, key: str) -> Selection | Poison:
         """``{factor: level}`` or ``{factor: [level, ...]}``, with levels of the study."""
         if not isinstance(node, MappingNode) or not node.entries:
             hint = "write {load: 0.5} or {load: [0.5, 0.7]}"
-            self.problems.add(f"{what}: {key!r} is not a mapping from factors to levels", node.position, hint)
-            return {}
-        found: Selection = {}
+            return self.problems.add(f"{what}: {key!r} is not a mapping from factors to levels", node.position, hint)
+        found: dict[str, list[tuple[Factor] | Poison]] = {}
         for factor, entry in node.entries.items():
-            if self.is_factor(factor, entry.key.position, what):
-                items = entry.value.items if isinstance(entry.value, Sequence) else (entry.value,)
-                if not items:
-                    self.problems.add(f"{what}: {key!r} lists no level of {factor}", entry.value.position)
-                levels = (self.level(factor, item, what) for item in items)
-                found[factor] = tuple(dict.fromkeys(level[0] for level in levels if level is not None))
-        return found
+            items = entry.value.items if isinstance(entry.value, Sequence) else (entry.value,)
+            if not self.is_factor(factor, entry.key.position, what):
+                found[factor] = [POISON]
+            elif items:
+                found[factor] = [self.level(factor, item, what) for item in items]
+            else:
+                found[factor] = [self.problems.add(f"{what}: {key!r} lists no level of {factor}", entry.value.position)]
+        if any(POISON in levels for levels in found.values()):
+            return POISON
+        return {factor: tuple(dict.fromkeys(level[0] for level in levels if level)) for factor, levels in found.items()}
 
-    def level(self, factor: str, node: Node, what: str) -> tuple[Factor] | None:
+    def level(self, factor: str, node: Node, what: str) -> tuple[Factor] | Poison:
         """The level that a node names, as the table holds it."""
         known = levels_of(self.dimensions, factor)
         value = as_factor(node, self.kinds[factor]) if isinstance(node, (Scalar, Sequence)) else ""
@@ -203,8 +211,8 @@ class QuestionReader(NodeReader):
         texts = [shown_level(each) for each in known]
         guess = did_you_mean(shown, texts) if self.kinds[factor] == "text" else ""
         hint = f"its levels: {', '.join(texts[:20])}{', ...' if len(texts) > 20 else ''}"
-        self.problems.add(f"{what}: the study has no level {shown} of {factor}{guess}", node.position, hint)
-        return None
+        message = f"{what}: the study has no level {shown} of {factor}{guess}"
+        return self.problems.add(message, node.position, hint)
 
     def is_factor(self, name: str, position: Position, what: str) -> bool:
         """Whether the study varies it; a problem otherwise."""
@@ -214,19 +222,20 @@ class QuestionReader(NodeReader):
         self.problems.add(message, position, f"it varies: {', '.join(self.kinds) or 'nothing'}")
         return False
 
-    def trend(self, node: Node, what: str, key: str) -> str:
+    def trend(self, node: Node, what: str, key: str) -> str | Poison:
         """A factor whose levels have an order; for ``per`` they must be numbers."""
         name = self.text(node, what)
-        if name is None or not self.is_factor(name, node.position, what):
-            return ""
+        if name is POISON or not self.is_factor(name, node.position, what):
+            return POISON
+        wrong = []
         if key == "per" and self.kinds[name] not in ("int", "float"):
-            self.problems.add(
-                f"{what}: the levels of {name} are not numbers, so there is no slope over it", node.position
-            )
+            wrong.append(f"the levels of {name} are not numbers, so there is no slope over it")
         size = next(dimension.size for dimension in self.dimensions if name in dimension.columns)
         if len(levels_of(self.dimensions, name)) < size:
-            self.problems.add(f"{what}: {name} takes a value more than once, so it has no order", node.position)
-        return name
+            wrong.append(f"{name} takes a value more than once, so it has no order")
+        for message in wrong:
+            self.problems.add(f"{what}: {message}", node.position)
+        return POISON if wrong else name
 
     def compares(self, claim: Claim) -> None:
         """Check that a claim has more than one level to compare."""
@@ -258,24 +267,24 @@ class QuestionReader(NodeReader):
 
     # -- the guideline --------------------------------------------------------------------------------------------
 
-    def guideline(self, entry: Entry) -> Guideline | None:
+    def guideline(self, entry: Entry) -> Guideline | Poison:
         """``{choose: servers, least: mean_wait, tolerance: 0.5}``."""
-        before = len(self.problems)
         entries = GUIDELINE.entries(self, entry.value, "guideline")
-        if entries is None:
-            return None
+        if entries is POISON:
+            return POISON
         aims = [key for key in ("least", "greatest") if key in entries]
         if "choose" not in entries or len(aims) != 1:
             message = "guideline needs 'choose' and either 'least' or 'greatest'"
-            self.problems.add(message, entry.key.position, "write {choose: servers, least: mean_wait}")
-            return None
+            return self.problems.add(message, entry.key.position, "write {choose: servers, least: mean_wait}")
         said = GUIDELINE.values(self, entries, "guideline", entry.key.position)
-        name, at = said.get("choose"), entries["choose"].value.position
-        if name and self.is_factor(name, at, "guideline") and len(levels_of(self.dimensions, name)) < 2:
-            self.problems.add(f"guideline: {name} has only one level, so there is nothing to choose", at)
-        if len(self.problems) > before:
-            return None
-        return Guideline(said["choose"], said[aims[0]], aims[0] == "greatest", said.get("tolerance", 0.0))
+        name, at = said["choose"], entries["choose"].value.position
+        if name is not POISON and not self.is_factor(name, at, "guideline"):
+            return POISON
+        if name is not POISON and len(levels_of(self.dimensions, name)) < 2:
+            return self.problems.add(f"guideline: {name} has only one level, so there is nothing to choose", at)
+        if POISON in said.values():
+            return POISON
+        return Guideline(name, said[aims[0]], aims[0] == "greatest", said.get("tolerance", 0.0))
 
 
 _METRICS = TEXTS.described({"anyOf": [ref("name"), {"type": "array", "items": ref("name"), "minItems": 1}]})

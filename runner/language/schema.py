@@ -14,13 +14,13 @@ from epicycle.actors import Configurable, declared_parameters
 from epicycle.aspects import FiringTimeParameter
 
 from ..catalogue import Catalogue, doc_of, first_sentence, parts_of
+from .acts import ACT
 from .dimensions import RANGE, dimension_schema
-from .disturbance import ACT, DISTURBANCE
+from .disturbance import DISTURBANCE
 from .fields import (
     EXPRESSION,
     LABEL,
     NAME,
-    Construct,
     Schema,
     about,
     looks_like,
@@ -30,21 +30,11 @@ from .fields import (
     schema_of,
 )
 from .metrics import METRIC
-from .models import (
-    BESIDE,
-    COMPOSITE,
-    DIRECTOR,
-    LIBRARY,
-    MODEL,
-    MODEL_DIRECTOR,
-    PARAMETER,
-    PORT,
-    RESERVED,
-    RUN,
-    composite_schema,
-)
+from .models import COMPOSITE, DIRECTOR, LIBRARY, MODEL, MODEL_DIRECTOR, RUN, composite_schema
 from .monitors import MONITOR
+from .parts import BESIDE, RESERVED
 from .places import CONNECTION, PATTERN_SCHEMA, POINTCUT, POINTCUTS_SCHEMA, PORT_SCHEMA, PORTS_SCHEMA, connection_schema
+from .ports import PARAMETER, PORT
 from .questions import CLAIM, GUIDELINE
 from .sampling import HYPERCUBE, MORRIS_INDICES, SOBOL_INDICES
 from .study import METRIC as METRIC_OF_STUDY
@@ -61,7 +51,7 @@ CONSTRUCTS = {
     "The director of the model": MODEL_DIRECTOR,
     "A connection": CONNECTION,
     "A pointcut": POINTCUT,
-    "Besides the parameters of an actor or aspect": Construct("", BESIDE),
+    "Besides the parameters of an actor or aspect": BESIDE,
     "A run": RUN,
     "A monitor": MONITOR,
     "A disturbance": DISTURBANCE,
@@ -158,7 +148,7 @@ def schema_text(schema: Schema) -> str:
 
 def _beside(kind: str) -> Schema:
     """The keys besides the parameters of an actor, aspect or figure."""
-    return {key: BESIDE[key].schema for key in sorted(RESERVED[kind.removeprefix("study_")] - {"type"})}
+    return {key: BESIDE.keys[key].schema for key in sorted(RESERVED[kind.removeprefix("study_")] - {"type"})}
 
 
 def _changed(kind: str) -> Schema:

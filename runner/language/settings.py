@@ -36,8 +36,10 @@ from ..text import (
     read,
     split,
 )
-from .declarations import ModelText, PartText, PointcutText
 from .fields import Shape
+from .models import ModelText
+from .parts import PartText, beside
+from .places import PointcutText
 
 
 @dataclass(frozen=True)
@@ -239,8 +241,9 @@ def change_aspect(text: ModelText, change: str, problems: Problems) -> ModelText
     if not NAME.match(name):
         problems.add(f"{name!r} is not a name", position, NAMES_HAVE)
         return text
-    enabled = values.pop("enabled").value if "enabled" in values else None
-    return put_aspect(text, PartText(name, position, Text(parts[0], position), values, None, at or (), enabled))
+    enabled = beside("enabled", values.pop("enabled").value) if "enabled" in values else None
+    added = PartText(name, position, Text(parts[0], position), values, at=at or (), enabled=enabled)
+    return put_aspect(text, added)
 
 
 def put_aspect(text: ModelText, part: PartText) -> ModelText:

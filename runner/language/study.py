@@ -10,10 +10,12 @@ from pathlib import Path
 from ..catalogue import find, is_path, unreadable
 from ..text import (
     MAX_SEED,
+    POISON,
     Entry,
     Mapping,
     Node,
     NodeReader,
+    Poison,
     Position,
     Problems,
     Scalar,
@@ -23,7 +25,6 @@ from ..text import (
     read,
 )
 from .claims import Questions
-from .declarations import PartText
 from .dimensions import DIMENSIONS, Dimension, Level, Listed
 from .fields import (
     FLAG,
@@ -33,15 +34,17 @@ from .fields import (
     Construct,
     Key,
     Shape,
+    keyed,
     named,
     names_of,
     node_as,
     number,
     one_or_more,
     ref,
+    sound,
 )
 from .files import named_file
-from .models import parts
+from .parts import PartText, parts
 from .questions import CLAIMS, GUIDELINE, QuestionReader, without
 from .settings import Setting, parse_setting, settings_like
 from .study_metric import StudyMetric, checked_metric
@@ -52,36 +55,122 @@ MAX_STUDY_SEED = MAX_SEED - MAX_REPLICATIONS
 RESERVED = ("run", "condition", "replication", "seed", "status", "events", "digest", "error", "wall_time", "replay")
 
 
+METRIC = Construct(
+    "A number that is kept for each run.",
+    {
+        "value": Key(
+            node_as(LABEL),
+            "The expression, over metrics of the model and other results of a run.",
+            missing=("{what} has no value", "add 'value: ...', an expression"),
+        ),
+        "unit": Key(TEXT, "Its unit; a metric of the model has its own."),
+        "to": Key(TEXT, "Its unit in the table (default: the same)."),
+        "doc": Key(TEXT, "What it is."),
+        "label": Key(TEXT, "Its label in figures and reports (default: the model's label, or its name)."),
+    },
+    type="object",
+    required=["value"],
+)
+_METRICS = {"anyOf": [names_of({"anyOf": [LABEL, METRIC.schema]}), {"type": "array", "items": ref("name")}]}
+_DISTURB = {"anyOf": [{"type": "object", "additionalProperties": one_or_more({"type": "string"})}, ref("texts")]}
+_HAS_NO = ("{what} has no {key!r}", "write {{metric: mean_wait, half_width: 0.1, at_most: 1000}}")
+
+
 @dataclass(frozen=True)
 class Until:
     """Replications continue, ``batch`` by batch, until the 95 % interval of a metric's mean is narrow enough."""
 
-    metric: str
     position: Position
-    half_width: float = 1.0
-    batch: int = 10
-    at_most: int = 1000
+    metric: str = keyed(TEXT.described(ref("name")), "The metric whose mean is estimated.", missing=_HAS_NO)
+    half_width: float = keyed(
+        number(float, 0.0), "Half the width of its 95 % interval at which replications stop.", missing=_HAS_NO
+    )
+    batch: int = keyed(
+        number(int, 2, MAX_REPLICATIONS), "The number of replications made at a time (default: 10).", default=10
+    )
+    at_most: int = keyed(
+        node_as(number(int, 2, MAX_REPLICATIONS).schema),  # whose bound is the batch
+        "The maximum number of replications of a condition (default: 1000).",
+        default=1000,
+    )
+
+
+UNTIL = Construct.of(Until, type="object", required=["metric", "half_width"])
 
 
 @dataclass(frozen=True)
 class Study:
     """A model, the conditions under which it is run, and what is kept of each run, as its file declares it."""
 
-    name: str
     path: Path
     text: str
-    model: str  # a path, or the name of a packaged model
-    doc: str = ""
-    fixed: tuple[Setting, ...] = ()
-    dimensions: tuple[Dimension, ...] = ()
-    replications: int = 1
-    seed: int = 0
-    paired: bool = True
-    until: Until | None = None
-    monitors: dict[str, Text] = field(default_factory=dict)  # beside those of the model
-    metrics: tuple[StudyMetric, ...] | None = None  # None: all of the model
-    figures: dict[str, PartText] | None = None  # None: those that suit the table
-    questions: Questions = field(default_factory=Questions)
+    name: str = keyed(
+        NAMED,
+        "The name of the study.",
+        key="study",
+        called="the study's name",
+        missing=("the study has no name", "add a line like 'study: my_study'"),
+        default="study",
+    )
+    doc: str = keyed(TEXT, "The question that it answers.", default="")
+    model: str = keyed(
+        Shape({"type": "string"}, lambda reader, node, what: reader.model(node, what)),
+        "A packaged model, or the path of a file relative to this one.",
+        called="the model",
+        missing=("the study has no model", "add a line like 'model: mm1'"),
+        default="",
+    )
+    fixed: tuple[Setting, ...] = keyed(
+        settings_like("observer[*].sensor.range: 5 m"),
+        "Values for parameters of the model in all runs: 'path: value'.",
+        key="set",
+        default=(),
+    )
+    dimensions: tuple[Dimension, ...] = keyed(
+        DIMENSIONS, "What is varied; every value is combined with every value of the others.", key="vary", default=()
+    )
+    disturb: tuple[Dimension, ...] = keyed(
+        Shape(_DISTURB, lambda reader, node, what: reader.disturb(node, what)),
+        "Disturbances as another dimension: 'name: [disturbance, ...]', or a list of single ones.",
+        default=(),
+    )
+    replications: int = keyed(
+        number(int, 1, MAX_REPLICATIONS), "The number of runs of each condition (default: 1).", default=1
+    )
+    seed: int = keyed(number(int, 0, MAX_STUDY_SEED), "The seed of the first replication (default: 0).", default=0)
+    paired: bool = keyed(
+        FLAG, "Whether a replication has the same seed in all conditions (default: true).", default=True
+    )
+    until: Until | None = keyed(
+        Shape(UNTIL.schema, lambda reader, node, what: reader.until(node, what)),
+        "When the replications of each condition stop, instead of a fixed number of them.",
+        default=None,
+    )
+    monitors: dict[str, Text] = keyed(
+        named(ref("text"), lambda reader, name, entry: reader.placed(entry.value, f"monitor {name!r}")),
+        "Properties that runs are to have, beside the monitors of the model: 'name: property'.",
+        default_factory=dict,
+    )
+    metrics: tuple[StudyMetric, ...] | None = keyed(  # None: all of the model
+        Shape(_METRICS, lambda reader, node, what: reader.metrics(node, what)),
+        "What is kept for each run: names of the model's metrics, or 'name: expression', or "
+        "'name: {value, unit, ...}'.",
+        default=None,
+    )
+    claims: Node | None = keyed(
+        CLAIMS, "Hypotheses on the results, by name; or the study whose claims are judged here, too.", default=None
+    )
+    guideline: Node | None = keyed(
+        node_as(GUIDELINE.schema),
+        "Which level of a factor to choose, for every combination of the others.",
+        default=None,
+    )
+    figures: dict[str, PartText] | None = keyed(  # None: those that suit the table
+        parts("figure", "study_figure"),
+        "What the report shows: 'name: {type, ...}' (default: means and distributions of all metrics).",
+        default=None,
+    )
+    questions: Questions = field(default_factory=Questions)  # which the claims and the guideline ask
     changes: tuple[str, ...] = ()  # --set, as given
     types: tuple[Path, ...] = ()
     aspects: tuple[str, ...] = ()  # --aspect
@@ -92,6 +181,9 @@ class Study:
     def factors(self) -> dict[str, str]:
         """The columns of the table that show what was varied, and what they hold."""
         return {name: kind for dimension in self.dimensions for name, kind in dimension.columns.items()}
+
+
+STUDY = Construct.of(Study, "A model under many conditions.", required=["model"])
 
 
 def is_study(path: Path) -> bool:
@@ -192,12 +284,11 @@ class _StudyReader(NodeReader):
             )
             return None
         entries = STUDY.entries(self, node, "the study")
-        if entries is None:
+        if entries is POISON:
             return None
-        said = STUDY.values(self, entries, "the study", node.position)
-        said.pop("claims", None), said.pop("guideline", None)  # which are read when everything else is known
-        said["dimensions"] = (*said.get("dimensions", ()), *said.pop("disturb", ()))
-        study = Study(said.pop("name", "study"), self.path, text, said.pop("model", ""), **said)
+        said = sound(STUDY.values(self, entries, "the study", node.position))
+        said["dimensions"] = (*said.get("dimensions", ()), *said.get("disturb", ()))
+        study = Study(self.path, text, **said)
         before = len(self.problems)
         self.columns(study)
         if len(self.problems) > before:
@@ -232,9 +323,9 @@ class _StudyReader(NodeReader):
     def disturb(self, node: Node, what: str) -> list[Dimension]:
         """Variants by name, ``{none: [], wifi: wifi_burst}``, or a list in which each entry is a variant."""
         if isinstance(node, Mapping):
-            variants = {name: self.texts(each.value, "a disturbance") for name, each in node.entries.items()}
+            variants = {name: self.texts(each.value, "a disturbance") or () for name, each in node.entries.items()}
         else:
-            texts = self.texts(node, what)
+            texts = self.texts(node, what) or ()
             variants = {Path(text.text).stem: (text,) for text in texts}
         levels = []
         for variant, texts in variants.items():
@@ -251,10 +342,10 @@ class _StudyReader(NodeReader):
         """A list of names, or a mapping from names to expressions."""
         found: list[StudyMetric | None] = []
         if isinstance(node, Mapping):
-            found += [self.metric(name, entry) for name, entry in self.named(node, what)]
+            found += [self.metric(name, entry) for name, entry in self.named(node, what) or ()]
         else:
             for item in self.items(node, what) or ():
-                if (name := self.name(item, "the metric")) is not None and isinstance(item, Scalar):
+                if (name := self.name(item, "the metric")) and isinstance(item, Scalar):
                     found.append(checked_metric(name, item, self.problems))
         return tuple(each for each in found if each is not None)
 
@@ -266,7 +357,7 @@ class _StudyReader(NodeReader):
         what, said, places = f"metric {name!r}", {}, {}
         if isinstance(entry.value, Mapping):
             entries = METRIC.entries(self, entry.value, what) or {}
-            said = METRIC.values(self, entries, what, entry.key.position)
+            said = sound(METRIC.values(self, entries, what, entry.key.position))
             places = {key: each.value.position for key, each in entries.items()}
             value = said.pop("value", None)
         if isinstance(value, Scalar):
@@ -275,18 +366,18 @@ class _StudyReader(NodeReader):
             self.problems.add(f"{what} is not an expression", value.position)
         return None
 
-    def until(self, node: Node, what: str) -> Until | None:
+    def until(self, node: Node, what: str) -> Until | Poison:
         """``{metric: mean_wait, half_width: 0.1, batch: 10, at_most: 1000}``."""
         entries = UNTIL.entries(self, node, what) or {}
         said = UNTIL.values(self, entries, what, node.position)
-        if not {"metric", "half_width"} <= entries.keys():
-            return None
-        least = said.get("batch", 10)
-        at_most = None
-        if (given := said.pop("at_most", None)) is not None:  # at least one batch
-            at_most = number(int, least, MAX_REPLICATIONS).read(self, given, "at_most")
-        metric, at = said.pop("metric", ""), entries["metric"].value.position
-        return Until(metric, at, **said, at_most=at_most or max(1000, least))
+        least = said.get("batch", 10) or 10
+        if "at_most" in said:
+            said["at_most"] = number(int, least, MAX_REPLICATIONS).read(self, said["at_most"], "at_most")
+        said.setdefault("at_most", max(1000, least))
+        if POISON in said.values():
+            return POISON
+        at: Position = entries["metric"].value.position
+        return Until(at, **said)
 
     def columns(self, study: Study) -> None:
         """Check that every column of the table has a unique name."""
@@ -305,96 +396,3 @@ class _StudyReader(NodeReader):
                 message = f"a metric cannot be called {metric.name!r}: the table already has a column with that name"
                 self.problems.add(message, metric.node.position, "give it another name: metrics: {name: expression}")
             seen[metric.name] = metric.node.position
-
-
-_HAS_NO = ("{what} has no {key!r}", "write {{metric: mean_wait, half_width: 0.1, at_most: 1000}}")
-UNTIL = Construct(
-    "",
-    {
-        "metric": Key(TEXT.described(ref("name")), "The metric whose mean is estimated.", missing=_HAS_NO),
-        "half_width": Key(
-            number(float, 0.0), "Half the width of its 95 % interval at which replications stop.", missing=_HAS_NO
-        ),
-        "batch": Key(number(int, 2, MAX_REPLICATIONS), "The number of replications made at a time (default: 10)."),
-        "at_most": Key(
-            node_as(number(int, 2, MAX_REPLICATIONS).schema),
-            "The maximum number of replications of a condition (default: 1000).",
-        ),
-    },
-    type="object",
-    required=["metric", "half_width"],
-)
-METRIC = Construct(
-    "A number that is kept for each run.",
-    {
-        "value": Key(
-            node_as(LABEL),
-            "The expression, over metrics of the model and other results of a run.",
-            missing=("{what} has no value", "add 'value: ...', an expression"),
-        ),
-        "unit": Key(TEXT, "Its unit; a metric of the model has its own."),
-        "to": Key(TEXT, "Its unit in the table (default: the same)."),
-        "doc": Key(TEXT, "What it is."),
-        "label": Key(TEXT, "Its label in figures and reports (default: the model's label, or its name)."),
-    },
-    type="object",
-    required=["value"],
-)
-_METRICS = {"anyOf": [names_of({"anyOf": [LABEL, METRIC.schema]}), {"type": "array", "items": ref("name")}]}
-_DISTURB = {"anyOf": [{"type": "object", "additionalProperties": one_or_more({"type": "string"})}, ref("texts")]}
-STUDY = Construct(
-    "A model under many conditions.",
-    {
-        "study": Key(
-            NAMED,
-            "The name of the study.",
-            "the study's name",
-            missing=("the study has no name", "add a line like 'study: my_study'"),
-            name="name",
-        ),
-        "doc": Key(TEXT, "The question that it answers."),
-        "model": Key(
-            Shape({"type": "string"}, _StudyReader.model),
-            "A packaged model, or the path of a file relative to this one.",
-            "the model",
-            missing=("the study has no model", "add a line like 'model: mm1'"),
-        ),
-        "set": Key(
-            settings_like("observer[*].sensor.range: 5 m"),
-            "Values for parameters of the model in all runs: 'path: value'.",
-            name="fixed",
-        ),
-        "vary": Key(
-            DIMENSIONS, "What is varied; every value is combined with every value of the others.", name="dimensions"
-        ),
-        "disturb": Key(
-            Shape(_DISTURB, _StudyReader.disturb),
-            "Disturbances as another dimension: 'name: [disturbance, ...]', or a list of single ones.",
-        ),
-        "replications": Key(number(int, 1, MAX_REPLICATIONS), "The number of runs of each condition (default: 1)."),
-        "seed": Key(number(int, 0, MAX_STUDY_SEED), "The seed of the first replication (default: 0)."),
-        "paired": Key(FLAG, "Whether a replication has the same seed in all conditions (default: true)."),
-        "until": Key(
-            Shape(UNTIL.schema, _StudyReader.until),
-            "When the replications of each condition stop, instead of a fixed number of them.",
-        ),
-        "monitors": Key(
-            named(ref("text"), lambda reader, name, entry: reader.placed(entry.value, f"monitor {name!r}")),
-            "Properties that runs are to have, beside the monitors of the model: 'name: property'.",
-        ),
-        "metrics": Key(
-            Shape(_METRICS, _StudyReader.metrics),
-            "What is kept for each run: names of the model's metrics, or 'name: expression', or "
-            "'name: {value, unit, ...}'.",
-        ),
-        "claims": Key(CLAIMS, "Hypotheses on the results, by name; or the study whose claims are judged here, too."),
-        "guideline": Key(
-            node_as(GUIDELINE.schema), "Which level of a factor to choose, for every combination of the others."
-        ),
-        "figures": Key(
-            parts("figure", "study_figure"),
-            "What the report shows: 'name: {type, ...}' (default: means and distributions of all metrics).",
-        ),
-    },
-    required=["model"],
-)

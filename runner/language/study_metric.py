@@ -9,7 +9,7 @@ from types import MappingProxyType
 
 from epicycle.actors.expression import ExpressionError, Formula
 
-from ..text import Position, Problems, Scalar, inside
+from ..text import Position, Problems, Scalar, blame
 
 ASPECTS, SIGNALS = "aspects", "signals"
 NUMBERS = ("end", "events", "firings")  # the other results that an expression knows
@@ -85,6 +85,5 @@ def checked_metric(
     try:
         return StudyMetric(name, source, node, **said, places=dict(places))
     except ExpressionError as error:
-        at = inside(node, source, error.offset, source[error.offset : error.offset + max(error.length, 1)])
-        problems.add(f"metric {name}: {error}", at)
+        blame(problems, f"metric {name}", error, node)
         return None

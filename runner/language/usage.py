@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator, Mapping
-from typing import Any
+from collections.abc import Iterable, Mapping
 
 from epicycle.actors import Actor, declared_parameters
 from epicycle.actors.expression import ExpressionError, names_in
 
 from ..catalogue import CatalogueError
-from ..text import Entry, Node, Position, Problems, Scalar, Sequence, Text, nearest
-from ..text import Mapping as MappingNode
-from .declarations import CompositeText, ModelText, PartText
+from ..text import POISON, Node, Poison, Problems, Scalar, Sequence, nearest
+from .models import CompositeText, ModelText
+from .parts import PartText
 
 _WORD = re.compile(r"[A-Za-z_]\w*")
 _MAX_STRANGE = 50  # comparing names takes time
@@ -21,45 +20,46 @@ _MAX_STRANGE = 50  # comparing names takes time
 def check_usage(
     text: ModelText,
     declared: Mapping[str, CompositeText],
-    composites: Mapping[str, CompositeText],
+    composites: Mapping[str, CompositeText | Poison],
     actor_types: Mapping[str, type[Actor]],
     problems: Problems,
 ) -> None:
     """Add a problem for every parameter of the model or of a class that no expression uses.
 
-    ``declared`` are the classes as written, ``composites`` with what they inherit.  What a base declares may be used
-    by the classes that extend it.
+    ``declared`` are the classes as written, ``composites`` with what they inherit.  What a class declares may be used
+    by its bases, and by the classes that extend it.
     """
-    used = {name: _names(_nodes(composite)) for name, composite in composites.items()}
-    # Up the order of inheritance: what a class uses counts for its base, and for the base of that.
-    for name in composites:
-        base = composites[name].extends
-        while base is not None and base.text in composites:
-            used[base.text] = used[base.text] | used[name]
-            base = composites[base.text].extends
-    for name, composite in composites.items():
-        if not composite.spoilt:
-            _add_unused(composite, declared[name].parameters, used[name], composites, actor_types, problems)
-    if not text.root.spoilt:
-        names = _names(_nodes((text.root, text.run, text.metrics, text.monitors, text.figures)))
-        _add_unused(text.root, text.root.parameters, names, composites, actor_types, problems)
+    own = {name: _names(composite.written) for name, composite in declared.items()}
+    whole = {name: composite for name, composite in composites.items() if composite}
+    used = dict(own)
+    for name, composite in whole.items():
+        base = composite.extends
+        while base:
+            used[base.text] = used[base.text] | own[name]
+            used[name] = used[name] | own[base.text]
+            base = whole[base.text].extends
+    for name, composite in whole.items():
+        _add_unused(composite, declared[name].parameters, used[name], whole, actor_types, problems)
+    _add_unused(text.root, text.root.parameters, _names(text.root.written), whole, actor_types, problems)
 
 
 def check_own_usage(composite: CompositeText, problems: Problems) -> None:
     """Add a problem for every parameter that nothing in the same text uses."""
-    _add_unused(composite, composite.parameters, _names(_nodes(composite)), {}, {}, problems)
+    _add_unused(composite, composite.parameters, _names(composite.written), {}, {}, problems)
 
 
 def _add_unused(
     composite: CompositeText,
     parameters: Iterable[str],
-    used: frozenset[str],
+    used: frozenset[str | Poison],
     composites: Mapping[str, CompositeText],
     actor_types: Mapping[str, type[Actor]],
     problems: Problems,
 ) -> None:
+    if POISON in used:  # perhaps by what is wrong
+        return
     unused = [name for name in parameters if name not in used]
-    strange = sorted(used - composite.parameters.keys())[:_MAX_STRANGE]
+    strange = sorted(each for each in used if each and each not in composite.parameters)[:_MAX_STRANGE]
     misspelled = {nearest(each, unused) for each in strange}  # which is reported where they are
     for name in unused:
         if name in misspelled:
@@ -88,34 +88,15 @@ def _parameters(
         return ()
 
 
-def _nodes(part: object) -> Iterator[Node]:
-    """Every node of the declarations that may contain an expression."""
-    waiting = [part]
-    while waiting:  # by class, not by pattern: a model may have a hundred thousand parts
-        each: Any = waiting.pop()
-        kind = type(each)
-        if kind in (Scalar, Sequence, MappingNode):
-            yield each
-        elif kind is Text:
-            if "${" in each.text:
-                yield Scalar(each.text, each.text, True, each.position)
-        elif kind is Entry:
-            yield each.value
-        elif kind is tuple:
-            waiting += each
-        elif kind is dict:
-            waiting += each.values()
-        elif kind is not Position:
-            waiting += (getattr(each, name) for name in getattr(kind, "__dataclass_fields__", ()))
-
-
-def _names(nodes: Iterable[Node]) -> frozenset[str]:
+def _names(nodes: Iterable[Node | Poison]) -> frozenset[str | Poison]:
     """The names that expressions use, at any depth; what is wrong with an expression is reported elsewhere."""
-    found: set[str] = set()
+    found: set[str | Poison] = set()
     waiting = list(nodes)
     while waiting:
         node = waiting.pop()
-        if isinstance(node, Scalar):
+        if node is POISON:
+            found.add(POISON)
+        elif isinstance(node, Scalar):
             if isinstance(node.value, str) and "${" in node.value:
                 try:
                     found |= names_in(node.value)

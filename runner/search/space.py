@@ -27,7 +27,7 @@ from ..language import (
     parse_setting,
     split_number,
 )
-from ..text import Entry, Mapping, Node, Position, Problems, Scalar, Sequence, matches, plain, select
+from ..text import POISON, Entry, Mapping, Node, Position, Problems, Scalar, Sequence, matches, plain, select
 
 HINT = "write load=0.5..0.9, policy=[fifo, lifo] or 'period={from: 1 s, to: 5 s, step: 1 s}'"
 _RANGE = re.compile(r"(.*?\S)\s*\.\.\s*(\S.*)")
@@ -179,7 +179,7 @@ def _axis(setting: Setting, model: Model, problems: Problems) -> Axis | None:
         return None
     key = Scalar(setting.path, setting.path, True, setting.position)
     dimension = DimensionReader(problems).dimension(setting.path, Entry(key, node))
-    if dimension is None:
+    if dimension is POISON:
         return None
     if dimension.size > MAX_VALUES:
         problems.add(

@@ -11,7 +11,7 @@ import re
 from collections.abc import Callable
 from typing import Final
 
-from epicycle.actors import EpicycleError, Quantity, convert, counted_in_si, to_nanoseconds
+from epicycle.actors import EpicycleError, FaultError, Quantity, convert, counted_in_si, to_nanoseconds
 from epicycle.actors.expression import DOTTED, ExpressionError, PortFormula
 
 from .property import OPERATORS, Condition, Junction, Not, Property, Quantified, Sends, Until
@@ -29,11 +29,12 @@ _SIGNS: Final = {
 }  # fmt: skip
 
 
-class PropertyError(ValueError):
+class PropertyError(FaultError, ValueError):
     """A text that is no property; ``offset`` and ``length`` say which part of it is wrong."""
 
     def __init__(self, message: str, offset: int, length: int, hint: str = "") -> None:
-        super().__init__(message)
+        super().__init__(message, span=(offset, length), help=[hint] if hint else [])
+        self.args = (message, offset, length, hint)  # what pickle rebuilds the error from
         self.offset = offset
         self.length = length
         self.hint = hint
@@ -220,9 +221,12 @@ class _Parser:
             raise self.fail(f"a condition is missing {what}", "write one such as 'actor.port >= 2 m'")
         start = self.tokens[first][1]
         token, offset = self.tokens[self.place - 1]
+        text = self.source[start : offset + len(token)]
         try:
-            return condition_of(self.source[start : offset + len(token)])
+            return condition_of(text)
         except ExpressionError as error:
+            if error.length and not _QUANTITY.search(text):  # which is rewritten, so that places in it move
+                raise PropertyError(str(error), start + error.offset, error.length) from None
             raise self.fail(str(error), "", first, self.place) from None
 
 

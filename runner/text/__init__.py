@@ -3,6 +3,7 @@
 from epicycle.actors import did_you_mean, nearest
 
 from .document import Entry, Mapping, Node, Scalar, Sequence, parse, plain, read
+from .faults import blame, place_in
 from .files import COMMAND_LINE, Noted, data_file, note_package, noting
 from .limits import MAX_SEED, NORMAL, RAISE_IT, Limits
 from .patterns import (
@@ -20,7 +21,7 @@ from .patterns import (
     names_of,
     select,
 )
-from .problems import MAX_PROBLEMS, ModelError, Position, Problem, Problems, told_raised
+from .problems import MAX_PROBLEMS, POISON, ModelError, Poison, Position, Problem, Problems, told_raised
 from .program import call_site, describe, entries_of, node_of, raised_at
 from .reading import NAME, NAMES_HAVE, SURE, NodeReader, Text, inside, is_empty, split, within
 
@@ -31,6 +32,7 @@ __all__ = [
     "NAME",
     "NAMES_HAVE",
     "NORMAL",
+    "POISON",
     "RAISE_IT",
     "SURE",
     "Comparisons",
@@ -43,6 +45,7 @@ __all__ = [
     "Noted",
     "PathIndex",
     "PatternError",
+    "Poison",
     "Position",
     "Problem",
     "Problems",
@@ -50,6 +53,7 @@ __all__ = [
     "Sequence",
     "Text",
     "TooManyError",
+    "blame",
     "call_site",
     "check_pattern",
     "compile_pattern",
@@ -70,6 +74,7 @@ __all__ = [
     "note_package",
     "noting",
     "parse",
+    "place_in",
     "plain",
     "raised_at",
     "read",

@@ -148,6 +148,7 @@ _LINE_BREAK = re.compile("\r\n|[\n\r\x85\u2028\u2029]")
 _CONTROL = re.compile("[^\t\n\r\x20-\x7e]")  # of an ASCII text
 _UNPRINTABLE = "[^\t\n\r\x20-\x7e\x85\xa0-\ud7ff\ue000-\ufefe\uff00-\ufffd\U00010000-\U0010ffff]"
 _BEGINNING = 50_000  # characters of a broken text that are read again by the slow parser, in a second at most
+_SCALAR = "scalar"  # the scope of a problem with a value as such: others at its place would be consequences
 _INDEXED = re.compile(r"\w\[(?:\d+|\*)\]")
 _ARROW = re.compile(r"\s*[-=]>")
 _PROPERTIES = re.compile(r"(?:[&!]\S*[ \t]+)+")
@@ -322,8 +323,7 @@ class _Builder:
             elif is_plain:
                 value = resolve(text)
         except ValueError as error:
-            self._problems.add(str(error), position)
-            position = dataclasses.replace(position, told=True)
+            self._problems.add(str(error), position, scope=_SCALAR)
         return Scalar(value, text, is_plain, position)
 
     def _tagged(self, tag: str, text: str, position: Position) -> Value:

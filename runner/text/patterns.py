@@ -9,7 +9,7 @@ import re
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from functools import cached_property, lru_cache
 
-from epicycle.actors import did_you_mean
+from epicycle.actors import FaultError, did_you_mean
 
 from .limits import NORMAL, Limits
 
@@ -22,7 +22,7 @@ _MANY = 5  # how often all paths are scanned before they are indexed by their na
 MAX_SHOWN = 12  # names in a message
 
 
-class PatternError(ValueError):
+class PatternError(FaultError, ValueError):
     """Text that is not a pattern; the message says why."""
 
 

@@ -3,7 +3,8 @@
 import unicodedata
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import NoReturn, TypeVar
+from enum import Enum
+from typing import Final, Literal, NoReturn, TypeVar
 
 from epicycle.actors import EpicycleError, shortened, visible, visible_character
 
@@ -12,6 +13,21 @@ MAX_SOURCE_WIDTH = 120
 _CUT = "..."
 
 T = TypeVar("T")
+
+
+class Poison(Enum):
+    """What stands for something wrong that has been reported: what depends on it is wrong, too, and not reported.
+
+    It is false, and ``Problems.add`` returns it.
+    """
+
+    POISON = "poison"
+
+    def __bool__(self) -> Literal[False]:
+        return False
+
+
+POISON: Final = Poison.POISON
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,7 +39,6 @@ class Position:
     column: int
     length: int
     source: str
-    told: bool = False  # its problem has been reported: other problems there would be consequences
 
     def __str__(self) -> str:
         """``file:line:column``, for messages that refer to another place."""
@@ -117,22 +132,23 @@ class Problems:
         about: tuple[str, ...] = (),
         raised: Position | None = None,
         cause: BaseException | None = None,
-    ) -> None:
+    ) -> Poison:
         """Note a problem; each hint becomes a line of help.  One too many raises all problems as a ModelError.
 
         ``cause`` is an exception in a user's code, and ``raised`` where it comes from.
         """
         key = about or message, position
         if key in self._kept:
-            return
+            return POISON
         self._count += 1
-        if position is not None and (position.told or self._scopes.setdefault(position, scope) != scope):
-            return
+        if position is not None and self._scopes.setdefault(position, scope) != scope:
+            return POISON
         if len(self._kept) == MAX_PROBLEMS:
             # Finding them all, and the nearest valid names, may take very long.
             raise self._error(more=True) from self._cause
         self._kept[key] = Problem(message, position, hints, raised=raised)
         self._cause = self._cause or cause
+        return POISON
 
     def raise_if_any(self) -> None:
         """Raise all problems as one ModelError, if there are any."""
@@ -144,10 +160,11 @@ class Problems:
         self.add(message, position, *hints, scope=scope)
         raise self._error() from self._cause
 
-    def whole(self, made: T | None) -> T:
+    def whole(self, made: T | Poison | None) -> T:
         """What has been made; raises all problems as one ModelError if there are any."""
         self.raise_if_any()
         assert made is not None, "what cannot be made is a problem"
+        assert made is not POISON, "so is what is made of it"
         return made
 
     def _error(self, *, more: bool = False) -> ModelError:

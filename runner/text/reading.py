@@ -9,7 +9,7 @@ from functools import lru_cache
 from epicycle.actors import did_you_mean, nearest
 
 from .document import Entry, Mapping, Node, Scalar, Sequence
-from .problems import Position, Problems
+from .problems import POISON, Poison, Position, Problems
 
 SURE = 0.75  # how similar a key must be to the valid one that it is read as
 NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*\Z")
@@ -25,18 +25,17 @@ class Text:
 
 
 class NodeReader:
-    """Anything malformed is added to ``problems`` and left out."""
+    """Reads nodes; what is malformed is added to ``problems`` and becomes ``POISON``."""
 
     def __init__(self, problems: Problems) -> None:
         self.problems = problems
 
-    def entries(self, node: Node, what: str, valid: tuple[str, ...]) -> dict[str, Entry] | None:
-        """The entries of a mapping, unknown keys reported and left out; None if it is not a mapping."""
+    def entries(self, node: Node, what: str, valid: tuple[str, ...]) -> dict[str, Entry] | Poison:
+        """The entries of a mapping, unknown keys reported and left out."""
         if not isinstance(node, Mapping):
             if is_empty(node):
                 return {}
-            self.problems.add(f"{what} is not a mapping", node.position, f"valid keys: {', '.join(valid)}")
-            return None
+            return self.problems.add(f"{what} is not a mapping", node.position, f"valid keys: {', '.join(valid)}")
         known = {}
         for key, entry in node.entries.items():
             if key in valid:
@@ -50,13 +49,12 @@ class NodeReader:
                     known.setdefault(meant, entry)
         return known
 
-    def named(self, node: Node, what: str) -> list[tuple[str, Entry]]:
+    def named(self, node: Node, what: str) -> list[tuple[str, Entry]] | Poison:
         """The entries of a mapping from names to things."""
         if is_empty(node):
             return []
         if not isinstance(node, Mapping):
-            self.problems.add(f"{what} is not a mapping from names", node.position)
-            return []
+            return self.problems.add(f"{what} is not a mapping from names", node.position)
         found = []
         for name, entry in node.entries.items():
             if NAME.match(name):
@@ -65,36 +63,34 @@ class NodeReader:
                 self.problems.add(f"{name!r} is not a name", entry.key.position, NAMES_HAVE)
         return found
 
-    def items(self, node: Node, what: str) -> tuple[Node, ...] | None:
+    def items(self, node: Node, what: str) -> tuple[Node, ...] | Poison:
         if isinstance(node, Sequence):
             return node.items
         if is_empty(node):
             return ()
-        self.problems.add(f"{what} is not a list", node.position, "begin each entry with '- '")
-        return None
+        return self.problems.add(f"{what} is not a list", node.position, "begin each entry with '- '")
 
-    def texts(self, node: Node, what: str) -> tuple[Text, ...]:
+    def texts(self, node: Node, what: str) -> tuple[Text, ...] | Poison:
         """A text, or a list of texts; empty entries are left out."""
         nodes = node.items if isinstance(node, Sequence) else (node,)
-        found = (self.placed(item, what) for item in nodes if not is_empty(item))
-        return tuple(each for each in found if each is not None)
+        found = [self.placed(item, what) for item in nodes if not is_empty(item)]
+        sound = tuple(each for each in found if each is not POISON)
+        return sound if len(sound) == len(found) else POISON
 
-    def placed(self, node: Node, what: str) -> Text | None:
+    def placed(self, node: Node, what: str) -> Text | Poison:
         """A text with its place."""
         said = self.text(node, what)
-        return None if said is None else Text(said, node.position)
+        return POISON if said is POISON else Text(said, node.position)
 
-    def text(self, node: Node, what: str) -> str | None:
+    def text(self, node: Node, what: str) -> str | Poison:
         if isinstance(node, Scalar):
             return node.value if isinstance(node.value, str) else node.text
-        self.problems.add(f"{what} is not a text", node.position)
-        return None
+        return self.problems.add(f"{what} is not a text", node.position)
 
-    def name(self, node: Node, what: str) -> str | None:
+    def name(self, node: Node, what: str) -> str | Poison:
         text = self.text(node, what)
-        if text is not None and not NAME.match(text):
-            self.problems.add(f"{what} {text!r} is not a name", node.position, NAMES_HAVE)
-            return None
+        if text is not POISON and not NAME.match(text):
+            return self.problems.add(f"{what} {text!r} is not a name", node.position, NAMES_HAVE)
         return text
 
 
@@ -112,9 +108,8 @@ def is_empty(node: Node) -> bool:
     return isinstance(node, Scalar) and node.value is None
 
 
-def within(text: Text, part: str) -> Position:
-    """The position of a part of a text; all of it if the part cannot be found in the file."""
-    at = text.position
+def within(at: Position, part: str) -> Position:
+    """The position of a part of a text at a place; all of it if the part cannot be found in the file."""
     start = at.source.find(part, at.column - 1)
     return at if start < 0 else replace(at, column=start + 1, length=len(part))
 

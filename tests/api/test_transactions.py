@@ -80,7 +80,7 @@ def state(model: Model) -> Any:
         "by path": [deepcopy(list(each.items())) for each in by_path],
         "borders": [deepcopy(graph.borders(path)) for path in graph.composites],
         "clocks": list(graph.clocks),
-        "gaps": [set(each) for each in (model.draft.empty, model.draft.unknown, model.draft.open, model.draft.kinds)],
+        "gaps": (dict(model.draft.gaps), set(model.draft.fed)),
         "rest": (model.draft.is_wired, graph.next_order, list(map(str, graph.detours)), model.is_checked),
         "aspects": [(woven.name, id(woven), repr(woven)) for woven in model.aspects],
         "watched": (model.recorded[:], model.stop_ports[:], [repr(metric) for metric in model.metrics], model.stop),

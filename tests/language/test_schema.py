@@ -14,6 +14,7 @@ from jsonschema import Draft202012Validator
 
 from epicycle.actors import (
     EpicycleError,
+    FaultError,
     Parameter,
     ParameterError,
     array_parameter,
@@ -22,22 +23,24 @@ from epicycle.actors import (
 )
 from epicycle.actors.core.units import quantity
 from epicycle.aspects import Aspect, MeasurementFailure, PacketLoss
-from epicycle.runner.build.connect import _ENDPOINT as ENDPOINT
-from epicycle.runner.build.connect import BadIndexError
 from epicycle.runner.build.connect import indices_of as resolve
 from epicycle.runner.catalogue import Catalogue, built_in, model_folders, own_figures, packaged_models
 from epicycle.runner.language import (
+    acts,
     dimensions,
     disturbance,
     json_schema,
     models,
+    parts,
     places,
+    ports,
     questions,
     study,
 )
 from epicycle.runner.language.fields import QUANTITY, Construct
 from epicycle.runner.language.fields import schema_of as value_schema
-from epicycle.runner.language.models import BESIDE
+from epicycle.runner.language.parts import BESIDE
+from epicycle.runner.language.places import _END as ENDPOINT
 from epicycle.runner.language.places import CONNECTION_TEXT, PATTERN
 from epicycle.runner.show.report import own_study_figures
 from epicycle.runner.text import NodeReader, PatternError, Problems, compile_pattern, parse, plain
@@ -167,14 +170,14 @@ def breaks_shape(problem: str, file: str) -> bool:
 
 
 def test_every_key_of_the_language_says_what_it_is() -> None:
-    modules = (disturbance, models, places, questions, study, dimensions)
+    modules = (acts, disturbance, models, parts, places, ports, questions, study, dimensions)
     constructs = {id(each): each for module in modules for each in vars(module).values() if isinstance(each, Construct)}
     assert len(constructs) > 15
     for construct in constructs.values():
         for key, declared in construct.schema["properties"].items():
             assert declared["description"].endswith((".", ")", "'.")), key
     reserved = {*Aspect.reserved, *built_in().actors["Clock"].reserved} - {"type"}
-    assert reserved - BESIDE.keys() == set()
+    assert reserved - BESIDE.keys.keys() == set()
 
 
 @pytest.mark.parametrize(
@@ -250,8 +253,8 @@ def test_connections_are_those_that_can_be_read(text: str) -> None:
     node = parse(f"connection: {text!r}", "m.yaml", Problems())
     reader = NodeReader(problems := Problems())
     connection = places.connection(reader, node.entries["connection"].value)  # type: ignore[union-attr]
-    ports = [*connection.sources, *connection.destinations] if connection is not None else []
-    is_good = connection is not None and not len(problems) and all(is_endpoint(port.text) for port in ports)
+    ports = [*connection.sources, *connection.destinations] if connection else []
+    is_good = bool(connection) and not len(problems) and all(is_endpoint(port.text) for port in ports)
     assert bool(re.search(CONNECTION_TEXT, text)) == is_good, text
 
 
@@ -263,7 +266,7 @@ def is_endpoint(text: str) -> bool:
     try:
         # Two expressions with something between them come to a text, which is no index.
         resolve(found[2], "a", 9, lambda expression: 2 if expression.count("${") == 1 else "2].b[2")
-    except BadIndexError:
+    except FaultError:
         return False
     return True
 

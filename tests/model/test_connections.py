@@ -8,9 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from epicycle.actors import Actor, InputPort, OutputPort
+from epicycle.actors import Actor, FaultError, InputPort, OutputPort
 from epicycle.runner.build import load_model
-from epicycle.runner.build.connect import BadIndexError
 from epicycle.runner.build.connect import indices_of as resolve
 from tests.model.model_parts import TYPES
 
@@ -107,7 +106,7 @@ def test_ranges_are_slices_with_both_ends(count: int, start: int | None, end: in
     closed = len(bounds) == 2 and min(bounds) >= 0
     beyond = any(each >= count for each in bounds) and (closed or start is None or expected)
     if count and (beyond or (closed and bounds[1] < bounds[0])):
-        with pytest.raises(BadIndexError):
+        with pytest.raises(FaultError):
             resolve(text, "a", count, lambda _: None)
     else:
         assert resolve(text, "a", count, lambda _: None) == (expected, True)
@@ -116,5 +115,5 @@ def test_ranges_are_slices_with_both_ends(count: int, start: int | None, end: in
 @pytest.mark.parametrize(("ends", "expected"), [("1..${0}", []), ("${2}..1", []), ("${1}..${2}", [1, 2])])
 def test_a_range_that_is_computed_may_be_empty(ends: str, expected: list[int]) -> None:
     assert resolve(ends, "a", 3, lambda text: int(text[2:-1])) == (expected, True)
-    with pytest.raises(BadIndexError, match=r"^a\[\$\{2\}..0\]: the range 2..0 runs backwards$"):
+    with pytest.raises(FaultError, match=r"^a\[\$\{2\}..0\]: the range 2..0 runs backwards$"):
         resolve("${2}..0", "a", 3, lambda text: int(text[2:-1]))

@@ -13,6 +13,7 @@ import epicycle.actors
 from epicycle.actors import (
     ChannelError,
     EpicycleError,
+    FaultError,
     FilterError,
     ParameterError,
     PortError,
@@ -132,6 +133,7 @@ ERRORS = [
     ActorError("main.sensor", Tag(5, 2), "fire()", "ValueError: no", "m.yaml:3:4"),
     LoopError(7, ("a", "b")),
     LoopError(7, ()),
+    FaultError("no", ("a", 3), of_key=True, span=(1, 2), help=["yes"]),
     ParameterError("no"),
     UnitError("no"),
     PortError("no"),

@@ -132,9 +132,9 @@ def test_conditions_that_cannot_be_judged(source: str, values: list[object], mes
             "write 'always b.x > 2' or 'eventually b.x > 2'",
         ),
         ("always a.x > 2 mice", "a.x > 2 mice", "unknown unit 'mice'", ""),
-        ("always x > 2", "x > 2", "unknown name 'x': a port is written 'actor.port'", ""),
+        ("always x > 2", "x", "unknown name 'x': a port is written 'actor.port'", ""),
         ("always 1 > 2", "1 > 2", "it names no port: write a port as 'actor.port'", ""),
-        ("always foo(a.x) > 2", "foo(a.x) > 2", "there is no function 'foo'", ""),
+        ("always foo(a.x) > 2", "foo(a.x)", "there is no function 'foo'", ""),
         ("always __import__('os').x", "__import__('os').x", "", ""),
     ],
 )

@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping as AnyMapping
 from contextlib import suppress
 
-from epicycle.actors import UnitError, variants
+from epicycle.actors import Fault, UnitError, variants
 
-from ...build import Complaint, made_figure, place_in_figure, tell_of_figure
+from ...build import made_figure, tell_of_figure
 from ...catalogue import with_offered
 from ...language import in_si, split_number
 from ...study import Plan
-from ...text import Mapping, Node, Problems, Sequence, plain
+from ...text import Mapping, Node, Problems, Sequence, place_in, plain
 from . import of_signals  # noqa: F401  whose types are known by that
 from .figure import SignalFigure, StudyFigure
 from .of_table import CURVES, Distributions, Means
@@ -44,7 +44,7 @@ def check_figures(plan: Plan) -> None:
             continue
         patterns = [(key, pattern) for key in figure.signal_parameters for pattern in figure.named(key)]
         for key, pattern in patterns:
-            position = place_in_figure(Complaint(key, "", key=pattern), written)
+            position = place_in(written, Fault("", (key, pattern), of_key=True))
             tried = [Problems() for _ in models]
             for model, told in zip(models, tried, strict=True):
                 model.outputs(pattern, f"figure {name}", position, told)
@@ -66,7 +66,7 @@ def figures_of_study(plan: Plan, problems: Problems) -> dict[str, StudyFigure]:
         if "where" in part.values and isinstance(where := part.values["where"].value, Mapping):
             values["where"] = {factor: _levels(entry.value, plan, factor) for factor, entry in where.entries.items()}
         figure = made_figure(name, known, (part.type.text, values, written), problems, of_study=True)
-        if figure is not None:
+        if figure:
             found[name] = figure
             for complaint in figure.complaints(plan):
                 tell_of_figure(complaint, name, written, problems)

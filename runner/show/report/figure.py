@@ -7,9 +7,9 @@ from itertools import product
 from pathlib import Path
 from typing import Any, ClassVar, NamedTuple
 
-from epicycle.actors import Configurable, MappingParameter, Parameter, counted, did_you_mean
+from epicycle.actors import Configurable, Fault, MappingParameter, Parameter, counted, did_you_mean
 
-from ...build import Complaint, Model
+from ...build import Model
 from ...language import Dimension, Factor
 from ...results import Results
 from ...study import Plan
@@ -51,7 +51,7 @@ class StudyFigure(Configurable):
         Parameter(str), {}, doc="names of metrics and factors in it, without their units"
     )
 
-    def complaints(self, plan: Plan) -> Iterator[Complaint]:
+    def complaints(self, plan: Plan) -> Iterator[Fault]:
         """Problems of the figure in this study: names that the study does not have, levels that do not occur."""
         factors, metrics = list(plan.study.factors), [metric.name for metric in plan.metrics]
         known = {"factor": factors, "metric": metrics, "column": factors + metrics}
@@ -59,14 +59,14 @@ class StudyFigure(Configurable):
             for name in self.named(parameter):
                 if name not in known[noun]:
                     message = f"the study has no {noun} {name!r}{did_you_mean(name, known[noun])}"
-                    yield Complaint(parameter, message, f"its {noun}s: {', '.join(known[noun]) or 'none'}", name)
+                    valid = f"its {noun}s: {', '.join(known[noun]) or 'none'}"
+                    yield Fault(message, (parameter, name), of_key=True, help=(valid,))
         for name, wanted in self.where.items():
             dimension = next((each for each in plan.study.dimensions if name in each.columns), None)
             for level in wanted if isinstance(wanted, list) else [wanted]:
                 if dimension is not None and not _has(dimension, name, level):
-                    yield Complaint(
-                        "where", f"{name} is never {shown(level)}", f"it is {_listed(dimension, name)}", name
-                    )
+                    message, levels = f"{name} is never {shown(level)}", f"it is {_listed(dimension, name)}"
+                    yield Fault(message, ("where", name), of_key=True, help=(levels,))
 
     def named(self, parameter: str) -> tuple[str, ...]:
         """The names that a parameter holds; none if the figure has no such parameter."""
@@ -103,7 +103,7 @@ class SignalFigure(StudyFigure):
         """What it needs from one of these runs, as plain data; called in the process that made the run."""
         raise NotImplementedError
 
-    def check_model(self, model: Model) -> Iterator[Complaint]:
+    def check_model(self, model: Model) -> Iterator[Fault]:
         """Problems of the figure in this model, except those of its signals."""
         yield from ()
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from epicycle.actors import (
     EpicycleError,
+    Fault,
     MappingParameter,
     Parameter,
     array_parameter,
@@ -23,7 +24,7 @@ from epicycle.actors import (
 )
 from epicycle.actors.expression import PortFormula, PortFormulaParameter
 
-from ...build import Complaint, Model, figures_of
+from ...build import Model, figures_of
 from ...catalogue import Figure
 from ...results import STOP_TIME, Results
 from ...study import Plan, half_width
@@ -78,10 +79,11 @@ class Series(RepeatedFigure):
     )
     log_y = Parameter(bool, False, doc="whether the vertical axis is logarithmic")
 
-    def complaints(self, plan: Plan) -> Iterator[Complaint]:
+    def complaints(self, plan: Plan) -> Iterator[Fault]:
         yield from super().complaints(plan)
         if self._formula.references:
-            yield Complaint("value", f"{self._formula.references[0]!r} is not part of the token", "write 'token.name'")
+            message = f"{self._formula.references[0]!r} is not part of the token"
+            yield Fault(message, ("value",), help=("write 'token.name'",))
 
     @property
     def _formula(self) -> PortFormula:
@@ -239,14 +241,11 @@ class SingleRun(SignalFigure):
         doc="how many runs of each condition, starting with the first, it is chosen from; all if left out",
     )
 
-    def check_model(self, model: Model) -> Iterator[Complaint]:
+    def check_model(self, model: Model) -> Iterator[Fault]:
         if self.figure not in model.figures:
             known = list(model.figures)
-            yield Complaint(
-                "figure",
-                f"the model has no figure {self.figure!r}{did_you_mean(self.figure, known)}",
-                f"its figures: {', '.join(known) or 'none'}",
-            )
+            message = f"the model has no figure {self.figure!r}{did_you_mean(self.figure, known)}"
+            yield Fault(message, ("figure",), help=(f"its figures: {', '.join(known) or 'none'}",))
 
     def _chosen(self, data: Data) -> tuple[Condition, dict[str, Any]] | None:
         rows = [

@@ -9,9 +9,8 @@ from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from epicycle.actors import EpicycleError, Parameter, counted, texts_parameter
+from epicycle.actors import EpicycleError, Fault, Parameter, counted, texts_parameter
 
-from ...build import Complaint
 from ...language import Factor
 from ...study import Estimate, Plan, mean
 from ..sheet import LIMIT, Sheet, set_log
@@ -46,16 +45,17 @@ class Means(TableFigure):
     log_x = Parameter(bool, False, doc="whether the horizontal axis is logarithmic")
     log_y = Parameter(bool, False, doc="whether the vertical axis is logarithmic")
 
-    def complaints(self, plan: Plan) -> Iterator[Complaint]:
+    def complaints(self, plan: Plan) -> Iterator[Fault]:
         yield from super().complaints(plan)
         if not self.metric:
-            yield Complaint("metric", "it names no metric", "name at least one")
+            yield Fault("it names no metric", ("metric",), help=("name at least one",))
         units = {plan.columns[name].unit for name in self.metric if name in plan.columns}
         if self.together and len(units) > 1:
             listed = ", ".join(f"{name} in {plan.columns[name].unit or '1'}" for name in self.metric)
-            yield Complaint("together", "metrics in one panel need the same unit", listed)
+            yield Fault("metrics in one panel need the same unit", ("together",), help=(listed,))
         if self.together and self.lines:
-            yield Complaint("lines", "the metrics are already its lines", "leave out 'lines' or 'together'")
+            advice = "leave out 'lines' or 'together'"
+            yield Fault("the metrics are already its lines", ("lines",), help=(advice,))
 
     def draw(self, data: Data, extracts: Mapping[RunKey, Any], paths: Sequence[Path]) -> str:
         arranged = self.arranged(data, has_axis=True, metrics=self.metric if self.together else ())
@@ -143,10 +143,10 @@ class Distributions(TableFigure):
     limit: Parameter[float | None] = Parameter(float, None, doc="a value to mark, such as a distance to keep")
     log = Parameter(bool, False, doc="whether the axis of values is logarithmic")
 
-    def complaints(self, plan: Plan) -> Iterator[Complaint]:
+    def complaints(self, plan: Plan) -> Iterator[Fault]:
         yield from super().complaints(plan)
         if not self.metrics:
-            yield Complaint("metrics", "it names no metric", "name at least one")
+            yield Fault("it names no metric", ("metrics",), help=("name at least one",))
 
     def draw(self, data: Data, extracts: Mapping[RunKey, Any], paths: Sequence[Path]) -> str:
         has_axis = self.style == BOXES

@@ -10,7 +10,7 @@ from epicycle.actors import EpicycleError, Quantity, declared_parameters, did_yo
 from epicycle.actors.expression import operand
 
 from ...build import Model
-from ...catalogue import conversion_problem, unit_before
+from ...catalogue import conversion_fault, unit_before
 from ...engine import Results
 from ...language import ASPECTS, NUMBERS, SIGNALS, Dimension, StudyMetric, asks_for_none, split_number
 from ...text import Problems, inside, select
@@ -63,8 +63,8 @@ def check_metric(metric: StudyMetric, models: Sequence[Model], problems: Problem
             metric.places.get("unit"),
             "leave 'unit' out; 'to: ...' converts",
         )
-    elif found := conversion_problem(unit_before(own or metric.unit, metric.to), metric.to):
-        problems.add(f"metric {metric.name}: {found[0]}", metric.places.get("to"), *([found[1]] if found[1] else []))
+    elif found := conversion_fault(unit_before(own or metric.unit, metric.to), metric.to):
+        problems.add(f"metric {metric.name}: {found.message}", metric.places.get("to"), *found.help)
 
 
 def value_of(metric: StudyMetric, results: Results) -> float | None:

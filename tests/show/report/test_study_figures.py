@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from epicycle.actors import EpicycleError
+from epicycle.actors import EpicycleError, Fault
 from epicycle.runner import open_study
 from epicycle.runner.cli import main
 from epicycle.runner.show.pen import style
@@ -109,9 +109,7 @@ def test_metrics_of_one_unit_may_be_lines_of_one_panel(data: Data, sheets: list[
     ],
 )
 def test_metrics_that_do_not_go_together(figure: Means, parameter: str, message: str, advice: str, data: Data) -> None:
-    assert [(each.parameter, each.message, each.help) for each in figure.complaints(data.plan)] == [
-        (parameter, message, advice)
-    ]
+    assert list(figure.complaints(data.plan)) == [Fault(message, (parameter,), help=(advice,))]
 
 
 @pytest.mark.parametrize("kind", [Means, Distributions])

@@ -1,0 +1,193 @@
+"""Parameters and ports of composites and models: what a file declares of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from keyword import iskeyword, kwlist
+
+from epicycle.actors import UnitError, convert, in_si, parse_unit
+from epicycle.actors.expression import CONSTANTS, FUNCTIONS
+
+from ..text import (
+    NAME,
+    POISON,
+    Entry,
+    Mapping,
+    Node,
+    NodeReader,
+    Poison,
+    Position,
+    Scalar,
+    Text,
+    blame,
+    is_empty,
+)
+from .fields import (
+    AT,
+    LABEL,
+    QUANTITY_SCHEMA,
+    TEXT,
+    Construct,
+    Shape,
+    keyed,
+    named,
+    names_of,
+    node_as,
+    number,
+    one_or_more,
+    ref,
+    sound,
+)
+from .fields import NAME as NAME_PATTERN
+
+
+@dataclass(frozen=True)
+class PortText:
+    """A port that a composite declares; without a type it takes that of the ports connected to it."""
+
+    name: str
+    position: Position
+    type: Text | None = keyed(
+        AT,
+        "What passes through it, such as float, 'float | int', array[2] or a token class.",
+        called="the type of {what}",
+        default=None,
+    )
+    doc: str = keyed(TEXT, "What it is.", default="")
+
+
+PORT = Construct.of(PortText, "A port of a composite: its type, or {type, doc}.", type=["object", "string", "null"])
+
+
+def _ports(reader: NodeReader, node: Node, what: str) -> dict[str, PortText]:
+    """``[a, b]`` or ``{a: type, b: {type: ..., doc: ...}, c: }``."""
+    if isinstance(node, Mapping):
+        found = [_port(reader, name, entry) for name, entry in node.entries.items()]
+    else:
+        found = [PortText(text.text, text.position) for text in reader.texts(node, what) or ()]
+    ports: dict[str, PortText] = {}
+    for port in found:
+        if not NAME.match(port.name):
+            reader.problems.add(f"{port.name!r} is not a port name", port.position)
+            continue
+        if port.name in ports:
+            reader.problems.add(f"port {port.name!r} is declared twice", port.position)
+        ports[port.name] = port
+    return ports
+
+
+def _port(reader: NodeReader, name: str, entry: Entry) -> PortText:
+    what = f"port {name!r}"
+    if isinstance(entry.value, Mapping):
+        said = PORT.read(reader, entry.value, what) or {}
+    else:
+        said = {} if is_empty(entry.value) else {"type": AT.read(reader, entry.value, f"the type of {what}")}
+    return PortText(name, entry.key.position, **sound(said))
+
+
+def _unit(reader: NodeReader, node: Node, what: str) -> str | Poison:
+    unit = reader.text(node, f"unit of {what}")
+    try:
+        if unit:
+            parse_unit(unit)
+    except UnitError as error:
+        return blame(reader.problems, what, error, node)
+    return unit
+
+
+def _choices(reader: NodeReader, node: Node, what: str) -> tuple[str, ...] | Poison:
+    found = reader.texts(node, "choices")
+    if found is POISON:
+        return POISON
+    return tuple(text.text for text in found) or reader.problems.add(
+        f"{what} has an empty list of choices", node.position
+    )
+
+
+_FREE_NUMBER = number(float)
+
+
+def _bound(reader: NodeReader, node: Node, what: str) -> float | str | Poison:
+    """A number, or a text with a unit, which is converted once the parameter's own is known."""
+    value = node.value if isinstance(node, Scalar) else None
+    try:
+        if isinstance(value, str) and in_si(value) is not None:
+            return value
+    except UnitError as error:
+        return blame(reader.problems, what, error, node)
+    found: float | Poison = _FREE_NUMBER.read(reader, node, what)
+    return found
+
+
+@dataclass(frozen=True)
+class ParameterText:
+    """A parameter that a model or composite declares; its value is poison if its declaration is wrong."""
+
+    name: str
+    position: Position
+    value: Node | Poison | None = keyed(node_as({}), "The default; without one, a value must be given.", default=None)
+    unit: str = keyed(
+        Shape(ref("text"), _unit), "The unit of numbers, such as m/s; 1 for a pure number.", called="{what}", default=""
+    )
+    # As written: a text has a unit of its own.
+    min: float | str | None = keyed(
+        Shape(QUANTITY_SCHEMA, _bound),
+        "The smallest value, in its unit or with one of its own.",
+        called="{key} of {what}",
+        default=None,
+    )
+    max: float | str | None = keyed(
+        Shape(QUANTITY_SCHEMA, _bound),
+        "The largest value, in its unit or with one of its own.",
+        called="{key} of {what}",
+        default=None,
+    )
+    choices: tuple[str, ...] = keyed(
+        Shape(one_or_more(LABEL), _choices), "The texts to choose from.", called="{what}", default=()
+    )
+    doc: str = keyed(TEXT, "What it is.", called="{key} of {what}", default="")
+    given: tuple[str, ...] = ("value",)  # the keys of the declaration, which change those of an inherited one
+
+    def bounds(self) -> tuple[float | None, float | None]:
+        """The least and the greatest value, in its unit; raises ``UnitError``."""
+        low, high = (None if each is None else convert(each, self.unit or "1") for each in (self.min, self.max))
+        if low is not None and high is not None and low > high:
+            raise UnitError("min is greater than max")
+        return low, high
+
+
+PARAMETER = Construct.of(ParameterText, type=["object", "array", "string", "number", "boolean", "null"])
+_NO_PARAMETERS = {"index", *CONSTANTS, *FUNCTIONS}
+
+
+def _parameter(reader: NodeReader, name: str, entry: Entry) -> ParameterText:
+    """``name: value`` or ``name: {value: ..., unit: ..., min: ..., max: ..., choices: ..., doc: ...}``."""
+    if name in _NO_PARAMETERS or iskeyword(name):
+        meaning = "the index of an instance in its array" if name == "index" else "something else"
+        message = f"a parameter cannot be called {name!r}: in expressions, that name means {meaning}"
+        reader.problems.add(message, entry.key.position, "give it another name")
+    if not isinstance(entry.value, Mapping):
+        return ParameterText(name, entry.key.position, entry.value)
+    what = f"parameter {name!r}"
+    entries = PARAMETER.entries(reader, entry.value, what) or {}
+    said = PARAMETER.values(reader, entries, what, entry.key.position)
+    found = ParameterText(name, entry.key.position, **sound(said), given=tuple(entries))
+    if POISON in said.values():
+        return replace(found, value=POISON)
+    if found.unit or not {type(found.min), type(found.max)} & {str}:  # otherwise it may be inherited
+        try:
+            found.bounds()
+        except UnitError as error:
+            at = next(key for key in ("min", "max") if key in entries)
+            return replace(found, value=blame(reader.problems, what, error, entries[at].value))
+    return found
+
+
+PARAMETERS = Shape(
+    {
+        **names_of(ref("parameter")),
+        "propertyNames": {"pattern": f"^{NAME_PATTERN}$", "not": {"enum": sorted({*_NO_PARAMETERS, *kwlist})}},
+    },
+    named({}, _parameter).read,
+)
+PORTS = Shape({"anyOf": [one_or_more(ref("name")), names_of(ref("port_declaration"))]}, _ports)

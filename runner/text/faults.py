@@ -1,0 +1,60 @@
+"""From what is wrong with a value to a problem at its place in a file or a program."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from epicycle.actors import EpicycleError, Fault, FaultError
+
+from .document import Mapping, Node, Scalar, Sequence
+from .patterns import in_general
+from .problems import POISON, Poison, Position, Problems
+from .program import describe, raised_at
+from .reading import inside
+
+
+def place_in(node: Node, fault: Fault) -> Position:
+    """Where in a value a fault is, as far as it is written out."""
+    for number, key in enumerate(fault.keys, start=1):
+        if isinstance(node, Sequence) and isinstance(key, int):
+            node = node.items[key]
+        elif isinstance(node, Mapping) and key in node.entries:
+            entry = node.entries[str(key)]
+            if fault.of_key and number == len(fault.keys):
+                return entry.key.position
+            node = entry.value
+        else:
+            items = node.items if isinstance(node, Sequence) else ()
+            named = next((item for item in items if isinstance(item, Scalar) and item.value == key), None)
+            if named is None:
+                return node.position
+            node = named
+    offset, length = fault.span or (0, 0)
+    if not length or not isinstance(node, Scalar) or "${" in node.text:  # of which the value is something else
+        return node.position
+    return inside(node, node.text, offset, node.text[offset : offset + length] or " ")
+
+
+def blame(
+    problems: Problems, label: str, error: Exception, where: Node | Position, scope: str = "", *, in_all: bool = False
+) -> Poison:
+    """Add what is wrong with a node, or with something at a position, or how the code of a user's class failed.
+
+    ``label`` is its name in messages; ``in_all``: what is wrong for all of an array is reported once.
+    """
+    at = where if isinstance(where, Position) else where.position
+
+    def tell(message: str, place: Position, *hints: str, **of_user: Any) -> None:
+        message = f"{label}: {message}"
+        about = (in_general(message),) if in_all else ()
+        problems.add(message, place, *hints, scope=scope, about=about, **of_user)
+
+    if isinstance(error, FaultError):
+        for fault in error.faults:
+            tell(fault.message, at if isinstance(where, Position) else place_in(where, fault), *fault.help)
+    elif isinstance(error, EpicycleError):
+        tell(str(error), at)
+    else:
+        told = str(error) if isinstance(error, ValueError) else ""
+        tell(told or describe(error), at, raised=raised_at(error), cause=error)
+    return POISON
