@@ -54,13 +54,11 @@ class Trajectory:
         crossings."""
         self.time, self.fraction = time, fraction
         self._fixed = list(self._held.values())
-        self._function = None
-        if all(type(value) is float for value in (*state, *self._fixed)):
+        self._function, exact = None, self._exact(state)
+        if exact is None and all(type(value) is float for value in (*state, *self._fixed)):
             sources = tuple(formula.source for formula in self._formulas.values())
             self._function = all_translated(sources, ("time", *self._also, *self.names, *self._held))
-        self.solution = Solution(
-            self._rates, self._bounds_of_rates, state, self.guards, **self._solver, exact=self._exact(state)
-        )
+        self.solution = Solution(self._rates, self._bounds_of_rates, state, self.guards, **self._solver, exact=exact)
 
     def _exact(self, state: State) -> Exact | None:
         """The solution, if every derivative is linear in its own state and depends on nothing else that moves."""
