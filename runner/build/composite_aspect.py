@@ -14,7 +14,7 @@ from itertools import chain
 from epicycle.actors import OutputPort, accepts, declared_parameters, type_name
 from epicycle.aspects import CompositeAspect, FiringTime, Request
 
-from ..graph import AspectModel, Detour, ModelGraph, WovenAspect, find_loop
+from ..graph import AspectModel, Detour, ModelGraph, WovenAspect, connection_place, find_loop
 from ..language import PartText, PointcutText, beside
 from ..text import PathIndex, Position, Problems, did_you_mean, place_in
 from .looks import without_port
@@ -84,7 +84,7 @@ class ModelWeaving(Weaving):
         ports, connections, actors = super().select(pointcuts)
         actors = {actor: unit for actor, unit in actors.items() if not self._is_inside(actor)}
         # Exclusions may remove what a pointcut selects; a pointcut for actors may name the composite around them.
-        aimed = {place: place for place in (*ports, *(_place(*ends) for ends in connections))} | actors
+        aimed = {place: place for place in (*ports, *(connection_place(*ends) for ends in connections))} | actors
         asked, times = self._asked, self._times
         self._asked = {place: asked[unit] for place, unit in aimed.items() if unit in asked}
         self._times = {place: times[unit] for place, unit in aimed.items() if unit in times}
@@ -111,7 +111,7 @@ class ModelWeaving(Weaving):
     def _connections_of(self, pointcut: PointcutText, left: str, right: str) -> list[tuple[str, str]]:
         found = super()._connections_of(pointcut, left, right)
         outside = [ends for ends in found if not any(map(self._is_inside, ends))]
-        self._ask(pointcut, [_place(*ends) for ends in outside], [_place(*ends) for ends in found])
+        self._ask(pointcut, [connection_place(*ends) for ends in outside], [connection_place(*ends) for ends in found])
         return outside
 
     def _ask(self, pointcut: PointcutText, places: list[str], found: list[str]) -> None:
@@ -168,7 +168,7 @@ class ModelWeaving(Weaving):
         found |= {actor: graph.director_of(actor) for actor in woven.actors}
         for source, destination in woven.connections:
             hop = next(hop for hop in graph.outgoing(source) if hop.destination == destination)
-            found[_place(source, destination)] = graph.director_over(hop)
+            found[connection_place(source, destination)] = graph.director_over(hop)
         for place, director in found.items():
             if director != own:
                 where, hint = f"outside {own}", f"declare it outside {own}"
@@ -224,7 +224,7 @@ def detours(graph: ModelGraph, aspects: Iterable[WovenAspect]) -> list[Detour]:
             senders[path] = lead([path], path)  # an aspect at an output acts before the send
     for hop in chain.from_iterable(map(graph.outgoing, graph.ports)) if at else ():
         sources = senders.get(hop.source, [hop.source]) if hop.delay is None else []
-        sources = lead(sources, _place(hop.source, hop.destination))
+        sources = lead(sources, connection_place(hop.source, hop.destination))
         if hop.destination not in senders:
             sources = lead(sources, hop.destination)
         for source in sources:
@@ -251,10 +251,6 @@ def check_nesting(aspects: Iterable[WovenAspect], graph: ModelGraph, problems: P
         hint = f"a token would never leave: attach one of them elsewhere, or exclude it: '!{second}.**'"
         problems.add(message, graph.positions.get(f"aspect {first}"), hint)
     return not loop
-
-
-def _place(source: str, destination: str) -> str:
-    return f"{source} -> {destination}"
 
 
 def _names(ports: Iterable[str]) -> list[str]:

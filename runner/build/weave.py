@@ -14,7 +14,7 @@ from dataclasses import dataclass, field
 from epicycle.actors import declared_parameters
 from epicycle.aspects import Aspect
 
-from ..graph import WovenAspect
+from ..graph import WovenAspect, connection_place
 from ..language import PointcutText
 from ..text import PathIndex, PatternError, Poison, did_you_mean, in_general, nearest
 from .looks import Looks, PlaceOf, unknown_inputs
@@ -292,8 +292,7 @@ class Weaving(View):
             self._problem(f"{pointcut.text!r} is not a pointcut: {error}", pointcut)
             return []
         if not found and not (self._excuses(self._full(left)) or self._excuses(self._full(right))):
-            known = [f"{hop.source} -> {hop.destination}" for hop in self.graph.hops]
-            near = did_you_mean(f"{self._full(left)} -> {self._full(right)}", known)
+            near = did_you_mean(connection_place(self._full(left), self._full(right)), map(str, self.graph.hops))
             self._problem(f"{pointcut.text!r} matches no connection{near}", pointcut)
         return found
 
