@@ -60,6 +60,11 @@ class FaultError(EpicycleError):
         return self.faults[0].message
 
     @property
+    def keys(self) -> Keys:
+        """Where in the value it is."""
+        return self.faults[0].keys
+
+    @property
     def help(self) -> tuple[str, ...]:
         """What would be right instead."""
         return self.faults[0].help

@@ -350,10 +350,9 @@ class Configurable:
             self._configured = frozenset(values)
         for name in values:
             if name not in declared:
-                message = unknown_parameter(type(self), name)
-                mark = "" if message.endswith("?") else ";"
-                valid = ", ".join(declared) or "none"
-                raise ParameterError(f"{message}{mark} valid parameters: {valid}", (name,), of_key=True)
+                has_guess = name not in self.refused and bool(did_you_mean(name, declared))  # which ends a sentence
+                valid = f"{'' if has_guess else ';'} valid parameters: {', '.join(declared) or 'none'}"
+                raise ParameterError(unknown_parameter(type(self), name) + valid, (name,), of_key=True)
         faults: list[Fault] = []
         for name, parameter in declared.items():
             if name not in values:

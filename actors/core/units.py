@@ -27,6 +27,10 @@ class UnitError(FaultError):
     """A unit that is unknown, or not of the required kind."""
 
 
+class _UnreadableError(UnitError):
+    """Text that is no unit."""
+
+
 @dataclass(frozen=True, slots=True)
 class Unit:
     """A unit as `scale * pi**pi_power` times a product of powers of m, kg, s, A, K and bit, in this order.
@@ -175,7 +179,7 @@ _SUPERSCRIPTS: Final = str.maketrans("⁺⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "+-012
 def parse_unit(text: str) -> Unit:
     """Return the unit that a text such as `m/s^2`, `m/s²`, `(m/s)^2`, `1/s` or `%` means."""
     if len(text) > MAX_TEXT:
-        raise UnitError(f"unreadable unit '{text[:20]}...': it is longer than {MAX_TEXT} characters")
+        raise _UnreadableError(f"unreadable unit '{text[:20]}...': it is longer than {MAX_TEXT} characters")
     return _Reader(text).read()
 
 
@@ -250,7 +254,7 @@ class _Reader:
         return unit
 
     def _unreadable(self, reason: str) -> UnitError:
-        return UnitError(f"unreadable unit '{self._text}': {reason}")
+        return _UnreadableError(f"unreadable unit '{self._text}': {reason}")
 
 
 def _did_you_mean(name: str) -> str:
@@ -329,7 +333,7 @@ def _unit_in(text: str, unit: str) -> Unit:
     try:
         return parse_unit(unit)
     except UnitError as error:
-        article = "an" if str(error).startswith("unreadable") else "the"
+        article = "an" if isinstance(error, _UnreadableError) else "the"
         raise UnitError(f"{brief(text)} has {article} {error}") from None
 
 

@@ -177,12 +177,15 @@ class ActorPoint(JoinPoint):
         return port, ""
 
 
+_WHOLE = " as a whole"  # a part of the name of a random stream: with another one, results would change
+
+
 class Unit(ActorPoint):
     """The target of an execution aspect as a whole: the ``points`` of its actors."""
 
     def __init__(self, path: str, first: ActorPoint) -> None:
         super().__init__(first.aspect, path, first._context, lambda job: None, first.shared)
-        self.random = aspect_stream(first._context.streams, path, f"{first.aspect} as a whole")
+        self.random = aspect_stream(first._context.streams, path, first.aspect + _WHOLE)
         self.points: list[ActorPoint] = []
         self._readings = first._readings
 

@@ -8,17 +8,17 @@ output ``response``, or its only output.  If there are several inputs, a pointcu
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from itertools import chain
 
 from epicycle.actors import OutputPort, accepts, declared_parameters, type_name
-from epicycle.aspects import CompositeAspect, FiringTime, Request
+from epicycle.aspects import Aspect, CompositeAspect, FiringTime, Request
 
-from ..graph import AspectModel, Detour, ModelGraph, WovenAspect, find_loop
+from ..graph import AspectModel, Detour, ModelGraph, WovenAspect, connection_place, find_loop
 from ..language import PartText, PointcutText, beside
-from ..text import PathIndex, Position, Problems, did_you_mean, place_in
-from .looks import without_port
-from .weave import Weaving
+from ..text import POISON, Poison, Position, Problems, did_you_mean, place_in
+from .looks import PlaceOf, without_port
+from .weave import Places, Pointcuts, bind
 
 BY_PLACE = "or name the input that takes the tokens: {at: ..., request: ...}"
 OWN = frozenset(declared_parameters(CompositeAspect))  # when it acts: these are not parameters of the composite
@@ -31,156 +31,126 @@ def as_actor(part: PartText) -> PartText:
     return replace(part, values=values, priority=priority)
 
 
-@dataclass
-class ModelWeaving(Weaving):
-    """Finds the places of an aspect that is the composite at ``path``, and connects it with them."""
+@dataclass(frozen=True)
+class _Plan:
+    """How tokens of an aspect's places come into its composite, and by which port they leave."""
 
-    path: str
-    position: Position
-    _response: str = field(default="", init=False)
-    _asked: dict[str, str] = field(default_factory=dict, init=False)  # the request port of each place
-    # With "" for one that is unknown, which has been reported.
-    _request_ports: dict[str, None] = field(default_factory=dict, init=False)
-    _times: dict[str, FiringTime] = field(default_factory=dict, init=False)
-    _is_misplaced: bool = field(default=False, init=False)
+    requests: list[str | Poison]  # the request ports
+    response: str | Poison
+    model: AspectModel | Poison
 
-    def __post_init__(self) -> None:
-        self.inputs, self.outputs = self.graph.borders(self.path)
 
-    @property
-    def kind(self) -> str:
-        return self.graph.composites[self.path]
+def weave_model(
+    pointcuts: Pointcuts,
+    aspect: Aspect | Poison,
+    at: Sequence[PointcutText | Poison],
+    place_of: PlaceOf,
+    position: Position,
+) -> WovenAspect | Poison:
+    """Attach an aspect that is a composite: what comes to its places is handed to it, and goes on when it answers."""
+    view, draft, graph = pointcuts, pointcuts.draft, pointcuts.graph
+    places = pointcuts.resolve(at)
+    plan = _planned(pointcuts, [each for each in at if each and not each.exclude], places, position)
+    if POISON in plan.requests or aspect is POISON:
+        draft.leave_open(pointcuts.own)
+    if aspect is POISON:
+        return POISON
+    woven = bind(view, aspect, places, place_of)
+    for port in (each for each in plan.requests if each):
+        for hop in list(graph.incoming(port)):  # a problem that has been reported
+            graph.disconnect(hop)
+        graph.open_requests(port)
+    if plan.response:
+        graph.ports[plan.response].type = Request
+    return replace(woven, model=plan.model) if plan.model else woven
 
-    def check(self, woven: WovenAspect) -> None:
-        """Find the ports by which tokens come in and leave, and check that the composite can attach to its places."""
-        self._response = self._only(self.outputs, "response", "output", self.position)
-        if not self._request_ports:
-            self._request(PointcutText("", self.position))
-        for port in filter(None, self._request_ports):
-            for hop in self.graph.incoming(port):
-                message = f"{port} takes the tokens of this aspect, so nothing else can be connected to it"
-                self._problem(message, hop.position, "add another input for other tokens")
-            if isinstance(self.graph.ports[port].port, OutputPort):
-                hint = "attach that aspect here, too, or add another composite"
-                self._problem(f"{self.path} is already the model of another aspect", self.position, hint)
-        self._check_types()
-        self._check_directors(woven)
 
-    def connect(self, woven: WovenAspect) -> WovenAspect:
-        """Let the tokens of all places come in, and continue when they are answered."""
-        if "" in self._request_ports:
-            self.draft.leave_open(self.path)
-        for port in filter(None, self._request_ports):
-            for hop in list(self.graph.incoming(port)):  # a problem that has been reported
-                self.graph.disconnect(hop)
-            self.graph.open_requests(port)
-        if self._response:
-            self.graph.ports[self._response].type = Request
-        if not self._response or self._is_misplaced:
-            return woven
-        return replace(woven, model=AspectModel(self.path, self.kind, self._response, self._asked, self._times))
+def _planned(view: Pointcuts, aimed: Sequence[PointcutText], places: Places, position: Position) -> _Plan:
+    """What is to be connected; what cannot be is reported."""
+    graph, path = view.graph, view.own
+    inputs, outputs = graph.borders(path)
+    of_each = [_request(view, inputs, each) for each in aimed or [PointcutText("", position)]]
+    requests = list(dict.fromkeys(of_each))
+    response = _only(view, outputs, "response", "output", position)
+    for port in (each for each in requests if each):
+        for hop in graph.incoming(port):
+            message = f"{port} takes the tokens of this aspect, so nothing else can be connected to it"
+            view.tell(message, hop.position, "add another input for other tokens")
+        if isinstance(graph.ports[port].port, OutputPort):
+            hint = "attach that aspect here, too, or add another composite"
+            view.tell(f"{path} is already the model of another aspect", position, hint)
+    _check_types(view, [each for each in (*requests, response) if each])
+    asked: dict[str, str] = {}
+    times: dict[str, FiringTime] = {}
+    names = (*places.ports, *(connection_place(*ends) for ends in places.connections), *places.actors)
+    for pointcut, request in zip(aimed, of_each, strict=False):
+        here = [place for place in names if places.aimed[place] is pointcut]
+        asked |= {place: request for place in here if request}
+        times |= {place: pointcut.firing_time for place in here if place in places.actors}
+        for fault in without_port("time", pointcut.firing_time, [each for each in here if each in graph.actors], graph):
+            where = pointcut.position if pointcut.time is None else place_in(pointcut.time.node, fault)
+            view.tell(fault.message, where, *fault.help)
+    is_placed = _is_under_one_director(view, places, position)
+    if not response or not is_placed:
+        return _Plan(requests, response, POISON)
+    asked = {place: asked[place] for place in names if place in asked}
+    return _Plan(requests, response, AspectModel(path, view.kind, response, asked, times))
 
-    def select(self, pointcuts: Sequence[PointcutText]) -> tuple[list[str], list[tuple[str, str]], dict[str, str]]:
-        ports, connections, actors = super().select(pointcuts)
-        actors = {actor: unit for actor, unit in actors.items() if not self._is_inside(actor)}
-        # Exclusions may remove what a pointcut selects; a pointcut for actors may name the composite around them.
-        aimed = {place: place for place in (*ports, *(_place(*ends) for ends in connections))} | actors
-        asked, times = self._asked, self._times
-        self._asked = {place: asked[unit] for place, unit in aimed.items() if unit in asked}
-        self._times = {place: times[unit] for place, unit in aimed.items() if unit in times}
-        return ports, connections, actors
 
-    def _aimed_at(self, pointcut: PointcutText, index: PathIndex) -> list[str]:
-        found = list(super()._aimed_at(pointcut, index))
-        outside = [path for path in found if path != self.path and not self._is_inside(path)]
-        self._ask(pointcut, outside, found)
-        if not pointcut.exclude:
-            self._times.update(dict.fromkeys(outside, pointcut.firing_time))
-            inside = [path for path in self.graph.actors if any(f"{path}.".startswith(f"{each}.") for each in outside)]
-            for fault in without_port("time", pointcut.firing_time, inside, self.graph):
-                where = pointcut.position if pointcut.time is None else place_in(pointcut.time.node, fault)
-                self._problem(fault.message, where, *fault.help)
-        return outside
-
-    def _of(self, pointcut: PointcutText) -> list[str]:
-        found = super()._of(pointcut)
-        outside = [port for port in found if not self._is_inside(port)]
-        self._ask(pointcut, outside, found)
-        return outside
-
-    def _connections_of(self, pointcut: PointcutText, left: str, right: str) -> list[tuple[str, str]]:
-        found = super()._connections_of(pointcut, left, right)
-        outside = [ends for ends in found if not any(map(self._is_inside, ends))]
-        self._ask(pointcut, [_place(*ends) for ends in outside], [_place(*ends) for ends in found])
-        return outside
-
-    def _ask(self, pointcut: PointcutText, places: list[str], found: list[str]) -> None:
-        """Note by which port the tokens of the places come in; if several pointcuts select a place, the last counts."""
-        if pointcut.exclude:
-            return
-        if found and not places:
-            self._problem(f"it cannot attach to its own inside, at {found[0]}", pointcut)
-        if request := self._request(pointcut):
-            self._asked.update(dict.fromkeys(places, request))
-
-    def _request(self, pointcut: PointcutText) -> str:
-        """The port by which the tokens of a pointcut come in."""
-        asked = pointcut.request
-        if asked is None:
-            found = self._only(self.inputs, "request", "input", pointcut.position, BY_PLACE)
-        else:
-            found = f"{self.path}.{asked.text}"
-            if found not in self.inputs:
-                names = _names(self.inputs)
-                hint = f"its inputs: {', '.join(names) or 'none'}"
-                self._problem(f"{self.kind} has no input {asked.text!r}{did_you_mean(asked.text, names)}", asked, hint)
-                found = ""
-        self._request_ports[found] = None
+def _request(view: Pointcuts, inputs: list[str], pointcut: PointcutText) -> str | Poison:
+    """The port by which the tokens of a pointcut come in."""
+    asked = pointcut.request
+    if asked is None:
+        return _only(view, inputs, "request", "input", pointcut.position, BY_PLACE)
+    found = f"{view.own}.{asked.text}"
+    if found in inputs:
         return found
+    names = _names(inputs)
+    hint = f"its inputs: {', '.join(names) or 'none'}"
+    return view.tell(f"{view.kind} has no input {asked.text!r}{did_you_mean(asked.text, names)}", asked, hint)
 
-    def _only(self, ports: list[str], name: str, direction: str, position: Position, hint: str = "") -> str:
-        """The port of that name, or the only one of its direction."""
-        named = f"{self.path}.{name}"
-        if named in ports or len(ports) == 1:
-            return named if named in ports else ports[0]
-        if not ports:
-            self._problem(f"{self.kind} has no {direction}", position, f"add '{direction}s: [{name}]' to {self.kind}")
-        else:
-            message = f"{self.kind} has {len(ports)} {direction}s, none of them called {name!r}"
-            known = f"its {direction}s: {', '.join(_names(ports))}"
-            self._problem(message, position, known, f"call one of them {name!r}" + (f", {hint}" if hint else ""))
-        return ""
 
-    def _check_types(self) -> None:
-        """Check that the ports take and give requests, if they declare types."""
-        for port in filter(None, (*self._request_ports, self._response)):
-            node = self.graph.ports[port]
-            wanted = node.type
-            if wanted is not None and not accepts(wanted, Request):
-                what = f"{port.rpartition('.')[2]} of {self.kind} has the type {type_name(wanted)}"
-                hint = "leave out its type: the actors inside receive requests, which contain the tokens"
-                self._problem(f"{what}, but aspects pass requests", node.declared, hint)
+def _only(
+    view: Pointcuts, ports: list[str], name: str, direction: str, position: Position, hint: str = ""
+) -> str | Poison:
+    """The port of that name, or the only one of its direction."""
+    named, kind = f"{view.own}.{name}", view.kind
+    if named in ports or len(ports) == 1:
+        return named if named in ports else ports[0]
+    if not ports:
+        return view.tell(f"{kind} has no {direction}", position, f"add '{direction}s: [{name}]' to {kind}")
+    message = f"{kind} has {len(ports)} {direction}s, none of them called {name!r}"
+    known = f"its {direction}s: {', '.join(_names(ports))}"
+    return view.tell(message, position, known, f"call one of them {name!r}" + (f", {hint}" if hint else ""))
 
-    def _check_directors(self, woven: WovenAspect) -> None:
-        """Check that all places are under the composite's own director, which has one order and one time for them."""
-        graph, own = self.graph, self.graph.director_of(self.path)
-        found = {port: graph.director_of(graph.owner(port)) for port in woven.ports}
-        found |= {actor: graph.director_of(actor) for actor in woven.actors}
-        for source, destination in woven.connections:
-            hop = next(hop for hop in graph.outgoing(source) if hop.destination == destination)
-            found[_place(source, destination)] = graph.director_over(hop)
-        for place, director in found.items():
-            if director != own:
-                where, hint = f"outside {own}", f"declare it outside {own}"
-                if director:
-                    where = f"inside {director}"
-                    hint = f"declare it inside {director}, or attach it to the ports of {director}"
-                self._problem(f"{place} is {where}, which has its own director", self.position, hint)
-                self._is_misplaced = True
-                return
 
-    def _is_inside(self, port: str) -> bool:
-        return port.startswith(f"{self.path}.")
+def _check_types(view: Pointcuts, ports: Iterable[str]) -> None:
+    """Check that the ports take and give requests, if they declare types."""
+    for port in ports:
+        node = view.graph.ports[port]
+        if node.type is not None and not accepts(node.type, Request):
+            what = f"{port.rpartition('.')[2]} of {view.kind} has the type {type_name(node.type)}"
+            hint = "leave out its type: the actors inside receive requests, which contain the tokens"
+            view.tell(f"{what}, but aspects pass requests", node.declared, hint)
+
+
+def _is_under_one_director(view: Pointcuts, places: Places, position: Position) -> bool:
+    """Whether all places are under the composite's own director, which has one order and one time for them."""
+    graph, own = view.graph, view.graph.director_of(view.own)
+    found = {port: graph.director_of(graph.owner(port)) for port in places.ports}
+    found |= {actor: graph.director_of(actor) for actor in places.actors}
+    for source, destination in places.connections:
+        hop = next(hop for hop in graph.outgoing(source) if hop.destination == destination)
+        found[connection_place(source, destination)] = graph.director_over(hop)
+    for place, director in found.items():
+        if director != own:
+            where, hint = f"outside {own}", f"declare it outside {own}"
+            if director:
+                where = f"inside {director}"
+                hint = f"declare it inside {director}, or attach it to the ports of {director}"
+            view.tell(f"{place} is {where}, which has its own director", position, hint)
+            return False
+    return True
 
 
 def detours(graph: ModelGraph, aspects: Iterable[WovenAspect]) -> list[Detour]:
@@ -224,7 +194,7 @@ def detours(graph: ModelGraph, aspects: Iterable[WovenAspect]) -> list[Detour]:
             senders[path] = lead([path], path)  # an aspect at an output acts before the send
     for hop in chain.from_iterable(map(graph.outgoing, graph.ports)) if at else ():
         sources = senders.get(hop.source, [hop.source]) if hop.delay is None else []
-        sources = lead(sources, _place(hop.source, hop.destination))
+        sources = lead(sources, connection_place(hop.source, hop.destination))
         if hop.destination not in senders:
             sources = lead(sources, hop.destination)
         for source in sources:
@@ -251,10 +221,6 @@ def check_nesting(aspects: Iterable[WovenAspect], graph: ModelGraph, problems: P
         hint = f"a token would never leave: attach one of them elsewhere, or exclude it: '!{second}.**'"
         problems.add(message, graph.positions.get(f"aspect {first}"), hint)
     return not loop
-
-
-def _place(source: str, destination: str) -> str:
-    return f"{source} -> {destination}"
 
 
 def _names(ports: Iterable[str]) -> list[str]:

@@ -63,17 +63,17 @@ class Looks(View):
         try:
             found = paths.select(self._full(pattern))
         except PatternError as error:
-            self._problem(f"{name}: {pattern!r} is not a pattern: {error}", within(position, pattern))
+            self.tell(f"{name}: {pattern!r} is not a pattern: {error}", within(position, pattern))
             return []
         fitting = [path for path in found if not of_ports or self._sends(path)]
         position = within(position, pattern)
         if found and not fitting:
-            self._problem(f"{name}: {found[0]} is an input port, but an output port is needed", position)
+            self.tell(f"{name}: {found[0]} is an input port, but an output port is needed", position)
         elif not found and not self.draft.excuses(self._full(pattern) + ("" if of_ports else ".*")):
             near = paths.did_you_mean(pattern, self.scope, lambda path: not of_ports or self._sends(path))
-            self._problem(f"{name}: {pattern!r} matches no {parameter.selects}{near}", position)
+            self.tell(f"{name}: {pattern!r} matches no {parameter.selects}{near}", position)
         elif len(fitting) > 1 and parameter.is_single:
-            self._problem(f"{name}: {pattern!r} selects {fitting[0]} and {fitting[1]}, but must select one", position)
+            self.tell(f"{name}: {pattern!r} selects {fitting[0]} and {fitting[1]}, but must select one", position)
         return fitting
 
     def reading(self, name: str, reference: str, position: Position) -> Reading:
@@ -89,10 +89,10 @@ class Looks(View):
         if self.draft.excuses(self._full(reference)):
             return reference, ()  # nothing can send there now, so the condition never holds
         if self._full(reference) in self.ports:
-            self._problem(f"{name}: {reference} is an input port, but an output port is needed", position)
+            self.tell(f"{name}: {reference} is an input port, but an output port is needed", position)
         else:
             near = self.ports.did_you_mean(reference, self.scope, self._sends)
-            self._problem(f"{name}: {reference!r} names no output port{near}", position)
+            self.tell(f"{name}: {reference!r} names no output port{near}", position)
         return reference, ()
 
     def _check_given(
@@ -112,7 +112,7 @@ class Looks(View):
                 if fields[0] not in names:
                     near = did_you_mean(fields[0], names)
                     message = f"{name}: {reference}: {source.type.__name__} has no field {fields[0]!r}{near}"
-                    self._problem(message, position, f"its fields: {', '.join(names)}")
+                    self.tell(message, position, f"its fields: {', '.join(names)}")
                     return False
         return True
 

@@ -67,11 +67,14 @@ class View:
     def _full(self, text: str) -> str:
         return f"{self.scope}.{text}" if self.scope else text
 
-    def _problem(
+    def tell(
         self, message: str, where: PointcutText | Text | Position | None, *hints: str, about: tuple[str, ...] = ()
-    ) -> None:
+    ) -> Poison:
+        """Report a problem of the aspect or monitor."""
         position = where.position if isinstance(where, (PointcutText, Text)) else where
-        self.problems.add(f"{self.called} {self.name}: {message}", position, *hints, scope=self.scope, about=about)
+        return self.problems.add(
+            f"{self.called} {self.name}: {message}", position, *hints, scope=self.scope, about=about
+        )
 
     def blame(self, error: FaultError, where: Node | Position) -> Poison:
         """Report what is wrong with a node, or with something at a position."""

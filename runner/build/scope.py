@@ -18,7 +18,7 @@ from epicycle.aspects import Aspect, CompositeAspect, CompositeExecutionAspect, 
 from ..graph import Like, ModelGraph, Ties, WovenAspect
 from ..language import Values
 from ..text import NAME, NAMES_HAVE, Position, Problems, call_site, did_you_mean
-from .composite_aspect import ModelWeaving, check_nesting
+from .composite_aspect import check_nesting, weave_model
 from .composite_class import CompositeInstance
 from .connect import Child, Inside, Link, Wiring, child_of_actors, make
 from .draft import Draft
@@ -34,7 +34,7 @@ from .named import (
     raising,
 )
 from .paths import Paths
-from .weave import Weaving
+from .weave import Pointcuts, bind
 from .weave_all import weave_decorations
 
 _INSTANCE = re.compile(r"([A-Za-z_][A-Za-z0-9_]*)(?:\[(\d{1,9})\])?\Z")
@@ -336,9 +336,9 @@ class Scope:
             if model.graph.rules_at(full).are_ptolemys:
                 aspect.follow_ptolemy()
             with raising() as problems:
-                pointcuts = Named(model.graph, self.path, position, problems).pointcuts(at, type(aspect))
-                weaving = Weaving(model.draft, Paths(model.draft), full, self.path, problems, type(aspect))
-                woven = weaving.weave(aspect, pointcuts, lambda *_: position)
+                named = Named(model.graph, self.path, position, problems).pointcuts(at, type(aspect))
+                pointcuts = Pointcuts(model.draft, Paths(model.draft), full, self.path, problems, type(aspect))
+                woven = bind(pointcuts, aspect, pointcuts.resolve(named), lambda _: position)
             model.enlist([woven])
             return woven
         draft, others = model.draft.copy(), list[WovenAspect]()
@@ -351,16 +351,15 @@ class Scope:
             draft.merge(made, draft.graph.director_of(path))
         kind = CompositeAspect if firing_time is None else CompositeExecutionAspect
         with raising() as problems:
-            pointcuts = Named(draft.graph, self.path, position, problems).pointcuts(at, kind)
-            pointcuts = [replace(each, firing_time=firing_time or 0.0) for each in pointcuts]
-            detour = ModelWeaving(draft, Paths(draft), full, self.path, problems, kind, path, position)
-            woven = detour.weave(kind(), pointcuts, lambda *_: position)
-            detour.check(woven)
-            woven = detour.connect(woven)
-            check_nesting([*model.aspects, woven], draft.graph, problems)
+            named = Named(draft.graph, self.path, position, problems).pointcuts(at, kind)
+            named = [replace(each, firing_time=firing_time or 0.0) for each in named]
+            pointcuts = Pointcuts(draft, Paths(draft), full, self.path, problems, kind, path)
+            made_model = weave_model(pointcuts, kind(), named, lambda _: position, position)
+            assert made_model
+            check_nesting([*model.aspects, made_model], draft.graph, problems)
         draft.graph.positions.setdefault(f"aspect {full}", position)
-        model.adopt(draft, [*others, woven])
-        return woven
+        model.adopt(draft, [*others, made_model])
+        return made_model
 
     def unweave(self, name: str) -> None:
         """Remove an aspect, with its composite if it is a model."""

@@ -1,4 +1,4 @@
-"""From aspect declarations to aspects attached to ports and connections.
+"""From the pointcuts of an aspect to its places, and from these to an aspect that is attached to them.
 
 A pointcut is a pattern of ports (``observer[*].plan_in``), of a connection (``a.out -> b.in``), or a selection by the
 type of an actor or composite, or by a tag that the model's author gave it, with the name of a port.  A pattern after
@@ -8,114 +8,139 @@ actors in it.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from epicycle.actors import declared_parameters
 from epicycle.aspects import Aspect
 
-from ..graph import WovenAspect
+from ..graph import WovenAspect, connection_place, is_within
 from ..language import PointcutText
-from ..text import PathIndex, PatternError, Poison, did_you_mean, in_general, nearest
+from ..text import POISON, PathIndex, PatternError, Poison, did_you_mean, in_general, nearest
 from .looks import Looks, PlaceOf, unknown_inputs
 from .paths import View
 
+Ends = tuple[str, str]
+Found = tuple[PointcutText, list[str] | Poison]  # what a pointcut selects; poison if it rightly selects nothing
+
+
+@dataclass(frozen=True)
+class Places:
+    """Where an aspect attaches; ``aimed`` is the last pointcut that selects each place, or a composite around it."""
+
+    ports: list[str] = field(default_factory=list)
+    connections: list[Ends] = field(default_factory=list)
+    actors: dict[str, str] = field(default_factory=dict)  # with what the pointcut names
+    parameters: list[str] = field(default_factory=list)
+    aimed: dict[str, PointcutText] = field(default_factory=dict)
+
 
 @dataclass
-class Weaving(View):
-    """Finds the places of one aspect of the class ``cls``."""
+class Pointcuts(View):
+    """Resolves the pointcuts of one aspect of the class ``cls``; it changes nothing.
+
+    An aspect that is the composite at the path ``own`` attaches to nothing in it.
+    """
 
     cls: type[Aspect]
-    _parameters: dict[str, bool] = field(default_factory=dict, init=False)  # selected ones, and whether excluded
-    _left_out: set[str] = field(default_factory=set, init=False)  # excluded ports, and the connections to them
-    _is_excused: bool = field(default=False, init=False)  # whether a pointcut rightly selects nothing
+    own: str = ""
 
     @property
     def kind(self) -> str:
-        return self.cls.__name__
+        return self.graph.composites[self.own] if self.own else self.cls.__name__
 
-    def weave(self, aspect: Aspect, at: Sequence[PointcutText | Poison], place_of: PlaceOf) -> WovenAspect:
-        """The aspect with its places and everything it reads; a pointcut that selects nothing is a problem.
-
-        ``place_of`` returns where something is wrong with its parameters in the model file.
-        """
-        before = len(self.problems)
+    def resolve(self, at: Sequence[PointcutText | Poison]) -> Places:
+        """The places; a pointcut that selects nothing is a problem."""
         pointcuts = [each for each in at if each]
-        self._is_excused = len(pointcuts) < len(at)
-        ports, connections, actors = self.select(pointcuts)
-        parameters = [path for path, is_left_out in self._parameters.items() if not is_left_out]
-        is_somewhere = ports or connections or actors or parameters
-        if pointcuts and not is_somewhere and not self._is_excused and len(self.problems) == before:
+        is_sound, places = (self._at_ports if self.cls.at_ports else self._at_actors)(pointcuts)
+        is_somewhere = places.ports or places.connections or places.actors or places.parameters
+        if pointcuts and not is_somewhere and is_sound and POISON not in at:
             only_out = all(pointcut.exclude for pointcut in pointcuts)
             nowhere = "'at' has only exclusions" if only_out else "'at' excludes everything that it selects"
-            self._problem(nowhere, pointcuts[0])
-        looks = Looks(self.draft, self.paths, self.name, self.scope, self.problems)
-        readings, selections, reads = looks.of(aspect, ports, place_of)
-        woven = WovenAspect(
-            self.name, aspect, ports, connections, actors, readings, selections, reads, parameters=parameters
+            self.tell(nowhere, pointcuts[0])
+        return places
+
+    # -- ports, connections and parameters ------------------------------------------------------------------------
+
+    def _at_ports(self, pointcuts: Sequence[PointcutText]) -> tuple[bool, Places]:
+        """The places at ports, and whether every pointcut has some."""
+        parameters: dict[str, bool] = {}  # whether they are excluded
+        of_ports: list[Found] = []
+        for pointcut in (each for each in pointcuts if each.ends is None):
+            named = self._parameters_of(pointcut)
+            if named is None:
+                ports = self._ports_of(pointcut)
+                of_ports.append((pointcut, ports and self._outside(pointcut, {port: (port,) for port in ports})))
+                continue
+            for path in named or ():
+                parameters[path] = pointcut.exclude or parameters.get(path, False)
+            of_ports.append((pointcut, named and []))
+        chosen = {port for pointcut, found in of_ports if not pointcut.exclude for port in found or ()}
+        left_out = {port for pointcut, found in of_ports if pointcut.exclude for port in found or ()}
+        of_connections, connections = self._connections([each for each in pointcuts if each.ends is not None])
+        found = [*of_ports, *of_connections]
+        return _is_sound(found), Places(
+            self.ports.in_order(chosen - left_out),
+            [ends for ends in connections if ends[1] not in left_out],
+            parameters=[path for path, is_left_out in parameters.items() if not is_left_out],
+            aimed=_aimed(found),
         )
-        self.check_times(woven, place_of)
-        return woven
 
-    def check_times(self, woven: WovenAspect, place_of: PlaceOf) -> None:
-        """Check that execution times by input port name ports that the actors have."""
-        for fault in unknown_inputs(woven, self.graph):
-            self._problem(fault.message, place_of(fault), *fault.help)
+    def _outside(self, pointcut: PointcutText, places: Mapping[str, tuple[str, ...]]) -> list[str] | Poison:
+        """Of places with their ends, those that are not in the aspect's own composite."""
+        left = [place for place, ends in places.items() if not any(map(self._is_own, ends))]
+        if places and not left and not pointcut.exclude:
+            return self.tell(f"it cannot attach to its own inside, at {next(iter(places))}", pointcut)
+        return left
 
-    def select(self, pointcuts: Sequence[PointcutText]) -> tuple[list[str], list[tuple[str, str]], dict[str, str]]:
-        """The ports, connections and actors that the pointcuts select."""
-        if not self.cls.at_ports:
-            return [], [], self._select_actors(pointcuts)
-        of_ports = [pointcut for pointcut in pointcuts if pointcut.ends is None]
-        chosen = {port for pointcut in of_ports if not pointcut.exclude for port in self._of(pointcut)}
-        self._left_out = {port for pointcut in of_ports if pointcut.exclude for port in self._of(pointcut)}
-        return self.ports.in_order(chosen - self._left_out), self._select_connections(pointcuts), {}
+    def _is_own(self, path: str) -> bool:
+        return bool(self.own) and is_within(path, self.own)
 
-    def _of(self, pointcut: PointcutText) -> list[str]:
+    def _ports_of(self, pointcut: PointcutText) -> list[str] | Poison:
         """The ports that the aspect can attach to, of those that one pointcut selects."""
-        if self._stands_at_parameters(pointcut):
-            return []
         found = self._matching(pointcut) if pointcut.text else self._chosen(pointcut)
-        if found is None:
-            return []
-        fitting = [port for port in found if self._fits(port)]
+        fitting = [port for port in found or () if self._fits(port)]
         if found and not fitting:
             where = " or ".join(sorted(self.cls.stands_at))
             other = f"{found[0]} is an {self.graph.direction(found[0])} port"
-            self._problem(f"{self.kind} attaches to {where} ports, but {other}", pointcut)
-        return fitting
+            return self.tell(f"{self.kind} attaches to {where} ports, but {other}", pointcut)
+        return POISON if found is POISON else fitting
 
-    def _stands_at_parameters(self, pointcut: PointcutText) -> bool:
-        """Whether a pointcut selects parameters of actors: because it says so, or because it matches no suitable port.
+    def _parameters_of(self, pointcut: PointcutText) -> list[str] | Poison | None:
+        """The parameters that a pointcut selects; None if it selects ports.
 
-        A pattern must name the parameter in full: ``sensor.*`` are ports.
+        It selects parameters because it says so, or because it matches no suitable port.  A pattern must name the
+        parameter in full: ``sensor.*`` are ports.
         """
         said, pattern = pointcut.parameter, self._full(pointcut.text)
         owner, _, name = pattern.rpartition(".")
         if said is None and (not pointcut.text or not owner or "*" in name):
-            return False
+            return None
         if not self.cls.alters_parameters:
-            if said is not None:
-                self._problem(f"{self.kind} alters no parameters", said, "leave 'parameter' out")
-            return said is not None
+            return (
+                None if said is None else self.tell(f"{self.kind} alters no parameters", said, "leave 'parameter' out")
+            )
         if said is not None:
             chosen, name = self._chosen_owners(pointcut), said.text
-            actors = None if chosen is None else [path for path in self.graph.actors if path in chosen]
+            if chosen is POISON:
+                return POISON
+            actors = [path for path in self.graph.actors if path in chosen]
         else:
             try:
                 if any(self._fits(port) for port in self.ports.select(pattern)):
-                    return False
+                    return None
                 actors = self.paths.actors.select(owner)
             except PatternError:
-                return False  # which is reported of it as a pattern of ports
-        having = [path for path in actors or () if name in declared_parameters(type(self.graph.actors[path]))]
-        if said is not None and actors is not None and not having:
+                return None  # which is reported of it as a pattern of ports
+        having = [path for path in actors if name in declared_parameters(type(self.graph.actors[path]))]
+        if said is not None and not having:
             names = sorted({each for path in actors for each in declared_parameters(type(self.graph.actors[path]))})
             hint = f"their parameters: {', '.join(names) or 'none'}"
-            self._problem(f"no {_asked(pointcut)} has a parameter {name!r}{did_you_mean(name, names)}", said, hint)
-        for path in having:
-            self._enter_parameter(path, name, pointcut)
-        return bool(having) or said is not None
+            return self.tell(f"no {_asked(pointcut)} has a parameter {name!r}{did_you_mean(name, names)}", said, hint)
+        if not having:
+            return None
+        found = [f"{path}.{name}" for path in having if pointcut.exclude or self._can_alter(path, name, pointcut)]
+        return found or POISON
 
     def _parameter_meant(self, pattern: str) -> tuple[str, ...]:
         """Advice: the parameter of an actor that a pattern nearly names."""
@@ -125,44 +150,47 @@ class Weaving(View):
         meant = nearest(name, declared_parameters(type(self.graph.actors[owner])))
         return () if meant is None else (f"{owner} has a parameter {meant!r}",)
 
-    def _enter_parameter(self, actor: str, name: str, pointcut: PointcutText) -> None:
-        """Add a parameter of an actor, if it holds what the aspect alters and nothing else sets it."""
+    def _can_alter(self, actor: str, name: str, pointcut: PointcutText) -> bool:
+        """Check that a parameter of an actor holds what the aspect alters, and nothing else sets it."""
         path, parameter = f"{actor}.{name}", declared_parameters(type(self.graph.actors[actor]))[name]
-        about = ("altered", in_general(path))
-        if pointcut.exclude:
-            self._parameters[path] = True
-        elif self.cls.alters_numbers and parameter.type not in (int, float, int | float):
-            self._problem(
-                f"{self.kind} alters numbers, but {path} is {parameter.describe_type()}", pointcut, about=about
-            )
+        hints: tuple[str, ...] = ()
+        if self.cls.alters_numbers and parameter.type not in (int, float, int | float):
+            message = f"{self.kind} alters numbers, but {path} is {parameter.describe_type()}"
         elif self.cls.alters_numbers and parameter.value_in(self.graph.actors[actor]) is None:
-            self._problem(f"{self.kind} alters numbers, but {path} has no value", pointcut, about=about)
+            message = f"{self.kind} alters numbers, but {path} has no value"
         elif path in self.graph.ports and self.graph.incoming(path):
-            sender = self.graph.incoming(path)[0].source
-            hint = f"attach the aspect to {sender!r}, where they come from"
-            self._problem(f"{path} gets its values over a connection", pointcut, hint, about=about)
+            message, sender = f"{path} gets its values over a connection", self.graph.incoming(path)[0].source
+            hints = (f"attach the aspect to {sender!r}, where they come from",)
         else:
-            self._parameters.setdefault(path, False)
+            return True
+        self.tell(message, pointcut, *hints, about=("altered", in_general(path)))
+        return False
 
-    def _matching(self, pointcut: PointcutText) -> list[str] | None:
+    def _matching(self, pointcut: PointcutText) -> list[str] | Poison:
+        """The ports that a pattern selects."""
         full = self._full(pointcut.text)
         try:
             found = self.ports.select(full)
         except PatternError as error:
-            several = ("for several pointcuts, write a list: [a.in, b.in]",) if "," in pointcut.text else ()
-            self._problem(f"{pointcut.text!r} is not a pointcut: {error}", pointcut, *several)
-            return None
-        if not found and not self._excuses(full):
-            near = self.ports.did_you_mean(pointcut.text, self.scope, self._fits)
-            advice = self.ports.advice(pointcut.text, self.scope, self._fits)
-            self._problem(f"{pointcut.text!r} matches no port{near}", pointcut, *advice, *self._parameter_meant(full))
-        return found
+            return self._no_pattern(pointcut, error, "[a.in, b.in]")
+        if found:
+            return found
+        if self.draft.excuses(full):
+            return POISON
+        near = self.ports.did_you_mean(pointcut.text, self.scope, self._fits)
+        advice = self.ports.advice(pointcut.text, self.scope, self._fits)
+        message = f"{pointcut.text!r} matches no port{near}"
+        return self.tell(message, pointcut, *advice, *self._parameter_meant(full))
 
-    def _chosen(self, pointcut: PointcutText) -> list[str] | None:
+    def _no_pattern(self, pointcut: PointcutText, error: PatternError, example: str) -> Poison:
+        several = (f"for several pointcuts, write a list: {example}",) if example and "," in pointcut.text else ()
+        return self.tell(f"{pointcut.text!r} is not a pointcut: {error}", pointcut, *several)
+
+    def _chosen(self, pointcut: PointcutText) -> list[str] | Poison:
         """The ports of the actors and composites of a type, or with a tag."""
         graph, owners = self.graph, self._chosen_owners(pointcut)
-        if owners is None:
-            return None
+        if owners is POISON:
+            return POISON
         of_owners = dict.fromkeys(path for owner in owners for path in self.ports.inside(owner))
         ports = self.ports.in_order(path for path in of_owners if graph.owner(path) in owners)
         if pointcut.port is None:
@@ -170,21 +198,19 @@ class Weaving(View):
             if not found and not any(path in self.draft.gaps for path in owners):
                 wanting = " or ".join(sorted(self.cls.stands_at))
                 where = pointcut.type or pointcut.tag
-                self._problem(f"{self.kind} attaches to {wanting} ports, but no {_asked(pointcut)} has one", where)
+                return self.tell(f"{self.kind} attaches to {wanting} ports, but no {_asked(pointcut)} has one", where)
             return found
         found = [path for path in ports if path.rpartition(".")[2] == pointcut.port.text]
         if not found:
             names = sorted({path.rpartition(".")[2] for path in ports})
             near = did_you_mean(pointcut.port.text, names)
             message = f"no {_asked(pointcut)} has a port {pointcut.port.text!r}{near}"
-            self._problem(message, pointcut.port, f"their ports: {', '.join(names) or 'none'}")
-            return None
+            return self.tell(message, pointcut.port, f"their ports: {', '.join(names) or 'none'}")
         return found
 
-    def _chosen_owners(self, pointcut: PointcutText) -> set[str] | None:
+    def _chosen_owners(self, pointcut: PointcutText) -> set[str] | Poison:
         """The actors and composites of a type, or with a tag."""
-        graph = self.graph
-        kinds = self.paths.kinds
+        graph, kinds = self.graph, self.paths.kinds
         inside = self.paths.holders.inside(self.scope)
         self.paths.holders.spend(len(inside))
         inside = [path for path in inside if path in kinds]
@@ -196,116 +222,139 @@ class Weaving(View):
             wanted = pointcut.tag
             owners = {path for path in inside if wanted.text in graph.tags.get(path, ())}
             known = {tag for path in inside for tag in graph.tags.get(path, ())}
-        if not owners and self.draft.may_hold(wanted.text, self.scope):
-            self._is_excused = True
-            return None
-        if not owners:
-            what = "types" if pointcut.type is not None else "tags"
-            message = f"there is no {_asked(pointcut)}{did_you_mean(wanted.text, sorted(known | self.draft.kinds))}"
-            self._problem(message, wanted, f"{what} here: {', '.join(sorted(known)) or 'none'}")
-            return None
-        return owners
+        if owners:
+            return owners
+        if self.draft.may_hold(wanted.text, self.scope):
+            return POISON
+        what = "types" if pointcut.type is not None else "tags"
+        message = f"there is no {_asked(pointcut)}{did_you_mean(wanted.text, sorted(known | self.draft.kinds))}"
+        return self.tell(message, wanted, f"{what} here: {', '.join(sorted(known)) or 'none'}")
 
-    def _select_actors(self, pointcuts: Sequence[PointcutText]) -> dict[str, str]:
-        """The actors that the pointcuts select, singly or with a composite around them, and what the pointcuts name."""
-        index = self.paths.owners
-        aimed = {path for pointcut in pointcuts if not pointcut.exclude for path in self._aimed_at(pointcut, index)}
-        spared = {path for pointcut in pointcuts if pointcut.exclude for path in self._aimed_at(pointcut, index)}
-        known = self.paths.holders
-        if any(each not in known for unit in aimed for each in (unit, *index.inside(unit))):
-            self._is_excused = True  # there is an actor that could not be made, which has been reported
-        found = {}
-        actors = self.paths.actors
-        chosen = {each for unit in aimed for each in (unit, *actors.inside(unit)) if each in actors}
-        for actor in actors.in_order(chosen):
-            parts = actor.split(".")
-            around = [".".join(parts[:length]) for length in range(1, len(parts) + 1)]
-            unit = next((path for path in around if path in aimed), None)
-            if unit is not None and not spared.intersection(around):
-                found[actor] = unit
-        return found
-
-    def _aimed_at(self, pointcut: PointcutText, index: PathIndex) -> Iterable[str]:
-        """The actors and composites that one pointcut selects."""
-        name, text = self.kind, pointcut.text
-        if pointcut.port is not None:
-            self._problem(f"{name} attaches to actors, not to their ports", pointcut.port, "leave 'port' out")
-        if not text:
-            return self._chosen_owners(pointcut) or ()
-        if pointcut.ends is not None:
-            receiver = pointcut.ends[1].rpartition(".")[0]
-            hint = f"write {receiver!r} for the receiving actor"
-            self._problem(f"{name} attaches to actors, not to connections", pointcut, hint)
-            return ()
-        full = self._full(text)
-        try:
-            found, ports = index.select(full), self.ports.select(full)
-        except PatternError as error:
-            several = ("for several pointcuts, write a list: [a, b]",) if "," in text else ()
-            self._problem(f"{text!r} is not a pointcut: {error}", pointcut, *several)
-            return ()
-        if not found and not self._excuses(f"{full}.*"):
-            if ports and "." in text:
-                owner = text.rpartition(".")[0]
-                self._problem(
-                    f"{name} attaches to actors, but {ports[0]} is a port",
-                    pointcut,
-                    f"write {owner!r}, without the port",
-                )
-            else:
-                inside = (path.removeprefix(self._full("")) for path in index.inside(self.scope))
-                known = sorted(path for path in inside if path.count(".") == text.count("."))
-                hint = f"actors and composites at this depth: {', '.join(known) or 'none'}"
-                self._problem(f"{text!r} matches no actor{index.did_you_mean(text, self.scope)}", pointcut, hint)
-        return found
-
-    def _select_connections(self, pointcuts: Sequence[PointcutText]) -> list[tuple[str, str]]:
+    def _connections(self, pointcuts: Sequence[PointcutText]) -> tuple[list[Found], list[Ends]]:
         """The single connections that pointcuts of the form ``a.out -> b.in`` select."""
-        chosen: dict[tuple[str, str], None] = {}
+        of_each: list[Found] = []
+        chosen: dict[str, Ends] = {}
         for pointcut in sorted(pointcuts, key=lambda each: each.exclude):
-            if pointcut.ends is None:
-                continue
-            found = self._connections_of(pointcut, *pointcut.ends)
+            ends = self._connections_of(pointcut)
+            places = {connection_place(*each): each for each in ends or ()}
+            found = POISON if ends is POISON else self._outside(pointcut, places)
+            of_each.append((pointcut, found))
             if not pointcut.exclude:
-                chosen |= dict.fromkeys(found)
-            elif found and not chosen.keys() & found:
+                chosen |= {place: places[place] for place in found or ()}
+            elif found and not chosen.keys() & set(found):
                 hint = "exclude ports from ports and connections from connections: select some, as in '*.out -> b.in'"
-                self._problem(f"'!{pointcut.text}' excludes no selected connection", pointcut, hint)
+                self.tell(f"'!{pointcut.text}' excludes no selected connection", pointcut, hint)
             else:
-                chosen = {each: None for each in chosen if each not in found}
-        return [each for each in chosen if each[1] not in self._left_out]
+                chosen = {place: each for place, each in chosen.items() if place not in (found or ())}
+        return of_each, list(chosen.values())
 
-    def _connections_of(self, pointcut: PointcutText, left: str, right: str) -> list[tuple[str, str]]:
+    def _connections_of(self, pointcut: PointcutText) -> list[Ends] | Poison:
         """The connections that one pointcut selects."""
         if "input" not in self.cls.stands_at:
-            self._problem(f"{self.kind} attaches to output ports, not to connections", pointcut)
-            return []
+            return self.tell(f"{self.kind} attaches to output ports, not to connections", pointcut)
+        assert pointcut.ends is not None
+        left, right = map(self._full, pointcut.ends)
         try:
-            ends = set(self.ports.select(self._full(right)))
-            found = [
-                (hop.source, hop.destination)
-                for source in self.ports.select(self._full(left))
-                for hop in self.graph.outgoing(source)
-                if hop.destination in ends
-            ]
+            ends = set(self.ports.select(right))
+            hops = [hop for source in self.ports.select(left) for hop in self.graph.outgoing(source)]
         except PatternError as error:
-            self._problem(f"{pointcut.text!r} is not a pointcut: {error}", pointcut)
-            return []
-        if not found and not (self._excuses(self._full(left)) or self._excuses(self._full(right))):
-            known = [f"{hop.source} -> {hop.destination}" for hop in self.graph.hops]
-            near = did_you_mean(f"{self._full(left)} -> {self._full(right)}", known)
-            self._problem(f"{pointcut.text!r} matches no connection{near}", pointcut)
-        return found
-
-    def _excuses(self, pattern: str) -> bool:
-        """Whether a pattern may match nothing."""
-        is_excused = self.draft.excuses(pattern)
-        self._is_excused = self._is_excused or is_excused
-        return is_excused
+            return self._no_pattern(pointcut, error, "")
+        found = [(hop.source, hop.destination) for hop in hops if hop.destination in ends]
+        if found:
+            return found
+        if self.draft.excuses(left) or self.draft.excuses(right):
+            return POISON
+        near = did_you_mean(connection_place(left, right), map(str, self.graph.hops))
+        return self.tell(f"{pointcut.text!r} matches no connection{near}", pointcut)
 
     def _fits(self, port: str) -> bool:
         """Whether the aspect can attach to a port."""
         return self.graph.direction(port) in self.cls.stands_at
+
+    # -- actors ---------------------------------------------------------------------------------------------------
+
+    def _at_actors(self, pointcuts: Sequence[PointcutText]) -> tuple[bool, Places]:
+        """The actors that the pointcuts select, singly or with a composite around them; and whether each has some."""
+        index, known, actors = self.paths.owners, self.paths.holders, self.paths.actors
+        found: list[Found] = []
+        for pointcut in pointcuts:
+            units = self._units_of(pointcut, index)
+            found.append((pointcut, units and self._outside(pointcut, {unit: (unit,) for unit in units})))
+        by_unit = _aimed(found)
+        spared = {unit for pointcut, units in found if pointcut.exclude for unit in units or ()}
+        # Those that could not be made are no actors.
+        is_whole = all(each in known for unit in by_unit for each in (unit, *index.inside(unit)))
+        chosen = {each for unit in by_unit for each in (unit, *actors.inside(unit)) if each in actors}
+        attached: dict[str, str] = {}
+        for actor in actors.in_order(each for each in chosen if not self._is_own(each)):
+            parts = actor.split(".")
+            around = [".".join(parts[:length]) for length in range(1, len(parts) + 1)]
+            unit = next((path for path in around if path in by_unit), None)
+            if unit is not None and not spared.intersection(around):
+                attached[actor] = unit
+        aimed = {actor: by_unit[unit] for actor, unit in attached.items()}
+        return is_whole and _is_sound(found), Places(actors=attached, aimed=aimed)
+
+    def _units_of(self, pointcut: PointcutText, index: PathIndex) -> list[str] | Poison:
+        """The actors and composites that one pointcut selects."""
+        name, text = self.kind, pointcut.text
+        if pointcut.port is not None:
+            self.tell(f"{name} attaches to actors, not to their ports", pointcut.port, "leave 'port' out")
+        if not text:
+            owners = self._chosen_owners(pointcut)
+            return POISON if owners is POISON else sorted(owners)
+        if pointcut.ends is not None:
+            receiver = pointcut.ends[1].rpartition(".")[0]
+            hint = f"write {receiver!r} for the receiving actor"
+            return self.tell(f"{name} attaches to actors, not to connections", pointcut, hint)
+        full = self._full(text)
+        try:
+            found, ports = index.select(full), self.ports.select(full)
+        except PatternError as error:
+            return self._no_pattern(pointcut, error, "[a, b]")
+        if found:
+            return found
+        if self.draft.excuses(f"{full}.*"):
+            return POISON
+        if ports and "." in text:
+            hint = f"write {text.rpartition('.')[0]!r}, without the port"
+            return self.tell(f"{name} attaches to actors, but {ports[0]} is a port", pointcut, hint)
+        inside = (path.removeprefix(self._full("")) for path in index.inside(self.scope))
+        near = sorted(path for path in inside if path.count(".") == text.count("."))
+        hint = f"actors and composites at this depth: {', '.join(near) or 'none'}"
+        return self.tell(f"{text!r} matches no actor{index.did_you_mean(text, self.scope)}", pointcut, hint)
+
+
+def bind(view: View, aspect: Aspect, places: Places, place_of: PlaceOf) -> WovenAspect:
+    """The aspect at its places, with everything that it reads.
+
+    ``place_of`` returns where something is wrong with its parameters in the model file.
+    """
+    looks = Looks(view.draft, view.paths, view.name, view.scope, view.problems)
+    readings, selections, reads = looks.of(aspect, places.ports, place_of)
+    woven = WovenAspect(
+        view.name,
+        aspect,
+        places.ports,
+        places.connections,
+        places.actors,
+        readings,
+        selections,
+        reads,
+        parameters=places.parameters,
+    )
+    for fault in unknown_inputs(woven, view.graph):  # of execution times by input port
+        looks.tell(fault.message, place_of(fault), *fault.help)
+    return woven
+
+
+def _aimed(found: Iterable[Found]) -> dict[str, PointcutText]:
+    """The last pointcut that selects each place."""
+    return {place: pointcut for pointcut, places in found if not pointcut.exclude for place in places or ()}
+
+
+def _is_sound(found: Iterable[Found]) -> bool:
+    return all(places is not POISON for _, places in found)
 
 
 def _asked(pointcut: PointcutText) -> str:

@@ -20,12 +20,12 @@ from epicycle.aspects import (
 from ..catalogue import CatalogueError
 from ..graph import ModelGraph, WovenAspect
 from ..language import Locals, PartText, PointcutText
-from ..text import POISON, RAISE_IT, Mapping, Poison, Position, Problems, Text, TooManyError, did_you_mean, place_in
-from .composite_aspect import OWN, ModelWeaving, check_nesting, detours
+from ..text import POISON, RAISE_IT, Mapping, Position, Problems, Text, TooManyError, did_you_mean, place_in
+from .composite_aspect import OWN, check_nesting, detours, weave_model
 from .draft import Draft
 from .paths import Paths
 from .unfold import Names, Unfolding
-from .weave import Weaving
+from .weave import Places, Pointcuts, bind
 
 
 def weave_all(made: Unfolding) -> list[WovenAspect]:
@@ -67,29 +67,27 @@ class _Weaver:
         if cls is None:
             return
         is_model = cls in (CompositeAspect, CompositeExecutionAspect)
-        own = {key: entry for key, entry in part.values.items() if not is_model or key in OWN}
+        given = {key: entry for key, entry in part.values.items() if not is_model or key in OWN}
         local, rules = Locals(name, names), self.graph.rules_at(name)
-        aspect = self.settler.configured(cls, replace(part, values=own), local, f"aspect {name}", rules, cls)
+        aspect = self.settler.configured(cls, replace(part, values=given), local, f"aspect {name}", rules, cls)
         if not part.at:
             hint = "add 'at:' with ports or patterns"
             self.problems.add(f"aspect {name} has no 'at'", part.position, hint, scope=scope)
         self.graph.positions[f"aspect {name}"] = part.position
-        weaving = Weaving(self.draft, self.paths, name, scope, self.problems, cls)
-        if is_model and name in self.graph.composites:
-            weaving = ModelWeaving(self.draft, self.paths, name, scope, self.problems, cls, name, part.position)
-            part = replace(part, at=tuple(each and self._timed(each, name, scope, names) for each in part.at))
+        own = name if is_model and name in self.graph.composites else ""
+        pointcuts = Pointcuts(self.draft, self.paths, name, scope, self.problems, cls, own)
         is_enabled = (
             name in self.graph.composites if is_model else self.settler.is_enabled(name, part, Locals(scope, names))
         )
-        if isinstance(aspect, Poison):
-            weaving.select([each for each in part.at if each])  # to report its problems
-            if isinstance(weaving, ModelWeaving):
-                self.draft.leave_open(name)
+        place_of = partial(place_in, Mapping(part.values, part.position))
+        if own:
+            at = [each and self._timed(each, name, scope, names) for each in part.at]
+            woven = weave_model(pointcuts, aspect, at, place_of, part.position)
+        else:
+            places = pointcuts.resolve(part.at)
+            woven = POISON if aspect is POISON else bind(pointcuts, aspect, places, place_of)
+        if not woven:
             return
-        woven = weaving.weave(aspect, part.at, partial(place_in, Mapping(part.values, part.position)))
-        if isinstance(weaving, ModelWeaving):
-            weaving.check(woven)
-            woven = weaving.connect(woven)
         self.made.places += len(woven.places)
         limit = self.graph.limits.places
         if self.made.places > limit:
@@ -180,15 +178,14 @@ def _weave(
             problems.add(f"aspect {name}: {error}", position)
             return None
     paths = Paths(draft, [port.path for port in own.values()])
-    pointcuts = [PointcutText.of(Text(each, position)) for each in at_parameter]
-    weaving = Weaving(draft, paths, name, actor.path, problems, type(aspect))
-    woven = replace(
-        weaving.weave(aspect, pointcuts, lambda *_: position),
-        ports=[own[port].path for port in decoration.ports if port in own],
+    pointcuts = Pointcuts(draft, paths, name, actor.path, problems, type(aspect))
+    named = pointcuts.resolve([PointcutText.of(Text(each, position)) for each in at_parameter])
+    places = Places(
+        [own[port].path for port in decoration.ports if port in own],
         actors={} if decoration.ports else {actor.path: actor.path},
-        comes_with_actor=True,
+        parameters=named.parameters,
     )
-    weaving.check_times(woven, lambda *_: position)
+    woven = replace(bind(pointcuts, aspect, places, lambda _: position), comes_with_actor=True)
     draft.graph.positions.setdefault(f"aspect {name}", position)
     return woven
 

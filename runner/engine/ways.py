@@ -28,7 +28,7 @@ from epicycle.aspects import (
     aspect_stream,
 )
 
-from ..graph import Clock, Hop, ModelGraph, WovenAspect
+from ..graph import Clock, Hop, ModelGraph, WovenAspect, connection_place
 from ..results import EventLog, Signal
 from ..text import describe
 from .acts import Acts, Named
@@ -243,7 +243,7 @@ class Ways:
         else:
             onward = self._woven(far, source, onward)
         for woven in reversed(self._woven_on.get((hop.source, far), [])):
-            onward = self._through(woven, far, source, onward, f"{hop.source} -> {far}")
+            onward = self._through(woven, far, source, onward, connection_place(hop.source, far))
         if hop.delay is None:
             return onward
         return Delayed(self.directors.of[self.graph.director_over(hop)], hop.delay, onward)

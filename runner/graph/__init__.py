@@ -1,6 +1,6 @@
 """The frozen model: actors, composites, ports and connections, aspects at their places, what is watched, and ranks."""
 
-from .acts import Act, ActName
+from .acts import Act, ActName, connection_place
 from .clock import Clock
 from .digraph import find_loop, in_order
 from .model_graph import Detour, Hop, Modal, ModelGraph, PortNode, Wire, is_within
@@ -34,6 +34,7 @@ __all__ = [
     "Wire",
     "WovenAspect",
     "check_processors",
+    "connection_place",
     "dependencies",
     "extent",
     "find_loop",

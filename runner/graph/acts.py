@@ -17,6 +17,11 @@ class ActName(NamedTuple):
         return f"{self.aspect} at {self.place}, token {self.token}"
 
 
+def connection_place(source: str, destination: str) -> str:
+    """The name of a single connection as the place of an act."""
+    return f"{source} -> {destination}"
+
+
 @dataclass(frozen=True)
 class Act:
     """An act as it happened: the port that the token comes from, the time (ns), and its entry in the event log.

@@ -15,6 +15,7 @@ from epicycle.actors import Actor, InputPort, OutputPort
 from epicycle.aspects import Request
 
 from ..text import NORMAL, Limits, Position
+from .acts import connection_place
 from .clock import Clock
 from .rules import Rules
 
@@ -31,7 +32,7 @@ class Hop:
     shared: int | None = field(default=None, kw_only=True)  # the same for all hops of a connection that is one channel
 
     def __str__(self) -> str:
-        return f"{self.source} -> {self.destination}"
+        return connection_place(self.source, self.destination)
 
 
 @dataclass(frozen=True)

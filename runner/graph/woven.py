@@ -10,6 +10,7 @@ from epicycle.actors.expression import PortFormula
 from epicycle.aspects import Aspect, ExecutionAspect, FiringTime, Reading, Selection
 
 from ..text import Problems
+from .acts import connection_place
 from .model_graph import ModelGraph, is_within
 
 
@@ -64,7 +65,7 @@ class WovenAspect:
     @property
     def places(self) -> list[str]:
         """Its places in words."""
-        connections = (f"{source} -> {destination}" for source, destination in self.connections)
+        connections = (connection_place(*ends) for ends in self.connections)
         return [*self.ports, *connections, *self.actors, *self.parameters]
 
     def without(self, path: str) -> WovenAspect:

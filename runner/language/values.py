@@ -65,7 +65,7 @@ class Values:
         """The value of a node, whose owner is called ``label``."""
         value = self._of(node, local, label)
         if not isinstance(node, Scalar) and is_too_deep(value):
-            return self._tell(f"{label}: nested deeper than {MAX_DEPTH} levels", node.position, local)
+            return self._tell(label, f"nested deeper than {MAX_DEPTH} levels", node.position, local)
         return value
 
     def _of(self, node: Node, local: Locals, label: str) -> Any:
@@ -87,13 +87,13 @@ class Values:
             if any(names.get(name) is POISON for name in asked):
                 return POISON
             if early := sorted(name for name in asked if name in later and name not in names):
-                message = f"{label}: {early[0]!r} has no value yet: a default may use only the parameters above it"
-                return self._tell(message, node.position, local, f"declare {early[0]!r} further up")
+                message = f"{early[0]!r} has no value yet: a default may use only the parameters above it"
+                return self._tell(label, message, node.position, local, f"declare {early[0]!r} further up")
             value = interpolate(node.value, {name: names[name] for name in asked if name in names}, self.budget)
         except ExpressionError as error:
             part = node.text[error.offset :][: error.length] or " "
             at = inside(node, node.text, error.offset, part)
-            self._tell(f"{label}: {error.message}", at, local, *self._unseen(node.value, local))
+            self._tell(label, error.message, at, local, *self._unseen(node.value, local))
             if self.budget.is_spent:
                 self.problems.raise_if_any()
             return POISON
@@ -120,10 +120,9 @@ class Values:
             return ("a value set from outside cannot use names of the model: write the value itself",)
         return (f"a composite knows only its own parameters: declare {unseen[0]!r} there and pass its value",)
 
-    def _tell(self, message: str, position: Position | None, local: Locals, *hints: str, **more: Any) -> Poison:
-        # A setting may be wrong for all of an array.
-        about = (in_general(message),) if local.is_outside else ()
-        return self.problems.add(message, position, *hints, scope=local.path, about=about, **more)
+    def _tell(self, label: str, message: str, position: Position, local: Locals, *hints: str) -> Poison:
+        about = (in_general(label), "") if local.is_outside else ()  # a setting may be wrong for all of an array
+        return self.problems.add(f"{label}: {message}", position, *hints, scope=local.path, about=about)
 
     def blame(self, label: str, error: Exception, where: Node | Position, local: Locals) -> Poison:
         """Report what is wrong with a node, or with something at a position; or how code of a class failed."""

@@ -44,14 +44,14 @@ def blame(
     """
     at = where if isinstance(where, Position) else where.position
 
-    def tell(message: str, place: Position, *hints: str, **of_user: Any) -> None:
-        message = f"{label}: {message}"
-        about = (in_general(message),) if in_all else ()
-        problems.add(message, place, *hints, scope=scope, about=about, **of_user)
+    def tell(message: str, place: Position, *hints: str, number: int = 0, **of_user: Any) -> None:
+        about = (in_general(label), str(number)) if in_all else ()
+        problems.add(f"{label}: {message}", place, *hints, scope=scope, about=about, **of_user)
 
     if isinstance(error, FaultError):
-        for fault in error.faults:
-            tell(fault.message, at if isinstance(where, Position) else place_in(where, fault), *fault.help)
+        for number, fault in enumerate(error.faults):
+            place = at if isinstance(where, Position) else place_in(where, fault)
+            tell(fault.message, place, *fault.help, number=number)
     elif isinstance(error, EpicycleError):
         tell(str(error), at)
     else:

@@ -94,8 +94,8 @@ class Problems:
     """
 
     def __init__(self) -> None:
-        self._kept: dict[tuple[str | tuple[str, ...], Position | None], Problem] = {}
-        self._warnings: dict[tuple[str | tuple[str, ...], Position | None], Problem] = {}
+        self._kept: dict[object, Problem] = {}
+        self._warnings: dict[object, Problem] = {}
         self._count = 0
         self._scopes: dict[Position, str] = {}
         self._cause: BaseException | None = None  # the first exception in a user's code
@@ -121,7 +121,8 @@ class Problems:
     def warn(self, message: str, position: Position | None = None, *hints: str, about: tuple[str, ...] = ()) -> None:
         """Note something that may be intended but probably is not; it does not count as a problem."""
         if len(self._warnings) < MAX_PROBLEMS:
-            self._warnings.setdefault((about or message, position), Problem(message, position, hints, "warning"))
+            warning = Problem(message, position, hints, "warning")
+            self._warnings.setdefault((about, position) if about else warning, warning)
 
     def add(
         self,
@@ -137,7 +138,8 @@ class Problems:
 
         ``cause`` is an exception in a user's code, and ``raised`` where it comes from.
         """
-        key = about or message, position
+        problem = Problem(message, position, hints, raised=raised)
+        key = (about, position) if about else problem
         if key in self._kept:
             return POISON
         self._count += 1
@@ -146,7 +148,7 @@ class Problems:
         if len(self._kept) == MAX_PROBLEMS:
             # Finding them all, and the nearest valid names, may take very long.
             raise self._error(more=True) from self._cause
-        self._kept[key] = Problem(message, position, hints, raised=raised)
+        self._kept[key] = problem
         self._cause = self._cause or cause
         return POISON
 

@@ -11,8 +11,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from epicycle.actors import Actor, InputPort, Measurement, OutputPort, Vehicle, accepts, shaped, type_name
-from epicycle.runner.catalogue import PortTypeError, built_in, read_type, token_types
+from epicycle.actors import Actor, FaultError, InputPort, Measurement, OutputPort, Vehicle, accepts, shaped, type_name
+from epicycle.runner.catalogue import built_in, read_type, token_types
 
 SIZES = (1, 2, 3)
 CONCRETE = [shape for length in (0, 1, 2) for shape in product(SIZES, repeat=length)]
@@ -79,6 +79,6 @@ def test_types_from_text(text: str) -> None:
 def test_no_text_makes_it_crash(text: str) -> None:
     try:
         said = type_name(read_type(text, dict))
-    except PortTypeError as error:
+    except FaultError as error:
         said = error.message
     assert said

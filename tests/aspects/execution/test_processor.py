@@ -265,7 +265,7 @@ run: {{stop: 1 s}}
         ),
         (
             "more: {type: Processor, at: '!**', times: {c: 1}}",
-            "7:45: error: aspect more: times: 'c' matches no actor",
+            "7:46: error: aspect more: times: 'c' matches no actor",
         ),
         (
             "more: {type: Processor, at: a, times: {a: 1 m}}",
