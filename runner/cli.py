@@ -9,7 +9,7 @@ from importlib import import_module
 from typing import Any
 
 from .collection import importing, seldom_collecting
-from .commands import COMMANDS
+from .commands import commands
 from .commands.options import BAD_INPUT, FAILED, INTERRUPTED
 from .leaving import leave
 from .printing import complain, complain_traceback, open_streams
@@ -87,9 +87,9 @@ def parser(arguments: Sequence[str] = ()) -> argparse.ArgumentParser:
         prog="epicycle", description="Discrete-event simulation of actor models written in YAML."
     )
     top.add_argument("--version", action=_Version, help="show the version and the core that makes the runs")
-    commands = top.add_subparsers(required=True, metavar="COMMAND")
-    for each in COMMANDS:
-        command = commands.add_parser(each.name, help=each.summary, description=each.description)
+    parsers = top.add_subparsers(required=True, metavar="COMMAND")
+    for each in commands(arguments):
+        command = parsers.add_parser(each.name, help=each.summary, description=each.description)
         for add in each.options if each.name in arguments else ():
             add(command)
         command.add_argument("--debug", action="store_true", help="show the full traceback of an error")

@@ -21,8 +21,8 @@ from epicycle.actors.compiled import LIBRARIES
 from epicycle.runner.catalogue import TAKES
 
 ROOT = Path(__file__).parents[1]
-FOLDERS = ("actors", "aspects", "models", "runner", "api")  # the last is `epicycle` itself
-CODE_FOLDERS = ("actors", "aspects", "runner", "api")
+FOLDERS = ("actors", "aspects", "models", "runner", "api", "ptolemy")  # api is `epicycle` itself
+CODE_FOLDERS = ("actors", "aspects", "runner", "api", "ptolemy")
 CONFIG = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))
 PACKAGES = CONFIG["tool"]["setuptools"]["packages"]
 TYPINGS = ROOT / "tests" / "typings"
@@ -85,7 +85,7 @@ WHERE = """
     import importlib, json, sysconfig
     from pathlib import Path
     folders = []
-    for name in ("actors", "aspects", "models", "runner"):
+    for name in ("actors", "aspects", "models", "runner", "ptolemy"):
         folders += map(Path, importlib.import_module(f"epicycle.{name}").__path__)
     home = folders[2]
     models = sorted(f"models/{file.relative_to(home).as_posix()}" for file in home.rglob("*.yaml"))
@@ -186,7 +186,7 @@ def test_nothing_is_imported_twice() -> None:
     """Look in a fresh interpreter started at the root, where a bare `import actors` would work too."""
     script = """
         import importlib, json, pkgutil, sys
-        for folder in ("epicycle.actors", "epicycle.aspects", "epicycle.models", "epicycle.runner"):
+        for folder in ("epicycle.actors", "epicycle.aspects", "epicycle.models", "epicycle.ptolemy", "epicycle.runner"):
             package = importlib.import_module(folder)
             for module in pkgutil.walk_packages(package.__path__, folder + "."):
                 if not module.name.endswith("__main__"):

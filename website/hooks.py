@@ -27,7 +27,7 @@ def on_startup(*, command: str, dirty: bool) -> None:
     package = PARTS / "epicycle"
     package.mkdir(parents=True)
     (package / "__init__.py").symlink_to(ROOT / "api" / "__init__.py")
-    for folder in ("actors", "aspects", "runner"):
+    for folder in ("actors", "aspects", "ptolemy", "runner"):
         (package / folder).symlink_to(ROOT / folder, target_is_directory=True)
 
 

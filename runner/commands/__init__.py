@@ -1,5 +1,13 @@
-"""The commands of the command line, in the order in which ``epicycle --help`` names them."""
+"""The commands of the command line, in the order in which ``epicycle --help`` names them, and what they are made of.
 
+Installed packages add to them by entry points of the group ``epicycle.commands``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ..printing import complain, tell
 from . import (
     calibrate,
     compare,
@@ -9,7 +17,6 @@ from . import (
     explain,
     falsify,
     fit,
-    imports,
     new,
     optimise,
     rare,
@@ -19,6 +26,8 @@ from . import (
     trace,
     view,
 )
+from .offered import offered_commands
+from .options import BAD_INPUT, BROKEN, DONE, FAILED, JSON, TYPES, Command, command, option, own_types, several
 
 COMMANDS = (
     run.run,
@@ -44,9 +53,33 @@ COMMANDS = (
     describe.actors,
     describe.aspects,
     describe.schema,
-    imports.import_,
     new.new,
     completion.completion,
 )
 
-__all__ = ["COMMANDS"]
+
+def commands(arguments: Sequence[str] = ()) -> tuple[Command, ...]:
+    """Our own commands and, unless the arguments name one of these, those of installed packages; our names win."""
+    own = {each.name for each in COMMANDS}
+    if next((each for each in arguments if not each.startswith("-")), "") in own:
+        return COMMANDS  # the others are searched for and imported only where that makes a difference
+    return (*COMMANDS, *(each for each in offered_commands() if each.name not in own))
+
+
+__all__ = [
+    "BAD_INPUT",
+    "BROKEN",
+    "COMMANDS",
+    "DONE",
+    "FAILED",
+    "JSON",
+    "TYPES",
+    "Command",
+    "command",
+    "commands",
+    "complain",
+    "option",
+    "own_types",
+    "several",
+    "tell",
+]

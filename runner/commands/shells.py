@@ -36,7 +36,7 @@ def script(shell: str) -> str:
 def _commands() -> Iterator[tuple[str, str, list[Given]]]:
     """Each command with its summary and its options and arguments."""
     from ..catalogue import built_in, packaged_disturbances, packaged_models, packaged_studies
-    from . import COMMANDS
+    from . import commands
 
     known = built_in()
     models, studies = tuple(packaged_models()), tuple(packaged_studies())
@@ -47,7 +47,7 @@ def _commands() -> Iterator[tuple[str, str, list[Given]]]:
         "NAME or FILE": tuple(packaged_disturbances()),
         "NAME or MODEL": (*known.aspects, *models),
     }
-    for each in COMMANDS:
+    for each in commands():
         parser, given = argparse.ArgumentParser(add_help=False), []
         for add in each.options:
             add(parser)

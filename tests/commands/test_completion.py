@@ -11,7 +11,7 @@ import pytest
 
 from epicycle.runner.catalogue import packaged_disturbances, packaged_models
 from epicycle.runner.cli import main
-from epicycle.runner.commands import COMMANDS
+from epicycle.runner.commands import commands
 
 
 def script(shell: str, capsys: pytest.CaptureFixture[str]) -> str:
@@ -36,7 +36,7 @@ def in_bash(text: str, line: str, folder: Path) -> list[str]:
 def test_bash_completes_commands_options_and_names(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     text = script("bash", capsys)
     offers = {
-        "": sorted([*(each.name for each in COMMANDS), "--help", "--version"]),
+        "": sorted([*(each.name for each in commands()), "--help", "--version"]),
         "comp": ["compare", "completion"],
         "run mm": ["mm1"],
         "run my": ["my_folder", "my_model.yaml"],
@@ -59,7 +59,7 @@ def test_bash_completes_commands_options_and_names(capsys: pytest.CaptureFixture
 @pytest.mark.parametrize("shell", ["zsh", "fish"])
 def test_the_other_shells_read_theirs(shell: str, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     text = script(shell, capsys)
-    for name in (*packaged_models(), *packaged_disturbances(), *(each.name for each in COMMANDS)):
+    for name in (*packaged_models(), *packaged_disturbances(), *(each.name for each in commands())):
         assert name in text
     if (found := shutil.which(shell)) is not None:
         (tmp_path / "script").write_text(text)
@@ -69,7 +69,7 @@ def test_the_other_shells_read_theirs(shell: str, capsys: pytest.CaptureFixture[
 def test_every_option_is_there(capsys: pytest.CaptureFixture[str]) -> None:
     """The scripts have everything that the commands' own help has."""
     texts = {shell: script(shell, capsys) for shell in ("bash", "zsh", "fish")}
-    for each in COMMANDS:
+    for each in commands():
         with pytest.raises(SystemExit):
             main([each.name, "--help"])
         for flag in set(re.findall(r"^  (?:-\w, |-\w \S+, )?(--[a-z-]+)", capsys.readouterr().out, re.M)):

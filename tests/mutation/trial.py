@@ -55,7 +55,7 @@ def copy_project(root: Path, to: Path) -> Path:
             (to / name).parent.mkdir(parents=True, exist_ok=True)
             shutil.copy2(root / name, to / name)
     (to / "epicycle").mkdir()
-    for folder in ("actors", "aspects", "models", "runner"):
+    for folder in ("actors", "aspects", "models", "ptolemy", "runner"):
         (to / "epicycle" / folder).symlink_to(to / folder)
     return to
 

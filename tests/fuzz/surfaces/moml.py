@@ -8,7 +8,7 @@ import numpy as np
 
 from tests.fuzz.surfaces.case import Case, Surface, chosen, spoiled, write
 from tests.fuzz.surfaces.expressions import PIECES, grown
-from tests.moml.moml_parts import COMPOSITE, LIB, TEXT, composite, entity, model, port, prop, wires
+from tests.ptolemy.importing.moml_parts import COMPOSITE, LIB, TEXT, composite, entity, model, port, prop, wires
 
 JAVA = (
     "DiscreteClock", "Expression", "Scale", "Ramp", "Test", "AddSubtract", "Const", "Publisher", "Subscriber",

@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 
 from epicycle.actors import Actor, InputPort, OutputPort
+from epicycle.ptolemy.importing import MomlError, import_moml
 from epicycle.runner.build import load_model
 from epicycle.runner.cli import main
-from epicycle.runner.moml import MomlError, import_moml
-from tests.moml.moml_parts import (
+from tests.ptolemy.importing.moml_parts import (
     COMPOSITE,
     DE,
     DIRECTOR,
@@ -284,7 +284,7 @@ def test_help_does_not_load_much() -> None:
     code = (
         "import sys; from epicycle.runner.cli import main\ntry:\n main(['import', '--help'])\nexcept SystemExit: pass\n"
     )
-    code += "assert 'numpy' not in sys.modules and 'epicycle.runner.moml' not in sys.modules"
+    code += "assert 'numpy' not in sys.modules and 'epicycle.ptolemy.importing' not in sys.modules"
     subprocess.run([sys.executable, "-c", code], check=True, stdout=subprocess.DEVNULL)
 
 

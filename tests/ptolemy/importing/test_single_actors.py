@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from epicycle.runner.moml import MomlError
-from tests.moml.moml_parts import (
+from epicycle.ptolemy.importing import MomlError
+from tests.ptolemy.importing.moml_parts import (
     LIB,
     TEXT,
     composite,

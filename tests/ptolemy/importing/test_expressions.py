@@ -8,12 +8,12 @@ from typing import Any
 import pytest
 
 from epicycle.actors.expression import evaluate as own_evaluate
-from runner.moml.entities import Property
-from runner.moml.operators import Rows, java_text
-from runner.moml.scope import Scope
-from runner.moml.syntax import ExpressionError, parse
-from runner.moml.translate import translated
-from runner.moml.values import evaluate
+from epicycle.ptolemy.importing.entities import Property
+from epicycle.ptolemy.importing.operators import Rows, java_text
+from epicycle.ptolemy.importing.scope import Scope
+from epicycle.ptolemy.importing.syntax import ExpressionError, parse
+from epicycle.ptolemy.importing.translate import translated
+from epicycle.ptolemy.importing.values import evaluate
 
 PARAMETERS: dict[str, Any] = {
     "n": 3,

@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from epicycle.ptolemy.importing import MomlError, import_moml
 from epicycle.runner.build import load_model
-from epicycle.runner.moml import MomlError, import_moml
-from tests.moml.moml_parts import DE, LIB, TEXT, composite, entity, model, port, prop, wires
-from tests.moml.test_modes import around, machine, modal, state, transition
+from tests.ptolemy.importing.moml_parts import DE, LIB, TEXT, composite, entity, model, port, prop, wires
+from tests.ptolemy.importing.test_modes import around, machine, modal, state, transition
 
 INNER = composite(
     "C",

@@ -6,8 +6,19 @@ from pathlib import Path
 
 import pytest
 
-from epicycle.runner.moml import MomlError
-from tests.moml.moml_parts import LIB, TEXT, composite, entity, imported, model, prop, recorded, wires, written
+from epicycle.ptolemy.importing import MomlError
+from tests.ptolemy.importing.moml_parts import (
+    LIB,
+    TEXT,
+    composite,
+    entity,
+    imported,
+    model,
+    prop,
+    recorded,
+    wires,
+    written,
+)
 
 
 def test_publishers_and_subscribers(tmp_path: Path) -> None:

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from tests.moml.moml_parts import PARAMETER, TEXT, entity, model, prop, recorded, wires
+from tests.ptolemy.importing.moml_parts import PARAMETER, TEXT, entity, model, prop, recorded, wires
 
 LIB = "ptolemy.actor.lib."
 

@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import Any
 from xml.sax.saxutils import quoteattr
 
+from epicycle.ptolemy.importing import Imported, import_moml
 from epicycle.runner.build import load_model
 from epicycle.runner.engine import Simulation
-from epicycle.runner.moml import Imported, import_moml
 
 HEAD = """<?xml version="1.0" standalone="no"?>
 <!DOCTYPE entity PUBLIC "-//UC Berkeley//DTD MoML 1//EN"

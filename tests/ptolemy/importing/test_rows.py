@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from tests.moml.moml_parts import DE, LIB, entity, model, notes, port, sent, wires
+from tests.ptolemy.importing.moml_parts import DE, LIB, entity, model, notes, port, sent, wires
 
 Fed = dict[str, dict[float, str]]  # what comes at the ports, by its time; several channels are "input 0", "input 1"
 

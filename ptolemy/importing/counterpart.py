@@ -10,8 +10,8 @@ from typing import Any
 
 from epicycle.actors import Actor as OwnActor
 from epicycle.actors import declared_parameters, declared_ports, has_own_ports
+from epicycle.runner.catalogue import built_in
 
-from ..catalogue import built_in
 from .names import snake
 from .relations import PortFace
 

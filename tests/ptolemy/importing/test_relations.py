@@ -6,7 +6,18 @@ from pathlib import Path
 
 import pytest
 
-from tests.moml.moml_parts import COMPOSITE, PARAMETER, composite, entity, model, port, prop, recorded, wires, written
+from tests.ptolemy.importing.moml_parts import (
+    COMPOSITE,
+    PARAMETER,
+    composite,
+    entity,
+    model,
+    port,
+    prop,
+    recorded,
+    wires,
+    written,
+)
 
 EVENTS = "".join(entity(name, "SingleEvent", value=number) for number, name in enumerate(("a", "b", "c"), 1))
 MERGE = entity("Merge", "ptolemy.domains.de.lib.Merge") + entity("Recorder", "Recorder")

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from runner.moml.counterpart import Counterpart
-from runner.moml.table import _NAMED as ROWS
-from runner.moml.table import counterpart_of
-from tests.moml.moml_parts import DE, LIB, TEXT, entity, model, notes, port, prop, run, wires
+from epicycle.ptolemy.importing.counterpart import Counterpart
+from epicycle.ptolemy.importing.table import _NAMED as ROWS
+from epicycle.ptolemy.importing.table import counterpart_of
+from tests.ptolemy.importing.moml_parts import DE, LIB, TEXT, entity, model, notes, port, prop, run, wires
 
 NEEDED = {
     **dict.fromkeys(("RecordAssembler", "Expression", "RecordUpdater", "UnionMerge"), port("x", "input")),

@@ -8,8 +8,8 @@ from functools import cached_property
 from typing import Any
 
 from epicycle.actors import Actor as OwnActor
+from epicycle.runner.catalogue import installed
 
-from ..catalogue import installed
 from .actors import Actor, face_of, is_decoration, is_layout, plain
 from .aspects import MODELS, aspects_of, is_aspect, is_request, is_response
 from .budget import spend

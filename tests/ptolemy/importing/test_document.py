@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from epicycle.runner.moml import MomlError, import_moml
-from tests.moml.moml_parts import COMPOSITE, HEAD, entity, imported, model
+from epicycle.ptolemy.importing import MomlError, import_moml
+from tests.ptolemy.importing.moml_parts import COMPOSITE, HEAD, entity, imported, model
 
 REFUSED = """m.xml:{line}: the file declares entities or its own DTD, which is not allowed
    help: only a line like '<!DOCTYPE entity PUBLIC ...>' may precede the model"""

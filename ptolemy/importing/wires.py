@@ -7,8 +7,8 @@ from itertools import pairwise
 from typing import Any
 
 from epicycle.actors import declared_ports
+from epicycle.runner.catalogue import built_in
 
-from ..catalogue import built_in
 from .entities import Entity
 from .modes import is_machine
 from .parts import Converting, CountsEnds, Level

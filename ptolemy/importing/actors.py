@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from epicycle.actors import ParameterError, declared_parameters
+from epicycle.runner.catalogue import built_in
 
-from ..catalogue import built_in
 from .budget import spend
 from .counterpart import UNSAID, Counterpart, ParameterSaid
 from .entities import Entity, Property

@@ -8,10 +8,21 @@ from pathlib import Path
 
 import pytest
 
+from epicycle.ptolemy.importing import MomlError, import_moml
 from epicycle.runner.build import load_model
-from epicycle.runner.moml import MomlError, import_moml
-from tests.moml.moml_parts import COMPOSITE, LIB, TEXT, composite, entity, imported, model, port, prop, wires
-from tests.moml.test_modes import modal, state
+from tests.ptolemy.importing.moml_parts import (
+    COMPOSITE,
+    LIB,
+    TEXT,
+    composite,
+    entity,
+    imported,
+    model,
+    port,
+    prop,
+    wires,
+)
+from tests.ptolemy.importing.test_modes import modal, state
 
 SPENT = "m.xml cannot be imported: it takes more than 1,000,000 steps"
 RELATION = '<relation name="r{0}" class="ptolemy.actor.TypedIORelation">{1}</relation>\n'

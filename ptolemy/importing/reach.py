@@ -6,8 +6,8 @@ from collections import Counter
 from collections.abc import Iterator
 
 from epicycle.actors import InputPort, declared_ports
+from epicycle.runner.catalogue import built_in
 
-from ..catalogue import built_in
 from .budget import spend
 from .counterpart import Counterpart
 from .directors import director_of, fires_whole

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from tests.conformance.test_conformance import RESOLUTION, own_name, own_token, recorded
-from tests.moml.moml_parts import DE, LIB, composite, entity, model, port, sent, wires
+from tests.ptolemy.importing.moml_parts import DE, LIB, composite, entity, model, port, sent, wires
 
 
 def values(*numbers: float) -> str:

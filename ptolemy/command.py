@@ -5,15 +5,14 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from ..printing import complain, tell
-from .options import DONE, TYPES, Command, option, own_types
+from epicycle.runner.commands import DONE, TYPES, Command, complain, option, own_types, tell
 
 
 def _run(options: argparse.Namespace) -> int:
     from epicycle.actors import EpicycleError
+    from epicycle.runner import load_model
 
-    from ..build import load_model
-    from ..moml import import_moml
+    from .importing import import_moml
 
     types = own_types(options)
     if options.out is not None and options.out.suffix not in (".yaml", ".yml"):
@@ -48,6 +47,6 @@ import_ = Command(  # "import" is a keyword in Python
         ),
         TYPES,
     ),
-    ("build", "moml"),
+    ("build",),
     _run,
 )

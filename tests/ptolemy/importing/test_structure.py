@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from epicycle.runner.moml import MomlError
-from tests.moml.moml_parts import (
+from epicycle.ptolemy.importing import MomlError
+from tests.ptolemy.importing.moml_parts import (
     COMPOSITE,
     DIRECTOR,
     HEAD,

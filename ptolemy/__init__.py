@@ -1,0 +1,19 @@
+"""Ptolemy II: imports its models, and runs them by its rules.  A plug-in: nothing else in Epicycle knows it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from .importing import Imported, MomlError, import_moml
+
+__all__ = ["Imported", "MomlError", "import_moml"]
+
+
+def __getattr__(name: str) -> Any:
+    # On first use: `epicycle --help` must not wait for the importer.
+    if name in __all__:
+        from . import importing
+
+        return getattr(importing, name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
