@@ -4,11 +4,12 @@ never read or write beyond an array."""
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Protocol, TypeVar
+from typing import Any, TypeVar
 
 from ..core import EpicycleError, InputPort, Parameter, ParameterError
 from .arrays import Array
-from .messages import ANY, RANGE, RELATIVE_POSITION, SOME, Shape
+from .messages import RANGE, RELATIVE_POSITION
+from .tokens import ANY, SOME, Shape, Token
 
 PLANE, SPACE = (2,), (3,)
 EITHER = PLANE + SPACE
@@ -33,15 +34,7 @@ class PlaceParameter(Parameter[Any]):
         return place
 
 
-class Message(Protocol):
-    """What has arrays whose shapes depend on the number of dimensions."""
-
-    def shapes(self, dimensions: int) -> tuple[tuple[str, Array, Shape], ...]:
-        """Each array with its name, and the shape that it should have."""
-        ...
-
-
-M = TypeVar("M", bound=Message)
+M = TypeVar("M", bound=Token)
 
 
 def received(port: InputPort[M], dimensions: Sequence[int] = EITHER) -> tuple[M, ...]:
@@ -65,10 +58,7 @@ def latest(port: InputPort[M], dimensions: Sequence[int] = EITHER) -> M:
 
 def _check(port: InputPort[M], message: M, dimensions: Sequence[int]) -> None:
     for each in dimensions:
-        for _, array, shape in message.shapes(each):
-            if array.shape != shape and not _fits(array.shape, shape):
-                break
-        else:
+        if message.fits(each):
             kind = getattr(message, "kind", RANGE)
             if kind not in _KINDS:
                 raise MessageError(
