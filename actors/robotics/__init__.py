@@ -1,9 +1,10 @@
 """Robots that observe and avoid a moving obstacle: bodies, sensors, estimators, controllers, messages."""
 
-from .controller import FlyingController, RobustController
+from .controller import RobustController
 from .detecting import MultiTargetSensor
 from .estimator import UnscentedEstimator
 from .filterpy_estimator import FilterError, FilterPyEstimator
+from .integrated_ou import IntegratedOUEstimator
 from .messages import (
     BodyState,
     Detections,
@@ -23,7 +24,6 @@ from .planning import (
     Solver,
     StayNear,
 )
-from .roaming import RoamingEstimator
 from .safe_controller import SafeController
 from .tracker import JPDATracker
 from .tracking_error import TrackingError
@@ -32,15 +32,14 @@ from .world import (
     ChannelError,
     CircularMotion,
     Flooding,
-    FlyingVehicle,
     Sensor,
     Vehicle,
 )
 
 __all__ = [
     "Barrier", "BodyState", "BroadcastChannel", "Casadi", "ChannelError", "CircularMotion", "ClearanceMonitor",
-    "Detections", "DistanceMonitor", "Estimate", "FilterError", "FilterPyEstimator", "Flooding", "FlyingController",
-    "FlyingVehicle", "GoalMonitor", "Inform", "JPDATracker", "Measurement", "MultiTargetSensor", "Objective", "Plan",
-    "ReachGoal", "RoamingEstimator", "RobustController", "SafeController", "Sensor", "SeparationMonitor", "Solver",
-    "StayNear", "TrackingError", "Tracks", "UnscentedEstimator", "Vehicle", "WaypointMotion",
+    "Detections", "DistanceMonitor", "Estimate", "FilterError", "FilterPyEstimator", "Flooding", "GoalMonitor",
+    "Inform", "IntegratedOUEstimator", "JPDATracker", "Measurement", "MultiTargetSensor", "Objective", "Plan",
+    "ReachGoal", "RobustController", "SafeController", "Sensor", "SeparationMonitor", "Solver", "StayNear",
+    "TrackingError", "Tracks", "UnscentedEstimator", "Vehicle", "WaypointMotion",
 ]  # fmt: skip

@@ -16,15 +16,17 @@ from ..core import (
     MappingParameter,
     OutputPort,
     Parameter,
+    ParameterError,
     array_parameter,
     did_you_mean,
+    shaped,
 )
 from ..core.elementary import hypot
 from .arrays import Array, array_of, finite, floats, joined, read_only, stacked
 from .estimator import TargetModel
 from .messages import BodyState, Estimate, Plan, Tracks, enclosing
 from .planning import Barrier, Objective, ReachGoal, Solver
-from .receiving import EITHER, latest, received
+from .receiving import EITHER, PlaceParameter, latest, received
 
 if TYPE_CHECKING:
     from .numerics.horizon import HorizonProblem
@@ -105,9 +107,12 @@ class RobustController(TargetModel, Actor):
     Before the first plan or estimate comes, the robot avoids only the positions in ``peers_at_start``. Plans and
     estimates that are not finite are ignored; the last good ones are kept.  Without a finite own state the control is
     zero, and nothing else is sent.
+
+    In space (``dimensions: 3``), speed and acceleration stay in ellipsoids (f1 and f2), as those of a ``Vehicle`` do,
+    and from the second step on, the plan stays above ``lowest`` and below ``highest`` (f7).  The target is on the
+    ground if its estimate is in the plane, and so are peers whose plans are.
     """
 
-    _dimensions = 2
     _of_target: Sequence[int] = EITHER  # the dimensions of the estimates that it takes
 
     trigger = InputPort(object, doc="plan now")
@@ -128,7 +133,7 @@ class RobustController(TargetModel, Actor):
         triggers=False,
         doc="name of one of the objectives, for this plan and all later ones until another role comes",
     )
-    control = OutputPort(np.ndarray, shape=(2,), doc="m/s^2, for the period after this one")
+    control = OutputPort(np.ndarray, shape=(None,), doc="m/s^2, for the period after this one")
     plan = OutputPort(Plan, doc="plan of this robot, for the others")
     violation = OutputPort(float, doc="largest violation of a constraint by the plan in metres; 0 if it keeps all")
     infeasible = OutputPort(int, doc="number of plans so far that broke a constraint")
@@ -137,8 +142,17 @@ class RobustController(TargetModel, Actor):
     objective = Parameter(Objective, ReachGoal(), doc="objective of the robot, until a role comes")
     objectives = MappingParameter(Parameter(Objective), {}, doc="objectives by role")
     solver = Parameter(Solver, Barrier(), doc="solver of the problem")
+    dimensions = Parameter(int, 2, min=2, max=3, doc="of the robot's positions: 3 if it flies, the height last")
     max_speed = Parameter(float, 8.0, unit="m/s", min=1e-6, doc="Vmax")
     max_acceleration = Parameter(float, 8.0, unit="m/s^2", min=1e-6, doc="Amax")
+    climb_speed = Parameter(float, 4.0, unit="m/s", above=0, doc="in space, largest vertical speed, up and down")
+    climb_acceleration = Parameter(float, 4.0, unit="m/s^2", above=0, doc="in space, largest vertical acceleration")
+    lowest: Parameter[float | None] = Parameter(
+        float, 1.0, unit="m", doc="in space, height to stay above; none if null"
+    )
+    highest: Parameter[float | None] = Parameter(
+        float, None, unit="m", doc="in space, height to stay below; none if left out"
+    )
     horizon = Parameter(int, 10, min=3, doc="N: prediction horizon in periods")
     horizon_from = Parameter(
         str,
@@ -158,20 +172,29 @@ class RobustController(TargetModel, Actor):
         bool, True, doc="whether process noise widens the target's predicted covariance, in f4 and in eq. (5)"
     )
     keep_out = array_parameter(
-        (None, 3), (), unit="m", doc="places that stand in the way: x, y, and the distance to keep from there"
+        (None, 3), (), unit="m", doc="in the plane, what stands in the way: x, y, and the distance to keep from there"
     )
-    peers_at_start = array_parameter(
-        (None, 2), (), unit="m", doc="positions of other robots at time 0, used until their plans come"
+    peers_at_start = PlaceParameter(
+        (), several=True, doc="positions of other robots at time 0, used until their plans come"
     )
     robot_name = Parameter(
         str, "", doc="name in the plan; if empty, the path of the composite that contains the controller"
     )
 
+    def check(self) -> None:
+        super().check()
+        d = self.dimensions
+        if d == 3 and len(self.keep_out):
+            raise ParameterError("keep_out: a robot that flies is above what stands in the way; leave it out")
+        if len(self.peers_at_start) and self.peers_at_start.shape[1] != d:
+            raise ParameterError(f"peers_at_start: places have {self.peers_at_start.shape[1]} numbers; expected {d}")
+        self.control.change("type", shaped(np.ndarray, (d,)))
+
     def initialize(self) -> None:
         from .numerics import definitions, horizon, reachability
         from .numerics.warm_up import compile_kernels
 
-        d = self._dimensions
+        d = self.dimensions
         for objective in (self.objective, *self.objectives.values()):
             objective.check_dimensions(d)
         self.solver.prepare()
@@ -196,7 +219,14 @@ class RobustController(TargetModel, Actor):
         self._nobody = no_means, no_covariances, np.empty((0, d)), np.empty(0)
         places, apart = self.keep_out[:, np.newaxis, :2], self.keep_out[:, 2:]
         self._standing_there = np.repeat(places, self._steps, axis=1), np.repeat(apart, self._steps, axis=1)
-        self._in_space = self._flight()
+        self._in_space: dict[str, Any] = {}  # limits, by their names in the problem
+        if d == 3:
+            self._in_space = {
+                "climb_speed": self.climb_speed,
+                "climb_acceleration": self.climb_acceleration,
+                "lowest": -math.inf if self.lowest is None else self.lowest,
+                "highest": math.inf if self.highest is None else self.highest,
+            }
         self._applied = np.zeros(d)  # U_t
         self._standing = self._nothing = _Standing(-math.inf, np.zeros(d), np.zeros(d), np.zeros((self._steps, d)))
         self._peers = _Peers(self.peers_at_start)
@@ -209,11 +239,11 @@ class RobustController(TargetModel, Actor):
         self._listen()
         if not self.trigger.present:
             return
-        own = latest(self.state, (self._dimensions,)) if self.state.present else None
+        own = latest(self.state, (self.dimensions,)) if self.state.present else None
         if own is None or not own.finite:
-            self._applied = np.zeros(self._dimensions)
+            self._applied = np.zeros(self.dimensions)
             self._standing = self._nothing
-            self.control.send(np.zeros(self._dimensions))
+            self.control.send(np.zeros(self.dimensions))
             return
         problem, starts = self._problem(own)
         solution = self.solver.solve(problem, starts)
@@ -250,7 +280,7 @@ class RobustController(TargetModel, Actor):
     def _send(self, own: BodyState, problem: HorizonProblem, controls: Array) -> None:
         self._standing = _Standing(own.time, problem.position, problem.velocity, controls)
         announced = joined(floats(self._applied), controls[: self.horizon])
-        self.plan.send(Plan(self._name, own.time, own, announced.reshape(self.horizon + 1, self._dimensions)))
+        self.plan.send(Plan(self._name, own.time, own, announced.reshape(self.horizon + 1, self.dimensions)))
         self._applied = read_only(controls[0])
         self.control.send(self._applied)
 
@@ -269,7 +299,7 @@ class RobustController(TargetModel, Actor):
             *standing[1:], now - standing.made_at, self._radius, velocity, speed, most, period
         )
         target_mean, target_covariance, points, weights = self._expected(now)
-        peer_mean, peer_distance = self._peer_tubes(self._peers.table(), now, *self._room, self._dimensions)
+        peer_mean, peer_distance = self._peer_tubes(self._peers.table(), now, *self._room, self.dimensions)
         posed = self._new_problem(
             period=period,
             position=position,
@@ -300,7 +330,7 @@ class RobustController(TargetModel, Actor):
         each = [
             self._expected_target(
                 target.mean, target.covariance, self._noise[len(target.mean)], *self._model, now - target.time,
-                self._steps, self._dimensions,
+                self._steps, self.dimensions,
             )
             for target in self._targets()
         ]  # fmt: skip
@@ -316,49 +346,13 @@ class RobustController(TargetModel, Actor):
             targets.extend(self._tracks.estimates)
         return targets
 
-    def _flight(self) -> dict[str, Any]:
-        """The limits that hold in space only, by their names in the problem."""
-        return {}
-
     def _braking(self, velocity: tuple[float, ...]) -> tuple[float, float]:
         """The speed, and the largest acceleration against it."""
-        return hypot(velocity[0], velocity[1]), self.max_acceleration
-
-
-class FlyingController(RobustController):
-    """A ``RobustController`` in space, with limits of climbing and of the height.
-
-    Speed and acceleration stay in ellipsoids (f1 and f2), as those of a ``FlyingVehicle`` do.  From the second step on,
-    the plan stays above ``lowest`` and below ``highest`` (f7).  The target is on the ground if its estimate is in the
-    plane, and so are peers whose plans are.
-    """
-
-    _dimensions = 3
-
-    control = OutputPort(np.ndarray, shape=(3,), doc="m/s^2, for the period after this one")
-
-    keep_out = array_parameter((0, 3), (), unit="m", doc="none: it flies above what stands in the way")
-    climb_speed = Parameter(float, 4.0, unit="m/s", above=0, doc="largest vertical speed, up and down")
-    climb_acceleration = Parameter(float, 4.0, unit="m/s^2", above=0, doc="largest vertical acceleration")
-    lowest: Parameter[float | None] = Parameter(float, 1.0, unit="m", doc="height to stay above; none if null")
-    highest: Parameter[float | None] = Parameter(float, None, unit="m", doc="height to stay below; none if left out")
-    peers_at_start = array_parameter(
-        (None, 3), (), unit="m", doc="positions of other robots at time 0, used until their plans come"
-    )
-
-    def _flight(self) -> dict[str, Any]:
-        return {
-            "climb_speed": self.climb_speed,
-            "climb_acceleration": self.climb_acceleration,
-            "lowest": -math.inf if self.lowest is None else self.lowest,
-            "highest": math.inf if self.highest is None else self.highest,
-        }
-
-    def _braking(self, velocity: tuple[float, ...]) -> tuple[float, float]:
-        x, y, z = velocity
-        level = hypot(x, y)
-        speed = hypot(level, z)
+        level = hypot(velocity[0], velocity[1])
+        if len(velocity) == 2:
+            return level, self.max_acceleration
+        speed = hypot(level, velocity[2])
         if not 0.0 < speed < math.inf:
             return speed, self.max_acceleration
-        weighted = hypot(level, z * (self.max_acceleration / self.climb_acceleration))
+        weighted = hypot(level, velocity[2] * (self.max_acceleration / self.climb_acceleration))
         return speed, self.max_acceleration * (speed / weighted)

@@ -92,14 +92,14 @@ class StayNear(Objective):
         _check_height("'offset'", self.offset, dimensions)
 
     def pose(self, problem: HorizonProblem, points: Array, weights: Array, peers: Sequence[str] = ()) -> HorizonProblem:
-        from .numerics.definitions import station
+        from .numerics.definitions import common_goal
 
         known = dict(zip((*peers, TARGET), (*problem.peer_mean, *problem.obstacle_mean[:1]), strict=False))
         near = [name for name in self.to if name in known]
         if not near:
             return problem.to_reach(problem.position)
         places, shares = np.stack([known[name] for name in near]), np.array([self.to[name] for name in near])
-        return problem.to_reach(station(places, shares) + in_space(self.offset, len(problem.position)))
+        return problem.to_reach(common_goal(places, shares) + in_space(self.offset, len(problem.position)))
 
 
 class Inform(Objective):

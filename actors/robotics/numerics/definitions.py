@@ -60,13 +60,13 @@ def f0(positions: Any, goal: Any) -> Any:
 def f0_of_several(positions: Any, places: Any, weights: Any) -> Any:
     """f0 of several goals that move (k, N, d), each with its weight (k,): (N,) in m^2.
 
-    It is the f0 of their ``station``, times the sum of the weights, and a term that no plan changes.
+    It is the f0 of their ``common_goal``, times the sum of the weights, and a term that no plan changes.
     """
     offsets = positions - places
     return (weights[:, np.newaxis] * (offsets * offsets).sum(axis=-1)).sum(axis=0)
 
 
-def station(places: Any, weights: Any) -> Any:
+def common_goal(places: Any, weights: Any) -> Any:
     """The goal (N, d) in m that has the optimum of ``f0_of_several``: the weighted mean of the places (k, N, d)."""
     return (weights[:, np.newaxis, np.newaxis] * places).sum(axis=0) / weights.sum()
 
@@ -277,7 +277,7 @@ def gospa(truth: Array, tracks: Array, cutoff: float) -> float:
     return float(np.sqrt(min(totals)))
 
 
-def roaming(speed: float, turn_time: float, elapsed: float, kept: float) -> tuple[Array, Array]:
+def integrated_ou(speed: float, turn_time: float, elapsed: float, kept: float) -> tuple[Array, Array]:
     """The model of a target of bounded speed: transition (4, 4) of its state (x, y, vx, vy), and the covariance gained.
 
     Its velocity is an Ornstein-Uhlenbeck process of which the share ``kept`` = exp(-elapsed / turn_time) is left; in
