@@ -34,6 +34,7 @@ from .resources.pool import Pool as _Pool, Pools as _Pools
 from .resources.stations import Machine as _Machine, Station as _Station
 from .robotics.controller import RobustController as _RobustController
 from .robotics.detecting import MultiTargetSensor as _MultiTargetSensor
+from .robotics.dynamics import DoubleIntegrator as _DoubleIntegrator, Dynamics
 from .robotics.estimator import UnscentedEstimator as _UnscentedEstimator
 from .robotics.filterpy_estimator import FilterPyEstimator as _FilterPyEstimator
 from .robotics.integrated_ou import IntegratedOUEstimator as _IntegratedOUEstimator
@@ -119,8 +120,8 @@ class Butterworth(_Butterworth):
     def __init__(self, *, cutoff: _Number, period: _Number, order: _Whole = ..., passes: Literal['low', 'high'] = ...) -> None: ...
 
 class Casadi(_Casadi):
-    """CasADi's IPOPT on the same problem, warm-started: thousands of times slower, an independent check."""
-    def __init__(self, *, max_iterations: _Whole = ...) -> None: ...
+    """CasADi's IPOPT, for any dynamics and any objective; on the paper's problem it is an independent check."""
+    def __init__(self, *, method: Literal['ipopt', 'fatrop'] = ..., max_iterations: _Whole = ...) -> None: ...
 
 class Cauchy(_Cauchy):
     """The Cauchy distribution, which has no mean; in physics, the Breit-Wigner distribution."""
@@ -213,6 +214,10 @@ class Display(_Display):
 class DistanceMonitor(_DistanceMonitor):
     """The distance between two bodies, whenever a state of one comes and both are known."""
     def __init__(self, path: str) -> None: ...
+
+class DoubleIntegrator(_DoubleIntegrator):
+    """The paper's robot, eq. (2): the control is the acceleration, and the state is position and velocity."""
+    def __init__(self, *, dimensions: _Whole = ..., max_speed: _Number = ..., max_acceleration: _Number = ..., climb_speed: _Number = ..., climb_acceleration: _Number = ...) -> None: ...
 
 class Equals(_Equals):
     """Sends whether all tokens that come together are equal; channels without a token are ignored."""
@@ -476,7 +481,7 @@ class ResettableTimer(_ResettableTimer):
 
 class RobustController(_RobustController):
     """Solves the horizon problem at every trigger and sends the acceleration for the *next* period."""
-    def __init__(self, path: str, *, objective: Objective | abc.Mapping[str, object] = ..., objectives: abc.Mapping[str, Objective | abc.Mapping[str, object]] = ..., solver: Solver | abc.Mapping[str, object] = ..., dimensions: _Whole = ..., max_speed: _Number = ..., max_acceleration: _Number = ..., climb_speed: _Number = ..., climb_acceleration: _Number = ..., lowest: _Number = ..., highest: _Number | None = ..., horizon: _Whole = ..., horizon_from: Literal['now', 'decision'] = ..., period: _Number = ..., safe_distance: _Number = ..., margin: _Number = ..., tube_initial: _Number = ..., tube_growth: _Number = ..., tube_time: Literal['steps', 'seconds'] = ..., covariance_noise: bool = ..., keep_out: _Rows = ..., peers_at_start: _Rows = ..., robot_name: str = ..., position_noise: _Number = ..., velocity_noise: _Number = ..., kappa: _Number = ...) -> None: ...
+    def __init__(self, path: str, *, dynamics: Dynamics | abc.Mapping[str, object] | None = ..., objective: Objective | abc.Mapping[str, object] = ..., objectives: abc.Mapping[str, Objective | abc.Mapping[str, object]] = ..., solver: Solver | abc.Mapping[str, object] = ..., dimensions: _Whole = ..., max_speed: _Number = ..., max_acceleration: _Number = ..., climb_speed: _Number = ..., climb_acceleration: _Number = ..., lowest: _Number = ..., highest: _Number | None = ..., horizon: _Whole = ..., horizon_from: Literal['now', 'decision'] = ..., period: _Number = ..., safe_distance: _Number = ..., margin: _Number = ..., tube_initial: _Number = ..., tube_growth: _Number = ..., tube_time: Literal['steps', 'seconds'] = ..., covariance_noise: bool = ..., keep_out: _Rows = ..., peers_at_start: _Rows = ..., robot_name: str = ..., position_noise: _Number = ..., velocity_noise: _Number = ..., kappa: _Number = ...) -> None: ...
 
 class Router(_Router):
     """Sends each token to one channel of its output: in turn, at random, to the least loaded, or by a property of the token."""
@@ -484,7 +489,7 @@ class Router(_Router):
 
 class SafeController(_SafeController):
     """A `RobustController` that also keeps a retreat open, for a target of bounded speed."""
-    def __init__(self, path: str, *, sigma_margin: _Number = ..., target_speed: _Number = ..., turn_time: _Number = ..., objective: Objective | abc.Mapping[str, object] = ..., objectives: abc.Mapping[str, Objective | abc.Mapping[str, object]] = ..., solver: Solver | abc.Mapping[str, object] = ..., dimensions: _Whole = ..., max_speed: _Number = ..., max_acceleration: _Number = ..., climb_speed: _Number = ..., climb_acceleration: _Number = ..., lowest: _Number = ..., highest: _Number | None = ..., horizon: _Whole = ..., horizon_from: Literal['now', 'decision'] = ..., period: _Number = ..., safe_distance: _Number = ..., margin: _Number = ..., tube_initial: _Number = ..., tube_growth: _Number = ..., tube_time: Literal['steps', 'seconds'] = ..., covariance_noise: bool = ..., keep_out: _Rows = ..., peers_at_start: _Rows = ..., robot_name: str = ..., position_noise: _Number = ..., velocity_noise: _Number = ..., kappa: _Number = ...) -> None: ...
+    def __init__(self, path: str, *, sigma_margin: _Number = ..., target_speed: _Number = ..., turn_time: _Number = ..., dynamics: Dynamics | abc.Mapping[str, object] | None = ..., objective: Objective | abc.Mapping[str, object] = ..., objectives: abc.Mapping[str, Objective | abc.Mapping[str, object]] = ..., solver: Solver | abc.Mapping[str, object] = ..., dimensions: _Whole = ..., max_speed: _Number = ..., max_acceleration: _Number = ..., climb_speed: _Number = ..., climb_acceleration: _Number = ..., lowest: _Number = ..., highest: _Number | None = ..., horizon: _Whole = ..., horizon_from: Literal['now', 'decision'] = ..., period: _Number = ..., safe_distance: _Number = ..., margin: _Number = ..., tube_initial: _Number = ..., tube_growth: _Number = ..., tube_time: Literal['steps', 'seconds'] = ..., covariance_noise: bool = ..., keep_out: _Rows = ..., peers_at_start: _Rows = ..., robot_name: str = ..., position_noise: _Number = ..., velocity_noise: _Number = ..., kappa: _Number = ...) -> None: ...
 
 class Sampler(_Sampler):
     """Passes on tokens that come at the same tag as a trigger; all others are lost."""
@@ -636,7 +641,7 @@ class VaryingRandom(_VaryingRandom):
 
 class Vehicle(_Vehicle):
     """A double integrator in the paper's discrete form."""
-    def __init__(self, path: str, *, start: _Row, start_velocity: _Row | None = ..., max_speed: _Number = ..., max_acceleration: _Number = ..., climb_speed: _Number = ..., climb_acceleration: _Number = ...) -> None: ...
+    def __init__(self, path: str, *, dynamics: Dynamics | abc.Mapping[str, object] | None = ..., start: _Row, start_velocity: _Row | None = ..., max_speed: _Number = ..., max_acceleration: _Number = ..., climb_speed: _Number = ..., climb_acceleration: _Number = ...) -> None: ...
 
 class VonMises(_VonMises):
     """The von Mises distribution of angles, in rad."""

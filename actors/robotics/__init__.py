@@ -1,7 +1,9 @@
 """Robots that observe and avoid a moving obstacle: bodies, sensors, estimators, controllers, messages."""
 
+from . import symbolic
 from .controller import RobustController
 from .detecting import MultiTargetSensor
+from .dynamics import DoubleIntegrator, Dynamics
 from .estimator import UnscentedEstimator
 from .filterpy_estimator import FilterError, FilterPyEstimator
 from .integrated_ou import IntegratedOUEstimator
@@ -10,6 +12,7 @@ from .messages import (
     Detections,
     Estimate,
     Measurement,
+    MotionState,
     Plan,
     Tracks,
 )
@@ -24,6 +27,7 @@ from .planning import (
     Solver,
     StayNear,
 )
+from .problem import Beliefs, Problem, Trajectory
 from .safe_controller import SafeController
 from .tracker import JPDATracker
 from .tracking_error import TrackingError
@@ -37,9 +41,10 @@ from .world import (
 )
 
 __all__ = [
-    "Barrier", "BodyState", "BroadcastChannel", "Casadi", "ChannelError", "CircularMotion", "ClearanceMonitor",
-    "Detections", "DistanceMonitor", "Estimate", "FilterError", "FilterPyEstimator", "Flooding", "GoalMonitor",
-    "Inform", "IntegratedOUEstimator", "JPDATracker", "Measurement", "MultiTargetSensor", "Objective", "Plan",
-    "ReachGoal", "RobustController", "SafeController", "Sensor", "SeparationMonitor", "Solver", "StayNear",
-    "TrackingError", "Tracks", "UnscentedEstimator", "Vehicle", "WaypointMotion",
+    "Barrier", "Beliefs", "BodyState", "BroadcastChannel", "Casadi", "ChannelError", "CircularMotion",
+    "ClearanceMonitor", "Detections", "DistanceMonitor", "DoubleIntegrator", "Dynamics", "Estimate", "FilterError",
+    "FilterPyEstimator", "Flooding", "GoalMonitor", "Inform", "IntegratedOUEstimator", "JPDATracker", "Measurement",
+    "MotionState", "MultiTargetSensor", "Objective", "Plan", "Problem", "ReachGoal", "RobustController",
+    "SafeController", "Sensor", "SeparationMonitor", "Solver", "StayNear", "TrackingError", "Tracks",
+    "Trajectory", "UnscentedEstimator", "Vehicle", "WaypointMotion", "symbolic",
 ]  # fmt: skip

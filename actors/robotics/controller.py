@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from operator import itemgetter
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -22,14 +22,14 @@ from ..core import (
     shaped,
 )
 from ..core.elementary import hypot
+from . import rolling
 from .arrays import Array, array_of, finite, floats, joined, read_only, stacked
+from .dynamics import DoubleIntegrator, Dynamics
 from .estimator import TargetModel
 from .messages import BodyState, Estimate, Plan, Tracks, enclosing
-from .planning import Barrier, Objective, ReachGoal, Solver
+from .planning import KNOWN, Barrier, Objective, ReachGoal, Solver
+from .problem import Beliefs, Problem
 from .receiving import EITHER, PlaceParameter, latest, received
-
-if TYPE_CHECKING:
-    from .numerics.horizon import HorizonProblem
 
 STEPS, SECONDS = "steps", "seconds"
 DECISION, NOW = "decision", "now"
@@ -108,6 +108,9 @@ class RobustController(TargetModel, Actor):
     estimates that are not finite are ignored; the last good ones are kept.  Without a finite own state the control is
     zero, and nothing else is sent.
 
+    A robot with other ``dynamics`` than the paper's plans with its own states and controls.  Its plan is sent to the
+    others as accelerations that bring a double integrator to the same places.
+
     In space (``dimensions: 3``), speed and acceleration stay in ellipsoids (f1 and f2), as those of a ``Vehicle`` do,
     and from the second step on, the plan stays above ``lowest`` and below ``highest`` (f7).  The target is on the
     ground if its estimate is in the plane, and so are peers whose plans are.
@@ -139,6 +142,9 @@ class RobustController(TargetModel, Actor):
     infeasible = OutputPort(int, doc="number of plans so far that broke a constraint")
     iterations = OutputPort(int, doc="Newton (or solver) iterations for this plan")
 
+    dynamics: Parameter[Dynamics | None] = Parameter(
+        Dynamics, None, doc="how the robot moves; if left out, as a DoubleIntegrator with the limits below"
+    )
     objective = Parameter(Objective, ReachGoal(), doc="objective of the robot, until a role comes")
     objectives = MappingParameter(Parameter(Objective), {}, doc="objectives by role")
     solver = Parameter(Solver, Barrier(), doc="solver of the problem")
@@ -183,18 +189,31 @@ class RobustController(TargetModel, Actor):
 
     def check(self) -> None:
         super().check()
-        d = self.dimensions
+        self._motion: Dynamics = self.dynamics or DoubleIntegrator(
+            dimensions=self.dimensions,
+            max_speed=self.max_speed,
+            max_acceleration=self.max_acceleration,
+            climb_speed=self.climb_speed,
+            climb_acceleration=self.climb_acceleration,
+        )
+        d = self._motion.dimensions
+        for objective in (self.objective, *self.objectives.values()):
+            if reason := self.solver.refuses(self._motion, objective):
+                raise ParameterError(f"solver: {reason}")
         if d == 3 and len(self.keep_out):
             raise ParameterError("keep_out: a robot that flies is above what stands in the way; leave it out")
         if len(self.peers_at_start) and self.peers_at_start.shape[1] != d:
             raise ParameterError(f"peers_at_start: places have {self.peers_at_start.shape[1]} numbers; expected {d}")
-        self.control.change("type", shaped(np.ndarray, (d,)))
+        self.control.change("type", shaped(np.ndarray, (self._motion.controls,)))
 
     def initialize(self) -> None:
         from .numerics import definitions, horizon, reachability
         from .numerics.warm_up import compile_kernels
 
-        d = self.dimensions
+        motion: Any = self._motion
+        d, size = motion.dimensions, motion.controls
+        self._d, self._rest = d, np.zeros(size)
+        self._is_papers = type(motion) is DoubleIntegrator
         for objective in (self.objective, *self.objectives.values()):
             objective.check_dimensions(d)
         self.solver.prepare()
@@ -219,16 +238,18 @@ class RobustController(TargetModel, Actor):
         self._nobody = no_means, no_covariances, np.empty((0, d)), np.empty(0)
         places, apart = self.keep_out[:, np.newaxis, :2], self.keep_out[:, 2:]
         self._standing_there = np.repeat(places, self._steps, axis=1), np.repeat(apart, self._steps, axis=1)
-        self._in_space: dict[str, Any] = {}  # limits, by their names in the problem
+        self._bounds: dict[str, Any] = {  # by their names in the problem; those of other dynamics are their own
+            name: getattr(motion, name, math.inf)
+            for name in ("max_speed", "max_acceleration", "climb_speed", "climb_acceleration")
+        }
         if d == 3:
-            self._in_space = {
-                "climb_speed": self.climb_speed,
-                "climb_acceleration": self.climb_acceleration,
-                "lowest": -math.inf if self.lowest is None else self.lowest,
-                "highest": math.inf if self.highest is None else self.highest,
-            }
-        self._applied = np.zeros(d)  # U_t
-        self._standing = self._nothing = _Standing(-math.inf, np.zeros(d), np.zeros(d), np.zeros((self._steps, d)))
+            self._bounds["lowest"] = -math.inf if self.lowest is None else self.lowest
+            self._bounds["highest"] = math.inf if self.highest is None else self.highest
+        elif self._is_papers:
+            del self._bounds["climb_speed"], self._bounds["climb_acceleration"]
+        self._applied = self._rest  # U_t
+        first = np.zeros(d if self._is_papers else motion.states)
+        self._standing = self._nothing = _Standing(-math.inf, first, np.zeros(d), np.zeros((self._steps, size)))
         self._peers = _Peers(self.peers_at_start)
         self._objective: Objective = self.objective
         self._target: Estimate | None = None
@@ -239,11 +260,10 @@ class RobustController(TargetModel, Actor):
         self._listen()
         if not self.trigger.present:
             return
-        own = latest(self.state, (self.dimensions,)) if self.state.present else None
+        own = latest(self.state, (self._d,)) if self.state.present else None
         if own is None or not own.finite:
-            self._applied = np.zeros(self.dimensions)
-            self._standing = self._nothing
-            self.control.send(np.zeros(self.dimensions))
+            self._applied, self._standing = self._rest, self._nothing
+            self.control.send(np.zeros(len(self._rest)))
             return
         problem, starts = self._problem(own)
         solution = self.solver.solve(problem, starts)
@@ -277,35 +297,44 @@ class RobustController(TargetModel, Actor):
             if tracks.finite and (self._tracks is None or tracks.time >= self._tracks.time):
                 self._tracks = tracks
 
-    def _send(self, own: BodyState, problem: HorizonProblem, controls: Array) -> None:
-        self._standing = _Standing(own.time, problem.position, problem.velocity, controls)
-        announced = joined(floats(self._applied), controls[: self.horizon])
-        self.plan.send(Plan(self._name, own.time, own, announced.reshape(self.horizon + 1, self.dimensions)))
+    def _send(self, own: BodyState, problem: Any, controls: Array) -> None:
+        if self._is_papers:
+            numbers, told = getattr(problem, "numbers", problem), own
+            self._standing = _Standing(own.time, numbers.position, numbers.velocity, controls)
+            accelerations = joined(floats(self._applied), controls[: self.horizon]).reshape(self.horizon + 1, self._d)
+        else:
+            self._standing = _Standing(own.time, problem.state, self._rest, controls)
+            told, accelerations = rolling.announced(own, problem.trajectory(controls).positions, self.period)
+        self.plan.send(Plan(self._name, own.time, told, accelerations))
         self._applied = read_only(controls[0])
         self.control.send(self._applied)
 
     # --- the problem ------------------------------------------------------------------------------------
 
-    def _problem(self, own: BodyState) -> tuple[HorizonProblem, Array]:
-        """The problem, and the starts of its solver (2, N, d): the standing plan from the next period on; braking."""
-        # Floats: arithmetic on arrays of two takes ten times as long.
-        place, moving, pushed = floats(own.position), floats(own.velocity), floats(self._applied)
-        now, period = own.time, self.period
-        position = array_of(tuple([p + period * v for p, v in zip(place, moving, strict=True)]))
-        moving = tuple([v + period * u for v, u in zip(moving, pushed, strict=True)])
-        velocity, (speed, most) = array_of(moving), self._braking(moving)
-        standing = self._standing
-        tube_centre, tube_radius, starts = self._standing_plan(
-            *standing[1:], now - standing.made_at, self._radius, velocity, speed, most, period
-        )
+    def _problem(self, own: BodyState) -> tuple[Any, Array]:
+        """The problem, and the starts of its solver (2, N, m): the standing plan from the next period on; braking."""
+        now, period, standing = own.time, self.period, self._standing
+        if self._is_papers:
+            # Floats: arithmetic on arrays of two takes ten times as long.
+            place, moving, pushed = floats(own.position), floats(own.velocity), floats(self._applied)
+            position = array_of(tuple([p + period * v for p, v in zip(place, moving, strict=True)]))
+            moving = tuple([v + period * u for v, u in zip(moving, pushed, strict=True)])
+            velocity, (speed, most) = array_of(moving), self._braking(moving)
+            tube_centre, tube_radius, starts = self._standing_plan(
+                *standing[1:], now - standing.made_at, self._radius, velocity, speed, most, period
+            )
+        else:
+            state = rolling.next_state(self._motion, own, self._applied, period)
+            position, velocity = state[: self._d], np.array(self._motion.velocity(state))
+            tube_centre, tube_radius, starts = rolling.standing_plan(
+                self._motion, standing.position, standing.controls, now - standing.made_at, self._radius, state, period
+            )
         target_mean, target_covariance, points, weights = self._expected(now)
-        peer_mean, peer_distance = self._peer_tubes(self._peers.table(), now, *self._room, self.dimensions)
+        peer_mean, peer_distance = self._peer_tubes(self._peers.table(), now, *self._room, self._d)
         posed = self._new_problem(
             period=period,
             position=position,
             velocity=velocity,
-            max_speed=self.max_speed,
-            max_acceleration=self.max_acceleration,
             tube_centre=tube_centre,
             tube_radius=tube_radius,
             safe_distance=self.safe_distance,
@@ -314,15 +343,21 @@ class RobustController(TargetModel, Actor):
             obstacle_covariance=target_covariance,
             peer_mean=peer_mean,
             peer_distance=peer_distance,
-            **self._in_space,
+            **self._bounds,
         )
-        posed = self._objective.pose(posed, points, weights, self._peers.names)
+        is_known = self._is_papers and type(self._objective) in KNOWN
+        if is_known:
+            posed = self._objective.pose(posed, points, weights, self._peers.names)
         if len(self.keep_out):  # as f5, but nobody who measures
             there, apart = self._standing_there
             posed = posed._replace(
                 peer_mean=np.concatenate((peer_mean, there)), peer_distance=np.concatenate((peer_distance, apart))
             )
-        return posed, starts
+        if is_known:
+            return posed, starts
+        beliefs = Beliefs(target_mean, target_covariance, points, weights, peer_mean, self._peers.names)
+        state = np.concatenate((position, velocity)) if self._is_papers else state
+        return Problem(posed, state, self._motion, self._objective, beliefs), starts
 
     def _expected(self, now: float) -> tuple[Array, ...]:
         """Means (K, N, d) and covariances (K, N, d (d + 1) / 2) of all targets, sigma points of each (K M, d) and their
@@ -330,7 +365,7 @@ class RobustController(TargetModel, Actor):
         each = [
             self._expected_target(
                 target.mean, target.covariance, self._noise[len(target.mean)], *self._model, now - target.time,
-                self._steps, self.dimensions,
+                self._steps, self._d,
             )
             for target in self._targets()
         ]  # fmt: skip
@@ -348,11 +383,12 @@ class RobustController(TargetModel, Actor):
 
     def _braking(self, velocity: tuple[float, ...]) -> tuple[float, float]:
         """The speed, and the largest acceleration against it."""
-        level = hypot(velocity[0], velocity[1])
+        bounds = self._bounds
+        level, most = hypot(velocity[0], velocity[1]), bounds["max_acceleration"]
         if len(velocity) == 2:
-            return level, self.max_acceleration
+            return level, most
         speed = hypot(level, velocity[2])
         if not 0.0 < speed < math.inf:
-            return speed, self.max_acceleration
-        weighted = hypot(level, velocity[2] * (self.max_acceleration / self.climb_acceleration))
-        return speed, self.max_acceleration * (speed / weighted)
+            return speed, most
+        weighted = hypot(level, velocity[2] * (most / bounds["climb_acceleration"]))
+        return speed, most * (speed / weighted)

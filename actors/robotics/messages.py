@@ -25,6 +25,13 @@ class BodyState(Token):
     time: float  # s
 
 
+@token()
+class MotionState(BodyState):
+    """The whole state of a robot with another ``Dynamics`` than the paper's.  It is also a ``BodyState``."""
+
+    rest: Numbers = array("n")  # the numbers of its state after the position
+
+
 @token(RANGE=RANGE)
 class Measurement(Token):
     """A measurement of the target by a robot's sensor at ``time``, with all data to fuse it elsewhere and later."""

@@ -28,7 +28,7 @@ import numpy as np
 from .compiled import Array, borrower
 from .constraints import BOUND, ROUNDING, VALUE
 from .entry import entry
-from .horizon import HorizonProblem
+from .horizon import TOLERANCE, HorizonProblem, Solution
 from .newton import newton_step
 from .task import (
     ACCEPTED,
@@ -48,7 +48,6 @@ from .task import (
 )
 from .vectors import Vector, length_of, read, replaced, steeper, total, write, zero_vector
 
-TOLERANCE = 1e-6  # m; smaller violations count as none
 _SLACK = 1e-4  # m; added to an infeasible problem's bounds, and the margin of restoration
 _NEARLY = 1e-3  # m; a violation that may be entirely due to the barriers of f1 and f2
 _CENTRING = 0.1  # how far a start is moved towards braking before anything else
@@ -65,15 +64,6 @@ _CROWD = 60  # constraints within reach; more are a crowd
 _HOPELESS = 1e3  # m^2; if a crowd's squared violations add up to more, a rough value is enough:
 _ROUGH = 1e-3  # the share of them that a minimisation may leave, and
 _ROUGH_TO = 1e-5  # the barrier parameter, divided by them, at which restoration ends
-
-
-class Solution(NamedTuple):
-    """The result of a solver: the plan and its quality."""
-
-    controls: Array  # (N, 2) U_{t+1} .. U_{t+N}
-    violation: float  # largest violation of f3-f5, metres; 0 when feasible
-    objective: float
-    iterations: int  # Newton steps
 
 
 PROGRESS, LEAST_VIOLATION, BRAKE = 0, 1, 2
