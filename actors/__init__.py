@@ -80,38 +80,39 @@ else:
     from .variables import SetVariable, Variable
 
 __all__ = [
-    "ABSENT", "CORE", "CORE_MODULES", "CORE_REASON", "MAX_DEPTH", "NANOSECONDS_PER_SECOND", "NEVER", "NO_TOKENS", "ODE",
-    "PID", "REQUIRED", "SAME", "Accumulator", "Ackermann", "Actor", "AddSubtract", "ArqReceiver", "ArqSender",
-    "Barrier", "Batch", "Bernoulli", "Binomial", "BlockExpression", "BodyState", "BooleanSelect", "BooleanSwitch",
-    "BroadcastChannel", "Butterworth", "Casadi", "Cauchy", "Changes", "ChannelError", "ChiSquare", "Choice",
-    "CircularMotion", "ClearanceMonitor", "Clock", "Collect", "Commutator", "Comparator", "Configurable", "Const",
-    "Constant", "Context", "Counter", "CurrentMicrostep", "CurrentTime", "DRand", "DeadZone", "Default", "Derivative",
-    "Detections", "Difference", "DiscreteFilter", "Display", "DistanceMonitor", "Distribution", "Emitter",
-    "Environment", "EpicycleError", "Equals", "Estimate", "Exponential", "Expression", "Extreme", "Fault", "FaultError",
-    "Filter", "FilterDesign", "FilterError", "FilterPyEstimator", "FirstOfInstant", "FirstOrder", "Flooding",
-    "FlyingController", "FlyingVehicle", "Function", "Gamma", "Generator", "GoalMonitor", "Histogram",
-    "HoldingExpression", "Hysteresis", "InertialSensor", "Inform", "Inhibit", "InputPort", "Integrator", "IsPresent",
-    "JPDATracker", "JavaRandom", "Latest", "LatestOfAll", "Limiter", "Line", "Link", "LogNormal", "LogicGate",
-    "LookupTable", "Machine", "MappingParameter", "Match", "MathFunction", "Measurement", "Merge", "ModalActor", "Mode",
-    "Moment", "MostRecent", "MovingAverage", "MovingStatistics", "MultiTargetSensor", "MultiplyDivide",
-    "NegativeBinomial", "NetworkSwitch", "Normal", "Objective", "OutputPort", "Parameter", "ParameterError", "Pending",
-    "Place", "Plan", "Poisson", "PoissonClock", "Pool", "Pools", "PortError", "PortParameter", "Pose", "Posts",
-    "Previous", "Process", "Pulse", "Quantity", "Quantizer", "Queue", "Ramp", "Random", "RandomInteger",
-    "RangeBearingSensor", "RangeScanner", "Ranks", "ReachGoal", "RecordAssembler", "RecordDisassembler", "Recorder",
-    "Register", "Repeat", "Replay", "ReplayError", "ResettableTimer", "RoamingEstimator", "RobustController", "Router",
-    "SafeController", "Sampler", "Scale", "Select", "Sensor", "SeparationMonitor", "Sequence", "Sequencer", "Server",
-    "SetFields", "SetVariable", "SharedQueue", "SingleEvent", "Solver", "Spread", "StateMachine", "StateSpace",
-    "Station", "StayNear", "Stop", "Stream", "Streams", "StudentT", "Switch", "Synchronizer", "Tag", "Test",
-    "TextFunction", "TimeAverage", "TimeCompare", "TimeDelay", "TimeGap", "Timer", "Times", "TrackingError", "Tracks",
-    "TransferFunction", "Triangular", "Unbatch", "Unicycle", "Uniform", "UnitError", "UnscentedEstimator", "Variable",
-    "VaryingRandom", "Vehicle", "VonMises", "WaitingLine", "WaitingTime", "Wake", "Way", "WaypointFollower",
-    "WaypointMotion", "When", "abridged", "accepts", "array_parameter", "bounds_text", "brief", "convert", "counted",
-    "counted_in_si", "cut", "declared_parameters", "declared_ports", "did_you_mean", "digits", "elementary",
-    "has_own_ports", "in_si", "irregular", "is_alone", "is_too_deep", "nearest", "new_tag", "new_wake",
-    "normal_quantile", "normal_share", "on_entry", "on_exit", "open_regular", "parse_unit", "paths", "plain", "present",
-    "random_stream", "read_regular", "read_table", "readable", "rounds", "shaped", "shortened", "texts_parameter",
-    "to_nanoseconds", "to_seconds", "token_type", "transition", "type_name", "unknown_parameter", "variants", "visible",
-    "visible_character", "visible_lines",
+    "ABSENT", "CORE", "CORE_MODULES", "CORE_REASON", "FORMER", "MAX_DEPTH", "NANOSECONDS_PER_SECOND", "NEVER",
+    "NO_TOKENS", "ODE", "PID", "REQUIRED", "SAME", "Accumulator", "Ackermann", "Actor", "AddSubtract", "ArqReceiver",
+    "ArqSender", "Barrier", "Batch", "Beliefs", "Bernoulli", "Binomial", "BlockExpression", "BodyState",
+    "BooleanSelect", "BooleanSwitch", "BroadcastChannel", "Butterworth", "Casadi", "Cauchy", "Changes", "ChannelError",
+    "ChiSquare", "Choice", "CircularMotion", "ClearanceMonitor", "Clock", "Collect", "Commutator", "Comparator",
+    "Configurable", "Const", "Constant", "Context", "Counter", "CurrentMicrostep", "CurrentTime", "DRand", "DeadZone",
+    "Default", "Derivative", "Detections", "Difference", "DiscreteFilter", "Display", "DistanceMonitor", "Distribution",
+    "DoubleIntegrator", "Dynamics", "Emitter", "Environment", "EpicycleError", "Equals", "Estimate", "Exponential",
+    "Expression", "Extreme", "Fault", "FaultError", "Filter", "FilterDesign", "FilterError", "FilterPyEstimator",
+    "FirstOfInstant", "FirstOrder", "Flooding", "Function", "Gamma", "Generator", "GoalMonitor", "Histogram",
+    "HoldingExpression", "Hysteresis", "InertialSensor", "Inform", "Inhibit", "InputPort", "IntegratedOUEstimator",
+    "Integrator", "IsPresent", "JPDATracker", "JavaRandom", "Latest", "LatestOfAll", "Limiter", "Line", "Link",
+    "LogNormal", "LogicGate", "LookupTable", "Machine", "MappingParameter", "Match", "MathFunction", "Measurement",
+    "Merge", "ModalActor", "Mode", "Moment", "MostRecent", "MotionState", "MovingAverage", "MovingStatistics",
+    "MultiTargetSensor", "MultiplyDivide", "NegativeBinomial", "NetworkSwitch", "Normal", "Objective", "OutputPort",
+    "Parameter", "ParameterError", "Pending", "Place", "Plan", "Poisson", "PoissonClock", "Pool", "Pools", "PortError",
+    "PortParameter", "Pose", "Posts", "Previous", "Problem", "Process", "Pulse", "Quantity", "Quantizer", "Queue",
+    "Ramp", "Random", "RandomInteger", "RangeBearingSensor", "RangeScanner", "Ranks", "ReachGoal", "RecordAssembler",
+    "RecordDisassembler", "Recorder", "Register", "Repeat", "Replay", "ReplayError", "ResettableTimer",
+    "RobustController", "Router", "SafeController", "Sampler", "Scale", "Select", "Sensor", "SeparationMonitor",
+    "Sequence", "Sequencer", "Server", "SetFields", "SetVariable", "SharedQueue", "SingleEvent", "Solver", "Spread",
+    "StateMachine", "StateSpace", "Station", "StayNear", "Stop", "Stream", "Streams", "StudentT", "Switch",
+    "Synchronizer", "Tag", "Test", "TextFunction", "TimeAverage", "TimeCompare", "TimeDelay", "TimeGap", "Timer",
+    "Times", "TrackingError", "Tracks", "Trajectory", "TransferFunction", "Triangular", "Unbatch", "Unicycle",
+    "Uniform", "UnitError", "UnscentedEstimator", "Variable", "VaryingRandom", "Vehicle", "VonMises", "WaitingLine",
+    "WaitingTime", "Wake", "Way", "WaypointFollower", "WaypointMotion", "When", "abridged", "accepts",
+    "array_parameter", "bounds_text", "brief", "convert", "counted", "counted_in_si", "cut", "declared_parameters",
+    "declared_ports", "did_you_mean", "digits", "elementary", "has_own_ports", "in_si", "irregular", "is_alone",
+    "is_too_deep", "nearest", "new_tag", "new_wake", "normal_quantile", "normal_share", "on_entry", "on_exit",
+    "open_regular", "parse_unit", "paths", "plain", "present", "random_stream", "read_regular", "read_table",
+    "readable", "rounds", "shaped", "shortened", "symbolic", "texts_parameter", "to_nanoseconds", "to_seconds",
+    "token_type", "transition", "type_name", "unknown_parameter", "variants", "visible", "visible_character",
+    "visible_lines",
 ]  # fmt: skip
 
 
@@ -137,9 +138,18 @@ _LATER = {
 }  # fmt: skip
 
 
+# Types that are others now: the message for a model or a program that names one.
+FORMER = {
+    "FlyingController": "write RobustController with 'dimensions: 3'",
+    "FlyingVehicle": "write Vehicle; it flies if its 'start' has a height",
+    "RoamingEstimator": "write IntegratedOUEstimator",
+}
+
+
 def __getattr__(name: str) -> Any:
     if name not in __all__:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        former = f": {FORMER[name]}" if name in FORMER else ""
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}{former}")
     module = next((module for module, names in _LATER.items() if name in names), ".robotics")
     found = globals()[name] = getattr(import_module(module, __name__), name)
     return found

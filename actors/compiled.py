@@ -46,7 +46,7 @@ LIBRARIES = {
     # Pays where thousands of runs are to come.
     "robots": (
         "epicycle.actors.robotics.arrays",
-        "epicycle.actors.robotics.messages",
+        "epicycle.actors.robotics.history",
         "epicycle.actors.robotics.estimator",
         "epicycle.actors.robotics.controller",
     ),

@@ -32,18 +32,19 @@ from .replay import Replay as _Replay
 from .resources.line import WaitingLine as _WaitingLine
 from .resources.pool import Pool as _Pool, Pools as _Pools
 from .resources.stations import Machine as _Machine, Station as _Station
-from .robotics.controller import FlyingController as _FlyingController, RobustController as _RobustController
+from .robotics.controller import RobustController as _RobustController
 from .robotics.detecting import MultiTargetSensor as _MultiTargetSensor
+from .robotics.dynamics import DoubleIntegrator as _DoubleIntegrator, Dynamics
 from .robotics.estimator import UnscentedEstimator as _UnscentedEstimator
 from .robotics.filterpy_estimator import FilterPyEstimator as _FilterPyEstimator
+from .robotics.integrated_ou import IntegratedOUEstimator as _IntegratedOUEstimator
 from .robotics.monitors import ClearanceMonitor as _ClearanceMonitor, DistanceMonitor as _DistanceMonitor, GoalMonitor as _GoalMonitor, SeparationMonitor as _SeparationMonitor
 from .robotics.motion import WaypointMotion as _WaypointMotion
 from .robotics.planning import Barrier as _Barrier, Casadi as _Casadi, Inform as _Inform, Objective, ReachGoal as _ReachGoal, Solver, StayNear as _StayNear
-from .robotics.roaming import RoamingEstimator as _RoamingEstimator
 from .robotics.safe_controller import SafeController as _SafeController
 from .robotics.tracker import JPDATracker as _JPDATracker
 from .robotics.tracking_error import TrackingError as _TrackingError
-from .robotics.world import BroadcastChannel as _BroadcastChannel, CircularMotion as _CircularMotion, Flooding as _Flooding, FlyingVehicle as _FlyingVehicle, Sensor as _Sensor, Vehicle as _Vehicle
+from .robotics.world import BroadcastChannel as _BroadcastChannel, CircularMotion as _CircularMotion, Flooding as _Flooding, Sensor as _Sensor, Vehicle as _Vehicle
 from .sinks import Display as _Display, Histogram as _Histogram, Recorder as _Recorder, Stop as _Stop, Test as _Test
 from .sources import Clock as _Clock, PoissonClock as _PoissonClock, Random as _Random, SingleEvent as _SingleEvent, VaryingRandom as _VaryingRandom
 from .statistics import MovingAverage as _MovingAverage, MovingStatistics as _MovingStatistics
@@ -119,8 +120,8 @@ class Butterworth(_Butterworth):
     def __init__(self, *, cutoff: _Number, period: _Number, order: _Whole = ..., passes: Literal['low', 'high'] = ...) -> None: ...
 
 class Casadi(_Casadi):
-    """CasADi's IPOPT on the same problem, warm-started: thousands of times slower, an independent check."""
-    def __init__(self, *, max_iterations: _Whole = ...) -> None: ...
+    """CasADi's IPOPT, for any dynamics and any objective; on the paper's problem it is an independent check."""
+    def __init__(self, *, method: Literal['ipopt', 'fatrop'] = ..., max_iterations: _Whole = ...) -> None: ...
 
 class Cauchy(_Cauchy):
     """The Cauchy distribution, which has no mean; in physics, the Breit-Wigner distribution."""
@@ -214,6 +215,10 @@ class DistanceMonitor(_DistanceMonitor):
     """The distance between two bodies, whenever a state of one comes and both are known."""
     def __init__(self, path: str) -> None: ...
 
+class DoubleIntegrator(_DoubleIntegrator):
+    """The paper's robot, eq. (2): the control is the acceleration, and the state is position and velocity."""
+    def __init__(self, *, dimensions: _Whole = ..., max_speed: _Number = ..., max_acceleration: _Number = ..., climb_speed: _Number = ..., climb_acceleration: _Number = ...) -> None: ...
+
 class Equals(_Equals):
     """Sends whether all tokens that come together are equal; channels without a token are ignored."""
     def __init__(self, path: str, *, tolerance: _Number = ...) -> None: ...
@@ -250,14 +255,6 @@ class Flooding(_Flooding):
     """Sends the messages of its robot, and repeats those of others for the robots that are out of their reach."""
     def __init__(self, path: str) -> None: ...
 
-class FlyingController(_FlyingController):
-    """A `RobustController` in space, with limits of climbing and of the height."""
-    def __init__(self, path: str, *, keep_out: _Rows = ..., climb_speed: _Number = ..., climb_acceleration: _Number = ..., lowest: _Number = ..., highest: _Number | None = ..., peers_at_start: _Rows = ..., objective: Objective | abc.Mapping[str, object] = ..., objectives: abc.Mapping[str, Objective | abc.Mapping[str, object]] = ..., solver: Solver | abc.Mapping[str, object] = ..., max_speed: _Number = ..., max_acceleration: _Number = ..., horizon: _Whole = ..., horizon_from: Literal['now', 'decision'] = ..., period: _Number = ..., safe_distance: _Number = ..., margin: _Number = ..., tube_initial: _Number = ..., tube_growth: _Number = ..., tube_time: Literal['steps', 'seconds'] = ..., covariance_noise: bool = ..., robot_name: str = ..., position_noise: _Number = ..., velocity_noise: _Number = ..., kappa: _Number = ...) -> None: ...
-
-class FlyingVehicle(_FlyingVehicle):
-    """A `Vehicle` in space, which climbs and sinks more slowly than it flies level."""
-    def __init__(self, path: str, *, start: _Row, start_velocity: _Row = ..., climb_speed: _Number = ..., climb_acceleration: _Number = ..., max_speed: _Number = ..., max_acceleration: _Number = ...) -> None: ...
-
 class Function(_Function):
     """Calls a Python function whenever one of its inputs gets a token, and sends what it returns."""
     def __init__(self, path: str, *, function: str | abc.Callable[..., object], hold: bool = ...) -> None: ...
@@ -293,6 +290,10 @@ class Inform(_Inform):
 class Inhibit(_Inhibit):
     """Passes on tokens unless an `inhibit` token comes with them; the opposite of a `Sampler`."""
     def __init__(self, path: str) -> None: ...
+
+class IntegratedOUEstimator(_IntegratedOUEstimator):
+    """The paper's filter with two changes, for a `SafeController`; the process noise of eq. (1) is not used."""
+    def __init__(self, path: str, *, degrees_of_freedom: _Number = ..., target_speed: _Number = ..., turn_time: _Number = ..., period: _Number = ..., prior_mean: _Row = ..., prior_variance: _Row = ..., max_delay: _Number = ..., noise_direction: Literal['expected', 'predicted'] = ..., position_noise: _Number = ..., velocity_noise: _Number = ..., kappa: _Number = ...) -> None: ...
 
 class Integrator(_Integrator):
     """The integral over time of a signal that arrives as tokens."""
@@ -478,13 +479,9 @@ class ResettableTimer(_ResettableTimer):
     """Sends a value after the number of seconds in the latest token."""
     def __init__(self, path: str, *, preemptive: bool = ..., value: object = ...) -> None: ...
 
-class RoamingEstimator(_RoamingEstimator):
-    """The paper's filter with two changes, for a `SafeController`; the process noise of eq. (1) is not used."""
-    def __init__(self, path: str, *, freedom: _Number = ..., target_speed: _Number = ..., turn_time: _Number = ..., period: _Number = ..., prior_mean: _Row = ..., prior_variance: _Row = ..., max_delay: _Number = ..., noise_direction: Literal['expected', 'predicted'] = ..., position_noise: _Number = ..., velocity_noise: _Number = ..., kappa: _Number = ...) -> None: ...
-
 class RobustController(_RobustController):
     """Solves the horizon problem at every trigger and sends the acceleration for the *next* period."""
-    def __init__(self, path: str, *, objective: Objective | abc.Mapping[str, object] = ..., objectives: abc.Mapping[str, Objective | abc.Mapping[str, object]] = ..., solver: Solver | abc.Mapping[str, object] = ..., max_speed: _Number = ..., max_acceleration: _Number = ..., horizon: _Whole = ..., horizon_from: Literal['now', 'decision'] = ..., period: _Number = ..., safe_distance: _Number = ..., margin: _Number = ..., tube_initial: _Number = ..., tube_growth: _Number = ..., tube_time: Literal['steps', 'seconds'] = ..., covariance_noise: bool = ..., keep_out: _Rows = ..., peers_at_start: _Rows = ..., robot_name: str = ..., position_noise: _Number = ..., velocity_noise: _Number = ..., kappa: _Number = ...) -> None: ...
+    def __init__(self, path: str, *, dynamics: Dynamics | abc.Mapping[str, object] | None = ..., objective: Objective | abc.Mapping[str, object] = ..., objectives: abc.Mapping[str, Objective | abc.Mapping[str, object]] = ..., solver: Solver | abc.Mapping[str, object] = ..., dimensions: _Whole = ..., max_speed: _Number = ..., max_acceleration: _Number = ..., climb_speed: _Number = ..., climb_acceleration: _Number = ..., lowest: _Number = ..., highest: _Number | None = ..., horizon: _Whole = ..., horizon_from: Literal['now', 'decision'] = ..., period: _Number = ..., safe_distance: _Number = ..., margin: _Number = ..., tube_initial: _Number = ..., tube_growth: _Number = ..., tube_time: Literal['steps', 'seconds'] = ..., covariance_noise: bool = ..., keep_out: _Rows = ..., peers_at_start: _Rows = ..., robot_name: str = ..., position_noise: _Number = ..., velocity_noise: _Number = ..., kappa: _Number = ...) -> None: ...
 
 class Router(_Router):
     """Sends each token to one channel of its output: in turn, at random, to the least loaded, or by a property of the token."""
@@ -492,7 +489,7 @@ class Router(_Router):
 
 class SafeController(_SafeController):
     """A `RobustController` that also keeps a retreat open, for a target of bounded speed."""
-    def __init__(self, path: str, *, confidence: _Number = ..., target_speed: _Number = ..., turn_time: _Number = ..., objective: Objective | abc.Mapping[str, object] = ..., objectives: abc.Mapping[str, Objective | abc.Mapping[str, object]] = ..., solver: Solver | abc.Mapping[str, object] = ..., max_speed: _Number = ..., max_acceleration: _Number = ..., horizon: _Whole = ..., horizon_from: Literal['now', 'decision'] = ..., period: _Number = ..., safe_distance: _Number = ..., margin: _Number = ..., tube_initial: _Number = ..., tube_growth: _Number = ..., tube_time: Literal['steps', 'seconds'] = ..., covariance_noise: bool = ..., keep_out: _Rows = ..., peers_at_start: _Rows = ..., robot_name: str = ..., position_noise: _Number = ..., velocity_noise: _Number = ..., kappa: _Number = ...) -> None: ...
+    def __init__(self, path: str, *, sigma_margin: _Number = ..., target_speed: _Number = ..., turn_time: _Number = ..., dynamics: Dynamics | abc.Mapping[str, object] | None = ..., objective: Objective | abc.Mapping[str, object] = ..., objectives: abc.Mapping[str, Objective | abc.Mapping[str, object]] = ..., solver: Solver | abc.Mapping[str, object] = ..., dimensions: _Whole = ..., max_speed: _Number = ..., max_acceleration: _Number = ..., climb_speed: _Number = ..., climb_acceleration: _Number = ..., lowest: _Number = ..., highest: _Number | None = ..., horizon: _Whole = ..., horizon_from: Literal['now', 'decision'] = ..., period: _Number = ..., safe_distance: _Number = ..., margin: _Number = ..., tube_initial: _Number = ..., tube_growth: _Number = ..., tube_time: Literal['steps', 'seconds'] = ..., covariance_noise: bool = ..., keep_out: _Rows = ..., peers_at_start: _Rows = ..., robot_name: str = ..., position_noise: _Number = ..., velocity_noise: _Number = ..., kappa: _Number = ...) -> None: ...
 
 class Sampler(_Sampler):
     """Passes on tokens that come at the same tag as a trigger; all others are lost."""
@@ -644,7 +641,7 @@ class VaryingRandom(_VaryingRandom):
 
 class Vehicle(_Vehicle):
     """A double integrator in the paper's discrete form."""
-    def __init__(self, path: str, *, start: _Row, start_velocity: _Row = ..., max_speed: _Number = ..., max_acceleration: _Number = ...) -> None: ...
+    def __init__(self, path: str, *, dynamics: Dynamics | abc.Mapping[str, object] | None = ..., start: _Row, start_velocity: _Row | None = ..., max_speed: _Number = ..., max_acceleration: _Number = ..., climb_speed: _Number = ..., climb_acceleration: _Number = ...) -> None: ...
 
 class VonMises(_VonMises):
     """The von Mises distribution of angles, in rad."""

@@ -1,14 +1,18 @@
 """Robots that observe and avoid a moving obstacle: bodies, sensors, estimators, controllers, messages."""
 
-from .controller import FlyingController, RobustController
+from . import symbolic
+from .controller import RobustController
 from .detecting import MultiTargetSensor
+from .dynamics import DoubleIntegrator, Dynamics
 from .estimator import UnscentedEstimator
 from .filterpy_estimator import FilterError, FilterPyEstimator
+from .integrated_ou import IntegratedOUEstimator
 from .messages import (
     BodyState,
     Detections,
     Estimate,
     Measurement,
+    MotionState,
     Plan,
     Tracks,
 )
@@ -23,7 +27,7 @@ from .planning import (
     Solver,
     StayNear,
 )
-from .roaming import RoamingEstimator
+from .problem import Beliefs, Problem, Trajectory
 from .safe_controller import SafeController
 from .tracker import JPDATracker
 from .tracking_error import TrackingError
@@ -32,15 +36,15 @@ from .world import (
     ChannelError,
     CircularMotion,
     Flooding,
-    FlyingVehicle,
     Sensor,
     Vehicle,
 )
 
 __all__ = [
-    "Barrier", "BodyState", "BroadcastChannel", "Casadi", "ChannelError", "CircularMotion", "ClearanceMonitor",
-    "Detections", "DistanceMonitor", "Estimate", "FilterError", "FilterPyEstimator", "Flooding", "FlyingController",
-    "FlyingVehicle", "GoalMonitor", "Inform", "JPDATracker", "Measurement", "MultiTargetSensor", "Objective", "Plan",
-    "ReachGoal", "RoamingEstimator", "RobustController", "SafeController", "Sensor", "SeparationMonitor", "Solver",
-    "StayNear", "TrackingError", "Tracks", "UnscentedEstimator", "Vehicle", "WaypointMotion",
+    "Barrier", "Beliefs", "BodyState", "BroadcastChannel", "Casadi", "ChannelError", "CircularMotion",
+    "ClearanceMonitor", "Detections", "DistanceMonitor", "DoubleIntegrator", "Dynamics", "Estimate", "FilterError",
+    "FilterPyEstimator", "Flooding", "GoalMonitor", "Inform", "IntegratedOUEstimator", "JPDATracker", "Measurement",
+    "MotionState", "MultiTargetSensor", "Objective", "Plan", "Problem", "ReachGoal", "RobustController",
+    "SafeController", "Sensor", "SeparationMonitor", "Solver", "StayNear", "TrackingError", "Tracks",
+    "Trajectory", "UnscentedEstimator", "Vehicle", "WaypointMotion", "symbolic",
 ]  # fmt: skip

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from operator import itemgetter
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -16,18 +16,20 @@ from ..core import (
     MappingParameter,
     OutputPort,
     Parameter,
+    ParameterError,
     array_parameter,
     did_you_mean,
+    shaped,
 )
 from ..core.elementary import hypot
+from . import rolling
 from .arrays import Array, array_of, finite, floats, joined, read_only, stacked
+from .dynamics import DoubleIntegrator, Dynamics
 from .estimator import TargetModel
 from .messages import BodyState, Estimate, Plan, Tracks, enclosing
-from .planning import Barrier, Objective, ReachGoal, Solver
-from .receiving import EITHER, latest, received
-
-if TYPE_CHECKING:
-    from .numerics.horizon import HorizonProblem
+from .planning import KNOWN, Barrier, Objective, ReachGoal, Solver
+from .problem import Beliefs, Problem
+from .receiving import EITHER, PlaceParameter, latest, received
 
 STEPS, SECONDS = "steps", "seconds"
 DECISION, NOW = "decision", "now"
@@ -105,9 +107,15 @@ class RobustController(TargetModel, Actor):
     Before the first plan or estimate comes, the robot avoids only the positions in ``peers_at_start``. Plans and
     estimates that are not finite are ignored; the last good ones are kept.  Without a finite own state the control is
     zero, and nothing else is sent.
+
+    A robot with other ``dynamics`` than the paper's plans with its own states and controls.  Its plan is sent to the
+    others as accelerations that bring a double integrator to the same places.
+
+    In space (``dimensions: 3``), speed and acceleration stay in ellipsoids (f1 and f2), as those of a ``Vehicle`` do,
+    and from the second step on, the plan stays above ``lowest`` and below ``highest`` (f7).  The target is on the
+    ground if its estimate is in the plane, and so are peers whose plans are.
     """
 
-    _dimensions = 2
     _of_target: Sequence[int] = EITHER  # the dimensions of the estimates that it takes
 
     trigger = InputPort(object, doc="plan now")
@@ -128,17 +136,29 @@ class RobustController(TargetModel, Actor):
         triggers=False,
         doc="name of one of the objectives, for this plan and all later ones until another role comes",
     )
-    control = OutputPort(np.ndarray, shape=(2,), doc="m/s^2, for the period after this one")
+    control = OutputPort(np.ndarray, shape=(None,), doc="m/s^2, for the period after this one")
     plan = OutputPort(Plan, doc="plan of this robot, for the others")
     violation = OutputPort(float, doc="largest violation of a constraint by the plan in metres; 0 if it keeps all")
     infeasible = OutputPort(int, doc="number of plans so far that broke a constraint")
     iterations = OutputPort(int, doc="Newton (or solver) iterations for this plan")
 
+    dynamics: Parameter[Dynamics | None] = Parameter(
+        Dynamics, None, doc="how the robot moves; if left out, as a DoubleIntegrator with the limits below"
+    )
     objective = Parameter(Objective, ReachGoal(), doc="objective of the robot, until a role comes")
     objectives = MappingParameter(Parameter(Objective), {}, doc="objectives by role")
     solver = Parameter(Solver, Barrier(), doc="solver of the problem")
+    dimensions = Parameter(int, 2, min=2, max=3, doc="of the robot's positions: 3 if it flies, the height last")
     max_speed = Parameter(float, 8.0, unit="m/s", min=1e-6, doc="Vmax")
     max_acceleration = Parameter(float, 8.0, unit="m/s^2", min=1e-6, doc="Amax")
+    climb_speed = Parameter(float, 4.0, unit="m/s", above=0, doc="in space, largest vertical speed, up and down")
+    climb_acceleration = Parameter(float, 4.0, unit="m/s^2", above=0, doc="in space, largest vertical acceleration")
+    lowest: Parameter[float | None] = Parameter(
+        float, 1.0, unit="m", doc="in space, height to stay above; none if null"
+    )
+    highest: Parameter[float | None] = Parameter(
+        float, None, unit="m", doc="in space, height to stay below; none if left out"
+    )
     horizon = Parameter(int, 10, min=3, doc="N: prediction horizon in periods")
     horizon_from = Parameter(
         str,
@@ -158,20 +178,42 @@ class RobustController(TargetModel, Actor):
         bool, True, doc="whether process noise widens the target's predicted covariance, in f4 and in eq. (5)"
     )
     keep_out = array_parameter(
-        (None, 3), (), unit="m", doc="places that stand in the way: x, y, and the distance to keep from there"
+        (None, 3), (), unit="m", doc="in the plane, what stands in the way: x, y, and the distance to keep from there"
     )
-    peers_at_start = array_parameter(
-        (None, 2), (), unit="m", doc="positions of other robots at time 0, used until their plans come"
+    peers_at_start = PlaceParameter(
+        (), several=True, doc="positions of other robots at time 0, used until their plans come"
     )
     robot_name = Parameter(
         str, "", doc="name in the plan; if empty, the path of the composite that contains the controller"
     )
 
+    def check(self) -> None:
+        super().check()
+        self._motion: Dynamics = self.dynamics or DoubleIntegrator(
+            dimensions=self.dimensions,
+            max_speed=self.max_speed,
+            max_acceleration=self.max_acceleration,
+            climb_speed=self.climb_speed,
+            climb_acceleration=self.climb_acceleration,
+        )
+        d = self._motion.dimensions
+        for objective in (self.objective, *self.objectives.values()):
+            if reason := self.solver.refuses(self._motion, objective):
+                raise ParameterError(f"solver: {reason}")
+        if d == 3 and len(self.keep_out):
+            raise ParameterError("keep_out: a robot that flies is above what stands in the way; leave it out")
+        if len(self.peers_at_start) and self.peers_at_start.shape[1] != d:
+            raise ParameterError(f"peers_at_start: places have {self.peers_at_start.shape[1]} numbers; expected {d}")
+        self.control.change("type", shaped(np.ndarray, (self._motion.controls,)))
+
     def initialize(self) -> None:
         from .numerics import definitions, horizon, reachability
         from .numerics.warm_up import compile_kernels
 
-        d = self._dimensions
+        motion: Any = self._motion
+        d, size = motion.dimensions, motion.controls
+        self._d, self._rest = d, np.zeros(size)
+        self._is_papers = type(motion) is DoubleIntegrator
         for objective in (self.objective, *self.objectives.values()):
             objective.check_dimensions(d)
         self.solver.prepare()
@@ -196,9 +238,18 @@ class RobustController(TargetModel, Actor):
         self._nobody = no_means, no_covariances, np.empty((0, d)), np.empty(0)
         places, apart = self.keep_out[:, np.newaxis, :2], self.keep_out[:, 2:]
         self._standing_there = np.repeat(places, self._steps, axis=1), np.repeat(apart, self._steps, axis=1)
-        self._in_space = self._flight()
-        self._applied = np.zeros(d)  # U_t
-        self._standing = self._nothing = _Standing(-math.inf, np.zeros(d), np.zeros(d), np.zeros((self._steps, d)))
+        self._bounds: dict[str, Any] = {  # by their names in the problem; those of other dynamics are their own
+            name: getattr(motion, name, math.inf)
+            for name in ("max_speed", "max_acceleration", "climb_speed", "climb_acceleration")
+        }
+        if d == 3:
+            self._bounds["lowest"] = -math.inf if self.lowest is None else self.lowest
+            self._bounds["highest"] = math.inf if self.highest is None else self.highest
+        elif self._is_papers:
+            del self._bounds["climb_speed"], self._bounds["climb_acceleration"]
+        self._applied = self._rest  # U_t
+        first = np.zeros(d if self._is_papers else motion.states)
+        self._standing = self._nothing = _Standing(-math.inf, first, np.zeros(d), np.zeros((self._steps, size)))
         self._peers = _Peers(self.peers_at_start)
         self._objective: Objective = self.objective
         self._target: Estimate | None = None
@@ -209,11 +260,10 @@ class RobustController(TargetModel, Actor):
         self._listen()
         if not self.trigger.present:
             return
-        own = latest(self.state, (self._dimensions,)) if self.state.present else None
+        own = latest(self.state, (self._d,)) if self.state.present else None
         if own is None or not own.finite:
-            self._applied = np.zeros(self._dimensions)
-            self._standing = self._nothing
-            self.control.send(np.zeros(self._dimensions))
+            self._applied, self._standing = self._rest, self._nothing
+            self.control.send(np.zeros(len(self._rest)))
             return
         problem, starts = self._problem(own)
         solution = self.solver.solve(problem, starts)
@@ -247,35 +297,44 @@ class RobustController(TargetModel, Actor):
             if tracks.finite and (self._tracks is None or tracks.time >= self._tracks.time):
                 self._tracks = tracks
 
-    def _send(self, own: BodyState, problem: HorizonProblem, controls: Array) -> None:
-        self._standing = _Standing(own.time, problem.position, problem.velocity, controls)
-        announced = joined(floats(self._applied), controls[: self.horizon])
-        self.plan.send(Plan(self._name, own.time, own, announced.reshape(self.horizon + 1, self._dimensions)))
+    def _send(self, own: BodyState, problem: Any, controls: Array) -> None:
+        if self._is_papers:
+            numbers, told = getattr(problem, "numbers", problem), own
+            self._standing = _Standing(own.time, numbers.position, numbers.velocity, controls)
+            accelerations = joined(floats(self._applied), controls[: self.horizon]).reshape(self.horizon + 1, self._d)
+        else:
+            self._standing = _Standing(own.time, problem.state, self._rest, controls)
+            told, accelerations = rolling.announced(own, problem.trajectory(controls).positions, self.period)
+        self.plan.send(Plan(self._name, own.time, told, accelerations))
         self._applied = read_only(controls[0])
         self.control.send(self._applied)
 
     # --- the problem ------------------------------------------------------------------------------------
 
-    def _problem(self, own: BodyState) -> tuple[HorizonProblem, Array]:
-        """The problem, and the starts of its solver (2, N, d): the standing plan from the next period on; braking."""
-        # Floats: arithmetic on arrays of two takes ten times as long.
-        place, moving, pushed = floats(own.position), floats(own.velocity), floats(self._applied)
-        now, period = own.time, self.period
-        position = array_of(tuple([p + period * v for p, v in zip(place, moving, strict=True)]))
-        moving = tuple([v + period * u for v, u in zip(moving, pushed, strict=True)])
-        velocity, (speed, most) = array_of(moving), self._braking(moving)
-        standing = self._standing
-        tube_centre, tube_radius, starts = self._standing_plan(
-            *standing[1:], now - standing.made_at, self._radius, velocity, speed, most, period
-        )
+    def _problem(self, own: BodyState) -> tuple[Any, Array]:
+        """The problem, and the starts of its solver (2, N, m): the standing plan from the next period on; braking."""
+        now, period, standing = own.time, self.period, self._standing
+        if self._is_papers:
+            # Floats: arithmetic on arrays of two takes ten times as long.
+            place, moving, pushed = floats(own.position), floats(own.velocity), floats(self._applied)
+            position = array_of(tuple([p + period * v for p, v in zip(place, moving, strict=True)]))
+            moving = tuple([v + period * u for v, u in zip(moving, pushed, strict=True)])
+            velocity, (speed, most) = array_of(moving), self._braking(moving)
+            tube_centre, tube_radius, starts = self._standing_plan(
+                *standing[1:], now - standing.made_at, self._radius, velocity, speed, most, period
+            )
+        else:
+            state = rolling.next_state(self._motion, own, self._applied, period)
+            position, velocity = state[: self._d], np.array(self._motion.velocity(state))
+            tube_centre, tube_radius, starts = rolling.standing_plan(
+                self._motion, standing.position, standing.controls, now - standing.made_at, self._radius, state, period
+            )
         target_mean, target_covariance, points, weights = self._expected(now)
-        peer_mean, peer_distance = self._peer_tubes(self._peers.table(), now, *self._room, self._dimensions)
+        peer_mean, peer_distance = self._peer_tubes(self._peers.table(), now, *self._room, self._d)
         posed = self._new_problem(
             period=period,
             position=position,
             velocity=velocity,
-            max_speed=self.max_speed,
-            max_acceleration=self.max_acceleration,
             tube_centre=tube_centre,
             tube_radius=tube_radius,
             safe_distance=self.safe_distance,
@@ -284,15 +343,21 @@ class RobustController(TargetModel, Actor):
             obstacle_covariance=target_covariance,
             peer_mean=peer_mean,
             peer_distance=peer_distance,
-            **self._in_space,
+            **self._bounds,
         )
-        posed = self._objective.pose(posed, points, weights, self._peers.names)
+        is_known = self._is_papers and type(self._objective) in KNOWN
+        if is_known:
+            posed = self._objective.pose(posed, points, weights, self._peers.names)
         if len(self.keep_out):  # as f5, but nobody who measures
             there, apart = self._standing_there
             posed = posed._replace(
                 peer_mean=np.concatenate((peer_mean, there)), peer_distance=np.concatenate((peer_distance, apart))
             )
-        return posed, starts
+        if is_known:
+            return posed, starts
+        beliefs = Beliefs(target_mean, target_covariance, points, weights, peer_mean, self._peers.names)
+        state = np.concatenate((position, velocity)) if self._is_papers else state
+        return Problem(posed, state, self._motion, self._objective, beliefs), starts
 
     def _expected(self, now: float) -> tuple[Array, ...]:
         """Means (K, N, d) and covariances (K, N, d (d + 1) / 2) of all targets, sigma points of each (K M, d) and their
@@ -300,7 +365,7 @@ class RobustController(TargetModel, Actor):
         each = [
             self._expected_target(
                 target.mean, target.covariance, self._noise[len(target.mean)], *self._model, now - target.time,
-                self._steps, self._dimensions,
+                self._steps, self._d,
             )
             for target in self._targets()
         ]  # fmt: skip
@@ -316,49 +381,14 @@ class RobustController(TargetModel, Actor):
             targets.extend(self._tracks.estimates)
         return targets
 
-    def _flight(self) -> dict[str, Any]:
-        """The limits that hold in space only, by their names in the problem."""
-        return {}
-
     def _braking(self, velocity: tuple[float, ...]) -> tuple[float, float]:
         """The speed, and the largest acceleration against it."""
-        return hypot(velocity[0], velocity[1]), self.max_acceleration
-
-
-class FlyingController(RobustController):
-    """A ``RobustController`` in space, with limits of climbing and of the height.
-
-    Speed and acceleration stay in ellipsoids (f1 and f2), as those of a ``FlyingVehicle`` do.  From the second step on,
-    the plan stays above ``lowest`` and below ``highest`` (f7).  The target is on the ground if its estimate is in the
-    plane, and so are peers whose plans are.
-    """
-
-    _dimensions = 3
-
-    control = OutputPort(np.ndarray, shape=(3,), doc="m/s^2, for the period after this one")
-
-    keep_out = array_parameter((0, 3), (), unit="m", doc="none: it flies above what stands in the way")
-    climb_speed = Parameter(float, 4.0, unit="m/s", above=0, doc="largest vertical speed, up and down")
-    climb_acceleration = Parameter(float, 4.0, unit="m/s^2", above=0, doc="largest vertical acceleration")
-    lowest: Parameter[float | None] = Parameter(float, 1.0, unit="m", doc="height to stay above; none if null")
-    highest: Parameter[float | None] = Parameter(float, None, unit="m", doc="height to stay below; none if left out")
-    peers_at_start = array_parameter(
-        (None, 3), (), unit="m", doc="positions of other robots at time 0, used until their plans come"
-    )
-
-    def _flight(self) -> dict[str, Any]:
-        return {
-            "climb_speed": self.climb_speed,
-            "climb_acceleration": self.climb_acceleration,
-            "lowest": -math.inf if self.lowest is None else self.lowest,
-            "highest": math.inf if self.highest is None else self.highest,
-        }
-
-    def _braking(self, velocity: tuple[float, ...]) -> tuple[float, float]:
-        x, y, z = velocity
-        level = hypot(x, y)
-        speed = hypot(level, z)
+        bounds = self._bounds
+        level, most = hypot(velocity[0], velocity[1]), bounds["max_acceleration"]
+        if len(velocity) == 2:
+            return level, most
+        speed = hypot(level, velocity[2])
         if not 0.0 < speed < math.inf:
-            return speed, self.max_acceleration
-        weighted = hypot(level, z * (self.max_acceleration / self.climb_acceleration))
-        return speed, self.max_acceleration * (speed / weighted)
+            return speed, most
+        weighted = hypot(level, velocity[2] * (most / bounds["climb_acceleration"]))
+        return speed, most * (speed / weighted)

@@ -2,16 +2,14 @@
 
 from __future__ import annotations
 
-from bisect import bisect_left
-from dataclasses import dataclass
 from functools import lru_cache
-from operator import attrgetter
 from typing import Any, TypeAlias
 
 import numpy as np
 
-from ..core import Actor, Configurable, InputPort, OutputPort, Parameter, array_parameter, to_nanoseconds, to_seconds
+from ..core import Actor, Configurable, InputPort, OutputPort, Parameter, array_parameter, to_seconds
 from .arrays import Array, array_of, floats, stacked
+from .history import History, Step
 from .messages import RANGE, RELATIVE_POSITION, Estimate, Measurement
 from .receiving import received
 
@@ -38,26 +36,13 @@ class TargetModel(Configurable):
         return np.diag([self.position_noise] * dimensions + [self.velocity_noise] * dimensions)
 
 
-@dataclass(slots=True)
-class _Step:
-    """A step of the filter at one time, repeated when a late measurement belongs there or earlier."""
-
-    time: int  # ns
-    measurements: list[Measurement]
-    after: Any = None  # the state of the filter then
-
-
 class _Estimator(TargetModel, Actor):
     """The common part of all estimators: the model of eq. (1), and one prediction and fusion at each trigger.
 
-    The estimate has the time of the trigger, and each measurement is fused at its own time.  A late measurement is
-    inserted at its place among the past steps, and the filter runs again from there: later estimates are, to the bit,
-    those of a filter that got it in time.  (Formulas for such out-of-sequence measurements, as by Bar-Shalom, IEEE
-    Trans. Aerosp. Electron. Syst. 38, 2002, spare the second run and are exact for linear models.)  Steps are kept for
-    ``max_delay``; older measurements are not fused, but counted at ``too_late``.
+    The estimate has the time of the trigger, and each measurement is fused at its own time, however late it comes
+    (``History``), if that is not more than ``max_delay``; older ones are counted at ``too_late``.
 
-    A measurement that comes between two triggers waits for the next one; one from the future, from a wrong clock, is
-    treated as made now.  A copy of a fused measurement has no effect.  Before the first measurement, or the first
+    A measurement that comes between two triggers waits for the next one.  Before the first measurement, or the first
     trigger, the filter holds its prior.  A measurement that is not finite is ignored, as is an update with a result
     that is not finite.
     """
@@ -90,75 +75,21 @@ class _Estimator(TargetModel, Actor):
         compile_kernels()
         self._kinds = {RANGE: float(ukf.RANGE), RELATIVE_POSITION: float(ukf.RELATIVE_POSITION)}
         self._process_noise = self.process_noise()
-        self._waiting: list[Measurement] = []  # for the next trigger
-        self._too_late = 0
-        self._steps: list[
-            _Step
-        ] = []  # of the last ``max_delay``, and the state of the filter before them, with its time
-        self._before: State = np.array(self.prior_mean), np.diag(self.prior_variance)
-        self._before_at: int | None = None  # None: it is the prior, at any time
+        prior: State = np.array(self.prior_mean), np.diag(self.prior_variance)
+        self._history = History(prior, _order, self.max_delay)
 
     def fire(self) -> None:
-        now = self.tag.time
-        self._take(now - to_nanoseconds(self.max_delay))
+        now, history = self.tag.time, self._history
+        if history.take([each for each in received(self.measurements) if each.finite], now):
+            self.too_late.send(history.too_late)
         if not self.trigger.present:
             return
-        state, fused = self._catch_up(self._waiting, now)
-        self._waiting = []
-        self._forget(now - to_nanoseconds(self.max_delay))
+        state, fused = history.run(now, self._advance)
+        history.forget(now)
         self.estimate.send(Estimate(*self._told(state), to_seconds(now), tuple(sorted(fused))))
 
-    def _take(self, earliest: int) -> None:
-        """Keep new measurements for the next trigger, unless they are older than ``earliest``."""
-        come = [*self._waiting, *(each for each in received(self.measurements) if each.finite)]
-        self._waiting = [each for each in come if to_nanoseconds(each.time) >= earliest]
-        if len(self._waiting) < len(come):
-            self._too_late += len(come) - len(self._waiting)
-            self.too_late.send(self._too_late)
-
-    def _catch_up(self, measurements: list[Measurement], now: int) -> tuple[State, set[str]]:
-        """Insert measurements at their times, and bring the filter to the present; also returns the robots that were
-        heard."""
-        steps = self._steps
-        first = self._place_of(now)  # of the first changed step
-        new: list[tuple[_Step, Measurement]] = []
-        for each in measurements:
-            place = self._place_of(min(to_nanoseconds(each.time), now))
-            step = steps[place]
-            if not any(known.robot == each.robot and _order(known) == _order(each) for known in step.measurements):
-                step.measurements.append(each)
-                new.append((step, each))
-                first = min(first, place)
-        state, before = (steps[first - 1].after, steps[first - 1].time) if first else (self._before, self._before_at)
-        fused = set()
-        for step in steps[first:]:
-            elapsed = 0.0 if before is None else to_seconds(step.time - before)
-            # Sorted, so that the order of arrival has no influence, not even on the last bit.
-            robots = {each.robot for each in step.measurements}
-            step.measurements.sort(key=_robot if len(robots) == len(step.measurements) else _order)
-            state, is_fused = self._step(state, elapsed, step.measurements)
-            if is_fused:
-                fused |= {each.robot for where, each in new if where is step}
-            step.after, before = state, step.time
-        return state, fused
-
-    def _place_of(self, time: int) -> int:
-        """The index of the step at that time, which may be new."""
-        steps = self._steps
-        place = len(steps)
-        if steps and time <= steps[-1].time:  # usually the last one, or a new one
-            place = place - 1 if time == steps[-1].time else bisect_left(steps, time, key=_time)
-        if place == len(steps) or steps[place].time != time:
-            steps.insert(place, _Step(time, []))
-        return place
-
-    def _forget(self, earliest: int) -> None:
-        """Forget the steps before a time, which no measurement can change any longer."""
-        if self._steps[0].time < earliest:  # there is at least the present one
-            count = bisect_left(self._steps, earliest, key=_time)
-            last = self._steps[count - 1]
-            self._before, self._before_at = last.after, last.time
-            del self._steps[:count]
+    def _advance(self, before: State, elapsed: float, step: Step) -> tuple[State, bool]:
+        return self._step(before, elapsed, step.data)
 
     def _step(self, before: State, elapsed: float, measurements: list[Measurement]) -> tuple[State, bool]:
         """The state of the filter ``elapsed`` seconds (0 at the first trigger) later; whether anything was fused."""
@@ -182,9 +113,6 @@ class _Estimator(TargetModel, Actor):
             vectors = (*place, *_NOTHING[: d - len(place)], *value, *_NOTHING[: d - len(value)])
             rows.append(array_of((self._kinds[each.kind], *vectors, each.along, each.across)))
         return stacked(rows, 3 + 2 * d)
-
-
-_time, _robot = attrgetter("time"), attrgetter("robot")
 
 
 def _order(measurement: Measurement) -> Any:

@@ -39,7 +39,7 @@ class FilterPyEstimator(_Estimator):
         self._filter = _make_filter(self.filter, self.kappa)
         self._at: State | None = None  # its state
         if self.filter == "CubatureKalmanFilter":  # the only one that needs columns
-            self._before = self._before[0].reshape(4, 1), self._before[1]
+            self._history.before = self._history.before[0].reshape(4, 1), self._history.before[1]
 
     def _step(self, before: State, elapsed: float, measurements: list[Measurement]) -> tuple[State, bool]:
         if before is not self._at:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import cached_property, partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -13,8 +13,9 @@ from .arrays import Array
 from .receiving import PlaceParameter
 
 if TYPE_CHECKING:
-    from .numerics.barrier import Solution
-    from .numerics.horizon import HorizonProblem
+    from .dynamics import Dynamics
+    from .numerics.horizon import HorizonProblem, Solution
+    from .problem import Beliefs, Problem, Trajectory
 
 NAT, BIT = "nat", "bit"
 TARGET = "target"
@@ -28,13 +29,21 @@ def in_space(place: Array, dimensions: int) -> Array:
 
 
 class Objective(Configurable):
-    """Base of the objectives: fills in the objective's fields of a horizon problem."""
+    """What a robot wants: a cost of its trajectory, given what it believes of the others.
+
+    It is written once for numbers and for symbols of CasADi: use the functions of ``symbolic``.  Those that Epicycle's
+    compiled solver knows have a ``pose``, too.
+    """
+
+    def cost(self, trajectory: Trajectory, beliefs: Beliefs) -> Any:
+        """The number that a plan should make small."""
+        raise NotImplementedError
 
     def check_dimensions(self, dimensions: int) -> None:
         """Raise ``ParameterError`` if it is not for a robot with so many dimensions."""
 
     def pose(self, problem: HorizonProblem, points: Array, weights: Array, peers: Sequence[str] = ()) -> HorizonProblem:
-        """The problem with this objective.
+        """The problem with this objective, for the compiled kernels.
 
         ``points`` (T M, 2) are the sigma points of T targets at the end of the horizon, one target after the other,
         each with the ``weights`` (M,).  T = 0 while no target is known.  ``peers`` are the names of the robots in the
@@ -58,6 +67,11 @@ class ReachGoal(Objective):
 
     def check_dimensions(self, dimensions: int) -> None:
         _check_height("'goal'", self.goal, dimensions)
+
+    def cost(self, trajectory: Trajectory, beliefs: Beliefs) -> Any:
+        from .numerics.definitions import f0
+
+        return f0(trajectory.positions, in_space(self.goal, trajectory.positions.shape[1])).sum()
 
     def pose(self, problem: HorizonProblem, points: Array, weights: Array, peers: Sequence[str] = ()) -> HorizonProblem:
         return problem.to_reach(in_space(self.goal, len(problem.position)))
@@ -91,15 +105,25 @@ class StayNear(Objective):
     def check_dimensions(self, dimensions: int) -> None:
         _check_height("'offset'", self.offset, dimensions)
 
-    def pose(self, problem: HorizonProblem, points: Array, weights: Array, peers: Sequence[str] = ()) -> HorizonProblem:
-        from .numerics.definitions import station
+    def cost(self, trajectory: Trajectory, beliefs: Beliefs) -> Any:
+        from .numerics.definitions import f0
 
-        known = dict(zip((*peers, TARGET), (*problem.peer_mean, *problem.obstacle_mean[:1]), strict=False))
+        goal = self._goal(trajectory.positions[0], beliefs.names, beliefs.peers, beliefs.targets)
+        return f0(trajectory.positions, goal).sum()
+
+    def pose(self, problem: HorizonProblem, points: Array, weights: Array, peers: Sequence[str] = ()) -> HorizonProblem:
+        return problem.to_reach(self._goal(problem.position, peers, problem.peer_mean, problem.obstacle_mean))
+
+    def _goal(self, here: Any, names: Sequence[str], peers: Any, targets: Any) -> Any:
+        """Where to be, at each step (N, d) or always (d,)."""
+        from .numerics.definitions import common_goal
+
+        known = dict(zip((*names, TARGET), (*peers, *targets[:1]), strict=False))
         near = [name for name in self.to if name in known]
         if not near:
-            return problem.to_reach(problem.position)
+            return here
         places, shares = np.stack([known[name] for name in near]), np.array([self.to[name] for name in near])
-        return problem.to_reach(station(places, shares) + in_space(self.offset, len(problem.position)))
+        return common_goal(places, shares) + in_space(self.offset, len(here))
 
 
 class Inform(Objective):
@@ -116,22 +140,58 @@ class Inform(Objective):
         bool, True, doc="whether to count what all robots measure together, or only what this one measures"
     )
 
+    def cost(self, trajectory: Trajectory, beliefs: Beliefs) -> Any:
+        from .numerics.definitions import f6, misfit, mutual_information
+
+        ends, total = (beliefs.peers if self.joint else beliefs.peers[:0])[:, -1], 0.0
+        heavy = np.array([not _is_zero(each) for each in beliefs.weights], dtype=bool)  # the others have no logarithm
+        for points, target in zip(beliefs.samples_by_target, beliefs.targets, strict=False):
+            points, weights = points[heavy], beliefs.weights[heavy]
+            others = misfit(points, ends, self.variance) if len(ends) else np.zeros((len(points), len(points)))
+            information = mutual_information(trajectory.positions[-1], points, weights, self.variance, others)
+            too_far = f6(trajectory.positions, target, self.range, trajectory.positive)
+            total = total - information + (self._gamma * too_far).sum()
+        return total
+
     def pose(self, problem: HorizonProblem, points: Array, weights: Array, peers: Sequence[str] = ()) -> HorizonProblem:
         others = problem.peer_mean if self.joint else problem.peer_mean[:0]
-        # In bits, the information is larger by a factor of 1 / log 2; a penalty smaller by that factor has the same
-        # optimum.
-        penalty = self.penalty * (LN2 if self.unit == BIT else 1.0)
-        return problem.to_inform(points, weights, others, self.variance, penalty, self.range)
+        return problem.to_inform(points, weights, others, self.variance, self._gamma, self.range)
+
+    @property
+    def _gamma(self) -> float:
+        """The penalty beside an information in nats.
+
+        In bits, the information is larger by a factor of 1 / log 2; a penalty smaller by that factor has the same
+        optimum.
+        """
+        return self.penalty * (LN2 if self.unit == BIT else 1.0)
+
+
+def _is_zero(weight: Any) -> bool:
+    """Whether a weight is the number 0; a symbol is none."""
+    return isinstance(weight, float) and weight == 0.0
+
+
+KNOWN = ReachGoal, StayNear, Inform  # objectives that the compiled kernels know
 
 
 class Solver(Configurable):
-    """Base of the solvers of the horizon problem."""
+    """Finds a plan for a ``Problem``.
+
+    It makes ``problem.cost(controls)`` small while all numbers of ``problem.limits(controls)`` and of
+    ``problem.constraints(controls)`` are at most 0, and answers ``problem.solution(controls)``.
+    """
 
     def prepare(self) -> None:
         """Called once before time starts: load what is slow to load, and report what is missing."""
 
-    def solve(self, problem: HorizonProblem, starts: Array) -> Solution:
-        """The best plan found from ``starts`` (k, N, 2); never raises, and finite for finite input."""
+    def refuses(self, dynamics: Dynamics, objective: Objective) -> str:
+        """Why it cannot solve problems with these; empty if it can."""
+        return ""
+
+    def solve(self, problem: Problem | HorizonProblem, starts: Array) -> Solution:
+        """The best plan found from ``starts`` (k, N, m), of which the last one brakes; never raises, and finite for
+        finite input."""
         raise NotImplementedError
 
 
@@ -160,6 +220,17 @@ class Barrier(Solver):
         "first one of least violation, or the hardest braking",
     )
 
+    def refuses(self, dynamics: Dynamics, objective: Objective) -> str:
+        from .dynamics import DoubleIntegrator
+
+        if type(dynamics) is DoubleIntegrator and type(objective) in KNOWN:
+            return ""
+        names = ", ".join(each.__name__ for each in KNOWN)
+        return (
+            f"Barrier solves the objectives {names} for a DoubleIntegrator, and not {type(objective).__name__} for a "
+            f"{type(dynamics).__name__}; write 'solver: {{type: Casadi}}'"
+        )
+
     @cached_property
     def _solve(self) -> Callable[[HorizonProblem, Array], Solution]:
         from .numerics import barrier
@@ -168,24 +239,27 @@ class Barrier(Solver):
         rules = barrier.Rules(self.gap, self.last_parameter, self.free_controls, answers[self.infeasible])
         return partial(barrier.solve, rules=rules)
 
-    def solve(self, problem: HorizonProblem, starts: Array) -> Solution:
+    def solve(self, problem: Any, starts: Array) -> Solution:
         return self._solve(problem, starts)
 
 
 class Casadi(Solver):
-    """CasADi's IPOPT on the same problem, warm-started: thousands of times slower, an independent check.
+    """CasADi's IPOPT, for any dynamics and any objective; on the paper's problem it is an independent check.
+
+    It is thousands of times slower than ``Barrier``.
 
     It comes with ``pip install 'epicycle[casadi]'``.
     """
 
-    max_iterations = Parameter(int, 500, min=1, doc="IPOPT iterations after which the best point so far is taken")
+    method = Parameter(str, "ipopt", choices=("ipopt", "fatrop"), doc="which of CasADi's solvers; both come with it")
+    max_iterations = Parameter(int, 500, min=1, doc="iterations after which the best point so far is taken")
 
     def prepare(self) -> None:
         from .casadi_solver import load_casadi
 
-        load_casadi()
+        load_casadi(self.method)
 
-    def solve(self, problem: HorizonProblem, starts: Array) -> Solution:
+    def solve(self, problem: Problem | HorizonProblem, starts: Array) -> Solution:
         from .casadi_solver import solve
 
-        return solve(problem, starts, self.max_iterations)
+        return solve(problem, starts, self.max_iterations, self.method)

@@ -4,11 +4,14 @@ never read or write beyond an array."""
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Protocol, TypeVar
+from typing import Any, TypeVar
 
-from ..core import EpicycleError, InputPort, Parameter, ParameterError
+import numpy as np
+
+from ..core import REQUIRED, EpicycleError, InputPort, Parameter, ParameterError
 from .arrays import Array
-from .messages import ANY, RANGE, RELATIVE_POSITION, SOME, Shape
+from .messages import RANGE, RELATIVE_POSITION
+from .tokens import ANY, SOME, Shape, Token
 
 PLANE, SPACE = (2,), (3,)
 EITHER = PLANE + SPACE
@@ -21,27 +24,24 @@ class MessageError(EpicycleError):
 
 
 class PlaceParameter(Parameter[Any]):
-    """A place in the plane or in space: an array of two or three numbers, the height last."""
+    """A place in the plane or in space: an array of two or three numbers, the height last; or ``several`` places."""
 
-    def __init__(self, default: tuple[float, ...], *, doc: str) -> None:
-        super().__init__(float, default, unit="m", shape=(None,), doc=doc)
+    def __init__(self, default: object = REQUIRED, *, several: bool = False, unit: str = "m", doc: str) -> None:
+        given: Any = default
+        super().__init__(float, given, unit=unit, shape=(None, None) if several else (None,), doc=doc)
 
     def convert(self, value: object) -> Any:
-        place = super().convert(value)
-        if place is not None and len(place) not in EITHER:
-            raise ParameterError(f"it has {len(place)} numbers; expected 2, or 3 with the height last")
-        return place
+        several = len(self.shape or ()) == 2
+        each = value if several and isinstance(value, (list, tuple, np.ndarray)) else (value,)
+        lengths = {len(place) for place in each if isinstance(place, (list, tuple, np.ndarray))}
+        for length in lengths - set(EITHER):
+            raise ParameterError(f"it has {length} numbers; expected 2, or 3 with the height last")
+        if len(lengths) > 1:
+            raise ParameterError("some places have a height, and others have none")
+        return super().convert(value)
 
 
-class Message(Protocol):
-    """What has arrays whose shapes depend on the number of dimensions."""
-
-    def shapes(self, dimensions: int) -> tuple[tuple[str, Array, Shape], ...]:
-        """Each array with its name, and the shape that it should have."""
-        ...
-
-
-M = TypeVar("M", bound=Message)
+M = TypeVar("M", bound=Token)
 
 
 def received(port: InputPort[M], dimensions: Sequence[int] = EITHER) -> tuple[M, ...]:
@@ -65,10 +65,7 @@ def latest(port: InputPort[M], dimensions: Sequence[int] = EITHER) -> M:
 
 def _check(port: InputPort[M], message: M, dimensions: Sequence[int]) -> None:
     for each in dimensions:
-        for _, array, shape in message.shapes(each):
-            if array.shape != shape and not _fits(array.shape, shape):
-                break
-        else:
+        if message.fits(each):
             kind = getattr(message, "kind", RANGE)
             if kind not in _KINDS:
                 raise MessageError(

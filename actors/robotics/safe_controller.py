@@ -3,18 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import TYPE_CHECKING, NamedTuple
+from collections.abc import Callable, Mapping
+from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 import numpy as np
 
-from ..core import OutputPort, Parameter
+from ..core import OutputPort, Parameter, ParameterError
 from ..core.elementary import cos, sin
 from .arrays import Array, pair
 from .controller import RobustController
+from .integrated_ou import IntegratedOU
 from .messages import BodyState
 from .receiving import PLANE
-from .roaming import RoamingModel
 
 if TYPE_CHECKING:
     from .numerics.horizon import HorizonProblem
@@ -31,19 +31,19 @@ class _Retreat(NamedTuple):
     time: float  # s, when that was so
 
 
-class SafeController(RoamingModel, RobustController):
+class SafeController(IntegratedOU, RobustController):
     """A ``RobustController`` that also keeps a retreat open, for a target of bounded speed.
 
     It differs in two things:
 
-    * It predicts the target as one that roams (``RoamingModel``), and keeps ``confidence`` standard deviations from it;
-      ``margin`` is for other robots alone.
+    * It predicts the target as one that roams (``IntegratedOU``), and keeps ``sigma_margin`` standard deviations from
+      it; ``margin`` is for other robots alone.
     * A plan's first control is sent only if, after it, there is a retreat: a direction in which the robot, once it
       accelerates that way with all it has, is certain to keep ``safe_distance`` for ever, wherever the target is within
-      ``confidence`` standard deviations of its estimate, and wherever it goes at up to ``target_speed``.  Otherwise the
-      control is mixed with that of the last retreat that was certain, or replaced by it.
+      ``sigma_margin`` standard deviations of its estimate, and wherever it goes at up to ``target_speed``.  Otherwise
+      the control is mixed with that of the last retreat that was certain, or replaced by it.
 
-    So if the estimate is right to ``confidence`` standard deviations whenever a retreat is found, and the robot moves
+    So if the estimate is right to ``sigma_margin`` standard deviations whenever a retreat is found, and the robot moves
     as its controls say, then it never comes within ``safe_distance``: a retreat that was certain stays so.  A retreat
     is from all targets that are known, those of ``tracks`` included; one that becomes known later was not in an earlier
     retreat.  Other robots are avoided by the plan alone.  Before there is a first retreat, the best one that there is
@@ -55,7 +55,16 @@ class SafeController(RoamingModel, RobustController):
 
     overrides = OutputPort(int, doc="number of controls so far that a retreat has changed")
 
-    confidence = Parameter(float, 3.5, unit="1", min=0, doc="standard deviations to keep from the target")
+    sigma_margin = Parameter(float, 3.5, unit="1", min=0, doc="standard deviations to keep from the target")
+
+    refused: ClassVar[Mapping[str, str]] = {
+        "confidence": "SafeController's parameter 'confidence' is now called 'sigma_margin'"
+    }
+
+    def check(self) -> None:
+        super().check()
+        if self.dimensions != 2:
+            raise ParameterError(f"dimensions: it is {self.dimensions}, and retreats are in the plane; leave it out")
 
     def initialize(self) -> None:
         from .numerics import reachability, retreat, ukf
@@ -65,7 +74,7 @@ class SafeController(RoamingModel, RobustController):
         compile_retreats()
         self._expected_target: Callable[..., tuple[Array, Array, Array, Array]] = self._predicted
         self._propagate, self._predict, self._sigma_points = reachability.propagate, ukf.predict, ukf.sigma_points
-        self._reaches, self._kept, self._best = retreat.reaches, retreat.kept_distance, retreat.best_retreat
+        self._support, self._kept, self._best = retreat.support, retreat.kept_distance, retreat.best_retreat
         turn = 2.0 * math.pi / _DIRECTIONS
         self._directions = np.array([(cos(i * turn), sin(i * turn)) for i in range(_DIRECTIONS)])
         self._limits = self.target_speed, self.max_speed, self.max_acceleration, self.period
@@ -79,14 +88,14 @@ class SafeController(RoamingModel, RobustController):
         """``reachability.expected_target`` for a target that roams."""
         mean, covariance = mean.copy(), covariance.copy()  # kernels would be compiled again for read-only arrays
         if elapsed > 0.0:
-            mean, covariance = self._predict(mean, covariance, *self.roaming(elapsed))
-        means, covariances = self._propagate(mean, covariance, *self.roaming(period), steps, dimensions)
-        points, weights = self._sigma_points(*self._predict(mean, covariance, *self.roaming(steps * period)), kappa)
+            mean, covariance = self._predict(mean, covariance, *self.motion(elapsed))
+        means, covariances = self._propagate(mean, covariance, *self.motion(period), steps, dimensions)
+        points, weights = self._sigma_points(*self._predict(mean, covariance, *self.motion(steps * period)), kappa)
         return means[np.newaxis], covariances[np.newaxis], points[:, :2].copy(), weights
 
     def _problem(self, own: BodyState) -> tuple[HorizonProblem, Array]:
         problem, starts = super()._problem(own)
-        return problem._replace(margin=self.confidence), starts
+        return problem._replace(margin=self.sigma_margin), starts
 
     def _send(self, own: BodyState, problem: HorizonProblem, controls: Array) -> None:
         if self._targets():
@@ -106,7 +115,7 @@ class SafeController(RoamingModel, RobustController):
         reaches = np.full(_DIRECTIONS, -math.inf)  # of the target that reaches farthest in each direction
         for target in self._targets():
             estimate = target.mean.copy(), target.covariance.copy(), max(now - target.time, 0.0)
-            reach = self._reaches(self._directions, *estimate, self.confidence, self.target_speed)
+            reach = self._support(self._directions, *estimate, self.sigma_margin, self.target_speed)
             reaches = np.maximum(reaches, reach)
         for share in _SHARES if last is not None else _SHARES[:1]:
             control = planned if last is None else share * planned + (1.0 - share) * self._away(last)

@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from bisect import bisect_left
 from dataclasses import dataclass, replace
-from operator import attrgetter
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..core import Actor, InputPort, OutputPort, Parameter, to_nanoseconds, to_seconds
+from ..core import Actor, InputPort, OutputPort, Parameter, to_seconds
 from .arrays import Array
 from .estimator import EXPECTED, PREDICTED, TargetModel
+from .history import History, Step
 from .messages import RANGE, Detections, Estimate, Tracks
 from .receiving import PLANE, received
 
@@ -48,18 +47,6 @@ class _Picture(NamedTuple):
         return self._replace(
             means=self.means[kept], covariances=self.covariances[kept], existence=self.existence[kept], records=records
         )
-
-
-@dataclass(slots=True)
-class _Step:
-    """The scans of one time, and the tracks after them."""
-
-    time: int  # ns
-    scans: list[tuple[Any, Detections]]  # each with what sorts it
-    after: _Picture | None = None
-
-
-_time = attrgetter("time")
 
 
 class JPDATracker(TargetModel, Actor):
@@ -146,11 +133,9 @@ class JPDATracker(TargetModel, Actor):
         self._separations = association.separations
         self._noise = self.process_noise()
         self._averaged = self.noise_direction == EXPECTED
-        self._waiting: list[Detections] = []  # for the next trigger
-        self._too_late = self._rough = 0
-        self._steps: list[_Step] = []  # of the last ``max_delay``, and the tracks before them, with their time
-        self._before = _Picture(np.empty((0, 4)), np.empty((0, 4, 4)), np.empty(0), ())
-        self._before_at: int | None = None
+        self._rough = 0
+        nothing = _Picture(np.empty((0, 4)), np.empty((0, 4, 4)), np.empty(0), ())
+        self._history = History(nothing, _order, self.max_delay)
         self._begun = 0  # tracks so far
         self._given = 0  # numbers so far
         self._numbers: dict[int, int] = {}  # of the tracks that were told, by origin
@@ -158,13 +143,15 @@ class JPDATracker(TargetModel, Actor):
         self._undone: list[tuple[int, _Picture]] = []  # what was told of tracks that late scans have undone, and when
 
     def fire(self) -> None:
-        now = self.tag.time
-        earliest = now - to_nanoseconds(self.max_delay)
-        self._take(earliest)
+        now, history = self.tag.time, self._history
+        if history.take([each for each in received(self.detections, PLANE) if each.finite], now):
+            self.too_late.send(history.too_late)
         if not self.trigger.present:
             return
-        picture = self._catch_up(now)
-        self._forget(earliest)
+        picture, _ = history.run(now, self._advance)
+        self._pass_on(now, picture)
+        if history.forget(now):
+            self._forget_numbers()
         if picture.rough != self._rough:
             self._rough = picture.rough
             self.approximated.send(self._rough)
@@ -205,76 +192,34 @@ class JPDATracker(TargetModel, Actor):
                 if distances[row, column] <= self.gate and one in self._numbers and other not in self._numbers:
                     self._numbers[other] = self._numbers.pop(one)
 
-    # --- in the order of time ---------------------------------------------------------------------------
-
-    def _take(self, earliest: int) -> None:
-        """Keep new scans for the next trigger, unless they are older than ``earliest``."""
-        come = [*self._waiting, *(each for each in received(self.detections, PLANE) if each.finite)]
-        self._waiting = [each for each in come if to_nanoseconds(each.time) >= earliest]
-        if len(self._waiting) < len(come):
-            self._too_late += len(come) - len(self._waiting)
-            self.too_late.send(self._too_late)
-
-    def _catch_up(self, now: int) -> _Picture:
-        """Insert waiting scans at their times, and bring all tracks to the present."""
-        steps, first = self._steps, self._place_of(now)
-        for scan in self._waiting:
-            place = self._place_of(min(to_nanoseconds(scan.time), now))
-            order = _order(scan)
-            if all(order != known for known, _ in steps[place].scans):
-                steps[place].scans.append((order, scan))
-                first = min(first, place)
-        self._waiting = []
-        before, at = self._before, self._before_at
-        if first:
-            last = steps[first - 1]
-            assert last.after is not None  # only new steps have none, and they follow
-            before, at = last.after, last.time
-        for step in steps[first:]:
-            # Sorted, so that the order of arrival has no influence.
-            step.scans.sort(key=lambda each: each[0])
-            told = step.after if step.time == self._told_at else None
-            before = self._step(before, 0.0 if at is None else to_seconds(step.time - at), step.scans)
-            step.after, at = before, step.time
-            if told is not None:
-                sure = {each.origin for each in before.records if each.is_confirmed}
-                numbered = self._numbers.keys() - sure
-                undone = [place for place, each in enumerate(told.records) if each.origin in numbered]
-                if undone:
-                    self._undone.insert(0, (step.time, told.only(undone)))
-        self._pass_on(now, before)
-        return before
-
-    def _place_of(self, time: int) -> int:
-        """The index of the step at that time, which may be new."""
-        steps = self._steps
-        place = bisect_left(steps, time, key=_time)
-        if place == len(steps) or steps[place].time != time:
-            steps.insert(place, _Step(time, []))
-        return place
-
-    def _forget(self, earliest: int) -> None:
-        """Forget the steps before a time, which no scan can change any longer."""
-        count = bisect_left(self._steps, earliest, key=_time)
-        if count:
-            last = self._steps[count - 1]
-            assert last.after is not None
-            self._before, self._before_at = last.after, last.time
-            del self._steps[:count]
-            self._undone = [each for each in self._undone if each[0] >= earliest and each[1].records]
-            pictures = [self._before, *(each.after for each in self._steps if each.after is not None)]
-            pictures.extend(told for _, told in self._undone)
-            kept = {each.origin for picture in pictures for each in picture.records}
-            self._numbers = {origin: number for origin, number in self._numbers.items() if origin in kept}
+    def _forget_numbers(self) -> None:
+        """Forget the numbers of tracks that no scan can bring back."""
+        steps = self._history.steps
+        self._undone = [each for each in self._undone if each[0] >= steps[0].time and each[1].records]
+        pictures = [self._history.before, *(each.after for each in steps)]
+        pictures.extend(told for _, told in self._undone)
+        kept = {each.origin for picture in pictures for each in picture.records}
+        self._numbers = {origin: number for origin, number in self._numbers.items() if origin in kept}
 
     # --- tracks -----------------------------------------------------------------------------------------
 
-    def _step(self, picture: _Picture, elapsed: float, scans: list[tuple[Any, Detections]]) -> _Picture:
+    def _advance(self, before: _Picture, elapsed: float, step: Step) -> tuple[_Picture, bool]:
+        told = step.after if step.time == self._told_at else None
+        picture = self._step(before, elapsed, step.data)
+        if told is not None:
+            sure = {each.origin for each in picture.records if each.is_confirmed}
+            numbered = self._numbers.keys() - sure
+            undone = [place for place, each in enumerate(told.records) if each.origin in numbered]
+            if undone:
+                self._undone.insert(0, (step.time, told.only(undone)))
+        return picture, True
+
+    def _step(self, picture: _Picture, elapsed: float, scans: list[Detections]) -> _Picture:
         """All tracks ``elapsed`` seconds later, after the scans of that time."""
         picture = self._predicted(picture, elapsed)
         before = tuple(replace(each, expected=0.0, detected=0.0, sources=()) for each in picture.records)
         picture = picture._replace(records=before)
-        for _, scan in scans:
+        for scan in scans:
             picture = self._after_scan(picture, scan)
         picture = self._managed(picture)
         if len(picture.records) > 1 and self.merge_distance > 0.0:

@@ -7,11 +7,23 @@ from typing import Any
 
 import numpy as np
 
-from ..core import Actor, EpicycleError, InputPort, OutputPort, Parameter, array_parameter, brief, counted
+from ..core import (
+    Actor,
+    EpicycleError,
+    InputPort,
+    OutputPort,
+    Parameter,
+    ParameterError,
+    array_parameter,
+    brief,
+    counted,
+    shaped,
+)
 from ..core.elementary import cos, hypot, sin
 from .arrays import all_finite, floats, pair
+from .dynamics import DoubleIntegrator, Dynamics
 from .messages import RANGE, RELATIVE_POSITION, BodyState, Measurement, Plan, enclosing
-from .receiving import latest
+from .receiving import PlaceParameter, latest
 from .sight import is_hidden
 
 
@@ -22,80 +34,67 @@ class Vehicle(Actor):
     the time of a trigger acts from that time on, so the state sent there does not depend on it; one that
     arrives between two triggers acts from the next one.  Without a new control, the last one is held.  A control that
     is not finite is ignored.
+
+    If its ``start`` has a height, it flies, and may climb and sink more slowly than it flies level: its velocity stays
+    in the ellipsoid ``(vx^2 + vy^2) / max_speed^2 + vz^2 / climb_speed^2 <= 1``, and its acceleration in that of the
+    other two limits; what leaves one is shortened in its direction.
+
+    With other ``dynamics``, their ``step`` over dt moves it, and the controls are theirs.
     """
 
     trigger = InputPort(object, doc="moves to the present time and sends the state")
-    acceleration = InputPort(np.ndarray, shape=(2,), triggers=False, doc="m/s^2, control to apply from now on")
+    acceleration = InputPort(np.ndarray, shape=(None,), triggers=False, doc="m/s^2, control to apply from now on")
     state = OutputPort(BodyState, depends_on=("trigger",), doc="position and velocity at this time")
 
-    start = array_parameter((2,), unit="m", doc="position at the first trigger")
-    start_velocity = array_parameter((2,), (0.0, 0.0), unit="m/s", doc="velocity at the first trigger")
+    dynamics: Parameter[Dynamics | None] = Parameter(
+        Dynamics, None, doc="how it moves; if left out, as a DoubleIntegrator with the limits below"
+    )
+    start = PlaceParameter(doc="position at the first trigger; with the height last for a vehicle that flies")
+    start_velocity = PlaceParameter(None, unit="m/s", doc="velocity at the first trigger; at rest if left out")
     max_speed = Parameter(float, 8.0, unit="m/s", min=0, doc="limit of the speed")
     max_acceleration = Parameter(float, 8.0, unit="m/s^2", min=0, doc="limit of the acceleration")
+    climb_speed = Parameter(float, 4.0, unit="m/s", above=0, doc="in space, limit of the vertical speed, up and down")
+    climb_acceleration = Parameter(
+        float, 4.0, unit="m/s^2", above=0, doc="in space, limit of the vertical acceleration"
+    )
+
+    def check(self) -> None:
+        count = len(self.start)
+        if self.start_velocity is not None and len(self.start_velocity) != count:
+            raise ParameterError(f"start_velocity: it has {len(self.start_velocity)} numbers, and 'start' has {count}")
+        self._motion: Any = self.dynamics or DoubleIntegrator(
+            dimensions=count,
+            max_speed=self.max_speed,
+            max_acceleration=self.max_acceleration,
+            climb_speed=self.climb_speed,
+            climb_acceleration=self.climb_acceleration,
+        )
+        name, d = type(self._motion).__name__, self._motion.dimensions
+        if d != count:
+            raise ParameterError(f"start: it has {count} numbers; expected {d} for a {name}")
+        if self.start_velocity is not None and not isinstance(self._motion, DoubleIntegrator):
+            raise ParameterError(f"start_velocity: a {name} starts as its parameters say; leave it out")
+        self.acceleration.change("type", shaped(np.ndarray, (self._motion.controls,)))
 
     def initialize(self) -> None:
-        self._speed_ratio, self._acceleration_ratio = self._ratios()
-        self._position = floats(self.start)
-        self._velocity = shortened(floats(self.start_velocity), self.max_speed, self._speed_ratio)
-        self._held = (0.0,) * len(self._position)
-        self._next = self._held
+        motion, place = self._motion, floats(self.start)
+        start = motion.at_rest(place) if self.start_velocity is None else (*place, *floats(self.start_velocity))
+        self._state = motion.limited_state(start)
+        self._held = self._next = (0.0,) * motion.controls
         self._moved_at: int | None = None
 
     def fire(self) -> None:
-        now = self.tag.time
+        now, motion = self.tag.time, self._motion
         if self.trigger.present:
             if self._moved_at is not None:
-                self._move((now - self._moved_at) / 1e9)
+                self._state = motion.limited_state(motion.step(self._state, self._held, (now - self._moved_at) / 1e9))
             self._held = self._next
             self._moved_at = now
-            self.state.send(BodyState(self._position, self._velocity, self.now))
+            self.state.send(motion.body(self._state, self.now))
         if self.acceleration.present and all_finite(wanted := floats(self.acceleration.value)):
-            self._next = shortened(wanted, self.max_acceleration, self._acceleration_ratio)
+            self._next = motion.limited_control(wanted)
             if self._moved_at == now:
                 self._held = self._next
-
-    def _move(self, elapsed: float) -> None:
-        velocity = self._velocity
-        self._position = _moved(self._position, elapsed, velocity)
-        self._velocity = shortened(_moved(velocity, elapsed, self._held), self.max_speed, self._speed_ratio)
-
-    def _ratios(self) -> tuple[float, float]:
-        """Of the limits of speed and acceleration to those of climbing."""
-        return 1.0, 1.0
-
-
-class FlyingVehicle(Vehicle):
-    """A ``Vehicle`` in space, which climbs and sinks more slowly than it flies level.
-
-    Its velocity stays in the ellipsoid ``(vx^2 + vy^2) / max_speed^2 + vz^2 / climb_speed^2 <= 1``, and its
-    acceleration in that of the other two limits; what leaves one is shortened in its direction.
-    """
-
-    acceleration = InputPort(np.ndarray, shape=(3,), triggers=False, doc="m/s^2, control to apply from now on")
-
-    start = array_parameter((3,), unit="m", doc="position at the first trigger, with the height last")
-    start_velocity = array_parameter((3,), (0.0, 0.0, 0.0), unit="m/s", doc="velocity at the first trigger")
-    climb_speed = Parameter(float, 4.0, unit="m/s", above=0, doc="limit of the vertical speed, up and down")
-    climb_acceleration = Parameter(float, 4.0, unit="m/s^2", above=0, doc="limit of the vertical acceleration")
-
-    def _ratios(self) -> tuple[float, float]:
-        return self.max_speed / self.climb_speed, self.max_acceleration / self.climb_acceleration
-
-
-def _moved(place: tuple[float, ...], elapsed: float, velocity: tuple[float, ...]) -> tuple[float, ...]:
-    return tuple([p + elapsed * v for p, v in zip(place, velocity, strict=True)])
-
-
-def shortened(vector: tuple[float, ...], longest: float, ratio: float = 1.0) -> tuple[float, ...]:
-    """The vector itself, or, if it is longer than ``longest``, the vector of that length in its direction; a height
-    counts times ``ratio``."""
-    length = hypot(vector[0], vector[1])
-    if len(vector) > 2:
-        length = hypot(length, ratio * vector[2])
-    if not length > longest:
-        return vector
-    share = longest / length
-    return tuple([x * share for x in vector])
 
 
 class CircularMotion(Actor):

@@ -3,25 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-
-from numpy.typing import ArrayLike
 
 from ..core.elementary import cos, sin
 from ..robotics import BodyState
+from ..robotics.tokens import token
 
-_set = object.__setattr__  # in a frozen token
 
-
-@dataclass(frozen=True, slots=True, eq=False, init=False)
+@token()
 class Pose(BodyState):
     """Position, velocity and heading of a vehicle at ``time``.  It is also a ``BodyState``."""
 
     heading: float  # rad from the x axis to the left; whole turns count
-
-    def __init__(self, position: ArrayLike, velocity: ArrayLike, time: float, heading: float) -> None:
-        BodyState.__init__(self, position, velocity, time)
-        _set(self, "heading", heading)
 
     @property
     def speed(self) -> float:

@@ -140,12 +140,15 @@ class Types(Mapping[str, type[T]], Generic[T]):
         self._own = own
         self._kind = _words(base)
         self._offers = _Offers(base, group)
+        self._former = epicycle.actors.FORMER if base is Actor else {}
 
     def __getitem__(self, name: str) -> type[T]:
         if name in self._own:
             return self._own[name]
         offers, loaded = self._offers.qualified, self._offers.loaded
         qualified = self._offers.by_name.get(name, [name])
+        if name in self._former and name not in self._offers.by_name:
+            raise CatalogueError(f"there is no {self._kind} type {name!r} any more", self._former[name])
         if len(qualified) > 1:
             packages = " and ".join(repr(offers[each].distribution) for each in qualified)
             raise CatalogueError(

@@ -28,27 +28,26 @@ import numpy as np
 from .compiled import Array, borrower
 from .constraints import BOUND, ROUNDING, VALUE
 from .entry import entry
-from .horizon import HorizonProblem
+from .horizon import TOLERANCE, HorizonProblem, Solution
 from .newton import newton_step
 from .task import (
-    TAKEN,
+    ACCEPTED,
     Phase,
     Task,
+    accept,
     at,
+    check_constraints,
     evaluate,
     keeps_limits,
     longest_step,
-    look,
     move,
     new_task,
     objective_of,
-    put,
     room_for,
-    take,
+    store,
 )
 from .vectors import Vector, length_of, read, replaced, steeper, total, write, zero_vector
 
-TOLERANCE = 1e-6  # m; smaller violations count as none
 _SLACK = 1e-4  # m; added to an infeasible problem's bounds, and the margin of restoration
 _NEARLY = 1e-3  # m; a violation that may be entirely due to the barriers of f1 and f2
 _CENTRING = 0.1  # how far a start is moved towards braking before anything else
@@ -65,15 +64,6 @@ _CROWD = 60  # constraints within reach; more are a crowd
 _HOPELESS = 1e3  # m^2; if a crowd's squared violations add up to more, a rough value is enough:
 _ROUGH = 1e-3  # the share of them that a minimisation may leave, and
 _ROUGH_TO = 1e-5  # the barrier parameter, divided by them, at which restoration ends
-
-
-class Solution(NamedTuple):
-    """The result of a solver: the plan and its quality."""
-
-    controls: Array  # (N, 2) U_{t+1} .. U_{t+N}
-    violation: float  # largest violation of f3-f5, metres; 0 when feasible
-    objective: float
-    iterations: int  # Newton steps
 
 
 PROGRESS, LEAST_VIOLATION, BRAKE = 0, 1, 2
@@ -124,7 +114,7 @@ def _minimise(task: Task, phase: Phase, mu: float, dual: float, tolerance: float
             length *= 0.5
             if length < 1e-10:  # rounding hides any further descent
                 return iteration
-        take(task)
+        accept(task)
         value = reached
     return _NEWTON_STEPS
 
@@ -144,7 +134,7 @@ def _brake(task: Task, share: float) -> None:
             push = share * min(most, left / task.period)
             for c in range(len(control)):
                 control = replaced(control, c, -push * task.velocity[c] / speed)
-        put(task, s, TAKEN, control)
+        store(task, s, ACCEPTED, control)
         left -= push * task.period
 
 
@@ -164,7 +154,7 @@ def _restore(task: Task) -> tuple[int, float]:
         last = mu <= least
         taken = _minimise(task, Phase.RESTORE, mu, dual, (0.01 if last else _CLOSE) * mu)
         iterations += taken
-        excess = look(task)
+        excess = check_constraints(task)
         if excess < 0.0:
             return iterations, 0.0
         left = 0.0
@@ -187,7 +177,7 @@ def _restore(task: Task) -> tuple[int, float]:
 def _optimise(task: Task, gap: float, last_parameter: float) -> tuple[int, float]:
     """Minimise the objective within each constraint's present violation; returns (Newton steps, objective)."""
     constraints = task.constraints
-    look(task)
+    check_constraints(task)
     for i in range(constraints.shape[0]):
         value = constraints[i, VALUE]
         constraints[i, BOUND] = value + _SLACK if value >= 0.0 else 0.0
@@ -201,7 +191,7 @@ def _optimise(task: Task, gap: float, last_parameter: float) -> tuple[int, float
         least = max(last_parameter, gap * max(1e-2, abs(objective)) / count)
         last = not mu > 1.1 * least  # also if it is NaN
         iterations += _minimise(task, Phase.OPTIMISE, mu, dual, (0.1 if last else _CLOSE) * mu)
-        look(task)
+        check_constraints(task)
         objective = objective_of(task)
         if last:
             return iterations, objective
@@ -216,18 +206,18 @@ def _hold(task: Task) -> None:
         return
     mean = zero_vector(task.position)
     for s in range(first, steps - 1):
-        mean = total(mean, at(task, s, TAKEN))
+        mean = total(mean, at(task, s, ACCEPTED))
     for c in range(len(mean)):
         mean = replaced(mean, c, mean[c] / (steps - 1 - first))
     for s in range(first, steps):
-        put(task, s, TAKEN, mean)
+        store(task, s, ACCEPTED, mean)
 
 
 @borrower
 def _read(task: Task, controls: Array) -> None:
     """Write the accepted controls."""
     for s in range(task.plan.shape[0]):
-        write(controls, s, 0, at(task, s, TAKEN))
+        write(controls, s, 0, at(task, s, ACCEPTED))
 
 
 def solve(problem: HorizonProblem, starts: Array, rules: Rules = _RULES) -> Solution:
@@ -278,15 +268,15 @@ def _search(
     for index in range(starts.shape[0]):
         _brake(task, 0.5)
         for s in range(steps):
-            taken = at(task, s, TAKEN)
+            taken = at(task, s, ACCEPTED)
             for c in range(len(zero)):
                 taken = replaced(taken, c, (1.0 - _CENTRING) * starts[index, s, c] + _CENTRING * taken[c])
-            put(task, s, TAKEN, taken)
+            store(task, s, ACCEPTED, taken)
         _hold(task)
         if not keeps_limits(task):
             continue
         left = 0.0
-        if not look(task) < 0.0:
+        if not check_constraints(task) < 0.0:
             more, left = _restore(task)
             iterations += more
         if left < least:
@@ -299,14 +289,14 @@ def _search(
         task = new_task(problem, starts.shape[1], free, math.inf, room, zero)
         _brake(task, 0.999)
         _read(task, best)
-        return max(0.0, look(task)), math.inf, iterations
+        return max(0.0, check_constraints(task)), math.inf, iterations
     for s in range(steps):
-        put(task, s, TAKEN, read(zero, best, s, 0))
+        store(task, s, ACCEPTED, read(zero, best, s, 0))
     if least > 0.0 and rules.infeasible == LEAST_VIOLATION:
-        look(task)  # the last start tried may be another one
+        check_constraints(task)  # the last start tried may be another one
         more, objective = 0, objective_of(task)
     else:
         more, objective = _optimise(task, rules.gap, rules.last_parameter)
     _read(task, best)
-    largest = look(task)
+    largest = check_constraints(task)
     return largest if largest > TOLERANCE else 0.0, objective, iterations + more

@@ -60,13 +60,13 @@ def f0(positions: Any, goal: Any) -> Any:
 def f0_of_several(positions: Any, places: Any, weights: Any) -> Any:
     """f0 of several goals that move (k, N, d), each with its weight (k,): (N,) in m^2.
 
-    It is the f0 of their ``station``, times the sum of the weights, and a term that no plan changes.
+    It is the f0 of their ``common_goal``, times the sum of the weights, and a term that no plan changes.
     """
     offsets = positions - places
     return (weights[:, np.newaxis] * (offsets * offsets).sum(axis=-1)).sum(axis=0)
 
 
-def station(places: Any, weights: Any) -> Any:
+def common_goal(places: Any, weights: Any) -> Any:
     """The goal (N, d) in m that has the optimum of ``f0_of_several``: the weighted mean of the places (k, N, d)."""
     return (weights[:, np.newaxis, np.newaxis] * places).sum(axis=0) / weights.sum()
 
@@ -128,9 +128,17 @@ def sigma_5(radius: Array, growth: float, lost: int) -> Array:
     return radius + growth * lost
 
 
-def f6(positions: Any, obstacle: Any, reach: Any) -> Any:
-    """Eq. (5), (N,) in m: max(0, distance to the obstacle Po (N, d) minus Dmax)."""
-    return np.maximum(0.0, out_of_reach(positions, obstacle, reach))
+def _positive(values: Any) -> Any:
+    """max(0, .) of each element."""
+    return np.maximum(0.0, values)
+
+
+def f6(positions: Any, obstacle: Any, reach: Any, positive: Any = _positive) -> Any:
+    """Eq. (5), (N,) in m: max(0, distance to the obstacle Po (N, d) minus Dmax).
+
+    A solver that works on symbols has variables in the place of the maximum.
+    """
+    return positive(out_of_reach(positions, obstacle, reach))
 
 
 def out_of_reach(positions: Any, obstacle: Any, reach: Any) -> Any:
@@ -157,11 +165,11 @@ def mutual_information(own: Any, points: Any, weights: Any, variance: Any, other
     return -(weights * np.log((weights * density).sum(axis=1))).sum()
 
 
-def objective(problem: HorizonProblem, positions: Any, beyond: Any = None) -> Any:
+def objective(problem: HorizonProblem, positions: Any, positive: Any = _positive) -> Any:
     """The objective: the sum of f0 of eq. (2), in m^2; or of eq. (5) over all targets, in nats, 0 while none is known.
 
-    ``beyond`` (T, N) replaces f6 if a solver has variables for it.  The sum of the informations is that of all targets
-    together: they are independent, and each has its own measurements.
+    The sum of the informations is that of all targets together: they are independent, and each has its own
+    measurements.
     """
     if problem.objective == REACH_GOAL:
         return f0(positions, problem.goal).sum()
@@ -170,7 +178,7 @@ def objective(problem: HorizonProblem, positions: Any, beyond: Any = None) -> An
         rows = slice(k * len(weights), (k + 1) * len(weights))
         points, others = problem.sigma_positions[rows], problem.others_distance[rows]
         information = mutual_information(positions[-1], points, weights, problem.measurement_variance, others)
-        too_far = f6(positions, obstacle, problem.measurement_range) if beyond is None else beyond[k]
+        too_far = f6(positions, obstacle, problem.measurement_range, positive)
         total = total - information + (problem.range_penalty * too_far).sum()
     return total
 
@@ -180,12 +188,12 @@ def targets(problem: HorizonProblem) -> Any:
     return problem.obstacle_mean[: len(problem.sigma_positions) // max(len(problem.sigma_weights), 1)]
 
 
-def constraints(problem: HorizonProblem, positions: Any) -> Any:
+def constraints(problem: HorizonProblem, positions: Any, decided: int = 2) -> Any:
     """f3, f4 of each obstacle, f5 of each peer with their margins alpha * sigma, and in space f7, in m: satisfied where
     <= 0.
 
-    (1 + K + n, N - 2), or two rows more: the positions at steps 1 and 2 are decided before the first unknown control
-    acts.
+    (1 + K + n, N - decided), or two rows more: in the paper's dynamics, the positions at steps 1 and 2 are ``decided``
+    before the first unknown control acts.
     ``peer_distance`` of the problem is Dmin with the margin of f5.  sigma_1 to sigma_3 are zero.
     """
     rows = [f3(positions, problem.tube_centre, problem.tube_radius)]
@@ -196,7 +204,7 @@ def constraints(problem: HorizonProblem, positions: Any) -> Any:
         rows.append(f5(positions, mean, distance))
     if positions.shape[1] == 3:
         rows.extend(f7(positions, problem.lowest, problem.highest))
-    return np.stack(rows)[:, 2:]
+    return np.stack(rows)[:, decided:]
 
 
 def driven(problem: HorizonProblem, controls: Any) -> tuple[Any, Any]:
@@ -277,7 +285,7 @@ def gospa(truth: Array, tracks: Array, cutoff: float) -> float:
     return float(np.sqrt(min(totals)))
 
 
-def roaming(speed: float, turn_time: float, elapsed: float, kept: float) -> tuple[Array, Array]:
+def integrated_ou(speed: float, turn_time: float, elapsed: float, kept: float) -> tuple[Array, Array]:
     """The model of a target of bounded speed: transition (4, 4) of its state (x, y, vx, vy), and the covariance gained.
 
     Its velocity is an Ornstein-Uhlenbeck process of which the share ``kept`` = exp(-elapsed / turn_time) is left; in

@@ -8,7 +8,8 @@ Row ``s - 1`` of an array over the horizon belongs to the prediction step s = 1.
 from __future__ import annotations
 
 import math
-from typing import NamedTuple
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -17,6 +18,22 @@ from .mutual_information import pairwise_distance
 
 REACH_GOAL = 0
 INFORM = 1
+TOLERANCE = 1e-6  # m; smaller violations count as none
+
+
+class Solution(NamedTuple):
+    """The result of a solver: the plan and its quality."""
+
+    controls: Array  # (N, m) U_{t+1} .. U_{t+N}
+    violation: float  # largest violation of f3-f5, metres; 0 when feasible
+    objective: float
+    iterations: int  # Newton steps, or whatever the solver counts
+
+
+def solution(problem: Any, controls: Array, iterations: int) -> Solution:
+    """A plan for a problem, with its violation and its cost."""
+    worst = float(np.max(problem.constraints(controls), initial=0.0))
+    return Solution(controls, worst if worst > TOLERANCE else 0.0, float(problem.cost(controls)), iterations)
 
 
 class HorizonProblem(NamedTuple):
@@ -51,6 +68,49 @@ class HorizonProblem(NamedTuple):
     climb_acceleration: float = math.inf  # largest vertical acceleration
     lowest: float = -math.inf  # f7, the height to stay above
     highest: float = math.inf  # f7, the height to stay below
+
+    # --- as a ``Problem``, by the definitions -----------------------------------------------------------
+
+    def cost(self, controls: Any, positive: Callable[[Any], Any] | None = None) -> Any:
+        """What is to be minimised; ``positive`` may replace max(0, .)."""
+        from . import definitions
+
+        more = {} if positive is None else {"positive": positive}
+        return definitions.objective(self, definitions.driven(self, controls)[0], **more)
+
+    def constraints(self, controls: Any) -> Any:
+        """f3 to f5 with their margins, and f7, m: satisfied where <= 0."""
+        from . import definitions
+
+        return definitions.violations(self, controls).ravel()
+
+    def limits(self, controls: Any) -> Any:
+        """f1 of all speeds but the first, which is decided already, and f2."""
+        from .definitions import driven, f1, f2
+
+        speeds = f1(driven(self, controls)[1][1:], self.max_speed, self.climb_speed)
+        return np.concatenate([speeds, f2(controls, self.max_acceleration, self.climb_acceleration)])
+
+    def solution(self, controls: Array, iterations: int = 0) -> Solution:
+        """The answer of a solver, with its violation of the constraints and its cost."""
+        return solution(self, controls, iterations)
+
+    @property
+    def arrays(self) -> list[Any]:
+        """All numbers but the kind of objective."""
+        return [value for name, value in zip(self._fields, self, strict=True) if name != "objective"]
+
+    @property
+    def key(self) -> Any:
+        """What else there is."""
+        return self.objective
+
+    def of(self, arrays: Sequence[Any]) -> HorizonProblem:
+        """The same problem of other numbers, or of symbols."""
+        names = [name for name in self._fields if name != "objective"]
+        return self._replace(**dict(zip(names, arrays, strict=True)))
+
+    # --- the objectives that kernels know ---------------------------------------------------------------
 
     def to_reach(self, goal: Array) -> HorizonProblem:
         """The same problem with the objective of eq. (2); a ``goal`` (d,) that stands still, or (N, d) at each step."""

@@ -16,8 +16,8 @@ from .compiled import Array, borrower, inner, kernel
 from .entry import entry
 from .ukf import (
     RANGE,
+    _add_congruence,
     _add_products,
-    _add_turned,
     _finite,
     _fuse,
     _gain,
@@ -96,17 +96,23 @@ def _linearised(about: Array, spread: Array, kappa: float, measurements: Array) 
 
 @inner
 def _fused_about(
-    about: Array, spread: Array, mean: Array, covariance: Array, kappa: float, measurements: Array, freedom: float
+    about: Array,
+    spread: Array,
+    mean: Array,
+    covariance: Array,
+    kappa: float,
+    measurements: Array,
+    degrees_of_freedom: float,
 ) -> tuple[Array, Array]:
     """The state after an update of (mean, covariance) with the noises as they are about a point.
 
-    The covariance is widened by (freedom + d^2) / (freedom + rows) if the squared normalised innovation d^2 is more
-    than the ``rows`` that are expected.
+    The covariance is widened by (nu + d^2) / (nu + rows), where nu is ``degrees_of_freedom``, if the squared normalised
+    innovation d^2 is more than the ``rows`` that are expected.
     """
     value, slope, rest = _linearised(about, spread, kappa, measurements)
     rows, size = slope.shape
     innovation, reach, expected = rest.copy(), np.zeros((size, rows)), np.zeros((1, rows))
-    _add_turned(innovation, np.zeros((rows, size)), slope, covariance)
+    _add_congruence(innovation, np.zeros((rows, size)), slope, covariance)
     for k in range(rows):
         expected[0, k] = value[k]
         for j in range(size):
@@ -124,10 +130,10 @@ def _fused_about(
             for j in range(size):
                 kept[i, j] -= gain[i, k] * slope[k, j]
     # (1 - K H) P (1 - K H)^T + K R K^T, which rounding cannot make indefinite.
-    _add_turned(after, np.zeros((size, size)), kept, covariance)
-    _add_turned(after, np.zeros((size, rows)), gain, rest)
+    _add_congruence(after, np.zeros((size, size)), kept, covariance)
+    _add_congruence(after, np.zeros((size, rows)), gain, rest)
     _symmetrise(after)
-    wider = max(1.0, (freedom + surprise) / (freedom + rows))
+    wider = max(1.0, (degrees_of_freedom + surprise) / (degrees_of_freedom + rows))
     for i in range(size):
         for j in range(size):
             after[i, j] *= wider
@@ -137,7 +143,7 @@ def _fused_about(
 @entry("Tuple((f8[::1], f8[:, ::1], b1))(f8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8, f8[:, ::1], f8)")
 def predict_and_fuse(
     mean: Array, covariance: Array, transition: Array, process_noise: Array, kappa: float, measurements: Array,
-    freedom: float,
+    degrees_of_freedom: float,
 ) -> tuple[Array, Array, bool]:  # fmt: skip
     """``ukf.predict``, then an update with measurements (m, 7), and whether anything was fused.
 
@@ -152,7 +158,7 @@ def predict_and_fuse(
     _fuse(about, spread, points, weights, measurements, noises)
     then, after = about, spread
     for _ in range(_ROUNDS):
-        then, after = _fused_about(then, spread, mean, covariance, kappa, measurements, freedom)
+        then, after = _fused_about(then, spread, mean, covariance, kappa, measurements, degrees_of_freedom)
     if not _finite(then, after):
         return mean, covariance, False
     return then, after, True

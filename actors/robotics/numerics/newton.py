@@ -29,7 +29,7 @@ from .vectors import (
     symmetric_size,
     times,
     total,
-    turned,
+    transposed,
     write,
     zero_matrix,
     zero_quadratic,
@@ -141,7 +141,7 @@ def _repair_in_space(stages: Array, s: int, zero: Vector) -> None:
                     turn = replaced(turn, k * d + k, 1.0)
                 turn = replaced(replaced(turn, i * d + i, cosine), j * d + j, cosine)
                 turn = replaced(replaced(turn, i * d + j, -sine), j * d + i, sine)
-                m, axes = times(times(turn, m), turned(turn)), times(turn, axes)
+                m, axes = times(times(turn, m), transposed(turn)), times(turn, axes)
     for i in range(d):
         for j in range(i, d):
             summed = 0.0
@@ -258,7 +258,7 @@ def newton_step(stages: Array, period: float, free: int, zero: Vector) -> float:
         if not definite:
             return 0.0
         constant = applied(inverse, gradient)
-        by_position = times(inverse, turned(PU))
+        by_position = times(inverse, transposed(PU))
         by_velocity = times(inverse, VU)
         descent -= dot(gradient, constant)
         write(stages, s, constant_at, constant)

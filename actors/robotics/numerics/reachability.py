@@ -10,7 +10,7 @@ import numpy as np
 from .compiled import Array, inner, kernel
 from .entry import entry
 from .horizon import trajectory
-from .ukf import constant_velocity, mapped, predict, sigma_points, turned
+from .ukf import congruence, constant_velocity, mapped, predict, sigma_points
 
 OLDEST = 100_000.0  # periods
 _SAME = 1e-6  # periods: a difference of times due to rounding
@@ -112,7 +112,7 @@ def propagate(
     own = mean.shape[0] // 2
     means, covariances = np.zeros((steps, dimensions)), np.zeros((steps, dimensions * (dimensions + 1) // 2))
     for s in range(steps):
-        mean, covariance = mapped(transition, mean), turned(transition, covariance, process_noise)
+        mean, covariance = mapped(transition, mean), congruence(transition, covariance, process_noise)
         place = 0
         for i in range(dimensions):
             if i < own:

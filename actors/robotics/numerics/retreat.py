@@ -14,7 +14,7 @@ _STEPS = 10_000  # of a retreat; one that takes longer is not certain of anythin
 
 
 @kernel
-def reaches(directions: Array, mean: Array, covariance: Array, age: float, margin: float, speed: float) -> Array:
+def support(directions: Array, mean: Array, covariance: Array, age: float, margin: float, speed: float) -> Array:
     """A target's largest coordinate along each of ``directions`` (K, 2), m.
 
     It was within ``margin`` standard deviations of its estimate (mean (4,), covariance (4, 4)) ``age`` seconds ago, and

@@ -53,7 +53,7 @@ _SHARE = 0.8  # largest share of the way to the nearest limit in one step
 _POSITION = 0
 _VELOCITY = 1
 _TRIED = 2  # the controls that position and velocity follow from
-TAKEN = 3  # the best controls so far
+ACCEPTED = 3  # the best controls so far
 _SHIFT = 4  # of the position, by a whole Newton step
 _VECTORS = 5  # number of vectors
 
@@ -154,7 +154,7 @@ def at(task: Task, s: int, vector: int) -> Vector:
 
 
 @inlined
-def put(task: Task, s: int, vector: int, value: Vector) -> None:
+def store(task: Task, s: int, vector: int, value: Vector) -> None:
     write(task.plan, s, vector * len(task.position), value)
 
 
@@ -163,8 +163,8 @@ def _drive(task: Task) -> None:
     """Compute the positions and velocities for the trial controls."""
     p, v = task.position, task.velocity
     for s in range(task.plan.shape[0]):
-        put(task, s, _POSITION, p)
-        put(task, s, _VELOCITY, v)
+        store(task, s, _POSITION, p)
+        store(task, s, _VELOCITY, v)
         p = plus(p, task.period, v)
         v = plus(v, task.period, at(task, s, _TRIED))
 
@@ -175,25 +175,25 @@ def move(task: Task, length: float) -> None:
     d = len(task.position)
     for s in range(task.plan.shape[0]):
         step = read(task.position, task.stages, s, step_column(d))
-        put(task, s, _TRIED, plus(at(task, s, TAKEN), length, step))
+        store(task, s, _TRIED, plus(at(task, s, ACCEPTED), length, step))
     _drive(task)
 
 
 @borrower
-def take(task: Task) -> None:
+def accept(task: Task) -> None:
     for s in range(task.plan.shape[0]):
-        put(task, s, TAKEN, at(task, s, _TRIED))
+        store(task, s, ACCEPTED, at(task, s, _TRIED))
 
 
 @borrower
-def look(task: Task) -> float:
+def check_constraints(task: Task) -> float:
     """Try the accepted controls, and write the value of each of f3-f5 and f7; returns the largest.
 
     It is negative if all are kept strictly, and inf if one is NaN.
     """
     constraints = task.constraints
     for s in range(task.plan.shape[0]):
-        put(task, s, _TRIED, at(task, s, TAKEN))
+        store(task, s, _TRIED, at(task, s, ACCEPTED))
     _drive(task)
     largest = -math.inf
     for i in range(constraints.shape[0]):
@@ -365,13 +365,13 @@ def longest_step(task: Task, phase: Phase) -> float:
     share = 1.0
     p = v = zero_vector(task.position)
     for s in range(task.plan.shape[0]):
-        put(task, s, _SHIFT, p)
+        store(task, s, _SHIFT, p)
         start, step = steeper(at(task, s, _VELOCITY), task.speed_ratio), steeper(v, task.speed_ratio)
         if squared(total(start, step)) >= task.max_speed * task.max_speed and s > 0:
             share = min(share, _share(start, step, task.max_speed))
         p = plus(p, h, v)
         change = read(task.position, stages, s, step_column(d))
-        start, step = steeper(at(task, s, TAKEN), task.acceleration_ratio), steeper(change, task.acceleration_ratio)
+        start, step = steeper(at(task, s, ACCEPTED), task.acceleration_ratio), steeper(change, task.acceleration_ratio)
         if squared(total(start, step)) >= task.max_acceleration * task.max_acceleration:
             share = min(share, _share(start, step, task.max_acceleration))
         v = plus(v, h, change)
@@ -397,7 +397,7 @@ def keeps_limits(task: Task) -> bool:
     """Whether the accepted controls keep f1 and f2 strictly."""
     v, steps = task.velocity, task.plan.shape[0]
     for s in range(steps):
-        u = at(task, s, TAKEN)
+        u = at(task, s, ACCEPTED)
         if not squared(steeper(u, task.acceleration_ratio)) < task.max_acceleration * task.max_acceleration:
             return False
         v = plus(v, task.period, u)

@@ -59,15 +59,15 @@ def sigma_points(mean: Array, covariance: Array, kappa: float) -> tuple[Array, A
 
 
 @inner
-def turned(a: Array, b: Array, onto: Array) -> Array:
+def congruence(a: Array, b: Array, onto: Array) -> Array:
     """onto + a @ b @ a.T."""
     result = onto.copy()
-    _add_turned(result, np.zeros(a.shape), a, b)
+    _add_congruence(result, np.zeros(a.shape), a, b)
     return result
 
 
 @borrower
-def _add_turned(result: Array, half: Array, a: Array, b: Array) -> None:
+def _add_congruence(result: Array, half: Array, a: Array, b: Array) -> None:
     """Add a @ b @ a.T; ``half``, zeros, becomes a @ b; summed in index order, so that the last bits do not depend on a
     BLAS."""
     size, inside = a.shape
@@ -138,7 +138,7 @@ def constant_velocity(period: float, dimensions: int = 2) -> Array:
 @kernel
 def predict(mean: Array, covariance: Array, transition: Array, process_noise: Array) -> tuple[Array, Array]:
     """One step of a linear model; the unscented transform of a linear map is exact, so it is written out."""
-    spread = turned(transition, covariance, np.zeros(covariance.shape))
+    spread = congruence(transition, covariance, np.zeros(covariance.shape))
     for i in range(spread.shape[0]):
         for j in range(spread.shape[1]):
             spread[i, j] += process_noise[i, j]
@@ -255,7 +255,7 @@ def _fuse(mean: Array, covariance: Array, points: Array, weights: Array, measure
             mean[j] += gain[j, k] * observed[k]
             for i in range(count):
                 points[i, j] -= gain[j, k] * images[i, k]
-    _add_turned(covariance, half, gain, noise)
+    _add_congruence(covariance, half, gain, noise)
     _add_products(covariance, weights, points, points)
     _symmetrise(covariance)
 

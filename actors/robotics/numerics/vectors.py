@@ -172,7 +172,7 @@ def row(like: Vector, m: Matrix, i: int) -> Vector:
 
 
 @inlined
-def turned(m: Matrix) -> Matrix:
+def transposed(m: Matrix) -> Matrix:
     """The transpose."""
     d, made = side(m), m
     for i in range(d):

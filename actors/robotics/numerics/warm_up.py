@@ -143,6 +143,6 @@ def _call_retreats() -> None:
     lines_of_sight.predict_and_fuse(mean, covariance, covariance, covariance, 0.0, np.zeros((1, 7)), 4.0)
     predict(mean, covariance, covariance, covariance)
     propagate(mean, covariance, covariance, covariance, _STEPS, 2)
-    reaches = retreat.reaches(one, mean, covariance, 0.0, 1.0, 1.0)
+    reaches = retreat.support(one, mean, covariance, 0.0, 1.0, 1.0)
     retreat.best_retreat(one, reaches, zero, zero, zero, 1.0, 2.0, 1.0, 0.1)
     retreat.kept_distance(1.0, 0.0, 0.0, zero, zero, zero, 1.0, 2.0, 1.0, 0.1)

@@ -9,7 +9,7 @@ from epicycle.actors import BodyState, Estimate, Measurement, Plan
 from epicycle.runner import Results, Simulation, load_model
 
 sight = importlib.import_module("epicycle.actors.robotics.sight")
-world = importlib.import_module("epicycle.actors.robotics.world")
+dynamics = importlib.import_module("epicycle.actors.robotics.dynamics")
 ukf = importlib.import_module("epicycle.actors.robotics.numerics.ukf")
 
 
@@ -49,9 +49,9 @@ def test_lines_of_sight_past_a_pillar(eye: tuple[float, ...], target: tuple[floa
 
 def test_what_is_longer_than_the_limit_is_shortened_in_its_direction() -> None:
     ratio = 8.0 / 2.0
-    kept = world.shortened((3.0, 0.0, 1.0), 8.0, ratio)
+    kept = dynamics.shortened((3.0, 0.0, 1.0), 8.0, ratio)
     assert kept == (3.0, 0.0, 1.0)
-    x, y, z = world.shortened((6.0, 8.0, 5.0), 8.0, ratio)
+    x, y, z = dynamics.shortened((6.0, 8.0, 5.0), 8.0, ratio)
     assert (x / 6.0, y / 8.0) == pytest.approx((z / 5.0, z / 5.0))
     assert (x * x + y * y) / 64.0 + z * z / 4.0 == pytest.approx(1.0)
 

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import copy
 import math
-from dataclasses import FrozenInstanceError
+import pickle
+from dataclasses import FrozenInstanceError, replace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from epicycle.actors import BodyState, Estimate, Measurement, Plan
+from epicycle.actors import BodyState, Estimate, Measurement, Plan, Pose
+from epicycle.runner.results.encoding import canonical
 
 
 def state(**changes: Any) -> BodyState:
@@ -87,3 +90,42 @@ def test_what_is_not_finite_cannot_be_used(bad: float) -> None:
 )
 def test_what_can_be_used(token: Any, usable: bool) -> None:
     assert token.finite is usable
+
+
+@pytest.mark.parametrize("make", [state, measurement, estimate, plan])
+def test_a_token_travels_between_processes(make: Any) -> None:
+    token = make()
+    for other in (pickle.loads(pickle.dumps(token)), copy.deepcopy(token)):
+        assert type(other) is type(token)
+        assert canonical(other) == canonical(token)
+        assert other.finite
+
+
+def test_a_token_that_extends_another_has_the_fields_of_both() -> None:
+    pose = Pose([1.0, 2.0], [3.0, 4.0], 0.5, 0.1)
+    assert replace(pose, position=(5.0, 6.0)).position.tolist() == [5.0, 6.0]
+    assert (pose.time, pose.heading, pose.finite) == (0.5, 0.1, True)
+    assert [name for name, _, _ in pose.shapes(2)] == ["position", "velocity"]
+
+
+@pytest.mark.parametrize(
+    ("given", "expected"),
+    [
+        ({"position": (1.0, 2.0)}, "missing 2 required positional arguments: 'velocity' and 'time'"),
+        ({"position": 0, "velocity": 0, "time": 0, "colour": 0}, "got an unexpected keyword argument 'colour'"),
+    ],
+)
+def test_what_a_token_is_made_of(given: dict[str, Any], expected: str) -> None:
+    with pytest.raises(TypeError) as caught:
+        BodyState(**given)
+    assert str(caught.value) == f"BodyState.__init__() {expected}"
+
+
+def test_where_the_shape_is_wrong_is_said_of_a_part() -> None:
+    wrong = plan(state=state(velocity=[1.0]))
+    assert [wrong.fits(d) for d in (1, 2, 3)] == [False, False, False]
+    assert [(name, array.shape, shape) for name, array, shape in wrong.shapes(2)] == [
+        ("state.position", (2,), (2,)),
+        ("state.velocity", (1,), (2,)),
+        ("controls", (3, 2), ("n > 0", 2)),
+    ]

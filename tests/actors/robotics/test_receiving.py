@@ -1,12 +1,14 @@
 """What a message's arrays must be like where it enters an actor: a wrong shape is an error that names the port."""
 
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 from epicycle.actors import (
+    FORMER,
     BodyState,
     Casadi,
     ClearanceMonitor,
@@ -14,17 +16,17 @@ from epicycle.actors import (
     DistanceMonitor,
     Estimate,
     FilterPyEstimator,
-    FlyingController,
     GoalMonitor,
     Inform,
+    IntegratedOUEstimator,
     JPDATracker,
     Measurement,
     MultiTargetSensor,
     Objective,
+    Parameter,
     ParameterError,
     Plan,
     ReachGoal,
-    RoamingEstimator,
     RobustController,
     SafeController,
     Sensor,
@@ -33,9 +35,17 @@ from epicycle.actors import (
     TrackingError,
     Tracks,
     UnscentedEstimator,
+    Vehicle,
 )
 from epicycle.actors.robotics.receiving import MessageError
 from epicycle.actors.testing import Harness
+from epicycle.runner import ModelError, load_model
+
+
+class Flying(RobustController):
+    """One whose robot flies."""
+
+    dimensions = Parameter(int, 3)
 
 
 def state(n: int = 2) -> BodyState:
@@ -57,9 +67,8 @@ MAKES: dict[type, Callable[[int], Any]] = {
     Plan: lambda n: Plan("a", 0.0, state(n), np.zeros((11, n))),
 }
 ACTORS = [
-    ClearanceMonitor, DistanceMonitor, FilterPyEstimator, FlyingController, GoalMonitor, JPDATracker,
-    MultiTargetSensor, RoamingEstimator, RobustController, SafeController, Sensor, SeparationMonitor, TrackingError,
-    UnscentedEstimator,
+    ClearanceMonitor, DistanceMonitor, FilterPyEstimator, Flying, GoalMonitor, IntegratedOUEstimator, JPDATracker,
+    MultiTargetSensor, RobustController, SafeController, Sensor, SeparationMonitor, TrackingError, UnscentedEstimator,
 ]  # fmt: skip
 PORTS = [(actor, name) for actor in ACTORS for name, port in actor("a").inputs.items() if port.type in MAKES]
 
@@ -67,7 +76,7 @@ PORTS = [(actor, name) for actor in ACTORS for name, port in actor("a").inputs.i
 def fire(actor: type, port: str, token: object) -> None:
     """Fire an actor with good tokens at all other ports."""
     harness, tokens = Harness(actor("main.a")), {}
-    dimensions = 3 if actor is FlyingController else 2
+    dimensions = 3 if actor is Flying else 2
     for name, each in harness.actor.inputs.items():
         if name in ("trigger", "body", "robot", "target", "a", "b", "state", "tracks", "others"):
             tokens[name] = MAKES[each.type](dimensions) if each.type in MAKES else 0
@@ -83,7 +92,7 @@ def test_a_wrong_number_of_dimensions(actor: type, port: str, numbers: int) -> N
     assert str(caught.value).startswith(f"main.a.{port} got {kind.__name__} with ")
 
 
-@pytest.mark.parametrize("actor", [FlyingController, RobustController, SafeController])
+@pytest.mark.parametrize("actor", [Flying, RobustController, SafeController])
 def test_a_whole_message(actor: type) -> None:
     """The covariance of another state than the mean."""
     expected = "(4, 4) in the plane" + (" or (6, 6) in space" if actor is not SafeController else "")
@@ -92,13 +101,13 @@ def test_a_whole_message(actor: type) -> None:
     assert str(caught.value) == (f"main.a.estimate got Estimate with 'covariance' of shape (6, 6); expected {expected}")
 
 
-@pytest.mark.parametrize("actor", [FlyingController, RobustController])
+@pytest.mark.parametrize("actor", [Flying, RobustController])
 def test_an_estimate_in_space(actor: type) -> None:
     """It has process noise for six numbers."""
     fire(actor, "estimate", estimate(3))
 
 
-@pytest.mark.parametrize("actor", [UnscentedEstimator, RoamingEstimator, JPDATracker])
+@pytest.mark.parametrize("actor", [UnscentedEstimator, IntegratedOUEstimator, JPDATracker])
 def test_an_unknown_kind(actor: type) -> None:
     port = "detections" if actor is JPDATracker else "measurements"
     make: Any = Detections if actor is JPDATracker else Measurement
@@ -130,7 +139,7 @@ def test_casadi_and_the_barrier_agree_in_space(objective: Objective) -> None:
     pytest.importorskip("casadi")
     found = []
     for more in ({}, {"solver": Casadi()}):
-        harness = Harness(FlyingController("main.a", objective=objective, **more))
+        harness = Harness(Flying("main.a", objective=objective, **more))
         there = BodyState((30.0, 0.0, 5.0), (0.0, 0.0, 0.0), 0.0)
         harness.fire(0.0, trigger=0, state=there, estimate=Estimate((9, 1, 0, 0), np.eye(4), 0.0))
         found.append(harness.last("control"))
@@ -148,6 +157,58 @@ def test_a_goal_in_the_air_for_a_robot_on_the_ground() -> None:
     with pytest.raises(ParameterError) as caught:
         Harness(RobustController("main.a", objective=ReachGoal(goal=(1, 2, 9))))
     assert str(caught.value) == "'goal' has a height, and the robot does not fly; expected 2 numbers"
+
+
+@pytest.mark.parametrize(
+    ("actor", "given", "expected"),
+    [
+        (
+            RobustController,
+            {"dimensions": 3, "keep_out": [[1, 2, 3]]},
+            "keep_out: a robot that flies is above what stands in the way; leave it out",
+        ),
+        (RobustController, {"peers_at_start": [[1, 2, 3]]}, "peers_at_start: places have 3 numbers; expected 2"),
+        (
+            RobustController,
+            {"peers_at_start": [[1, 2, 3], [1, 2]]},
+            "main.a: RobustController.peers_at_start: some places have a height, and others have none",
+        ),
+        (SafeController, {"dimensions": 3}, "dimensions: it is 3, and retreats are in the plane; leave it out"),
+        (
+            Vehicle,
+            {"start": [1, 2], "start_velocity": [1, 2, 3]},
+            "start_velocity: it has 3 numbers, and 'start' has 2",
+        ),
+        (Vehicle, {"start": [1]}, "main.a: Vehicle.start: it has 1 numbers; expected 2, or 3 with the height last"),
+    ],
+)
+def test_what_flies_in_part_is_refused(actor: type, given: dict[str, Any], expected: str) -> None:
+    with pytest.raises(ParameterError) as caught:
+        actor("main.a", **given)
+    assert str(caught.value) == expected
+
+
+@pytest.mark.parametrize(
+    ("actor", "name", "expected"),
+    [(SafeController, "confidence", "sigma_margin"), (IntegratedOUEstimator, "freedom", "degrees_of_freedom")],
+)
+def test_parameters_that_have_another_name_now(actor: type, name: str, expected: str) -> None:
+    with pytest.raises(ParameterError) as caught:
+        actor("main.a", **{name: 2.0})
+    told = f"main.a: {actor.__name__}'s parameter {name!r} is now called {expected!r}; valid parameters: "
+    assert str(caught.value).startswith(told)
+
+
+def test_types_that_are_others_now(tmp_path: Path) -> None:
+    file = tmp_path / "model.yaml"
+    for name, advice in FORMER.items():
+        file.write_text(f"model: old\nactors:\n  a: {{type: {name}}}\n", encoding="utf-8")
+        with pytest.raises(ModelError) as caught:
+            load_model(file)
+        assert str(caught.value) == (
+            f"{file}:3:13: error: a: there is no actor type {name!r} any more\n    3 |   a: {{type: {name}}}\n"
+            f"      |             {'^' * len(name)}\n   help: {advice}"
+        )
 
 
 # --- the safe controller --------------------------------------------------------------------------------
@@ -174,7 +235,7 @@ def test_tracks_are_retreated_from_as_an_estimate_is() -> None:
 @pytest.mark.parametrize(
     ("actor", "name"),
     [(SafeController, each) for each in ("position_noise", "velocity_noise", "covariance_noise")]
-    + [(RoamingEstimator, each) for each in ("position_noise", "velocity_noise")],
+    + [(IntegratedOUEstimator, each) for each in ("position_noise", "velocity_noise")],
 )
 def test_noise_that_does_nothing_is_refused(actor: type, name: str) -> None:
     with pytest.raises(ParameterError) as caught:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import epicycle
-from epicycle.actors import BodyState, Estimate, ReachGoal, RoamingEstimator, SafeController, Vehicle
+from epicycle.actors import BodyState, Estimate, IntegratedOUEstimator, ReachGoal, SafeController, Vehicle
 from epicycle.actors.robotics.numerics import retreat
 from epicycle.actors.testing import Harness
 from epicycle.runner.cli import main
@@ -78,7 +78,7 @@ def test_the_reach_of_a_target() -> None:
     """The support of its ellipse, and the way it can have gone since."""
     random = np.random.default_rng(3)
     root, mean = random.normal(size=(4, 4)), random.normal(size=4)
-    found = retreat.reaches(AROUND, mean, root @ root.T, 0.4, 3.0, SPEED)
+    found = retreat.support(AROUND, mean, root @ root.T, 0.4, 3.0, SPEED)
     ellipse = mean[:2] + 3.0 * np.array([p / math.hypot(*p) for p in random.normal(size=(20_000, 4))]) @ root.T[:, :2]
     for n, most in zip(AROUND, found, strict=True):
         assert (ellipse @ n).max() + 0.4 * SPEED <= most + 1e-9
@@ -130,7 +130,7 @@ def test_without_a_state_it_stops_and_without_a_target_it_plans() -> None:
 
 def test_the_estimator_of_a_roaming_target() -> None:
     """It predicts with the model: far ahead, the speed is the target's, in no direction."""
-    estimator = RoamingEstimator("e", prior_mean=(5, 5, 1, 1), prior_variance=(1, 1, 9, 9), target_speed=1.5)
+    estimator = IntegratedOUEstimator("e", prior_mean=(5, 5, 1, 1), prior_variance=(1, 1, 9, 9), target_speed=1.5)
     harness = Harness(estimator)
     harness.fire(0.0, trigger=0)
     harness.fire(60.0, trigger=1)

@@ -269,10 +269,10 @@ def test_it_remembers_no_more_than_it_may_need() -> None:
     harness = Harness(UnscentedEstimator("e", max_delay=1.0))
     for tick in range(100):
         harness.fire(tick / 10, trigger=tick, measurements=[measured("a", tick / 10)])
-    assert len(harness.actor._steps) == 11
+    assert len(harness.actor._history.steps) == 11
     for tick in range(100, 200):
         harness.fire(tick / 10, measurements=[measured("a", tick / 10)])
-    assert len(harness.actor._waiting) == 11
+    assert len(harness.actor._history._waiting) == 11
     assert harness.last("too_late") == 89
 
 

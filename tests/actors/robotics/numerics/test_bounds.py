@@ -6,7 +6,7 @@ import sys
 
 SCRIPT = """
 import numpy as np
-from epicycle.actors import BodyState, Estimate, FlyingController, Inform, RobustController
+from epicycle.actors import BodyState, Estimate, Inform, RobustController
 from epicycle.actors.robotics.numerics import warm_up
 from epicycle.actors.testing import Harness
 
@@ -15,9 +15,9 @@ for dimensions in (2, 3):
     warm_up.compile_kernels(dimensions)
 warm_up.compile_tracking()
 warm_up.compile_retreats()
-for controller, d in ((RobustController, 2), (FlyingController, 3)):
+for d in (2, 3):
     for size in (4, 6):
-        harness = Harness(controller("main.a", objective=Inform()))
+        harness = Harness(RobustController("main.a", objective=Inform(), dimensions=d))
         own = BodyState((30.0, 0.0, 5.0)[:d], np.zeros(d), 0.3)
         harness.fire(0.3, trigger=0, state=own, estimate=Estimate(np.zeros(size), np.eye(size), 0.0))
         assert np.isfinite(harness.last("control")).all()

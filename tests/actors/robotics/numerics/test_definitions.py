@@ -34,7 +34,7 @@ ukf = importlib.import_module(PREFIX + "ukf")
 HorizonProblem, constraints_of, term = horizon.HorizonProblem, constraints.constraints_of, constraints.term
 constraint_columns = constraints.constraint_columns
 ellipsoid, keeps_limits, new_task, smoothed = task._ellipsoid, task.keeps_limits, task.new_task, terms.smoothed
-TAKEN = task.TAKEN
+ACCEPTED = task.ACCEPTED
 room_for = task.room_for
 read = importlib.import_module(PREFIX + "vectors").read
 
@@ -50,7 +50,7 @@ def test_the_target_s_model(random: np.random.Generator) -> None:
 
 def test_a_roaming_target() -> None:
     """Two spans are one of both lengths; many short steps of v' = v - v h / T + noise tend to it."""
-    first, second, both = (definitions.roaming(1.5, 2.0, t, math.exp(-t / 2.0)) for t in (0.3, 0.9, 1.2))
+    first, second, both = (definitions.integrated_ou(1.5, 2.0, t, math.exp(-t / 2.0)) for t in (0.3, 0.9, 1.2))
     assert second[0] @ first[0] == pytest.approx(both[0], abs=1e-14)
     assert second[0] @ first[1] @ second[0].T + second[1] == pytest.approx(both[1], abs=1e-14)
     h, transition, gained = 1e-4, np.eye(4), np.zeros((4, 4))
@@ -60,7 +60,7 @@ def test_a_roaming_target() -> None:
         gained[[2, 3], [2, 3]] += 1.5**2 * h / 2.0
     assert transition == pytest.approx(both[0], abs=1e-4)
     assert gained == pytest.approx(both[1], abs=1e-4)
-    assert np.diag(definitions.roaming(1.5, 2.0, 100.0, 0.0)[1])[2:] == pytest.approx([1.125, 1.125])
+    assert np.diag(definitions.integrated_ou(1.5, 2.0, 100.0, 0.0)[1])[2:] == pytest.approx([1.125, 1.125])
 
 
 def test_dynamics(random: np.random.Generator) -> None:
@@ -103,7 +103,7 @@ def room_of(*fields: Any) -> int:
 def keeps(controls: np.ndarray, room: np.ndarray, *fields: Any) -> bool:
     posed = new_task(HorizonProblem(*fields), len(controls), len(controls), np.inf, room, (0.0, 0.0))
     for s in range(len(controls)):
-        posed.plan[s, 2 * TAKEN], posed.plan[s, 2 * TAKEN + 1] = controls[s, 0], controls[s, 1]
+        posed.plan[s, 2 * ACCEPTED], posed.plan[s, 2 * ACCEPTED + 1] = controls[s, 0], controls[s, 1]
     return keeps_limits(posed)
 
 
@@ -290,7 +290,7 @@ def test_staying_near_several(random: np.random.Generator) -> None:
     """It is to be at their weighted mean, which is where the weighted sum of f0 is least, at every step."""
     for _ in range(20):
         places, weights = random.normal(scale=9.0, size=(3, 10, 2)), random.uniform(0.1, 3.0, size=3)
-        station = definitions.station(places, weights)
+        station = definitions.common_goal(places, weights)
         least = definitions.f0_of_several(station, places, weights)
         assert least == pytest.approx(
             sum(w * definitions.f0(station, each) for w, each in zip(weights, places, strict=True))

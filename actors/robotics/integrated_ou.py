@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from functools import lru_cache
+from typing import ClassVar
 
 from ..core import Configurable, Parameter, ParameterError
 from ..core.elementary import exp
@@ -12,7 +14,7 @@ from .estimator import State, UnscentedEstimator
 from .messages import Measurement
 
 
-class RoamingModel(Configurable):
+class IntegratedOU(Configurable):
     """The parameters of a target that roams: its speed is bounded, and it turns now and then.
 
     Its velocity is an Ornstein-Uhlenbeck process with the standard deviation ``target_speed / sqrt(2)`` in each
@@ -28,6 +30,7 @@ class RoamingModel(Configurable):
 
     def check(self) -> None:
         """Refuse inherited parameters that would do nothing."""
+        super().check()
         for name in self._unused:
             if getattr(self, name) != declared_parameters(type(self))[name].default:
                 raise ParameterError(
@@ -36,17 +39,17 @@ class RoamingModel(Configurable):
                     (name,),
                 )
 
-    def roaming(self, elapsed: float) -> tuple[Array, Array]:
+    def motion(self, elapsed: float) -> tuple[Array, Array]:
         """The transition (4, 4) of the state (x, y, vx, vy) over a time, and the covariance (4, 4) that it gains."""
-        from .numerics.definitions import roaming
+        from .numerics.definitions import integrated_ou
 
-        return roaming(self.target_speed, self.turn_time, elapsed, exp(-elapsed / self.turn_time))
+        return integrated_ou(self.target_speed, self.turn_time, elapsed, exp(-elapsed / self.turn_time))
 
 
-class RoamingEstimator(RoamingModel, UnscentedEstimator):
+class IntegratedOUEstimator(IntegratedOU, UnscentedEstimator):
     """The paper's filter with two changes, for a ``SafeController``; the process noise of eq. (1) is not used.
 
-    The target roams (``RoamingModel``).  By eq. (1), with the noise of Table II as it is read here
+    The target roams (``IntegratedOU``).  By eq. (1), with the noise of Table II as it is read here
     (``velocity_noise``), the deviation of its velocity grows by 2 m/s in a second; the estimate follows the noise
     across the line of sight, and may swing to the other side of it.
 
@@ -54,7 +57,7 @@ class RoamingEstimator(RoamingModel, UnscentedEstimator):
     the target is; and a measurement that surprises the filter widens its estimate, as in a filter of Student's t.
     """
 
-    freedom = Parameter(
+    degrees_of_freedom = Parameter(
         float,
         4.0,
         unit="1",
@@ -63,16 +66,20 @@ class RoamingEstimator(RoamingModel, UnscentedEstimator):
         doc="degrees of freedom of the noise; the fewer, the more it may surprise",
     )
 
+    refused: ClassVar[Mapping[str, str]] = {
+        "freedom": "IntegratedOUEstimator's parameter 'freedom' is now called 'degrees_of_freedom'"
+    }
+
     def initialize(self) -> None:
         from .numerics import lines_of_sight
         from .numerics.warm_up import compile_retreats
 
         super().initialize()
         compile_retreats()
-        self._model = lru_cache(8)(self.roaming)
+        self._model = lru_cache(8)(self.motion)
         self._sight = lines_of_sight.predict_and_fuse
 
     def _step(self, before: State, elapsed: float, measurements: list[Measurement]) -> tuple[State, bool]:
-        given = *before, *self._model(elapsed), self.kappa, self._rows(measurements), self.freedom
+        given = *before, *self._model(elapsed), self.kappa, self._rows(measurements), self.degrees_of_freedom
         mean, covariance, fused = self._sight(*given)
         return (mean, covariance), fused

@@ -1,0 +1,116 @@
+"""The horizon problem of a robot with any dynamics and any objective, as its solver sees it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from ..core import Configurable, declared_parameters
+from .arrays import Array
+
+if TYPE_CHECKING:
+    from .dynamics import Dynamics
+    from .numerics.horizon import HorizonProblem, Solution
+    from .planning import Objective
+
+
+class Beliefs(NamedTuple):
+    """What a robot expects of the others at steps 1..N, for an objective: arrays of numbers or of symbols."""
+
+    targets: Array  # (T, N, d) m, where each target is expected
+    covariances: Array  # (T, N, d (d + 1) / 2) m^2 of that, the rows of the upper triangle
+    samples: Array  # (T M, d) m, where each may be at step N: M sigma points, or the particles of a ``SampledEstimate``
+    weights: Array  # (M,) of the samples of a target
+    peers: Array  # (n, N, d) m, where the other robots are going to be
+    names: tuple[str, ...] = ()  # theirs
+
+    @property
+    def samples_by_target(self) -> list[Array]:
+        """The samples (M, d) of each target."""
+        size = len(self.weights)
+        return [self.samples[k : k + size] for k in range(0, len(self.samples), size)] if size else []
+
+
+class Trajectory(NamedTuple):
+    """A plan, for an objective: arrays of numbers or of symbols, a row for each of the steps 1..N."""
+
+    states: Any  # (N, n)
+    positions: Any  # (N, d)
+    controls: Any  # (N, m)
+    period: float  # s
+    positive: Callable[[Any], Any] = lambda values: np.maximum(0.0, values)
+
+    # ``positive`` is max(0, .) of each element, for costs that grow with it: a solver may put variables in its place.
+
+
+class Problem(NamedTuple):
+    """A plan to be found: controls (N, m) for steps 1..N of the horizon, of which the last changes no state any more.
+
+    What is to be kept is in the ``numbers``: tube, obstacles and peers.  ``state`` is that at step 1.
+    """
+
+    numbers: HorizonProblem
+    state: Array
+    dynamics: Dynamics
+    objective: Objective
+    beliefs: Beliefs
+
+    def trajectory(self, controls: Any, positive: Callable[[Any], Any] | None = None) -> Trajectory:
+        """The states under controls (N, m)."""
+        states = self.dynamics.trajectory(self.state, controls, self.numbers.period)
+        made = Trajectory(states, states[:, : self.dynamics.dimensions], controls, self.numbers.period)
+        return made if positive is None else made._replace(positive=positive)
+
+    def cost(self, controls: Any, positive: Callable[[Any], Any] | None = None) -> Any:
+        """What is to be minimised."""
+        return self.objective.cost(self.trajectory(controls, positive), self.beliefs)
+
+    def constraints(self, controls: Any) -> Any:
+        """Lengths in m that are <= 0 if the plan keeps off obstacles and peers, and in its tube: f3 to f5, and f7."""
+        from .numerics.definitions import constraints
+
+        return constraints(self.numbers, self.trajectory(controls).positions, self.dynamics.decided).ravel()
+
+    def limits(self, controls: Any) -> Any:
+        """Numbers that are <= 0 if the robot can do it: those of the dynamics, of all states but the first, which is
+        decided, and of all controls."""
+        states = self.trajectory(controls).states[1:]
+        rows: list[Sequence[Any]] = [self.dynamics.state_limits(state) for state in states]
+        rows += [self.dynamics.control_limits(control) for control in controls]
+        return np.array([each for row in rows for each in row])
+
+    def solution(self, controls: Array, iterations: int = 0) -> Solution:
+        """The answer of a solver, with its violation of the constraints and its cost."""
+        from .numerics.horizon import solution
+
+        return solution(self, controls, iterations)
+
+    # --- for solvers that work on symbols ---------------------------------------------------------------
+
+    @property
+    def arrays(self) -> list[Any]:
+        """All numbers."""
+        return [self.state, *self.numbers.arrays, *self.beliefs[:5]]
+
+    @property
+    def key(self) -> Any:
+        """What else there is."""
+        return self.numbers.key, _told(self.dynamics), _told(self.objective), self.beliefs.names
+
+    def of(self, arrays: Sequence[Any]) -> Problem:
+        """The same problem of other numbers, or of symbols."""
+        beliefs = Beliefs(*arrays[-5:])._replace(names=self.beliefs.names)
+        return self._replace(state=arrays[0], numbers=self.numbers.of(arrays[1:-5]), beliefs=beliefs)
+
+
+def _told(value: Any) -> Any:
+    """A part with all its parameters, as something that is equal if the part is."""
+    if isinstance(value, Configurable):
+        return type(value), *(_told(each.value_in(value)) for each in declared_parameters(type(value)).values())
+    if isinstance(value, Mapping):
+        return tuple((name, _told(each)) for name, each in value.items())
+    if isinstance(value, (list, tuple)):
+        return tuple(map(_told, value))
+    return (value.shape, value.tobytes()) if isinstance(value, np.ndarray) else value
