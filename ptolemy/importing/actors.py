@@ -17,7 +17,7 @@ from .entities import Property, is_aside, is_text, is_variable
 from .notes import Notes
 from .parts import Part
 from .syntax import ExpressionError, names_of, parse
-from .table import UNSAID, Setting, Row
+from .table import UNSAID, Row, Setting
 from .tables import WORDS
 from .translation import Code, Kind, Meaning, Value, code_of, kind_of, named
 from .variables import Changing, Variables
