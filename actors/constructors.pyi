@@ -35,13 +35,15 @@ from .resources.stations import Machine as _Machine, Station as _Station
 from .robotics.controller import RobustController as _RobustController
 from .robotics.detecting import MultiTargetSensor as _MultiTargetSensor
 from .robotics.dynamics import DoubleIntegrator as _DoubleIntegrator, Dynamics
-from .robotics.estimator import UnscentedEstimator as _UnscentedEstimator
+from .robotics.estimator import ExtendedEstimator as _ExtendedEstimator, UnscentedEstimator as _UnscentedEstimator
 from .robotics.filterpy_estimator import FilterPyEstimator as _FilterPyEstimator
 from .robotics.integrated_ou import IntegratedOUEstimator as _IntegratedOUEstimator
 from .robotics.monitors import ClearanceMonitor as _ClearanceMonitor, DistanceMonitor as _DistanceMonitor, GoalMonitor as _GoalMonitor, SeparationMonitor as _SeparationMonitor
 from .robotics.motion import WaypointMotion as _WaypointMotion
+from .robotics.particle_estimator import ParticleEstimator as _ParticleEstimator
 from .robotics.planning import Barrier as _Barrier, Casadi as _Casadi, Inform as _Inform, Objective, ReachGoal as _ReachGoal, Solver, StayNear as _StayNear
 from .robotics.safe_controller import SafeController as _SafeController
+from .robotics.sensor_models import SensorModel
 from .robotics.tracker import JPDATracker as _JPDATracker
 from .robotics.tracking_error import TrackingError as _TrackingError
 from .robotics.world import BroadcastChannel as _BroadcastChannel, CircularMotion as _CircularMotion, Flooding as _Flooding, Sensor as _Sensor, Vehicle as _Vehicle
@@ -231,6 +233,10 @@ class Expression(_Expression):
     """Evaluates an expression whenever one of its inputs gets a token."""
     def __init__(self, path: str, *, expression: str | float | Formula, gives: Literal['number', 'truth value', 'text', 'any value'] | None = ..., hold: bool = ..., iteration: bool = ...) -> None: ...
 
+class ExtendedEstimator(_ExtendedEstimator):
+    """The extended Kalman filter: what a sensor measures is a linear function, with its slope at the prediction."""
+    def __init__(self, path: str, *, noise_direction: Literal['expected', 'predicted'] = ..., period: _Number = ..., prior_mean: _Row = ..., prior_variance: _Row = ..., max_delay: _Number = ..., position_noise: _Number = ..., velocity_noise: _Number = ..., kappa: _Number = ...) -> None: ...
+
 class Extreme(_Extreme):
     """The largest or smallest of the tokens that come together, and its channel; of equal ones, the first."""
     def __init__(self, path: str, *, take: Literal['greatest', 'least']) -> None: ...
@@ -241,7 +247,7 @@ class Filter(_Filter):
 
 class FilterPyEstimator(_FilterPyEstimator):
     """A filter of FilterPy with the model of `UnscentedEstimator`; fuses one measurement after another."""
-    def __init__(self, path: str, *, filter: Literal['ExtendedKalmanFilter', 'UnscentedKalmanFilter', 'CubatureKalmanFilter', 'KalmanFilter', 'SquareRootKalmanFilter'] = ..., period: _Number = ..., prior_mean: _Row = ..., prior_variance: _Row = ..., max_delay: _Number = ..., noise_direction: Literal['expected', 'predicted'] = ..., position_noise: _Number = ..., velocity_noise: _Number = ..., kappa: _Number = ...) -> None: ...
+    def __init__(self, path: str, *, filter: Literal['ExtendedKalmanFilter', 'UnscentedKalmanFilter', 'CubatureKalmanFilter', 'KalmanFilter', 'SquareRootKalmanFilter'] = ..., noise_direction: Literal['expected', 'predicted'] = ..., period: _Number = ..., prior_mean: _Row = ..., prior_variance: _Row = ..., max_delay: _Number = ..., position_noise: _Number = ..., velocity_noise: _Number = ..., kappa: _Number = ...) -> None: ...
 
 class FirstOfInstant(_FirstOfInstant):
     """Passes on the first token of each instant; others at the same time, also at later microsteps, are lost."""
@@ -293,7 +299,7 @@ class Inhibit(_Inhibit):
 
 class IntegratedOUEstimator(_IntegratedOUEstimator):
     """The paper's filter with two changes, for a `SafeController`; the process noise of eq. (1) is not used."""
-    def __init__(self, path: str, *, degrees_of_freedom: _Number = ..., target_speed: _Number = ..., turn_time: _Number = ..., period: _Number = ..., prior_mean: _Row = ..., prior_variance: _Row = ..., max_delay: _Number = ..., noise_direction: Literal['expected', 'predicted'] = ..., position_noise: _Number = ..., velocity_noise: _Number = ..., kappa: _Number = ...) -> None: ...
+    def __init__(self, path: str, *, degrees_of_freedom: _Number = ..., target_speed: _Number = ..., turn_time: _Number = ..., noise_direction: Literal['expected', 'predicted'] = ..., period: _Number = ..., prior_mean: _Row = ..., prior_variance: _Row = ..., max_delay: _Number = ..., position_noise: _Number = ..., velocity_noise: _Number = ..., kappa: _Number = ...) -> None: ...
 
 class Integrator(_Integrator):
     """The integral over time of a signal that arrives as tokens."""
@@ -394,6 +400,10 @@ class ODE(_ODE):
 class PID(_PID):
     """A controller with a proportional, an integral and a derivative part, which acts at each measurement."""
     def __init__(self, path: str, *, setpoint: _Number = ..., proportional: _Number = ..., integral: _Number = ..., derivative: _Number = ..., integration: Literal['hold', 'trapezoid'] = ..., filter_time: _Number = ..., setpoint_weight: _Number = ..., derivative_weight: _Number = ..., low: _Number = ..., high: _Number = ..., anti_windup: Literal['clamping', 'back_calculation', 'none'] = ..., tracking_time: _Number | None = ..., initial: _Number = ..., late_reset: bool = ...) -> None: ...
+
+class ParticleEstimator(_ParticleEstimator):
+    """A bootstrap particle filter: any belief, and any sensor."""
+    def __init__(self, path: str, *, particles: _Whole = ..., samples: _Whole = ..., period: _Number = ..., prior_mean: _Row = ..., prior_variance: _Row = ..., max_delay: _Number = ..., position_noise: _Number = ..., velocity_noise: _Number = ..., kappa: _Number = ...) -> None: ...
 
 class Poisson(_Poisson):
     """The Poisson distribution: the number of rare events."""
@@ -505,7 +515,7 @@ class Select(_Select):
 
 class Sensor(_Sensor):
     """Measures the target's relative position, or its distance, with normal noise (Table II)."""
-    def __init__(self, path: str, *, kind: Literal['relative_position', 'range'] = ..., along: _Number = ..., across: _Number = ..., max_range: _Number | None = ..., occluders: _Rows = ..., robot_name: str = ...) -> None: ...
+    def __init__(self, path: str, *, model: SensorModel | abc.Mapping[str, object] | None = ..., kind: Literal['relative_position', 'range'] = ..., along: _Number = ..., across: _Number = ..., max_range: _Number | None = ..., occluders: _Rows = ..., robot_name: str = ...) -> None: ...
 
 class SeparationMonitor(_SeparationMonitor):
     """The smallest distance between any two of several bodies, whenever a state comes and two or more are known."""
@@ -628,8 +638,8 @@ class Uniform(_Uniform):
     def __init__(self, *, low: _Number = ..., high: _Number = ...) -> None: ...
 
 class UnscentedEstimator(_UnscentedEstimator):
-    """The unscented Kalman filter of the paper, compiled; fuses all measurements of one time at once."""
-    def __init__(self, path: str, *, period: _Number = ..., prior_mean: _Row = ..., prior_variance: _Row = ..., max_delay: _Number = ..., noise_direction: Literal['expected', 'predicted'] = ..., position_noise: _Number = ..., velocity_noise: _Number = ..., kappa: _Number = ...) -> None: ...
+    """The unscented Kalman filter of the paper; fuses all measurements of one time at once."""
+    def __init__(self, path: str, *, noise_direction: Literal['expected', 'predicted'] = ..., period: _Number = ..., prior_mean: _Row = ..., prior_variance: _Row = ..., max_delay: _Number = ..., position_noise: _Number = ..., velocity_noise: _Number = ..., kappa: _Number = ...) -> None: ...
 
 class Variable(_Variable):
     """A value that may change: a token becomes its value at the next microstep, and is sent then."""

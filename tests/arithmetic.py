@@ -52,6 +52,7 @@ EXCEPTIONS = {  # file or folder: what it may use, and why
     "actors/robotics/casadi_solver.py": (("casadi", ".sum()"), FOREIGN),
     "actors/robotics/filterpy_estimator.py": (("filterpy", "numpy.linalg"), FOREIGN),
     "actors/robotics/numerics/definitions.py": (("**", ".sum()", "sum", "numpy.exp", "numpy.log"), PAPER),
+    "actors/robotics/planning.py": ((".sum()",), PAPER),
     "actors/statistics.py": (("**",), FRACTIONS),
     "aspects/core/fields.py": (("sum",), WHOLE),
     "aspects/execution.py": (("sum",), WHOLE),

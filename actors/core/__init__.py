@@ -31,6 +31,7 @@ from .parameter import (
     ParameterError,
     bounds_text,
     declared_parameters,
+    part_finders,
     unknown_parameter,
     variants,
 )
@@ -54,8 +55,8 @@ __all__ = [
     "Wake", "Way", "When", "abridged", "accepts", "array_parameter", "bounds_text", "brief", "convert", "counted",
     "counted_in_si", "cut", "declared_parameters", "declared_ports", "did_you_mean", "digits", "elementary",
     "has_own_ports", "in_si", "irregular", "is_alone", "is_too_deep", "nearest", "new_tag", "new_wake",
-    "normal_quantile", "normal_share", "open_regular", "parse_unit", "paths", "plain", "present", "random_stream",
-    "read_regular", "read_table", "readable", "rounds", "shaped", "shortened", "texts_parameter", "to_nanoseconds",
-    "to_seconds", "token_type", "type_name", "unknown_parameter", "variants", "visible", "visible_character",
-    "visible_lines",
+    "normal_quantile", "normal_share", "open_regular", "parse_unit", "part_finders", "paths", "plain", "present",
+    "random_stream", "read_regular", "read_table", "readable", "rounds", "shaped", "shortened", "texts_parameter",
+    "to_nanoseconds", "to_seconds", "token_type", "type_name", "unknown_parameter", "variants", "visible",
+    "visible_character", "visible_lines",
 ]  # fmt: skip

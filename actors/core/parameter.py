@@ -417,6 +417,10 @@ def variants(base: type) -> dict[str, type]:
     return found
 
 
+# Called with a name that is no variant's: each may import a class of that name.
+part_finders: list[Callable[[str], None]] = []
+
+
 def build_variant(base: type, value: object, unit: str = "") -> object:
     """Make one of the variants of ``base`` from a mapping with a ``type`` key; an instance is returned as it is.
 
@@ -424,13 +428,16 @@ def build_variant(base: type, value: object, unit: str = "") -> object:
     """
     if isinstance(value, base):
         return value
+    name = value.get("type") if isinstance(value, Mapping) else None
+    if isinstance(name, str) and name not in variants(base):
+        for find in part_finders:
+            find(name)
     known = variants(base)
     valid = ", ".join(sorted(known))
     if not isinstance(value, Mapping):
         raise ParameterError(f"{brief(value)} is not a mapping {{type: ...}} with one of the types {valid}")
     if "type" not in value:
         raise ParameterError(f"{brief(value)} has no 'type'; expected one of {valid}")
-    name = value["type"]
     if not isinstance(name, str) or name not in known:
         raise ParameterError(f"{brief(name)} is not one of {valid}{did_you_mean(str(name), known)}", ("type",))
     values = {key: item for key, item in value.items() if key != "type"}

@@ -18,12 +18,11 @@ import numpy as np
 
 from ..core import EpicycleError
 from .arrays import Array
-from .numerics.horizon import TOLERANCE, Solution
+from .numerics.horizon import FAR, TOLERANCE, Solution
 from .problem import Problem
 
 _SLACK = 1e-4  # m; added to the second stage's bounds, so that they have an interior
 _STRICT = 1e-6  # by which limits are kept, as the solver keeps its bounds up to a tolerance
-_FAR = 1e6  # m; a tube without bound would be inf - inf to a solver; this one is out of reach
 _KEPT = 64  # programs
 _OPTIONS: dict[str, dict[str, Any]] = {
     "ipopt": {
@@ -85,17 +84,12 @@ def _prepared(problem: Any) -> Any:
         samples = beliefs.samples[np.resize(heavy, len(beliefs.samples))]
         beliefs = beliefs._replace(samples=samples, weights=beliefs.weights[heavy])
         return problem._replace(numbers=_prepared(problem.numbers), beliefs=beliefs)
-    heavy = problem.sigma_weights > 0.0
-    rows = np.resize(heavy, len(problem.sigma_positions))
-    return problem._replace(
-        tube_radius=np.where(np.isfinite(problem.tube_radius), problem.tube_radius, _FAR),
-        climb_speed=min(problem.climb_speed, _FAR),
-        climb_acceleration=min(problem.climb_acceleration, _FAR),
-        lowest=max(problem.lowest, -_FAR),
-        highest=min(problem.highest, _FAR),
-        sigma_positions=problem.sigma_positions[rows],
-        sigma_weights=problem.sigma_weights[heavy],
-        others_distance=problem.others_distance[np.ix_(rows, heavy)] if heavy.any() else np.empty((0, 0)),
+    return problem.weighed()._replace(
+        tube_radius=np.where(np.isfinite(problem.tube_radius), problem.tube_radius, FAR),
+        climb_speed=min(problem.climb_speed, FAR),
+        climb_acceleration=min(problem.climb_acceleration, FAR),
+        lowest=max(problem.lowest, -FAR),
+        highest=min(problem.highest, FAR),
     )
 
 

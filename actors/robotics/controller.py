@@ -26,7 +26,7 @@ from . import rolling
 from .arrays import Array, array_of, finite, floats, joined, read_only, stacked
 from .dynamics import DoubleIntegrator, Dynamics
 from .estimator import TargetModel
-from .messages import BodyState, Estimate, Plan, Tracks, enclosing
+from .messages import BodyState, Estimate, Plan, SampledEstimate, Tracks, enclosing
 from .planning import KNOWN, Barrier, Objective, ReachGoal, Solver
 from .problem import Beliefs, Problem
 from .receiving import EITHER, PlaceParameter, latest, received
@@ -369,10 +369,21 @@ class RobustController(TargetModel, Actor):
             )
             for target in self._targets()
         ]  # fmt: skip
-        if len(each) < 2:
-            return each[0] if each else self._nobody
+        if len(each) == 1:
+            target = self._targets()[0]
+            return (*each[0][:2], *self._samples(target, now)) if type(target) is SampledEstimate else each[0]
+        if not each:
+            return self._nobody
         means, covariances, points, weights = zip(*each, strict=True)
         return np.concatenate(means), np.concatenate(covariances), np.concatenate(points), weights[0]
+
+    def _samples(self, target: SampledEstimate, now: float) -> tuple[Array, Array]:
+        """The positions (M, d) of a target's samples at step N, if each moves on as it does, and their weights."""
+        ahead, samples = now - target.time + self._steps * self.period, target.samples
+        own, places = samples.shape[1] // 2, np.zeros((len(samples), self._d))
+        common = min(own, self._d)
+        places[:, :common] = samples[:, :common] + ahead * samples[:, own : own + common]
+        return places, np.array(target.weights)
 
     def _targets(self) -> list[Estimate]:
         """The latest estimates of all targets."""

@@ -9,8 +9,10 @@ import numpy as np
 from ..core import Actor, InputPort, OutputPort, Parameter
 from ..core.elementary import cos, hypot, sin
 from .arrays import pair
-from .messages import RANGE, RELATIVE_POSITION, BodyState, Detections, enclosing
+from .messages import BodyState, Detections, enclosing
 from .receiving import PLANE, by_channel, latest
+from .sensor_models import RANGE, RELATIVE_POSITION
+from .sight import disturbed
 
 
 class MultiTargetSensor(Actor):
@@ -78,8 +80,7 @@ class MultiTargetSensor(Actor):
     def _measured(self, dx: float, dy: float, distance: float, along: float, across: float) -> tuple[float, ...]:
         if self.kind == RANGE:
             return (distance + along,)
-        nx, ny = (dx / distance, dy / distance) if distance > 0.0 else (1.0, 0.0)  # the line of sight
-        return dx + along * nx - across * ny, dy + along * ny + across * nx
+        return disturbed((dx, dy), distance, distance, along, across)
 
     def _clutter(self) -> tuple[float, ...]:
         """A value from nowhere."""

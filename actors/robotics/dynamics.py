@@ -20,7 +20,7 @@ class Dynamics(Configurable):
     """How a robot moves, written once for numbers and for symbols of CasADi: use ``symbolic`` for its functions.
 
     A state begins with the position.  Say how many numbers states and controls have, and write ``step``; write
-    ``velocity`` unless a state goes on with it, and the limits and the braking that there are.
+    ``velocity`` unless it is what follows in the state, and the limits and the braking that there are.
     """
 
     dimensions: int = 2  # d, of its positions
@@ -74,7 +74,7 @@ class Dynamics(Configurable):
         return state
 
     def body(self, state: Sequence[float], time: float) -> BodyState:
-        """The token that tells a state."""
+        """The token for a state."""
         d = self.dimensions
         return MotionState(np.array(state[:d]), np.array(self.velocity(state)), time, np.array(state[d:]))
 

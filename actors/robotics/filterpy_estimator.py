@@ -9,8 +9,9 @@ import numpy as np
 from ..core import EpicycleError, Parameter
 from ..core.elementary import hypot
 from .arrays import Array
-from .estimator import EXPECTED, State, _Estimator
-from .messages import RANGE, Measurement
+from .estimator import EXPECTED, KalmanEstimator, State
+from .messages import Estimate, Measurement
+from .sensor_models import RANGE
 
 # FilterPy's EnsembleKalmanFilter is left out: it draws from NumPy's global random state, so runs would not be
 # reproducible.
@@ -22,7 +23,7 @@ class FilterError(EpicycleError):
     """A filter cannot use the measurements it got."""
 
 
-class FilterPyEstimator(_Estimator):
+class FilterPyEstimator(KalmanEstimator):
     """A filter of FilterPy with the model of ``UnscentedEstimator``; fuses one measurement after another.
 
     Late measurements are fused at their own time, as there.
@@ -38,19 +39,21 @@ class FilterPyEstimator(_Estimator):
         super().initialize()
         self._filter = _make_filter(self.filter, self.kappa)
         self._at: State | None = None  # its state
-        if self.filter == "CubatureKalmanFilter":  # the only one that needs columns
-            self._history.before = self._history.before[0].reshape(4, 1), self._history.before[1]
 
-    def _step(self, before: State, elapsed: float, measurements: list[Measurement]) -> tuple[State, bool]:
-        if before is not self._at:
-            self._filter.x, self._filter.P = map(np.array, before)
+    def step(self, state: State, elapsed: float, measurements: list[Measurement]) -> tuple[State, bool]:
+        if state is not self._at:
+            self._filter.x, self._filter.P = map(np.array, state)
         if elapsed > 0.0:
-            self._predict(elapsed)
+            self._move(elapsed)
         fused = bool(measurements) and self._update(measurements)
         self._at = np.array(self._filter.x), np.array(self._filter.P)
         return self._at, fused
 
-    def _predict(self, elapsed: float) -> None:
+    def prior(self) -> State:
+        mean, covariance = super().prior()
+        return mean.reshape(4, 1) if self.filter == "CubatureKalmanFilter" else mean, covariance  # which needs columns
+
+    def _move(self, elapsed: float) -> None:
         from .numerics.ukf import constant_velocity
 
         self._filter.Q = self._noise_over(elapsed)
@@ -61,6 +64,8 @@ class FilterPyEstimator(_Estimator):
             self._filter.predict()
 
     def _update(self, measurements: list[Measurement]) -> bool:
+        for each in measurements:
+            self._check(each)
         noises = self._noises(measurements)
         before = np.array(self._filter.x), np.array(self._filter.P)
         for each, (xx, xy, yy) in zip(measurements, noises, strict=True):
@@ -70,6 +75,18 @@ class FilterPyEstimator(_Estimator):
             return True
         self._filter.x, self._filter.P = before
         return False
+
+    def _check(self, measurement: Measurement) -> None:
+        if type(measurement) is not Measurement:
+            raise FilterError(
+                f"{self.path}: FilterPy's filters take relative positions and ranges, and {measurement.robot} has a "
+                f"{measurement.kind}; use an UnscentedEstimator, an ExtendedEstimator or a ParticleEstimator"
+            )
+        if len(measurement.observer) != 2:
+            raise FilterError(
+                f"{self.path}: FilterPy's filters take observers in the plane, and {measurement.robot} measures from a "
+                "height; use an UnscentedEstimator"
+            )
 
     def _noises(self, measurements: list[Measurement]) -> Array:
         """The measurements' covariances (m, 3), all as seen from the prediction, independent of the order of fusion."""
@@ -84,11 +101,6 @@ class FilterPyEstimator(_Estimator):
 
     def _fuse(self, measurement: Measurement, noise: Array) -> None:
         observer, ranged = measurement.observer, measurement.kind == RANGE
-        if len(observer) != 2:
-            raise FilterError(
-                f"{self.path}: FilterPy's filters take observers in the plane, and {measurement.robot} measures from a "
-                "height; use an UnscentedEstimator"
-            )
         used = self._filter
 
         def observe(state: Array) -> Array:
@@ -132,6 +144,9 @@ class FilterPyEstimator(_Estimator):
 
     def _told(self, state: State) -> State:
         return np.array(state[0]).ravel(), 0.5 * (state[1] + state[1].T)
+
+    def estimate_of(self, state: State, time: float, sources: tuple[str, ...]) -> Estimate:
+        return Estimate(*self._told(state), time, sources)
 
 
 def _make_filter(name: str, kappa: float) -> Any:

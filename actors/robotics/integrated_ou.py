@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import lru_cache
 from typing import ClassVar
 
 from ..core import Configurable, Parameter, ParameterError
@@ -76,10 +75,9 @@ class IntegratedOUEstimator(IntegratedOU, UnscentedEstimator):
 
         super().initialize()
         compile_retreats()
-        self._model = lru_cache(8)(self.motion)
         self._sight = lines_of_sight.predict_and_fuse
 
-    def _step(self, before: State, elapsed: float, measurements: list[Measurement]) -> tuple[State, bool]:
-        given = *before, *self._model(elapsed), self.kappa, self._rows(measurements), self.degrees_of_freedom
+    def _step(self, state: State, elapsed: float, measurements: list[Measurement]) -> tuple[State, bool]:
+        given = *state, *self._model(elapsed), self.kappa, self._rows(measurements), self.degrees_of_freedom
         mean, covariance, fused = self._sight(*given)
         return (mean, covariance), fused

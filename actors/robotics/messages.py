@@ -9,11 +9,11 @@ the token rely on it, however long it was on the way.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 
+from .arrays import floats
+from .sensor_models import RANGE, SensorModel, model_of
 from .tokens import Numbers, Token, array, part, token
-
-RELATIVE_POSITION = "relative_position"
-RANGE = "range"
 
 
 @token()
@@ -47,6 +47,49 @@ class Measurement(Token):
     def usable(self) -> bool:
         """Whether the deviations are those of a sensor."""
         return 0.0 < self.along < math.inf and (self.kind == RANGE or 0.0 < self.across < math.inf)
+
+    @property
+    def sensor(self) -> SensorModel:
+        """What the sensor measures."""
+        return model_of(self.kind, self.along, self.across)
+
+    def expected(self, target: Sequence[float]) -> Sequence[float]:
+        """What would be measured without noise if the state of the target (2 d) were this one."""
+        return self.sensor.h(target, floats(self.observer))
+
+    def noise(self, target: Sequence[float]) -> Sequence[Sequence[float]]:
+        """The covariance of the measurement if the state of the target were this one."""
+        return self.sensor.noise(target, floats(self.observer))
+
+    def innovation(self, target: Sequence[float]) -> Sequence[float]:
+        """What was measured, minus what is expected of a state of the target."""
+        return self.sensor.difference(floats(self.value), self.expected(target))
+
+
+@token()
+class Observation(Measurement):
+    """A ``Measurement`` by a ``SensorModel``, whose name is its kind; it goes along, so that any filter can fuse it."""
+
+    value: Numbers = array("n")  # as many numbers as the model has
+    model: SensorModel
+    state: Numbers = array("n")  # of the robot, as the model takes it
+
+    def usable(self) -> bool:
+        """All that is said of the noise is in the model."""
+        return True
+
+    @property
+    def sensor(self) -> SensorModel:
+        """What the sensor measures."""
+        return self.model
+
+    def expected(self, target: Sequence[float]) -> Sequence[float]:
+        """What would be measured without noise if the state of the target (2 d) were this one."""
+        return self.model.h(target, floats(self.state))
+
+    def noise(self, target: Sequence[float]) -> Sequence[Sequence[float]]:
+        """The covariance of the measurement if the state of the target were this one."""
+        return self.model.noise(target, floats(self.state))
 
 
 @token(RANGE=RANGE)
@@ -92,6 +135,21 @@ class Estimate(Token):
 
 
 @token()
+class SampledEstimate(Estimate):
+    """An ``Estimate`` that is more than a normal distribution: samples of the state, with their weights.
+
+    ``Inform`` takes the information that measurements give about them.
+    """
+
+    samples: Numbers = array("n > 0", "2 * d", kw_only=True)
+    weights: Numbers = array("len(self.samples)", kw_only=True)  # of the samples; together 1
+
+    def usable(self) -> bool:
+        """Whether no weight is negative."""
+        return min(floats(self.weights)) >= 0.0
+
+
+@token()
 class Tracks(Token):
     """A robot's estimates of several targets at ``time``, each with the number of its track."""
 
@@ -108,6 +166,14 @@ class Plan(Token):
     time: float  # s, that of ``state``
     state: BodyState = part()
     controls: Numbers = array("n > 0", "d")  # m/s^2: the one being applied now, then the planned ones
+
+
+def state_of(body: BodyState) -> list[float]:
+    """The state of a robot as a ``SensorModel`` takes it: its position and what else its token tells."""
+    if isinstance(body, MotionState):
+        return [*floats(body.position), *floats(body.rest)]
+    heading = getattr(body, "heading", None)
+    return [*floats(body.position), *(floats(body.velocity) if heading is None else (heading,))]
 
 
 def enclosing(path: str) -> str:

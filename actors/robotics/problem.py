@@ -46,7 +46,7 @@ class Trajectory(NamedTuple):
 
 
 class Problem(NamedTuple):
-    """A plan to be found: controls (N, m) for steps 1..N of the horizon, of which the last changes no state any more.
+    """A plan to be found: controls (N, m) for steps 1..N of the horizon, of which the last one changes no state.
 
     What is to be kept is in the ``numbers``: tube, obstacles and peers.  ``state`` is that at step 1.
     """
@@ -70,8 +70,10 @@ class Problem(NamedTuple):
     def constraints(self, controls: Any) -> Any:
         """Lengths in m that are <= 0 if the plan keeps off obstacles and peers, and in its tube: f3 to f5, and f7."""
         from .numerics.definitions import constraints
+        from .numerics.horizon import within_reach
 
-        return constraints(self.numbers, self.trajectory(controls).positions, self.dynamics.decided).ravel()
+        positions = self.trajectory(controls).positions
+        return within_reach(constraints(self.numbers, positions, self.dynamics.decided).ravel())
 
     def limits(self, controls: Any) -> Any:
         """Numbers that are <= 0 if the robot can do it: those of the dynamics, of all states but the first, which is

@@ -10,7 +10,8 @@ import numpy as np
 
 from ..core import REQUIRED, EpicycleError, InputPort, Parameter, ParameterError
 from .arrays import Array
-from .messages import RANGE, RELATIVE_POSITION
+from .messages import Observation
+from .sensor_models import RANGE, RELATIVE_POSITION
 from .tokens import ANY, SOME, Shape, Token
 
 PLANE, SPACE = (2,), (3,)
@@ -67,7 +68,7 @@ def _check(port: InputPort[M], message: M, dimensions: Sequence[int]) -> None:
     for each in dimensions:
         if message.fits(each):
             kind = getattr(message, "kind", RANGE)
-            if kind not in _KINDS:
+            if kind not in _KINDS and not isinstance(message, Observation):
                 raise MessageError(
                     f"{port.path} got {type(message).__name__} of the kind {kind!r}; expected {' or '.join(_KINDS)}"
                 )

@@ -1,9 +1,27 @@
-"""Lines of sight between points in space, and what stands on the ground between them."""
+"""Lines of sight: their noise, and what stands on the ground between two points in space."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Sequence
+
+
+def disturbed(
+    offset: Sequence[float], level: float, length: float, along: float, across: float, upright: float = 0.0
+) -> tuple[float, ...]:
+    """A way (d,) to a target with errors: ``along`` the line of sight, level and ``across`` it, and ``upright`` to
+    both; ``level`` is its length as seen from above, and ``length`` the whole one."""
+    dx, dy = offset[0], offset[1]
+    lx, ly = (dx / level, dy / level) if level > 0.0 else (1.0, 0.0)
+    if len(offset) == 2:
+        return dx + along * lx - across * ly, dy + along * ly + across * lx
+    dz = offset[2]
+    nx, ny, nz = (dx / length, dy / length, dz / length) if length > 0.0 else (1.0, 0.0, 0.0)
+    return (
+        dx + along * nx - across * ly - upright * nz * lx,
+        dy + along * ny + across * lx - upright * nz * ly,
+        dz + along * nz + upright * (nx * lx + ny * ly),
+    )
 
 
 def is_hidden(

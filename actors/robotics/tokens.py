@@ -31,12 +31,12 @@ _VARIES = {ANY: "", SOME: " > 0"}
 _LATEST = to_seconds(LATEST)
 
 
-def array(*sizes: str) -> Any:
+def array(*sizes: str, kw_only: bool = False) -> Any:
     """A field that holds an array of floats.
 
     Each of its ``sizes`` is ``n``, ``n > 0``, or an expression in d, the number of dimensions, and the token, ``self``.
     """
-    return field(metadata={"sizes": sizes})
+    return field(metadata={"sizes": sizes}, kw_only=kw_only)
 
 
 def part(several: bool = False) -> Any:
@@ -93,6 +93,8 @@ def _text_of(cls: Any) -> str:
     given, sets, fits, shapes, usable = ["self"], [], [], [], ["abs(self.time) <= latest"]
     for each in fields(cls):
         name = f"self.{each.name}"
+        if each.kw_only and "*" not in given:
+            given.append("*")
         given.append(each.name if each.default is MISSING else f"{each.name}={each.default!r}")
         sizes, several = each.metadata.get("sizes"), each.metadata.get("part")
         sets.append(f"set_{each.name}(self, {each.name if sizes is None else f'read_only({each.name})'})")

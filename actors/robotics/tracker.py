@@ -11,8 +11,9 @@ from ..core import Actor, InputPort, OutputPort, Parameter, to_seconds
 from .arrays import Array
 from .estimator import EXPECTED, PREDICTED, TargetModel
 from .history import History, Step
-from .messages import RANGE, Detections, Estimate, Tracks
+from .messages import Detections, Estimate, Tracks
 from .receiving import PLANE, received
+from .sensor_models import RANGE
 
 _LIKELY = 0.5  # probability from which a track counts as in range, or a detection as new; share of expected detections
 

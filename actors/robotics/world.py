@@ -22,9 +22,10 @@ from ..core import (
 from ..core.elementary import cos, hypot, sin
 from .arrays import all_finite, floats, pair
 from .dynamics import DoubleIntegrator, Dynamics
-from .messages import RANGE, RELATIVE_POSITION, BodyState, Measurement, Plan, enclosing
+from .messages import BodyState, Measurement, Observation, Plan, enclosing, state_of
 from .receiving import PlaceParameter, latest
-from .sight import is_hidden
+from .sensor_models import RANGE, RELATIVE_POSITION, SensorModel, root_of
+from .sight import disturbed, is_hidden
 
 
 class Vehicle(Actor):
@@ -145,6 +146,8 @@ class Sensor(Actor):
     Robot and target are on the ground, at height 0, unless their positions have a third number.  What hides the target
     stands on the ground: upright cylinders up to a height.  No line of sight goes through one, and a measurement behind
     it is not sent.
+
+    With a ``model`` it measures what that says, and sends an ``Observation``, with errors of that model's covariance.
     """
 
     robot = InputPort(BodyState, doc="where the robot that carries the sensor is")
@@ -158,6 +161,9 @@ class Sensor(Actor):
         Measurement, doc="measurement, sent at tags where both are known, and the target is in range and in sight"
     )
 
+    model: Parameter[SensorModel | None] = Parameter(
+        SensorModel, None, doc="what is measured; if left out, 'kind' with its deviations"
+    )
     kind = Parameter(str, RELATIVE_POSITION, choices=(RELATIVE_POSITION, RANGE), doc="what is measured")
     along = Parameter(float, 0.2, unit="m", min=0, doc="standard deviation along the line of sight, sigma_d")
     across = Parameter(float, 2.0, unit="m", min=0, doc="standard deviation across the line of sight, sigma_b")
@@ -174,6 +180,7 @@ class Sensor(Actor):
     def initialize(self) -> None:
         self._draw = self.random_stream("noise").standard_normal
         self._draw_upright = self.random_stream("upright noise").standard_normal  # of a flying robot
+        self._draw_of_model = self.random_stream("noise of the model").standard_normal
         self._hidden_by = [tuple(each) for each in self.occluders.tolist()]
         self._name = self.robot_name or enclosing(self.path)
 
@@ -197,23 +204,30 @@ class Sensor(Actor):
             return
         if self._hidden_by and is_hidden((*here, 0.0)[:3], (*there, 0.0)[:3], self._hidden_by):
             return
+        if self.model is not None:
+            self.measurement.send(self._observed(robot, latest(self.location) if self.location.present else robot))
+            return
         along, across = self.along * error_along, self.across * error_across
         if self.kind == RANGE:
             value: tuple[float, ...] = (distance + along,)
-        elif flies:
-            # The line of sight; and across it, a level direction and the one upright to both.
-            nx, ny, nz = (dx / distance, dy / distance, dz / distance) if distance > 0.0 else (1.0, 0.0, 0.0)
-            lx, ly = (dx / level, dy / level) if level > 0.0 else (1.0, 0.0)
-            upright = self.across * error_upright
-            value = (
-                dx + along * nx - across * ly - upright * nz * lx,
-                dy + along * ny + across * lx - upright * nz * ly,
-                dz + along * nz + upright * (nx * lx + ny * ly),
-            )
         else:
-            nx, ny = (dx / level, dy / level) if level > 0.0 else (1.0, 0.0)  # the line of sight
-            value = dx + along * nx - across * ny, dy + along * ny + across * nx
+            offset = (dx, dy, dz) if flies else (dx, dy)
+            value = disturbed(offset, level, distance, along, across, self.across * error_upright)
         self.measurement.send(Measurement(self._name, believed, self.kind, value, self.along, self.across, robot.time))
+
+    def _observed(self, robot: BodyState, believed: BodyState) -> Observation:
+        """What the model says, with an error of its covariance."""
+        model: Any = self.model
+        body = latest(self.target)
+        target, observer = [*floats(body.position), *floats(body.velocity)], state_of(robot)
+        value = list(map(float, model.h(target, observer)))
+        root = root_of(model.noise(target, observer))
+        drawn = [self._draw_of_model() for _ in value]
+        for i, row in enumerate(root):
+            for k in range(i + 1):
+                value[i] += row[k] * drawn[k]
+        kind = type(model).__name__
+        return Observation(self._name, believed.position, kind, value, 0.0, 0.0, robot.time, model, state_of(believed))
 
 
 class ChannelError(EpicycleError):

@@ -65,7 +65,7 @@ def join_channels(model: Entity, notes: Notes) -> None:
 def _terminals(composite: Entity, around: tuple[Entity, ...], scope: Scope) -> Iterator[_Terminal]:
     around = (*around, composite)
     for child in composite.entities.values():
-        inner = scope.inside(child)
+        inner = Scope(child, scope)
         places: dict[str, tuple[Property, str]] = {child.name: (child, child.kind)}
         places |= {f"{child.name}.{name}": (port, port.kind.removesuffix("Port")) for name, port in child.ports.items()}
         for name, (said, word) in places.items():

@@ -19,13 +19,13 @@ def plain_iterations(model: Entity, notes: Notes) -> None:
     waiting: list[tuple[Entity, Scope, Entity | None]] = [(model, Scope(model), None)]
     while waiting:
         composite, scope, outside = waiting.pop()
-        waiting += [(child, scope.inside(child), composite) for child in composite.entities.values()]
+        waiting += [(child, Scope(child, scope), composite) for child in composite.entities.values()]
         director = director_of(composite)
         if director is None or not fires_whole(director):
             continue
         for child in composite.entities.values():
             if child.kind in _DELAYS:
-                _register(child, scope.inside(child))
+                _register(child, Scope(child, scope))
         inner = Scope(director, scope, NUMBERS)
         said = [director.properties.pop(name, None) for name in ("period", "iterations")]
         try:

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Collection
 
 from .entities import Property, is_aside, is_decoration, is_layout, is_variable
-from .nets import face_at
 from .notes import Notes
 from .parts import Part
 from .tables import why_not
@@ -58,31 +57,18 @@ def about_unknown(part: Part, notes: Notes) -> None:
 
 def _only_takes(part: Part, port: str) -> bool:
     face = part.face(port)
-    is_named = port.startswith("input") or port in part.entity.ports
-    return face is not None and face.direction == "input" and is_named
+    return face is not None and face.direction == "input" and (port.startswith("input") or port in part.entity.ports)
 
 
 def is_watched(part: Part) -> bool:
     """Whether a view must be kept: an aspect is enabled there, or it occupies a channel of a multiport."""
-    around = part.around
-    if is_decorated(part):
-        return True
-    prefix = f"{part.entity.name}."
-    relations = {
-        link.relation for port, links in around.entity.links.items() if port.startswith(prefix) for link in links
-    }
-    for port, links in around.entity.links.items():
-        face = face_at(around, port) if "." in port and len(links) > 1 else None
-        is_several = face is not None and face.multi and face.direction == "output"
-        if is_several and relations & {link.relation for link in links}:
-            return True
-    return False
-
-
-def is_decorated(part: Part) -> bool:
-    """Whether any aspect is enabled at an actor or its ports."""
     owners: list[Property] = [part.entity, *part.entity.ports.values()]
-    return any(is_enabled(said) for owner in owners for said in owner.properties.values())
+    if any(is_enabled(said) for owner in owners for said in owner.properties.values()):
+        return True
+    ends = [end for nets in part.outside.values() for _, net in nets for end in net.ends]
+    others = [(end.part.face(end.port), f"{end.part.entity.name}.{end.port}") for end in ends if not end.is_own]
+    links = part.around.entity.links
+    return any(face and face.multi and face.direction == "output" and len(links[path]) > 1 for face, path in others)
 
 
 def is_enabled(said: Property) -> bool:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from functools import cached_property
 from typing import Any
 
 from epicycle.actors.expression import text_of
 
-from .entities import Entity, Property, is_text, is_variable
+from .entities import Property, is_text, is_variable
 from .syntax import ExpressionError, Tree, parse
 from .translation import Code, Meaning, Value, meaning_of
 
@@ -28,27 +28,23 @@ class Scope:
     def __init__(
         self, entity: Property, around: Scope | None = None, defaults: Mapping[str, object] | None = None
     ) -> None:
-        self.entity = entity
-        self.around = around
-        self.defaults = defaults or {}
+        self.entity, self.around, self._defaults = entity, around, defaults or {}
         self.changes: Changes = {} if around is None else around.changes
-        self._found: dict[tuple[str, bool], Meaning] = {}
-        self._failed: dict[tuple[str, bool], str] = {}
+        self._found: dict[tuple[str, bool], Meaning | ExpressionError] = {}
         self._open: set[str] = set()
 
-    def inside(self, entity: Entity, defaults: Mapping[str, object] | None = None) -> Scope:
-        """The scope of an entity inside this one."""
-        return Scope(entity, self, defaults)
+    def _outwards(self) -> Iterator[Scope]:
+        scope: Scope | None = self
+        while scope is not None:
+            yield scope
+            scope = scope.around
 
     def home(self, name: str) -> Scope | None:
         """Where a name is declared."""
-        scope: Scope | None = self
-        while scope is not None and scope.own(name) is None:
-            scope = scope.around
-        return scope
+        return next((scope for scope in self._outwards() if scope.own(name) is not None), None)
 
     def own(self, name: str) -> Property | None:
-        """The attribute of that name here."""
+        """The attribute of that name here, or in an attribute that extends the scope."""
         found = self.entity.properties.get(name)
         if found is not None and is_variable(found):
             return found
@@ -56,7 +52,6 @@ class Scope:
 
     @cached_property
     def _extending(self) -> list[Property]:
-        """The attributes here that extend the scope."""
         extending = ("ScopeExtendingAttribute", "ScopeExtender")
         return [each for each in self.entity.properties.values() if each.java.endswith(extending)]
 
@@ -67,21 +62,17 @@ class Scope:
 
     def _named(self, name: str, asking: Property | None, *, during_run: bool) -> Meaning:
         """What a name means; to the attribute that is asking, its own name means one further out."""
-        scope: Scope | None = self
-        while scope is not None:
+        for scope in self._outwards():
             if during_run and (id(scope.entity), name) in scope.changes:
                 return scope.changes[id(scope.entity), name]
             if (found := scope.own(name)) is not None and found is not asking:
                 return scope._attribute(name, found, during_run=during_run)
-            if name in scope.defaults:
-                return Value(scope.defaults[name])
-            scope = scope.around
+            if name in scope._defaults:
+                return Value(scope._defaults[name])
         raise KeyError(name)
 
     def _attribute(self, name: str, said: Property, *, during_run: bool) -> Meaning:
         key = name, during_run and bool(self.changes)
-        if key in self._failed:
-            raise ExpressionError(self._failed[key])
         if key not in self._found:
             if name in self._open or len(self._open) > MAX_DEPTH:
                 raise ExpressionError(f"{name!r} is defined in terms of itself")
@@ -89,18 +80,21 @@ class Scope:
             try:
                 self._found[key] = self.meaning_of(said, during_run=during_run)
             except ExpressionError as error:
-                if len(self._open) == 1:  # otherwise it may be too deep only from where it was asked for
-                    self._failed[key] = str(error)
-                raise
+                if len(self._open) > 1:  # it may be too deep only from where it was asked for
+                    raise
+                self._found[key] = error
             finally:
                 self._open.discard(name)
-        return self._found[key]
+        found = self._found[key]
+        if isinstance(found, ExpressionError):
+            raise ExpressionError(str(found))
+        return found
 
     def meaning_of(self, said: Property, *, during_run: bool = True) -> Meaning:
         """What an attribute means in a run, or before it."""
         text = said.value or ""
         if is_text(said):
-            return Value(self.filled(text, as_is=said.java.endswith("StringAttribute")))
+            return Value(text if said.java.endswith("StringAttribute") else self.filled(text))
         return self.meaning(text, asking=said, during_run=during_run)
 
     def meaning(
@@ -108,14 +102,14 @@ class Scope:
         during_run: bool = True,
     ) -> Meaning:  # fmt: skip
         """What an expression means, in which some names have a meaning of their own; None if it is empty."""
-        known = names or {}
-        tree = parse(text) if isinstance(text, str) and text.strip() else text
-        if isinstance(tree, str):
+        if isinstance(text, str) and not text.strip():
             return Value(None)
+        known = names or {}
 
         def lookup(name: str) -> Meaning:
             return known[name] if name in known else self._named(name, asking, during_run=during_run)
 
+        tree = parse(text) if isinstance(text, str) else text
         return meaning_of(tree, lookup, {each.text for each in known.values() if isinstance(each, Code)})
 
     def value_of(self, said: Property) -> Any:
@@ -126,10 +120,8 @@ class Scope:
         """The value of an expression before the run; None if it is empty."""
         return _value(self.meaning(text, during_run=False))
 
-    def filled(self, text: str, *, as_is: bool = False) -> str:
+    def filled(self, text: str) -> str:
         """A text with its ``$name`` filled in."""
-        if as_is or "$" not in text:
-            return text
 
         def value(match: re.Match[str]) -> str:
             if match[1]:

@@ -1,10 +1,11 @@
 """Which types a model may name: Epicycle's own, those of installed packages, and the caller's.
 
 A package offers types as entry points (``Name = "package.module:Name"``) of the groups ``epicycle.actors``,
-``epicycle.aspects``, ``epicycle.figures`` and ``epicycle.study_figures``.
+``epicycle.aspects``, ``epicycle.figures``, ``epicycle.study_figures``, and ``epicycle.parts`` for what stands as a
+value in a model, such as an ``Objective``.
 
 They are known by name and imported when a model names them. Epicycle's own names always mean Epicycle's types; if a
-name is taken, or two packages offer it, ``package.Name`` selects one.
+name is taken, or two packages offer it, ``package.Name`` selects one.  Parts go by the names of their classes alone.
 """
 
 from __future__ import annotations
@@ -24,7 +25,7 @@ from typing import Any, Generic, TypeVar
 
 import epicycle.actors
 import epicycle.aspects
-from epicycle.actors import Actor, Configurable, EpicycleError, FaultError, Process
+from epicycle.actors import Actor, Configurable, EpicycleError, FaultError, ParameterError, Process, part_finders
 from epicycle.aspects import Aspect, CompositeAspect, CompositeExecutionAspect, JoinPointAspect
 
 from ..text import note_package
@@ -38,7 +39,7 @@ T = TypeVar("T", bound=Configurable)
 
 def _words(base: type) -> str:
     """The name of a kind of types in a sentence."""
-    return re.sub(r"(?<=[a-z])(?=[A-Z])", " ", base.__name__).lower()
+    return "part" if base is Configurable else re.sub(r"(?<=[a-z])(?=[A-Z])", " ", base.__name__).lower()
 
 
 class CatalogueError(FaultError):
@@ -207,7 +208,7 @@ class Catalogue:
                 actors[each.__name__] = each
             elif issubclass(each, Aspect):
                 aspects[each.__name__] = each
-            else:
+            elif not issubclass(each, Configurable):  # a part, such as an Objective, is known since it was defined
                 raise TypeError(f"{each.__name__} is neither an Actor nor an Aspect")
         return Catalogue(_with(self.actors, actors), _with(self.aspects, aspects))
 
@@ -267,6 +268,19 @@ def with_offered(base: type[T], group: str, own: Mapping[str, type[T]]) -> Mappi
     return offered.with_types({name: cls for name, cls in own.items() if cls not in offered.loaded})
 
 
+def _import_part(name: str) -> None:
+    """Import the parts of a name that installed packages offer; raises ``ParameterError`` if that fails."""
+    offered = _offered(Configurable, "epicycle.parts")
+    if name in offered:
+        try:
+            _ = offered[name]
+        except CatalogueError as error:
+            raise ParameterError("; ".join((error.message, *error.help))) from None
+
+
+part_finders.append(_import_part)
+
+
 def figure_types() -> Mapping[str, type[Figure]]:
     """The figures that a model may use, by name."""
     return with_offered(Figure, "epicycle.figures", own_figures())
@@ -292,7 +306,7 @@ class TypesError(EpicycleError):
 
 
 def types_of_file(path: Path) -> list[type]:
-    """The actors and aspects that a Python file defines; its code is run, as by ``import``.
+    """The actors, aspects and parts that a Python file defines; its code is run, as by ``import``.
 
     Raises ``TypesError``.
     """
@@ -301,13 +315,13 @@ def types_of_file(path: Path) -> list[type]:
         each
         for name, each in vars(module).items()
         if isinstance(each, type)
-        and issubclass(each, (Actor, Aspect))
+        and issubclass(each, Configurable)
         and each.__module__ == module.__name__
         and not name.startswith("_")
         and not isabstract(each)
     ]
     if not found:
-        raise TypesError(f"--types {path}: the file defines no actor and no aspect")
+        raise TypesError(f"--types {path}: the file defines no actor, no aspect and no part such as an Objective")
     return found
 
 

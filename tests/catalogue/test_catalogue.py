@@ -10,6 +10,7 @@ import sys
 import tomllib
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -287,3 +288,48 @@ def test_every_type_of_epicycle_has_a_topic_and_every_topic_a_type() -> None:
 
 def test_a_docstring_that_is_no_text() -> None:
     assert doc_of(type("Thing", (), {"__doc__": 3})) == "3"
+
+
+PART = """from epicycle.actors import Objective
+
+
+class AcmeStay(Objective):
+    def cost(self, trajectory, beliefs):
+        return 0.0
+"""
+
+
+CONTROLLED = """model: m
+actors:
+  c: {type: Clock, period: 0.1 s}
+  v: {type: Vehicle, start: [1, 2]}
+  a: {type: RobustController, objective: {type: %s}, solver: {type: Casadi}}
+connections:
+  - c.output -> v.trigger, a.trigger
+  - v.state -> a.state
+  - {from: a.control, to: v.acceleration, delay: 0.1 s}
+"""
+
+
+def objective_of(name: str) -> Any:
+    """The objective of a controller that names one."""
+    Path("m.yaml").write_text(CONTROLLED % name, encoding="utf-8")
+    actor: Any = load_model("./m.yaml").graph.actors["a"]
+    return actor.objective
+
+
+def test_a_part_is_imported_when_a_model_names_it(site: Path) -> None:
+    install(site, "acme_stay", PART, parts="AcmeStay = acme_stay:AcmeStay")
+    install(site, "acme_bomb", "raise SystemExit('boom')", parts="AcmeBomb = acme_bomb:AcmeBomb")
+    list(installed().actors)
+    assert "acme_stay" not in sys.modules
+    assert type(objective_of("AcmeStay")).__name__ == "AcmeStay"
+    assert "acme_bomb" not in sys.modules
+    with pytest.raises(ModelError) as caught:
+        objective_of("AcmeBomb")
+    assert str(caught.value) == (
+        "m.yaml:5:42: error: a.objective: part 'AcmeBomb' of the package 'acme-bomb' cannot be loaded: "
+        "SystemExit: boom; its entry point in the group epicycle.parts is AcmeBomb = acme_bomb:AcmeBomb; fix or uninstall 'acme-bomb'\n"
+        "    5 |   a: {type: RobustController, objective: {type: AcmeBomb}, solver: {type: Casadi}}\n"
+        "      |                                          ^^^^^^^^^^^^^^^^"
+    )

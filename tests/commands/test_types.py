@@ -91,7 +91,11 @@ def test_without_types_the_model_is_wrong(capsys: pytest.CaptureFixture[str]) ->
         ("gone_of_mine.py", None, "there is no such file"),
         ("of_mine.txt", "", "expected a Python file such as my_actors.py"),
         ("of-mine.py", "", "expected a Python file such as my_actors.py"),
-        ("none_of_mine.py", "from epicycle.actors import Clock", "the file defines no actor and no aspect"),
+        (
+            "none_of_mine.py",
+            "from epicycle.actors import Clock",
+            "the file defines no actor, no aspect and no part such as an Objective",
+        ),
         ("bad_of_mine.py", "x = 1\n1 / 0", "ZeroDivisionError: division by zero (line 2)"),
         ("exit_of_mine.py", "raise SystemExit(3)", "SystemExit: 3 (line 1)"),
         ("json.py", "", "another module is called 'json'; give the file another name"),

@@ -19,6 +19,7 @@ from .mutual_information import pairwise_distance
 REACH_GOAL = 0
 INFORM = 1
 TOLERANCE = 1e-6  # m; smaller violations count as none
+FAR = 1e6  # m; a tube without bound would be inf - inf to some solvers; this one is out of reach
 
 
 class Solution(NamedTuple):
@@ -28,6 +29,11 @@ class Solution(NamedTuple):
     violation: float  # largest violation of f3-f5, metres; 0 when feasible
     objective: float
     iterations: int  # Newton steps, or whatever the solver counts
+
+
+def within_reach(values: Any) -> Any:
+    """Constraints of which none is infinitely far from its bound."""
+    return values if values.dtype == object else np.maximum(values, -FAR)
 
 
 def solution(problem: Any, controls: Array, iterations: int) -> Solution:
@@ -76,13 +82,25 @@ class HorizonProblem(NamedTuple):
         from . import definitions
 
         more = {} if positive is None else {"positive": positive}
-        return definitions.objective(self, definitions.driven(self, controls)[0], **more)
+        return definitions.objective(self.weighed(), definitions.driven(self, controls)[0], **more)
+
+    def weighed(self) -> HorizonProblem:
+        """The same problem without sigma points of weight 0, which have no effect, and no logarithm."""
+        if self.sigma_weights.dtype == object or self.sigma_weights.all():
+            return self
+        heavy = self.sigma_weights > 0.0
+        rows = np.resize(heavy, len(self.sigma_positions))  # of each target
+        return self._replace(
+            sigma_positions=self.sigma_positions[rows],
+            sigma_weights=self.sigma_weights[heavy],
+            others_distance=self.others_distance[np.ix_(rows, heavy)] if heavy.any() else np.empty((0, 0)),
+        )
 
     def constraints(self, controls: Any) -> Any:
         """f3 to f5 with their margins, and f7, m: satisfied where <= 0."""
         from . import definitions
 
-        return definitions.violations(self, controls).ravel()
+        return within_reach(definitions.violations(self, controls).ravel())
 
     def limits(self, controls: Any) -> Any:
         """f1 of all speeds but the first, which is decided already, and f2."""

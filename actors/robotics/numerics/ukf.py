@@ -214,7 +214,7 @@ def update(mean: Array, covariance: Array, kappa: float, measurements: Array, no
 @inner
 def _fuse(mean: Array, covariance: Array, points: Array, weights: Array, measurements: Array, noises: Array) -> None:
     """``update`` in place, with the sigma points, which are overwritten."""
-    size, count, d = mean.shape[0], points.shape[0], dimensions_of(measurements)
+    count, d = points.shape[0], dimensions_of(measurements)
     rows = 0
     for m in range(measurements.shape[0]):
         rows += 1 if measurements[m, _KIND] == RANGE else d
@@ -234,6 +234,15 @@ def _fuse(mean: Array, covariance: Array, points: Array, weights: Array, measure
                     _range(points, i, measurements, m) if is_range else _away(points, i, measurements, m, c)
                 )
         row += width
+    _fuse_images(mean, covariance, points, weights, images, observed, noise)
+
+
+@inner
+def _fuse_images(
+    mean: Array, covariance: Array, points: Array, weights: Array, images: Array, observed: Array, noise: Array
+) -> None:
+    """The update in place, with what is measured at each sigma point (M, rows), and in truth; these are overwritten."""
+    size, count, rows = mean.shape[0], points.shape[0], observed.shape[0]
     for k in range(rows):  # from here on, all relative to the expected values
         expected = 0.0
         for i in range(count):
@@ -258,6 +267,22 @@ def _fuse(mean: Array, covariance: Array, points: Array, weights: Array, measure
     _add_congruence(covariance, half, gain, noise)
     _add_products(covariance, weights, points, points)
     _symmetrise(covariance)
+
+
+@entry("Tuple((f8[::1], f8[:, ::1], b1))(f8[::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[:, ::1], f8[::1], f8[:, ::1])")
+def fuse_images(
+    mean: Array, covariance: Array, points: Array, weights: Array, images: Array, observed: Array, noise: Array
+) -> tuple[Array, Array, bool]:
+    """``update`` with measurements of any sensor, and whether anything was fused.
+
+    ``images`` (M, rows) would be measured at the sigma ``points``, ``observed`` (rows,) was; ``noise`` is their
+    covariance.  If the result would not be finite, nothing is fused.
+    """
+    then, spread = mean.copy(), covariance.copy()
+    _fuse_images(then, spread, points.copy(), weights, images.copy(), observed.copy(), noise)
+    if not _finite(then, spread):
+        return mean, covariance, False
+    return then, spread, True
 
 
 @borrower

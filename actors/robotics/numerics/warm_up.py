@@ -19,7 +19,7 @@ from .compiled import config, folder
 from .horizon import INFORM, HorizonProblem
 from .mutual_information import pairwise_distance
 from .reachability import expected_target, peer_tubes, standing_plan
-from .ukf import constant_velocity, predict_and_fuse
+from .ukf import constant_velocity, fuse_images, predict_and_fuse, sigma_points
 
 _LOGGER = logging.getLogger("epicycle")
 _PATIENCE = 1.0  # s before the wait is explained; loading the cached kernels is quicker
@@ -113,6 +113,8 @@ def call_others() -> None:
     mean, covariance, _ = predict_and_fuse(
         np.zeros(4), np.eye(4), constant_velocity(period), np.eye(4), 0.0, np.zeros((1, 7)), True
     )
+    points, weights = sigma_points(mean, covariance, 0.0)
+    fuse_images(mean, covariance, points, weights, points[:, :1].copy(), np.zeros(1), np.eye(1))
     for token in (mean, covariance):
         token.setflags(write=False)
     _, _, points, _ = expected_target(mean, covariance, np.eye(4), False, 0.0, period, 0.0, _STEPS, 2)

@@ -106,15 +106,7 @@ def crowded_problem(random: np.random.Generator) -> "horizon.HorizonProblem":
 
 
 def objective_by_definition(problem: "horizon.HorizonProblem", controls: np.ndarray) -> float:
-    """Without the centre of the sigma points, which has no weight."""
-    heavy = problem.sigma_weights > 0.0
-    rows = np.resize(heavy, len(problem.sigma_positions))  # of each target
-    problem = problem._replace(
-        sigma_positions=problem.sigma_positions[rows],
-        sigma_weights=problem.sigma_weights[heavy],
-        others_distance=problem.others_distance[np.ix_(rows, heavy)],
-    )
-    return float(definitions.objective(problem, definitions.driven(problem, controls)[0]))
+    return float(problem.cost(controls))
 
 
 def solve(problem: "horizon.HorizonProblem", start: np.ndarray | None = None) -> "barrier.Solution":

@@ -1,0 +1,298 @@
+"""Robots of one's own, written as in docs/extending.md: a car, a bearing sensor, an objective, a filter, a solver."""
+
+from __future__ import annotations
+
+import math
+import shutil
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from epicycle.actors import (
+    Barrier,
+    Beliefs,
+    BodyState,
+    DoubleIntegrator,
+    Estimate,
+    ExtendedEstimator,
+    Inform,
+    ParameterError,
+    Plan,
+    Problem,
+    ReachGoal,
+    RobustController,
+    Sensor,
+    StayNear,
+    UnscentedEstimator,
+    Vehicle,
+)
+from epicycle.actors.testing import Harness
+from epicycle.runner import Model, Results, Simulation, load_model
+from epicycle.runner.catalogue import packaged_models, types_of_file
+from epicycle.runner.cli import main
+
+OWN = Path(__file__).parent / "own"
+OWN_ROBOT = """composites:
+  OwnRobot:
+    extends: MobileRobot
+"""
+LINES = {"car.py": 60, "car.yaml": 40, "bearing.py": 20, "sight.py": 25, "particles.py": 60, "slsqp.py": 25}
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """One's own folder, with a copy of the packaged robots."""
+    shutil.copytree(OWN, tmp_path, dirs_exist_ok=True)
+    shutil.copytree(Path(str(packaged_models()["collision_avoidance"])).parent / "robots", tmp_path / "robots")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def types(name: str) -> list[type]:
+    return types_of_file(OWN / f"{name}.py")
+
+
+def play(model: Model, seed: int = 1, until: float | None = None) -> Results:
+    return Simulation(model, seed=seed, keep_log=True).run(until=until)
+
+
+def error_of_the_estimate(results: Results, robot: str = "main") -> float:
+    """How far the last estimate is from the obstacle."""
+    last = {f"{each.actor}.{each.port}": each.value for each in results.log.records}
+    return float(np.hypot(*(last[f"{robot}.estimator.estimate"].mean[:2] - last["obstacle.state"].position)))
+
+
+def team_with(folder: Path, estimator: str) -> Path:
+    """The model of the car with a robot of the paper in its place, and with another estimator in all robots."""
+    text = (folder / "car.yaml").read_text(encoding="utf-8")
+    for old, new in (
+        ("    dynamics: {type: Bicycle, heading: 180 deg}\n", ""),
+        ("    solver: {type: Casadi}\n", ""),
+        ("type: MobileRobot\n", "type: OwnRobot\n"),
+        ("parameters:\n", f"{OWN_ROBOT}    actors: {{estimator: {{type: {estimator}}}}}\nparameters:\n"),
+    ):
+        assert old in text
+        text = text.replace(old, new)
+    (folder / "team.yaml").write_text(text, encoding="utf-8")
+    return folder / "team.yaml"
+
+
+@pytest.mark.parametrize("name", LINES)
+def test_it_is_short(name: str) -> None:
+    assert len((OWN / name).read_text(encoding="utf-8").splitlines()) <= LINES[name]
+
+
+def test_nothing_is_left_out() -> None:
+    assert {path.name for path in OWN.iterdir() if path.is_file()} == set(LINES)
+
+
+# --- a car ----------------------------------------------------------------------------------------------
+
+
+def test_a_car_drives_as_its_bicycle_model_says(folder: Path) -> None:
+    (bicycle,) = types("car")
+    vehicle = Harness(Vehicle("v", dynamics=bicycle(heading=0.0, wheelbase=2.0), start=[1, 2]))
+    expected = [1.0, 2.0, 0.0, 0.0]
+    for k in range(20):
+        vehicle.fire(k / 10, trigger=k, acceleration=np.array([2.0, 0.3]))
+        body = vehicle.last("state")
+        assert [*body.position, *body.rest] == pytest.approx(expected)
+        assert body.velocity == pytest.approx(
+            [expected[3] * math.cos(expected[2]), expected[3] * math.sin(expected[2])]
+        )
+        x, y, heading, speed = expected
+        expected = [
+            x + 0.1 * speed * math.cos(heading), y + 0.1 * speed * math.sin(heading),
+            heading + 0.1 * speed * math.tan(0.3) / 2.0, speed + 0.2,
+        ]  # fmt: skip
+
+
+def test_a_car_arrives_and_others_know_where_it_goes(folder: Path) -> None:
+    """What it announces, taken as a double integrator's plan, is where it plans to be, and nearly where it gets to."""
+    pytest.importorskip("casadi")
+    results = play(load_model(folder / "car.yaml", types=types("car")))
+    assert results.metrics["arrival"] < 8.0
+    assert results.metrics["nearest"] > 2.0
+    states = {round(10 * each.time): each for each in results.signals["main.state"].tokens}
+    for state in states.values():
+        assert -2.0 <= state.rest[1] <= 8.0
+    plans = [each.value for each in results.log.records if each.actor == "main.controller" and each.port == "plan"]
+    assert len(plans) > 40
+    for plan in plans[5:-5]:
+        place, velocity, ahead = plan.state.position.copy(), plan.state.velocity.copy(), []
+        for control in plan.controls:
+            place, velocity = place + 0.1 * velocity, velocity + 0.1 * control
+            ahead.append(place)
+        then = round(10 * plan.time)
+        assert ahead[0] == pytest.approx(states[then + 1].position, abs=1e-9)
+        assert ahead[1] == pytest.approx(states[then + 2].position, abs=0.1)
+
+
+def test_the_car_from_the_command_line(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["validate", "car.yaml", "--types", str(OWN / "car.py")]) == 0
+    assert main(["actors", "Vehicle", "--types", str(OWN / "car.py")]) == 0
+    assert "Bicycle" in capsys.readouterr().out
+
+
+def test_a_solver_that_cannot_is_named(folder: Path) -> None:
+    (bicycle,) = types("car")
+    with pytest.raises(ParameterError) as caught:
+        RobustController("main.controller", dynamics=bicycle())
+    assert str(caught.value) == (
+        "solver: Barrier solves the objectives ReachGoal, StayNear, Inform for a DoubleIntegrator, and not ReachGoal "
+        "for a Bicycle; write 'solver: {type: Casadi}'"
+    )
+    with pytest.raises(ParameterError) as caught:
+        Vehicle("v", dynamics=bicycle(), start=[1, 2, 3])
+    assert str(caught.value) == "start: it has 3 numbers; expected 2 for a Bicycle"
+    with pytest.raises(ParameterError) as caught:
+        Vehicle("v", dynamics=bicycle(), start=[1, 2], start_velocity=[1, 0])
+    assert str(caught.value) == "start_velocity: a Bicycle starts as its parameters say; leave it out"
+
+
+@pytest.mark.slow
+def test_the_car_is_safe(folder: Path) -> None:
+    """In 100 runs in which a quarter of all messages and measurements are lost, with two observers."""
+    pytest.importorskip("casadi")
+    model = load_model(folder / "car.yaml", types=types("car"))
+    runs = [Simulation(model, seed=seed).run().metrics for seed in range(100)]
+    assert min(run["nearest"] for run in runs) >= 2.0
+    assert max(run["arrival"] for run in runs) < 30.0
+
+
+# --- a sensor -------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("estimator", ["UnscentedEstimator", "ExtendedEstimator", "ParticleEstimator"])
+def test_a_bearing_only_sensor_in_every_filter(estimator: str, folder: Path) -> None:
+    """Four robots that see directions know where the obstacle is; late and lost messages included."""
+    model = load_model(
+        team_with(folder, estimator),
+        types=types("bearing"),
+        set={"*.sensor.model": {"type": "Bearing", "deviation": "2 deg"}, "disturbance": 0.1},
+    )
+    results = play(model, seed=3, until=3.0)
+    assert error_of_the_estimate(results) < 1.0
+
+
+def test_an_angle_has_no_beginning(folder: Path) -> None:
+    """The target behind the robot, where bearings jump by a whole turn."""
+    (bearing,) = types("bearing")
+    sensors = [Harness(Sensor(f"r{i}.s", model=bearing(deviation=0.02)), seed=i) for i in range(2)]
+    for kind in (UnscentedEstimator, ExtendedEstimator):
+        estimator = Harness(kind("e", prior_mean=(-9, 0, 0, 0), prior_variance=(4, 4, 1, 1)))
+        for k in range(30):
+            measured = []
+            for sensor, y in zip(sensors, (3.0, -3.0), strict=True):
+                there = BodyState((-10.0, 0.3 * (-1) ** k * 0.1), (0.0, 0.0), k / 10)
+                sensor.fire(k / 10, robot=BodyState((0.0, y), (0.0, 0.0), k / 10), target=there)
+                measured.append(sensor.last("measurement"))
+            estimator.fire(k / 10, trigger=k, measurements=measured)
+        assert estimator.last("estimate").mean[:2] == pytest.approx([-10.0, 0.0], abs=1.0)
+
+
+# --- an objective ---------------------------------------------------------------------------------------
+
+
+def test_an_observer_that_keeps_the_obstacle_in_sight(folder: Path) -> None:
+    pytest.importorskip("casadi")
+    pillars = [[16.0, 4.0, 1.0]]
+    seen = {}
+    for name, objective in (
+        ("theirs", {"type": "StayNear", "to": {"target": 1}, "offset": [6, 6]}),
+        ("own", {"type": "KeepSight", "pillars": pillars, "away": "8 m"}),
+    ):
+        model = load_model(
+            "collision_avoidance",
+            types=types("sight"),
+            set={
+                "observers": 1, "observer[*].controller.objective": objective,
+                "observer[*].controller.solver": {"type": "Casadi"},
+            },
+        )  # fmt: skip
+        results = play(model, until=4.0)
+        robots, targets = (results.signals[each].tokens for each in ("observer[0].state", "obstacle.state"))
+        shares = np.linspace(0.0, 1.0, 200)[:, np.newaxis]
+        lines = [a.position + shares * (b.position - a.position) for a, b in zip(robots, targets, strict=True)]
+        seen[name] = [float(np.hypot(*(line - pillars[0][:2]).T).min()) > 1.0 for line in lines[20:]]
+    assert all(seen["own"])
+    assert not all(seen["theirs"])
+
+
+# --- a filter -------------------------------------------------------------------------------------------
+
+
+def test_inform_uses_the_samples_of_a_particle_filter(folder: Path) -> None:
+    model = load_model(team_with(folder, "OwnParticles"), types=types("particles"))
+    asked: list[Any] = []
+    inner = type(model.graph.actors["observer[0].controller"].solver).solve
+
+    def note(self: Any, problem: Any, starts: Any) -> Any:
+        asked.append(problem)
+        return inner(self, problem, starts)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(type(model.graph.actors["observer[0].controller"].solver), "solve", note)
+        results = play(model, until=3.0)
+    informed = [each for each in asked if len(each.sigma_weights) == 20]
+    assert len(informed) >= 58  # two observers, and all but the first tick
+    assert error_of_the_estimate(results, "observer[0]") < 1.5
+    states = [each for each in results.log.records if (each.actor, each.port) == ("observer[0].vehicle", "state")]
+    moved = [each.value.position for each in states]
+    assert np.hypot(*(moved[-1] - moved[0])) > 3.0
+
+
+# --- a solver -------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("objective", [ReachGoal(), StayNear(to={"target": 1.0}), Inform()])
+def test_scipy_finds_the_plan_of_the_barrier_method(objective: Any, folder: Path) -> None:
+    (slsqp,) = types("slsqp")
+    harness = Harness(RobustController("main.a", objective=objective, solver=slsqp()))
+    there = BodyState((30.0, 0.0), (-2.0, 0.5), 0.0)
+    estimate = Estimate((22, 1, 0, 0), 0.1 * np.eye(4), 0.0)
+    harness.fire(0.0, trigger=0, state=there, estimate=estimate)
+    assert harness.last("violation") < 1e-5
+    problem, starts = harness.actor._problem(there)
+    ours, theirs = Barrier().solve(problem, starts), slsqp().solve(problem, starts)
+    assert theirs.violation < 1e-5
+    assert theirs.objective == pytest.approx(ours.objective, rel=1e-3, abs=1e-3)
+    if not isinstance(objective, Inform):  # whose optimum is flat
+        assert theirs.controls[:8] == pytest.approx(ours.controls[:8], abs=0.1)
+
+
+# --- the protocols and the kernels ----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("objective", [ReachGoal(goal=(3, 4)), StayNear(to={"b": 2.0, "target": 1.0}), Inform()])
+@pytest.mark.parametrize("dimensions", [2, 3])
+def test_a_cost_is_what_the_kernels_minimise(objective: Any, dimensions: int, random: np.random.Generator) -> None:
+    """The same problem as numbers for kernels, and by its dynamics and objective."""
+    controller = RobustController("a.c", objective=objective, dimensions=dimensions)
+    harness, d = Harness(controller), dimensions
+    place = random.normal(size=d) + 5.0
+    other = BodyState(random.normal(size=d), np.zeros(d), 0.0)
+    covariance = np.diag([1.0, 2.0, 0.5, 0.5])
+    harness.fire(
+        0.0, trigger=0, state=BodyState(place, np.ones(d), 0.0), estimate=Estimate((9, 1, 0, 0), covariance, 0.0),
+        peer_plans=[Plan("b", 0.0, other, np.zeros((11, d)))],
+    )  # fmt: skip
+    numbers, _ = harness.actor._problem(BodyState(place, np.ones(d), 0.1))
+    expected, covariances, points, weights = harness.actor._expected(0.1)
+    beliefs = Beliefs(expected, covariances, points, weights, numbers.peer_mean, ("b",))
+    state = np.concatenate([numbers.position, numbers.velocity])
+    motion = DoubleIntegrator(dimensions=d)
+    problem = Problem(numbers, state, motion, objective, beliefs)
+    for _ in range(20):
+        controls = random.normal(size=(10, d), scale=4.0)
+        heavy = numbers.sigma_weights > 0.0
+        sized = np.resize(heavy, len(numbers.sigma_positions))
+        prepared = numbers._replace(
+            sigma_positions=numbers.sigma_positions[sized], sigma_weights=numbers.sigma_weights[heavy],
+            others_distance=numbers.others_distance[np.ix_(sized, heavy)] if heavy.any() else np.empty((0, 0)),
+        )  # fmt: skip
+        assert problem.cost(controls) == pytest.approx(prepared.cost(controls), rel=1e-9)
+        assert problem.constraints(controls) == pytest.approx(numbers.constraints(controls))
+        assert sorted(problem.limits(controls)) == pytest.approx(sorted(numbers.limits(controls)))
