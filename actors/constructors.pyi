@@ -41,7 +41,8 @@ from .robotics.integrated_ou import IntegratedOUEstimator as _IntegratedOUEstima
 from .robotics.monitors import ClearanceMonitor as _ClearanceMonitor, DistanceMonitor as _DistanceMonitor, GoalMonitor as _GoalMonitor, SeparationMonitor as _SeparationMonitor
 from .robotics.motion import WaypointMotion as _WaypointMotion
 from .robotics.particle_estimator import ParticleEstimator as _ParticleEstimator
-from .robotics.planning import Barrier as _Barrier, Casadi as _Casadi, Inform as _Inform, Objective, ReachGoal as _ReachGoal, Solver, StayNear as _StayNear
+from .robotics.planning import Barrier as _Barrier, Casadi as _Casadi, Inform as _Inform, ReachGoal as _ReachGoal, Solver, StayNear as _StayNear
+from .robotics.problem import Objective
 from .robotics.safe_controller import SafeController as _SafeController
 from .robotics.sensor_models import SensorModel
 from .robotics.tracker import JPDATracker as _JPDATracker

@@ -203,7 +203,7 @@ def test_tables_2_and_3_in_every_robot(robot: str) -> None:
     start = START if robot == MAIN else OBSERVER_STARTS[OBSERVERS.index(robot)]
     limits = {"max_speed": V_MAX[robot], "max_acceleration": A_MAX[robot]}
     for part, numbers in (
-        ("vehicle", {"start": start, "start_velocity": [0.0, 0.0], **limits}),
+        ("vehicle", {"start": start, "start_velocity": None, **limits}),
         ("sensor", SENSOR),
         ("estimator", ESTIMATOR),
         ("controller", {**CONTROLLER, **limits}),

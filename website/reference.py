@@ -8,7 +8,7 @@ from typing import NamedTuple
 FOLDER = "reference"  # of the pages, beside the overview
 # Chapters that share a page; each other chapter without purposes has its own.
 SHARED = {
-    "Values of parameters": ("FilterDesign", "Distribution", "Generator", "Objective", "Solver"),
+    "Values of parameters": ("FilterDesign", "Distribution", "Generator", "Dynamics", "Objective", "Solver"),
     "Metrics and figures": ("Metrics", "Figures", "Figures of studies"),
 }
 _CHAPTER = re.compile(r"^## (.+)\n", re.M)

@@ -25,12 +25,11 @@ from .planning import (
     Barrier,
     Casadi,
     Inform,
-    Objective,
     ReachGoal,
     Solver,
     StayNear,
 )
-from .problem import Beliefs, Problem, Trajectory
+from .problem import Beliefs, Objective, Problem, Trajectory
 from .safe_controller import SafeController
 from .sensor_models import SensorModel
 from .tracker import JPDATracker

@@ -27,8 +27,8 @@ from .arrays import Array, array_of, finite, floats, joined, read_only, stacked
 from .dynamics import DoubleIntegrator, Dynamics
 from .estimator import TargetModel
 from .messages import BodyState, Estimate, Plan, SampledEstimate, Tracks, enclosing
-from .planning import KNOWN, Barrier, Objective, ReachGoal, Solver
-from .problem import Beliefs, Problem
+from .planning import KNOWN, Barrier, ReachGoal, Solver
+from .problem import Beliefs, Objective, Problem
 from .receiving import EITHER, PlaceParameter, latest, received
 
 STEPS, SECONDS = "steps", "seconds"

@@ -10,6 +10,7 @@ import numpy as np
 
 from ..core import Configurable, MappingParameter, Parameter, ParameterError
 from .arrays import Array
+from .problem import Objective
 from .receiving import PlaceParameter
 
 if TYPE_CHECKING:
@@ -26,30 +27,6 @@ def in_space(place: Array, dimensions: int) -> Array:
     """A place (.., 2) or (.., 3), with a height of 0 added if it has none and there are three dimensions."""
     missing = dimensions - place.shape[-1]
     return np.concatenate((place, np.zeros((*place.shape[:-1], missing))), axis=-1) if missing > 0 else place
-
-
-class Objective(Configurable):
-    """What a robot wants: a cost of its trajectory, given what it believes of the others.
-
-    It is written once for numbers and for symbols of CasADi: use the functions of ``symbolic``.  Those that Epicycle's
-    compiled solver knows have a ``pose``, too.
-    """
-
-    def cost(self, trajectory: Trajectory, beliefs: Beliefs) -> Any:
-        """The number that a plan should make small."""
-        raise NotImplementedError
-
-    def check_dimensions(self, dimensions: int) -> None:
-        """Raise ``ParameterError`` if it is not for a robot with so many dimensions."""
-
-    def pose(self, problem: HorizonProblem, points: Array, weights: Array, peers: Sequence[str] = ()) -> HorizonProblem:
-        """The problem with this objective, for the compiled kernels.
-
-        ``points`` (T M, 2) are the sigma points of T targets at the end of the horizon, one target after the other,
-        each with the ``weights`` (M,).  T = 0 while no target is known.  ``peers`` are the names of the robots in the
-        problem, in its order.
-        """
-        raise NotImplementedError
 
 
 def _check_height(name: str, place: Array, dimensions: int) -> None:

@@ -13,7 +13,6 @@ from .arrays import Array
 if TYPE_CHECKING:
     from .dynamics import Dynamics
     from .numerics.horizon import HorizonProblem, Solution
-    from .planning import Objective
 
 
 class Beliefs(NamedTuple):
@@ -43,6 +42,30 @@ class Trajectory(NamedTuple):
     positive: Callable[[Any], Any] = lambda values: np.maximum(0.0, values)
 
     # ``positive`` is max(0, .) of each element, for costs that grow with it: a solver may put variables in its place.
+
+
+class Objective(Configurable):
+    """What a robot wants: a cost of its trajectory, given what it believes of the others.
+
+    It is written once for numbers and for symbols of CasADi: use the functions of ``symbolic``.  Those that Epicycle's
+    compiled solver knows have a ``pose``, too.
+    """
+
+    def cost(self, trajectory: Trajectory, beliefs: Beliefs) -> Any:
+        """The number that a plan should make small."""
+        raise NotImplementedError
+
+    def check_dimensions(self, dimensions: int) -> None:
+        """Raise ``ParameterError`` if it is not for a robot with so many dimensions."""
+
+    def pose(self, problem: HorizonProblem, points: Array, weights: Array, peers: Sequence[str] = ()) -> HorizonProblem:
+        """The problem with this objective, for the compiled kernels.
+
+        ``points`` (T M, 2) are the sigma points of T targets at the end of the horizon, one target after the other,
+        each with the ``weights`` (M,).  T = 0 while no target is known.  ``peers`` are the names of the robots in the
+        problem, in its order.
+        """
+        raise NotImplementedError
 
 
 class Problem(NamedTuple):

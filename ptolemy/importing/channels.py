@@ -18,6 +18,7 @@ from .syntax import ExpressionError
 
 _LINK = 5  # steps
 _FIRST_LINK = 1_000_000  # after all links of the file
+_CHECKS = dict.fromkeys(("PublisherTest", "PublisherNonStrictTest"), "Publisher")  # which stay
 
 
 class _Terminal(NamedTuple):
@@ -56,7 +57,7 @@ def join_channels(model: Entity, notes: Notes) -> None:
             path = ".".join([*(composite.name for composite in each.around[1:]), each.name])
             notes.error(f"{path} receives nothing: no Publisher within reach has its channel")
     for each in terminals:
-        if "." not in each.name:
+        if "." not in each.name and each.around[-1].entities[each.name].kind not in _CHECKS:
             del each.around[-1].entities[each.name]
             for port in ("input", "output"):
                 each.around[-1].links.pop(f"{each.name}.{port}", None)
@@ -66,7 +67,7 @@ def _terminals(composite: Entity, around: tuple[Entity, ...], scope: Scope) -> I
     around = (*around, composite)
     for child in composite.entities.values():
         inner = Scope(child, scope)
-        places: dict[str, tuple[Property, str]] = {child.name: (child, child.kind)}
+        places: dict[str, tuple[Property, str]] = {child.name: (child, _CHECKS.get(child.kind, child.kind))}
         places |= {f"{child.name}.{name}": (port, port.kind.removesuffix("Port")) for name, port in child.ports.items()}
         for name, (said, word) in places.items():
             if word in ("Publisher", "Subscriber") and (said is child or said.kind != word):

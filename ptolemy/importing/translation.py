@@ -158,7 +158,7 @@ def filled(pattern: str, *operands: Meaning) -> Meaning:
         return Value(_computed(pattern, values))
     tree, places = _pattern(pattern)
     codes = {name: code_of(each) for name, each in names.items()}
-    kind = _kind(tree, {name: each.kind for name, each in codes.items()})
+    kind = _kind(pattern, tuple(each.kind for each in codes.values()))
     return _checked(replaced(tree, codes), kind, [codes[name] for name in places if name in codes])
 
 
@@ -179,40 +179,23 @@ def _computed(pattern: str, values: Mapping[str, Any]) -> Any:
     raise ExpressionError(f"it cannot be evaluated: {said}")
 
 
-_CALLS: Mapping[str, Kind] = {
-    **dict.fromkeys(("int", "len", "floor", "ceil", "round"), int),
-    **dict.fromkeys(("float", "sqrt", "exp", "log", "sin", "cos", "tan", "atan2", "hypot"), float),
-    "str": str,
-}
+_ANY: tuple[Kind, ...] = (int, float, str, bool, Array(int))
+_SAMPLES: dict[Kind, Any] = {int: 1, float: 1.0, str: "1", bool: True, dict: {}}
 
 
-def _kind(node: ast.expr, kinds: Mapping[str, Kind]) -> Kind:
-    """The kind of a value of a pattern."""
-    match node:
-        case ast.Name(id=name):
-            return kinds.get(name)
-        case ast.Constant(value=value):
-            return type(value)
-        case ast.Compare() | ast.BoolOp() | ast.UnaryOp(op=ast.Not()):
-            return bool
-        case ast.UnaryOp(operand=operand):
-            return _kind(operand, kinds)
-        case ast.BinOp(left=left, op=op, right=right):
-            both = _common((_kind(left, kinds), _kind(right, kinds)))
-            return float if both is int and isinstance(op, ast.Div) else both
-        case ast.IfExp(body=one, orelse=other):
-            return _common((_kind(one, kinds), _kind(other, kinds)))
-        case ast.Call(func=ast.Name(id=name), args=arguments):
-            of = _common(_kind(each, kinds) for each in arguments)
-            return _CALLS[name] if name in _CALLS else of.items if isinstance(of, Array) and name != "sorted" else of
-        case ast.Subscript(value=whole, slice=index):
-            of = _kind(whole, kinds)
-            return of.items if isinstance(of, Array) and not isinstance(index, ast.Slice) else of
-        case ast.List(elts=items):
-            return Array(_common(_kind(each, kinds) for each in items))
-        case ast.ListComp(elt=item):
-            return Array(_kind(item, kinds))
-    return None
+def _sample(kind: Kind) -> Any:
+    return [_sample(kind.items or int)] * 2 if isinstance(kind, Array) else _SAMPLES.get(kind)
+
+
+@cache
+def _kind(pattern: str, kinds: tuple[Kind, ...]) -> Kind:
+    """The kind of what a pattern gives: that of its value for samples of the operands, if it is always the same."""
+    found = set()
+    for each in _ANY if None in kinds else (None,):
+        values = dict(zip(LETTERS, (_sample(kind or each) for kind in kinds), strict=False))
+        with suppress(OwnError):
+            found.add(kind_of(evaluate(pattern, values)))
+    return found.pop() if len(found) == 1 else None
 
 
 # -- trees ------------------------------------------------------------------------------------------------------------

@@ -58,7 +58,8 @@ class Variables:
         for part in model.everything():
             if part.entity.kind == "SetVariable" and part.outer is not None:
                 self._add_set(part, part.outer)
-            elif part.parts and director_of(part.entity) is not None:  # a transparent composite never reads such a port
+            elif part.role == "machine" or (part.parts and director_of(part.entity) is not None):
+                # A transparent composite never reads such a port.
                 for name, said in part.entity.properties.items():
                     path = f"{part.entity.name}.{name}"
                     if said.kind == "PortParameter" and part.outer is not None and part.outer.entity.links.get(path):

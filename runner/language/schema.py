@@ -196,7 +196,7 @@ def _part(base: type, known: Mapping[str, type]) -> Schema:
         "description": first_sentence(doc_of(base)),
         "properties": {"type": {"anyOf": [_choice(known), ref("expression")]}},
         "required": ["type"],
-        "allOf": _by_type(known, part_name(base)),
+        **({"allOf": _by_type(known, part_name(base))} if known else {}),
     }
 
 

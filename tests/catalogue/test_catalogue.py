@@ -329,7 +329,8 @@ def test_a_part_is_imported_when_a_model_names_it(site: Path) -> None:
         objective_of("AcmeBomb")
     assert str(caught.value) == (
         "m.yaml:5:42: error: a.objective: part 'AcmeBomb' of the package 'acme-bomb' cannot be loaded: "
-        "SystemExit: boom; its entry point in the group epicycle.parts is AcmeBomb = acme_bomb:AcmeBomb; fix or uninstall 'acme-bomb'\n"
+        "SystemExit: boom; its entry point in the group epicycle.parts is AcmeBomb = acme_bomb:AcmeBomb; fix or "
+        "uninstall 'acme-bomb'\n"
         "    5 |   a: {type: RobustController, objective: {type: AcmeBomb}, solver: {type: Casadi}}\n"
         "      |                                          ^^^^^^^^^^^^^^^^"
     )

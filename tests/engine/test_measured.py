@@ -120,7 +120,7 @@ def test_metrics_computed_from_others() -> None:
         ("a: {take: mean}", "metric 'a' has no port"),
         ("a: {of: []}", "metric 'a' has no port"),
         ("a: {of: silent.output, take: mean, across: sum, interval: 0.9}", "metric a: 'interval' cannot be used with"),
-        ("a: {of: silent.output, across: product}", "metric a, across: 'product' is not one of"),
+        ("a: {of: silent.output, across: product}", "metric a.across: 'product' is not one of"),
     ],
 )
 def test_metrics_that_are_wrong(metrics: str, message: str) -> None:

@@ -193,7 +193,7 @@ def test_every_key_of_the_language_says_what_it_is() -> None:
         ("model: m\nactors: {a: {type: Robot, anything: [1]}}", []),  # a composite, from this file or another
         ("model: m\nactors: {a: {type: other_package.Lidar}}", []),
         ("model: m\nactors: {a: {type: 3}}", ["$.actors.a.type"]),
-        ("model: m\nactors: {a: {type: Vehicle, start: [1]}}", ["$.actors.a.start"]),
+        ("model: m\nactors: {a: {type: Clock, period: []}}", ["$.actors.a.period"]),
         ("model: m\nactors: {a: {type: Vehicle, start: [1, 2 m]}}", []),
         (
             "model: m\nactors: {a: {type: RobustController, objective: {type: Inform, rnge: 3}}}",

@@ -11,12 +11,14 @@ from __future__ import annotations
 
 import math
 from itertools import product
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 
 from .compiled import Array
-from .horizon import REACH_GOAL, HorizonProblem
+
+REACH_GOAL, INFORM = 0, 1  # the kinds of objectives: eq. (2), eq. (5)
+Posed: TypeAlias = Any  # a ``HorizonProblem``, whose cost and constraints are these definitions
 
 _TINY = 1e-18  # m^2; gives a root a slope also at zero, and changes it by less than 1e-9 m
 
@@ -165,7 +167,7 @@ def mutual_information(own: Any, points: Any, weights: Any, variance: Any, other
     return -(weights * np.log((weights * density).sum(axis=1))).sum()
 
 
-def objective(problem: HorizonProblem, positions: Any, positive: Any = _positive) -> Any:
+def objective(problem: Posed, positions: Any, positive: Any = _positive) -> Any:
     """The objective: the sum of f0 of eq. (2), in m^2; or of eq. (5) over all targets, in nats, 0 while none is known.
 
     The sum of the informations is that of all targets together: they are independent, and each has its own
@@ -183,12 +185,12 @@ def objective(problem: HorizonProblem, positions: Any, positive: Any = _positive
     return total
 
 
-def targets(problem: HorizonProblem) -> Any:
+def targets(problem: Posed) -> Any:
     """The positions (T, N, 2) of the obstacles that the objective of eq. (5) is about: the first ones."""
     return problem.obstacle_mean[: len(problem.sigma_positions) // max(len(problem.sigma_weights), 1)]
 
 
-def constraints(problem: HorizonProblem, positions: Any, decided: int = 2) -> Any:
+def constraints(problem: Posed, positions: Any, decided: int = 2) -> Any:
     """f3, f4 of each obstacle, f5 of each peer with their margins alpha * sigma, and in space f7, in m: satisfied where
     <= 0.
 
@@ -207,12 +209,12 @@ def constraints(problem: HorizonProblem, positions: Any, decided: int = 2) -> An
     return np.stack(rows)[:, decided:]
 
 
-def driven(problem: HorizonProblem, controls: Any) -> tuple[Any, Any]:
+def driven(problem: Posed, controls: Any) -> tuple[Any, Any]:
     """The ``dynamics`` of a problem: positions and velocities (N, d) at steps 1..N under controls (N, d)."""
     return dynamics(problem.position, problem.velocity, controls, problem.period)
 
 
-def violations(problem: HorizonProblem, controls: Array) -> Array:
+def violations(problem: Posed, controls: Array) -> Array:
     """The ``constraints`` of a problem under controls (N, d)."""
     values: Array = constraints(problem, driven(problem, controls)[0])
     return values

@@ -13,11 +13,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from . import definitions
 from .compiled import Array, kernel
+from .definitions import INFORM, REACH_GOAL, driven, f1, f2
 from .mutual_information import pairwise_distance
 
-REACH_GOAL = 0
-INFORM = 1
 TOLERANCE = 1e-6  # m; smaller violations count as none
 FAR = 1e6  # m; a tube without bound would be inf - inf to some solvers; this one is out of reach
 
@@ -79,8 +79,6 @@ class HorizonProblem(NamedTuple):
 
     def cost(self, controls: Any, positive: Callable[[Any], Any] | None = None) -> Any:
         """What is to be minimised; ``positive`` may replace max(0, .)."""
-        from . import definitions
-
         more = {} if positive is None else {"positive": positive}
         return definitions.objective(self.weighed(), definitions.driven(self, controls)[0], **more)
 
@@ -98,14 +96,10 @@ class HorizonProblem(NamedTuple):
 
     def constraints(self, controls: Any) -> Any:
         """f3 to f5 with their margins, and f7, m: satisfied where <= 0."""
-        from . import definitions
-
         return within_reach(definitions.violations(self, controls).ravel())
 
     def limits(self, controls: Any) -> Any:
         """f1 of all speeds but the first, which is decided already, and f2."""
-        from .definitions import driven, f1, f2
-
         speeds = f1(driven(self, controls)[1][1:], self.max_speed, self.climb_speed)
         return np.concatenate([speeds, f2(controls, self.max_acceleration, self.climb_acceleration)])
 

@@ -24,7 +24,8 @@ from .constraints import (
     subjects,
     term,
 )
-from .horizon import REACH_GOAL, HorizonProblem
+from .definitions import REACH_GOAL
+from .horizon import HorizonProblem
 from .mutual_information import informed, new_points, point_columns
 from .newton import add, clear, control_column, stage_columns, step_column, velocity_column
 from .terms import smoothed, stay_near

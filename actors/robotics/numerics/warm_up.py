@@ -16,7 +16,8 @@ import numpy as np
 
 from .barrier import solve
 from .compiled import config, folder
-from .horizon import INFORM, HorizonProblem
+from .definitions import INFORM
+from .horizon import HorizonProblem
 from .mutual_information import pairwise_distance
 from .reachability import expected_target, peer_tubes, standing_plan
 from .ukf import constant_velocity, fuse_images, predict_and_fuse, sigma_points

@@ -49,7 +49,7 @@ def test_declared_on_a_port() -> None:
     assert type_name(Rows.input.type) == "array[n, 2]"
     assert repr(Rows("a").outputs["output"]) == "<output port a.output: array[2]>"
     assert pickle.loads(pickle.dumps(Rows.output.type)) == shaped(np.ndarray, (2,))
-    assert type_name(Vehicle.acceleration.type) == "array[2]"
+    assert type_name(Vehicle.acceleration.type) == "array[n]"
 
 
 TEXTS: dict[str, Any] = {

@@ -223,7 +223,7 @@ def test_unions(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     "java",
     [
-        f"{LIB}hoc.Case", f"{LIB}hoc.MultiInstanceComposite", f"{LIB}hoc.ThreadedComposite", f"{LIB}PublisherTest",
+        f"{LIB}hoc.Case", f"{LIB}hoc.MultiInstanceComposite", f"{LIB}hoc.ThreadedComposite",
         f"{LIB}SubscriptionAggregator", "ptolemy.domains.sdf.lib.Chop", "ptolemy.domains.de.lib.EventButton",
         "ptolemy.domains.de.test.CancelFireAtTest",
     ],

@@ -23,6 +23,7 @@ GIVEN: dict[str, dict[str, object]] = {
     "Expression": {"expression": "2 * x"},
     "Pulse": {"indexes": "{0}"},
     "NonStrictTest": {"correctValues": "{1}"},
+    "PublisherTest": {"correctValues": "{1}"},
     "Test": {"correctValues": "{1}"},
     "SetVariable": {"variableName": "P"},
     "Sequence": {"repeat": "false"},
