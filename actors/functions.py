@@ -6,7 +6,7 @@ import inspect
 import math
 import typing
 from bisect import bisect_right
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from importlib.metadata import entry_points
 from types import UnionType
 from typing import Any
@@ -28,7 +28,6 @@ from .core import (
     token_type,
 )
 from .expression import FormulaParameter
-from .matching import matched
 
 FUNCTION_GROUP = "epicycle.functions"
 _KINDS: dict[str, Any] = {"number": float, "truth value": bool, "text": str, "any value": Any}
@@ -49,9 +48,8 @@ class Expression(Actor):
     ``${...}`` is replaced by the text of its value, so write a value that may be negative in parentheses: ``(${a}) **
     2``.
 
-    Nothing is sent before every input has had a token.  Where the inputs keep their tokens, as in Ptolemy, each token
-    is used once: the k-th tokens of all inputs together.  Ptolemy: ``Expression``, and most actors that compute one
-    token from another: ``input[index]`` is its ``ArrayElement``.
+    Nothing is sent before every input has had a token.  Ptolemy: ``Expression``, and most actors that compute one token
+    from another: ``input[index]`` is its ``ArrayElement``.
     """
 
     output: OutputPort[Any] = OutputPort(float, doc="the value of the expression")
@@ -61,7 +59,6 @@ class Expression(Actor):
         str,
         None,
         choices=tuple(_KINDS),
-        ptolemy="any value",
         doc="type of the value; if left out, a truth value for a comparison, a number otherwise",
     )
     hold = Parameter(bool, True, doc="whether an input without a token is used with its latest one")
@@ -74,7 +71,7 @@ class Expression(Actor):
     def own_ports(self) -> dict[str, InputPort[Any] | OutputPort[Any]]:
         known = ("time", "iteration") if self.iteration else ("time",)
         names = [name for name in self.expression.names if name not in known]
-        return {name: InputPort(ptolemy={"keep": True}, doc="a name in the expression") for name in names}
+        return {name: InputPort(doc="a name in the expression") for name in names}
 
     def initialize(self) -> None:
         self._ports = list(self.inputs.values())
@@ -82,9 +79,12 @@ class Expression(Actor):
         self._count = 0
 
     def fire(self) -> None:
-        keeps = any(port.keep for port in self._ports)
-        for values in matched(self._ports) if keeps else self._latest.rounds():
+        for values in self.rounds():
             self.output.send(self._value(values))
+
+    def rounds(self) -> Iterable[dict[str, Any]]:
+        """The tokens to evaluate it for, by the names of the inputs."""
+        return self._latest.rounds()
 
     def _value(self, values: dict[str, Any]) -> Any:
         formula, values["time"] = self.expression, self.now
@@ -233,7 +233,6 @@ class LookupTable(Actor):
         str,
         "error",
         choices=("error", "nearest", "nothing"),
-        ptolemy="nothing",
         doc="what is sent for an input outside the table",
     )
 

@@ -9,8 +9,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from epicycle.actors import ParameterError, declared_parameters
-from epicycle.runner.catalogue import built_in
 
+from ..dialect import known_types
 from .budget import spend
 from .counterpart import UNSAID, Counterpart, ParameterSaid
 from .entities import Entity, Property
@@ -140,7 +140,7 @@ class Actor:
 
     def _is_default(self, name: str, value: object) -> bool:
         """Whether our actor has this value by default under a director with ``like: ptolemy``."""
-        kind = built_in().actors.get(self.row.type)
+        kind = known_types().actors.get(self.row.type)
         parameter = None if kind is None or "type" in self.values else declared_parameters(kind).get(name)
         if parameter is None or parameter.required or (isinstance(value, str) and "${" in value):
             return False
@@ -148,7 +148,7 @@ class Actor:
             found = parameter.convert(value)
         except ParameterError:
             return False
-        default = parameter.ptolemy_value if parameter.differs else parameter.default_value
+        default = parameter.default_value
         return isinstance(found, (bool, int, float, str)) and type(found) is type(default) and found == default
 
     def _limit(self, name: str) -> None:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from epicycle import actors
 from epicycle.actors import declared_parameters
 
+from ..generators import LAWS
 from .special import Special, finite_stop
 
 if TYPE_CHECKING:
@@ -60,8 +61,11 @@ def generator(actor: Actor) -> None:
     """The numbers of Java's generators, if the model fixes them by its own seed or the shared one."""
     own, shared = actor.get("privateSeed"), actor.get("seed", actor.seed)
     kind = "DRand" if ".colt." in actor.entity.java else "JavaRandom"
+    law = actor.values.get("distribution", {}).get("type", "Exponential")  # which a PoissonClock draws
     if (made := actor.text("generatorClass", "DRand")) != "DRand":
         actor.notes.note(f"{actor.path}.generatorClass = {made!r} has no counterpart; the numbers will differ")
+    elif law not in LAWS and (own or shared):
+        actor.notes.note(f"{actor.path}: the numbers of its {law} distribution will differ")
     elif isinstance(own, int) and not isinstance(own, bool):
         actor.values["generator"] = {"type": kind, "seed": own}
     elif isinstance(shared, int) and shared:

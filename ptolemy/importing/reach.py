@@ -6,8 +6,8 @@ from collections import Counter
 from collections.abc import Iterator
 
 from epicycle.actors import InputPort, declared_ports
-from epicycle.runner.catalogue import built_in
 
+from ..dialect import known_types
 from .budget import spend
 from .counterpart import Counterpart
 from .directors import director_of, fires_whole
@@ -42,7 +42,7 @@ def _idle(
         row = conversion.rows.get(id(child))
         if row is None or row.is_view or id(child) in conversion.idle:
             continue
-        kind = built_in().actors.get(row.type)
+        kind = known_types().actors.get(row.type)
         if kind is None:
             continue
         if row.needs and not any(is_fed(conversion, composite, child, name, counting) for name in row.needs):

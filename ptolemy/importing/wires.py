@@ -7,8 +7,8 @@ from itertools import pairwise
 from typing import Any
 
 from epicycle.actors import declared_ports
-from epicycle.runner.catalogue import built_in
 
+from ..dialect import known_types
 from .entities import Entity
 from .modes import is_machine
 from .parts import Converting, CountsEnds, Level
@@ -77,7 +77,7 @@ def _sends_by_channel(conversion: Converting, level: Level, end: End) -> bool:
     if part is None or part.row is None or end.port not in part.row.ports:
         return False
     said = part.row.ports[end.port]
-    kind = built_in().actors.get(part.row.type)
+    kind = known_types().actors.get(part.row.type)
     if said.face.direction == "input" or kind is None:
         return False
     port = declared_ports(kind).get(said.ours)

@@ -18,7 +18,7 @@ from epicycle.actors import (
     unknown_parameter,
 )
 
-from ..graph import LIKE, TIES, Rules
+from ..catalogue import LIKE
 from ..language import CompositeText, PartText, Setting, Settings, Values
 from ..text import (
     RAISE_IT,
@@ -140,9 +140,8 @@ class Settler:
         names: dict[str, object],
         position: Position,
         path: str,
-        rules: Rules,
     ) -> dict[str, object] | None:
-        """Converted values for a Configurable class, with defaults by the rules; None if some are wrong."""
+        """Converted values for a Configurable class; None if some are wrong."""
         declared = declared_parameters(cls)
         before, complete = len(self.problems), True
         result: dict[str, object] = {}
@@ -154,9 +153,7 @@ class Settler:
                 node, known, scope = setting.node, self.values.outside, ""
                 outside[name] = setting.position
             if node is None:
-                if parameter.differs and rules.are_ptolemys:
-                    result[name] = parameter.ptolemy_value
-                elif parameter.required:
+                if parameter.required:
                     self._tell_missing(f"{label}: {cls.__name__}", name, parameter.doc, position, path)
                 continue
             value = self.values.of(node, known, f"{label}.{name}", scope)
@@ -256,7 +253,6 @@ def drift(value: object) -> float:
 OF_DIRECTORS: dict[str, Callable[[Any], Any]] = {
     "start": lambda start: None if start is None else local_nanoseconds(start),
     "drift": drift,
-    "ties": TIES.convert,
     "like": LIKE.convert,
 }
 

@@ -57,7 +57,6 @@ class _Weaver:
         self.made = made
         self.draft = made.draft
         self.graph = made.draft.graph
-        self.known = made.known
         self.settler = made.settler
         self.problems = made.problems
         self.paths = Paths(made.draft)
@@ -69,8 +68,7 @@ class _Weaver:
             return
         is_model = cls in (CompositeAspect, CompositeExecutionAspect)
         given = {key: entry for key, entry in part.values.items() if not is_model or key in OWN}
-        rules = self.graph.rules_at(name)
-        values = self.settler.configuration(f"aspect {name}", cls, given, names, part.position, name, rules)
+        values = self.settler.configuration(f"aspect {name}", cls, given, names, part.position, name)
         if not part.at:
             hint = "add 'at:' with ports or patterns"
             self.problems.add(f"aspect {name} has no 'at'", part.position, hint, scope=scope)
@@ -103,7 +101,7 @@ class _Weaver:
 
     def _type(self, name: str, scope: str, part: PartText) -> type[Aspect] | None:
         """The type of an aspect; None, and a problem, if it cannot have that type."""
-        known, wanted = self.known, part.type.text
+        known, wanted = self.made.known_at(name), part.type.text
         if wanted in known.broken:
             return None
         try:

@@ -9,7 +9,7 @@ from epicycle.actors import Actor, UnitError, in_si, parse_unit
 from epicycle.actors.expression import CONSTANTS, FUNCTIONS
 from epicycle.aspects import Aspect
 
-from ..graph import LIKE, PTOLEMY, TIES
+from ..catalogue import LIKE, dialects
 from ..text import (
     MAX_SEED,
     NAME,
@@ -46,7 +46,6 @@ from .fields import (
     number,
     one_or_more,
     ref,
-    schema_of,
 )
 from .fields import NAME as NAME_PATTERN
 from .metrics import METRICS
@@ -230,18 +229,15 @@ def parts(kind: str, definition: str = "", *, derived: bool = False) -> Shape:
 # -- composite classes --------------------------------------------------------------------------------------------
 
 
-def _rules(**defaults: str) -> dict[str, Key]:
-    """The rules of a director."""
-    said = {"ties": TIES, "like": LIKE}
-    return {
-        key: Key(node_as(schema_of(each)), f"{each.doc[:1].upper()}{each.doc[1:]} (default: {defaults[key]}).")
-        for key, each in said.items()
-    }
+def _like(default: str) -> dict[str, Key]:
+    """The dialect of a director."""
+    doc = f"{LIKE.doc[:1].upper()}{LIKE.doc[1:]} (default: {default})."
+    return {"like": Key(node_as({"type": "string"}), doc)}
 
 
 MODEL_DIRECTOR = Construct(
     "The rules of the model's director, and of the directors inside that do not override them.",
-    _rules(ties="declared", like="epicycle"),
+    _like("epicycle"),
 )
 DIRECTOR = Construct(
     "A separate director, with a local clock.",
@@ -252,7 +248,7 @@ DIRECTOR = Construct(
         "drift": Key(
             node_as(computed("number", unit="1")), "The rate of local time; 1 is as fast as the time outside."
         ),
-        **_rules(ties="as outside", like="as outside"),
+        **_like("as outside"),
     },
 )
 DOC = Key(TEXT, "What it shows or does.")
@@ -386,8 +382,8 @@ RUN = Construct(
 
 def _model_director(reader: NodeReader, node: Node, what: str) -> dict[str, Entry]:
     """What a file declares about the model's director."""
-    if isinstance(node, Scalar) and node.value == PTOLEMY:
-        reader.problems.add(f"{what} is not a mapping", node.position, f"write 'director: {{like: {PTOLEMY}}}'")
+    if isinstance(node, Scalar) and node.value in dialects():
+        reader.problems.add(f"{what} is not a mapping", node.position, f"write 'director: {{like: {node.value}}}'")
         return {}
     if isinstance(node, Mapping):
         for key in [key for key in ("start", "drift") if key in node.entries]:

@@ -1,0 +1,42 @@
+"""``like: ptolemy``."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from functools import cache
+from importlib import import_module
+from typing import Any
+
+from epicycle.actors import Actor
+from epicycle.aspects import Aspect
+from epicycle.runner.catalogue import Catalogue, Dialect, built_in
+
+
+class Ptolemy(Dialect):
+    """The rules of Ptolemy II, and its actors where they differ from Epicycle's."""
+
+    name = "ptolemy"
+    is_strict = True
+
+    @classmethod
+    def types(cls) -> Iterable[type]:
+        modules = (import_module(f".{each}", __package__) for each in ("computing", "generators", "machine", "timing"))
+        known = [each for module in modules for each in vars(module).items()]
+        return [cls for name, cls in known if _is_ours(name, cls)]
+
+    @classmethod
+    def director(cls) -> Any:
+        from .posted import PostedDirector
+
+        return PostedDirector
+
+
+@cache
+def known_types() -> Catalogue:
+    """Epicycle's own actors and aspects, as they are under ``like: ptolemy``."""
+    return built_in().like(Ptolemy)
+
+
+def _is_ours(name: str, found: object) -> bool:
+    is_type = isinstance(found, type) and issubclass(found, (Actor, Aspect))
+    return is_type and found.__module__.startswith(__package__) and not name.startswith("_")
