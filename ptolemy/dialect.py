@@ -20,7 +20,8 @@ class Ptolemy(Dialect):
 
     @classmethod
     def types(cls) -> Iterable[type]:
-        modules = (import_module(f".{each}", __package__) for each in ("computing", "generators", "machine", "timing"))
+        files = ("computing", "dictionary", "generators", "machine", "timing")
+        modules = (import_module(f".{each}", __package__) for each in files)
         known = [each for module in modules for each in vars(module).items()]
         return [cls for name, cls in known if _is_ours(name, cls)]
 

@@ -12,6 +12,8 @@ from epicycle.actors import (
     Actor,
     Configurable,
     EpicycleError,
+    InputPort,
+    OutputPort,
     Parameter,
     elementary,
     rounds,
@@ -161,6 +163,26 @@ class Random(_Drawing, actors.Random):
 
 class VaryingRandom(_Drawing, actors.VaryingRandom):
     """A ``Random`` whose distribution changes during the run."""
+
+
+class Rician(_Drawing):
+    """Sends, for each trigger, how far a point is from the origin whose two coordinates are drawn from normal laws.
+
+    Ptolemy: ``Rician``.
+    """
+
+    trigger: InputPort[Any] = InputPort(multi=True, doc="when to send")
+    output = OutputPort(float, doc="the drawn distance")
+
+    x_mean = Parameter(float, 0.0, doc="the mean of the first coordinate")
+    y_mean = Parameter(float, 0.0, doc="the mean of the second coordinate")
+    standard_deviation = Parameter(float, 1.0, min=0, doc="the standard deviation of both")
+
+    def fire(self) -> None:
+        for _ in rounds(self.trigger):
+            x = self.random.normal(self.x_mean, self.standard_deviation)
+            y = self.random.normal(self.y_mean, self.standard_deviation)
+            self.output.send(math.sqrt(x * x + y * y))
 
 
 class PoissonClock(_Drawing, actors.PoissonClock):

@@ -7,19 +7,21 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
 from itertools import count, pairwise
+from typing import NamedTuple
 
 from .budget import spend
-from .directors import director_of
-from .entities import Entity, Link, Port, Property, Relation, kind
+from .entities import Entity, Port, Property, director_of, is_text
 from .notes import Notes
+from .scope import Scope
+from .syntax import ExpressionError
 
 _LINK = 5  # steps
+_FIRST_LINK = 1_000_000  # after all links of the file
+_CHECKS = dict.fromkeys(("PublisherTest", "PublisherNonStrictTest"), "Publisher")  # which stay
 
 
-@dataclass(frozen=True)
-class _Terminal:
+class _Terminal(NamedTuple):
     """A Publisher or Subscriber, or a port of that kind: its place, from the model down, and its channel."""
 
     around: tuple[Entity, ...]
@@ -28,73 +30,75 @@ class _Terminal:
     is_global: bool
     is_source: bool
 
-    @property
-    def path(self) -> str:
-        return ".".join([*(each.name for each in self.around[1:]), self.name])
-
-    @property
-    def region(self) -> Entity:
-        """The composite whose director governs it."""
-        return next((each for each in reversed(self.around) if director_of(each) is not None), self.around[0])
-
     def hears(self, source: _Terminal) -> bool:
         """Whether this subscriber receives what ``source`` publishes."""
-        is_near = self.region is source.region or source.is_global or self.is_global
+        is_near = _region(self.around) is _region(source.around) or source.is_global or self.is_global
         return source.channel == self.channel and is_near
+
+
+def _region(around: tuple[Entity, ...]) -> Entity:
+    """The composite whose director governs a place."""
+    return next((each for each in reversed(around) if director_of(each) is not None), around[0])
 
 
 def join_channels(model: Entity, notes: Notes) -> None:
     """Join the relations of the publishers and subscribers of each channel, and remove these actors."""
-    terminals = list(_terminals(model, ()))
+    terminals = list(_terminals(model, (), Scope(model)))
     sources = [each for each in terminals if each.is_source]
-    orders = count(1_000_000)  # after all links of the file
+    orders = count(_FIRST_LINK)
     for each in terminals:
         spend(len(sources))
         heard = [] if each.is_source else [source for source in sources if each.hears(source)]
         for source in heard:
-            shared = _shared(source.around, each.around)
-            _lead(source, shared, orders)
-            _lead(each, shared, orders)
+            shared = sum(1 for one, other in zip(source.around, each.around, strict=False) if one is other)
+            for end in (source, each):
+                _lead(end, end.around[shared - 1 :], orders)
         if not heard and not each.is_source:
-            notes.error(f"{each.path} receives nothing: no Publisher within reach has its channel")
+            path = ".".join([*(composite.name for composite in each.around[1:]), each.name])
+            notes.error(f"{path} receives nothing: no Publisher within reach has its channel")
     for each in terminals:
-        if "." not in each.name:
-            home = each.around[-1]
-            del home.entities[each.name]
+        if "." not in each.name and each.around[-1].entities[each.name].kind not in _CHECKS:
+            del each.around[-1].entities[each.name]
             for port in ("input", "output"):
-                home.links.pop(f"{each.name}.{port}", None)
+                each.around[-1].links.pop(f"{each.name}.{port}", None)
 
 
-def _terminals(composite: Entity, around: tuple[Entity, ...]) -> Iterator[_Terminal]:
+def _terminals(composite: Entity, around: tuple[Entity, ...], scope: Scope) -> Iterator[_Terminal]:
     around = (*around, composite)
     for child in composite.entities.values():
-        places: list[tuple[str, Property]] = [(f"{child.name}.{port.name}", port) for port in child.ports.values()]
-        for name, said in [(child.name, child), *places]:
-            word = kind(said).removesuffix("Port") if said is not child else kind(said)
-            if word in ("Publisher", "Subscriber") and (said is child or kind(said) == f"{word}Port"):
-                channel = (said.text("channel") or "channel1").strip().strip('"')
-                is_global = (said.text("global") or "false").strip() == "true"
-                yield _Terminal(around, name, channel, is_global, word == "Publisher")
-        yield from _terminals(child, around)
+        inner = Scope(child, scope)
+        places: dict[str, tuple[Property, str]] = {child.name: (child, _CHECKS.get(child.kind, child.kind))}
+        places |= {f"{child.name}.{name}": (port, port.kind.removesuffix("Port")) for name, port in child.ports.items()}
+        for name, (said, word) in places.items():
+            if word in ("Publisher", "Subscriber") and (said is child or said.kind != word):
+                is_global = said.word("global") == "true"
+                yield _Terminal(around, name, _channel(said, inner), is_global, word == "Publisher")
+        yield from _terminals(child, around, inner)
 
 
-def _shared(one: tuple[Entity, ...], other: tuple[Entity, ...]) -> int:
-    """How many composites two places have in common."""
-    return sum(1 for a, b in zip(one, other, strict=False) if a is b)
+def _channel(said: Property, scope: Scope) -> str:
+    """The channel of a Publisher or Subscriber, or of a port that is one."""
+    text, inner = (said.text("channel") or "channel1").strip(), Scope(said, scope)
+    if text.startswith('"') and not is_text(said.properties["channel"]):
+        try:
+            return str(inner.value(text))
+        except ExpressionError:
+            pass
+    return inner.filled(text.strip('"'))
 
 
-def _lead(terminal: _Terminal, shared: int, orders: Iterator[int]) -> None:
-    """Link a terminal to the relation of its channel in the innermost shared composite."""
+def _lead(terminal: _Terminal, way: tuple[Entity, ...], orders: Iterator[int]) -> None:
+    """Link a terminal to the relation of its channel, through the composites between."""
     relation = f"channel {terminal.channel}"
-    way = terminal.around[shared - 1 :]
     for composite in way:
-        composite.relations.setdefault(relation, Relation(relation))
+        composite.link(relation, 0)
+    inner = way[-1]
     if "." in terminal.name:
-        _link(way[-1], terminal.name, relation, orders)
-    else:
-        for link in _links(terminal):
+        _link(inner, terminal.name, relation, orders)
+    for port in ("input", "output"):
+        for link in inner.links.get(f"{terminal.name}.{port}", ()):
             if link.relation is not None and link.relation != relation:
-                way[-1].joined.append((relation, link.relation, link.order))
+                inner.joined.append((relation, link.relation, link.order))
                 link.relation = relation
     for outer, inner in pairwise(way):
         port = re.sub(r"\W+", "_", terminal.channel) + ("_out" if terminal.is_source else "_in")
@@ -106,12 +110,7 @@ def _lead(terminal: _Terminal, shared: int, orders: Iterator[int]) -> None:
 
 def _link(composite: Entity, port: str, relation: str, orders: Iterator[int]) -> None:
     """Link a port to a relation, unless it is linked already."""
-    links = composite.links.setdefault(port, [])
+    links = composite.links.get(port, ())
     spend(_LINK + len(links))
     if all(link.relation != relation for link in links):
-        links.append(Link(port, relation, 0, next(orders)))
-
-
-def _links(terminal: _Terminal) -> list[Link]:
-    known = terminal.around[-1].links
-    return [link for port in ("input", "output") for link in known.get(f"{terminal.name}.{port}", [])]
+        composite.link(relation, next(orders), port)

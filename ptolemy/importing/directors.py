@@ -5,65 +5,51 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from .actors import is_layout, plain, seconds
-from .entities import Entity, Property, kind
+from .entities import Property, is_layout
 from .notes import Notes
-from .reasons import why_not
 from .scope import Scope
 from .syntax import ExpressionError
+from .tables import WORDS, why_not
+from .translation import Code
+from .writing import plain, seconds
 
-_DE_LIKE = frozenset({"DEDirector", "DECQDirector"})
-_FIRED_WHOLE = frozenset({
-    "SDFDirector", "SROnceDirector", "SRDirector", "DDFDirector", "HDFDirector", "PSDFDirector", "FSMDirector",
-    "MultirateFSMDirector", "TMDirector", "GiottoDirector",
-})  # fmt: skip
-_IN_ITERATIONS = frozenset({"SDFDirector", "SRDirector", "SROnceDirector"})  # which a clock can start, even at the top
 NUMBERS = {"AUTO": -1, "UNBOUNDED": 0}  # Ptolemy's names for numbers of iterations
-_WITHOUT_EFFECT = frozenset({
-    "binCountFactor", "isCQAdaptive", "minBinCount", "maskImpliedFirings", "timeResolution", "verbose",
-    "allowDisconnectedGraphs", "allowRateChanges", "vectorizationFactor", "stopWhenQueueIsEmpty", "seed",
-    "constrainBufferSizes", "enforceMicrostepSemantics", "SuppressWarnings", "period", "AUTO", "UNBOUNDED",
-})  # fmt: skip
-_IN_REAL_TIME = frozenset({"synchronizeToRealTime", "timeScale", "realTime"})
-
-
-def director_of(entity: Entity) -> Property | None:
-    """The composite's own director, if it has one."""
-    found = [each for each in entity.properties.values() if kind(each).endswith("Director") and not is_layout(each)]
-    return found[-1] if found else None
 
 
 def fires_whole(director: Property) -> bool:
     """Whether it fires all actors in each iteration, even those that nothing triggers."""
-    return kind(director) in _FIRED_WHOLE
+    return director.kind in WORDS["directors that fire whole"]
 
 
-def said_of(director: Property, path: str, around: Scope, notes: Notes, *, of_model: bool) -> dict[str, Any]:
+def needs_word(director: Property) -> bool:
+    """Whether a model with this director can only be imported as one of DE."""
+    return director.kind in WORDS["directors in iterations"]
+
+
+def said_of(director: Property, path: str, around: Scope, notes: Notes, *, of_model: bool = False) -> dict[str, Any]:
     """The settings of a director, including its stop time in s."""
     found: dict[str, Any] = {}
     scope = Scope(director, around, NUMBERS)
-    if fires_whole(director) and (not of_model or kind(director) in _IN_ITERATIONS):
-        notes.note(f"{path}, a {kind(director)}: the actors inside fire by the rules of DE")
-    elif kind(director) not in _DE_LIKE:
+    if fires_whole(director) and (not of_model or needs_word(director)):
+        notes.note(f"{path}, a {director.kind}: the actors inside fire by the rules of DE")
+    elif director.kind not in WORDS["directors like DE"]:
         notes.error(f"{path} is a {director.java}, which has no counterpart{why_not(director.java)}")
     for name, said in director.properties.items():
-        if is_layout(said) or name in _WITHOUT_EFFECT:
+        if is_layout(said) or name in WORDS["settings without effect"]:
             continue
         try:
-            if name == "localClock" and said.text("clockDrift"):
-                found |= _drift(scope.value(said.text("clockDrift") or ""))
-            elif (
-                said.value is not None and said.value.strip() and not _note(name, scope.value_of(said), found, of_model)
-            ):
-                end = "run it with --realtime" if name in _IN_REAL_TIME else "has no counterpart"
+            if name == "localClock":
+                for drift in (said.properties.get(each) for each in ("clockDrift", "clockRate")):
+                    if drift is not None:
+                        _note("clockDrift", Scope(said, scope).value_of(drift), found, of_model)
+                        if isinstance(Scope(said, scope).meaning_of(drift), Code):
+                            notes.note(f"{path}.{name}.{drift.name} = {drift.value!r} keeps its initial value")
+            elif (said.value or "").strip() and not _note(name, scope.value_of(said), found, of_model):
+                end = "run it with --realtime" if name in WORDS["settings in real time"] else "has no counterpart"
                 notes.note(f"{path}.{name} = {said.value!r}: {end}")
         except (ExpressionError, ValueError, TypeError) as error:
             notes.note(f"{path}.{name} = {said.value!r}: {error}")
     return found
-
-
-def _drift(value: Any) -> dict[str, Any]:
-    return {} if value == 1.0 else {"drift": plain(value)}
 
 
 def _note(name: str, value: Any, found: dict[str, Any], of_model: bool) -> bool:
@@ -73,7 +59,7 @@ def _note(name: str, value: Any, found: dict[str, Any], of_model: bool) -> bool:
     elif name == "stopTime":
         found |= {} if value is None or math.isinf(value) or value > 1e300 else {"stop": float(value)}
     elif name == "clockDrift":
-        found |= _drift(value)
+        found |= {} if value == 1.0 else {"drift": plain(value)}
     elif name == "iterations":
         return of_model or value in (-1, 0, 1)
     else:

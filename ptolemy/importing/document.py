@@ -1,4 +1,7 @@
-"""Reading MoML: an XML file as a tree of elements with their lines; nothing is fetched or expanded.
+"""Reads a MoML file: its elements are carried out as they come; nothing is fetched or expanded.
+
+MoML is a list of instructions: an element creates what it names, or changes it if it exists.  An instance of a class
+that the file defines starts as a copy of it.
 
 A file of Ptolemy II names its DTD on the line before the first element.  That line is blanked, and any other part of a
 DTD is refused, so a file can neither define nor request entities.
@@ -8,7 +11,7 @@ from __future__ import annotations
 
 import codecs
 import re
-from dataclasses import dataclass, field
+from collections.abc import Mapping
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -17,10 +20,14 @@ from xml.sax.handler import ContentHandler
 
 from epicycle.actors import EpicycleError
 
+from .entities import COMPOSITE, Entity, Link, Port, Property, Relation, copied
+from .notes import Notes
+
 MAX_BYTES = 20_000_000
 MAX_ELEMENTS = 300_000
 MAX_DEPTH = 100
-
+MAX_ENTITIES = 20_000
+MAX_CHANNEL = 1000
 _DOCTYPE = re.compile(
     rb"""<!DOCTYPE\s+[\w.:-]+(?:\s+PUBLIC\s+(?:"[^"<>]*"|'[^'<>]*')|\s+SYSTEM)?(?:\s+(?:"[^"<>]*"|'[^'<>]*'))?\s*>"""
 )
@@ -34,23 +41,12 @@ class MomlError(EpicycleError):
     """A file that cannot be imported; the message states why and where."""
 
 
-@dataclass
-class Element:
-    """One element of the file."""
+def read_model(path: Path, notes: Notes) -> Entity:
+    """The model of a file; ``notes`` get what could not be done.  Raises ``MomlError``."""
+    # Imported here because no other command needs it.
+    from defusedxml.common import DefusedXmlException
+    from defusedxml.expatreader import DefusedExpatParser
 
-    tag: str
-    attributes: dict[str, str]
-    line: int
-    children: list[Element] = field(default_factory=list)
-    text: str = ""
-
-    def get(self, name: str) -> str | None:
-        """The value of an attribute, or None."""
-        return self.attributes.get(name)
-
-
-def read_document(path: Path) -> Element:
-    """The root element of a file; raises ``MomlError``."""
     try:
         with path.open("rb") as file:
             data = file.read(MAX_BYTES + 1)
@@ -58,34 +54,23 @@ def read_document(path: Path) -> Element:
         raise MomlError(f"{path} cannot be read: {getattr(error, 'strerror', None) or error}") from None
     if len(data) > MAX_BYTES:
         raise MomlError(f"{path} is larger than the maximum of {MAX_BYTES:,} bytes")
-    return parse_document(data, str(path))
-
-
-def parse_document(data: bytes, name: str) -> Element:
-    """The root element of a text; messages call it ``name``."""
-    # Imported here because no other command needs it.
-    from defusedxml.common import DefusedXmlException
-    from defusedxml.expatreader import DefusedExpatParser
-
-    data = _without_doctype(_decodable(data))
-    tree = _Tree(name)
+    builder = _Builder(str(path), notes)
     parser: Any = DefusedExpatParser(forbid_dtd=True)
-    parser.setContentHandler(tree)
+    parser.setContentHandler(builder)
     try:
-        parser.parse(BytesIO(data))
+        parser.parse(BytesIO(_without_doctype(_decodable(data))))
     except DefusedXmlException:
-        line = parser.getLineNumber()
         raise MomlError(
-            f"{name}:{line}: the file declares entities or its own DTD, which is not allowed\n"
+            f"{path}:{parser.getLineNumber()}: the file declares entities or its own DTD, which is not allowed\n"
             "   help: only a line like '<!DOCTYPE entity PUBLIC ...>' may precede the model"
         ) from None
     except SAXParseException as error:
-        raise MomlError(f"{name}:{error.getLineNumber()}: not well-formed XML: {error.getMessage()}") from None
+        raise MomlError(f"{path}:{error.getLineNumber()}: not well-formed XML: {error.getMessage()}") from None
     except (ValueError, LookupError) as error:  # an encoding unknown to Python
-        raise MomlError(f"{name}: not well-formed XML: {error}") from None
-    if tree.root is None:
-        raise MomlError(f"{name}: the file is empty")
-    return tree.root
+        raise MomlError(f"{path}: not well-formed XML: {error}") from None
+    if builder.root is None:
+        raise MomlError(f"{path}: the file is empty")
+    return builder.root
 
 
 def _decodable(data: bytes) -> bytes:
@@ -101,52 +86,191 @@ def _decodable(data: bytes) -> bytes:
 
 def _without_doctype(data: bytes) -> bytes:
     """The text with the line that names the DTD blanked, so that lines keep their numbers."""
-    start = data.find(b"<!DOCTYPE")
-    prolog = _PROLOG.match(data.removeprefix(codecs.BOM_UTF8))
-    if start < 0 or prolog is None or prolog.end() + (len(data) - len(data.removeprefix(codecs.BOM_UTF8))) != start:
-        return data
-    found = _DOCTYPE.match(data, start)
-    if found is None:
-        return data
-    return data[:start] + re.sub(rb"[^\n]", b" ", found[0]) + data[found.end() :]
+    mark = len(codecs.BOM_UTF8) if data.startswith(codecs.BOM_UTF8) else 0
+    prolog = _PROLOG.match(data, mark)
+    found = None if prolog is None else _DOCTYPE.match(data, prolog.end())
+    return data if found is None else data[: found.start()] + re.sub(rb"[^\n]", b" ", found[0]) + data[found.end() :]
 
 
-class _Tree(ContentHandler):
-    """Builds the tree, within limits on its size and depth."""
+class _Builder(ContentHandler):
+    """Makes the model; what is open are the things that elements inside belong to, or None to leave these out."""
 
-    def __init__(self, name: str) -> None:
+    def __init__(self, file: str, notes: Notes) -> None:
         super().__init__()
-        self.root: Element | None = None
-        self._name = name
-        self._open: list[Element] = []
-        self._count = 0
+        self.root: Entity | None = None
+        self._file, self._notes = file, notes
+        self._open: list[Property | None] = []
+        self._text = ""
+        self._elements = self._entities = self._links = 0
         self._locator: Any = None
 
     def setDocumentLocator(self, locator: Any) -> None:  # noqa: N802  the name is SAX's
         self._locator = locator
 
-    def _line(self) -> int:
-        return int(self._locator.getLineNumber() or 0)
-
     def startElement(self, name: str, attrs: Any) -> None:  # noqa: N802
-        self._count += 1
-        if self._count > MAX_ELEMENTS:
-            raise MomlError(f"{self._name}: more than the maximum of {MAX_ELEMENTS:,} elements")
+        self._elements += 1
+        if self._elements > MAX_ELEMENTS:
+            raise MomlError(f"{self._file}: more than the maximum of {MAX_ELEMENTS:,} elements")
         if len(self._open) >= MAX_DEPTH:
-            raise MomlError(f"{self._name}:{self._line()}: elements are nested deeper than {MAX_DEPTH} levels")
-        made = Element(name, dict(attrs.items()), self._line())
-        if self._open:
-            self._open[-1].children.append(made)
+            raise self._error(f"elements are nested deeper than {MAX_DEPTH} levels")
+        self._text = ""
+        said = dict(attrs.items())
+        if self.root is None and name != "group":
+            if name not in ("entity", "class", "model"):
+                raise self._error(f"<{name}> is not a model: MoML starts with <entity>")
+            self.root = self._made(name, self._name(name, said), said)
+            self._open.append(self.root)
+            return
+        around = self._open[-1] if self._open else None
+        if name == "group":
+            self._open.append(around)
+        elif isinstance(around, Entity):
+            self._open.append(self._in_entity(around, name, said))
         else:
-            self.root = made
-        self._open.append(made)
+            self._open.append(None if around is None else self._in_property(around, name, said))
 
     def endElement(self, name: str) -> None:  # noqa: N802
         self._open.pop()
+        around = self._open[-1] if self._open else None
+        if name == "doc" and isinstance(around, Entity):
+            around.doc = self._text.strip()
 
     def characters(self, content: str) -> None:
-        if self._open:
-            self._open[-1].text += content
+        self._text += content
 
     def skippedEntity(self, name: str) -> None:  # noqa: N802
-        raise MomlError(f"{self._name}:{self._line()}: unknown entity &{name};")
+        raise self._error(f"unknown entity &{name};")
+
+    def _error(self, text: str) -> MomlError:
+        return MomlError(f"{self._file}:{self._locator.getLineNumber()}: {text}")
+
+    def _tell(self, text: str) -> None:
+        self._notes.note(f"line {self._locator.getLineNumber()}: {text}")
+
+    def _name(self, tag: str, said: Mapping[str, str]) -> str:
+        if "name" not in said:
+            raise self._error(f"<{tag}> has no name")
+        return said["name"]
+
+    # -- entities and properties ------------------------------------------------------------------------------------
+
+    def _in_entity(self, entity: Entity, tag: str, said: Mapping[str, str]) -> Property | None:
+        """Apply an element to the entity that contains it; returns what elements inside it belong to."""
+        match tag:
+            case "property" | "director":  # the latter in the first version of MoML
+                return self._property(entity, tag, said)
+            case "port":
+                name = self._name(tag, said)
+                return self._about(entity.ports.setdefault(name, Port(name)), said)
+            case "relation":
+                name = self._name(tag, said)
+                return self._about(entity.relations.setdefault(name, Relation(name)), said)
+            case "entity" | "model" | "class":
+                return self._child(entity, tag, said)
+            case "link":
+                self._link(entity, said)
+            case "unlink":
+                self._unlink(entity, said)
+            case "deleteEntity":
+                entity.entities.pop(self._name(tag, said), None)
+                for port in [port for port in entity.links if port.rpartition(".")[0] == said["name"]]:
+                    del entity.links[port]
+            case "deleteRelation":
+                entity.relations.pop(self._name(tag, said), None)
+            case "deletePort" | "deleteProperty":
+                (entity.ports if tag == "deletePort" else entity.properties).pop(self._name(tag, said), None)
+            case "input" | "import":
+                self._tell(f"the file {said.get('source')!r} is not read")
+            case _ if tag not in ("configure", "display", "doc", "location", "rendition", "vertex"):
+                self._tell(f"<{tag}> is not supported and is left out")
+        return None
+
+    def _child(self, entity: Entity, tag: str, said: Mapping[str, str]) -> Entity | None:
+        name = self._name(tag, said)
+        *path, last = [name] if name.startswith(".") else name.split(".")
+        home = entity.down(path)
+        if home is None:
+            self._tell(f"{name!r}: there is no entity {'.'.join(path)!r}")
+            return None
+        kin = home.classes if tag == "class" else home.entities
+        if last not in kin or ("class" in said and last not in home.entities):
+            kin[last] = self._made(tag, last, said)
+        return kin[last]
+
+    def _made(self, tag: str, name: str, said: Mapping[str, str]) -> Entity:
+        """A new entity or class."""
+        java = said.get("extends") or said.get("class") or COMPOSITE
+        pattern = self._class(java)
+        self._entities += 1 if pattern is None else sum(1 for _ in pattern.everything())
+        if self._entities > MAX_ENTITIES:
+            raise self._error(f"more than the maximum of {MAX_ENTITIES:,} entities")
+        if "source" in said:
+            self._tell(f"{name}: the file {said['source']!r} is not read")
+        if pattern is None:
+            return Entity(name, java)
+        made = copied(pattern)
+        made.name = name
+        made.of_class = pattern.of_class if tag != "class" and pattern.of_class else pattern.name
+        return made
+
+    def _class(self, name: str) -> Entity | None:
+        """The class of that name visible inside the open entities; None if the file defines none."""
+        around = [each for each in self._open if isinstance(each, Entity)]
+        first, *parts = name.removeprefix(".").split(".")
+        if name.startswith("."):
+            return around[0].down(parts) if around and around[0].name == first else None
+        return next((found for each in reversed(around) if (found := each.down([first, *parts])) is not None), None)
+
+    def _property(self, owner: Property, tag: str, said: Mapping[str, str]) -> Property:
+        for name in self._name(tag, said).split("."):
+            owner = owner.properties.setdefault(name, Property(name))
+        return self._about(owner, said)
+
+    def _in_property(self, owner: Property, tag: str, said: Mapping[str, str]) -> Property | None:
+        """Apply an element to a property, port or relation."""
+        if tag in ("property", "director"):
+            return self._property(owner, tag, said)
+        if tag == "deleteProperty":
+            owner.properties.pop(said.get("name", ""), None)
+        elif tag == "entity" and "name" in said:  # a model inside an attribute
+            owner.properties.setdefault(said["name"], Property(said["name"]))
+        return None
+
+    def _about(self, owner: Property, said: Mapping[str, str]) -> Property:
+        owner.java = said.get("class") or owner.java
+        owner.value = said.get("value", owner.value)
+        return owner
+
+    # -- links ----------------------------------------------------------------------------------------------------
+
+    def _link(self, entity: Entity, said: Mapping[str, str]) -> None:
+        self._links += 1
+        port, relation = said.get("port"), said.get("relation")
+        place = _number(said.get("insertAt") or said.get("insertInside"))
+        if "relation1" in said and "relation2" in said:
+            entity.joined.append((said["relation1"], said["relation2"], self._links))
+        elif port is None:
+            self._tell("a link without a port is left out")
+        elif relation is not None and relation not in entity.relations:
+            self._tell(f"the link of {port} is left out: there is no relation {relation!r}")
+        elif place is not None and place > MAX_CHANNEL:
+            self._tell(f"the link of {port} is left out: its channel {place} is above the limit of {MAX_CHANNEL}")
+        else:
+            links = entity.links.setdefault(port, [])
+            links += [Link(None, 0) for _ in range((place or 0) - len(links))]
+            links.insert(len(links) if place is None else place, Link(relation, self._links))
+
+    def _unlink(self, entity: Entity, said: Mapping[str, str]) -> None:
+        links, relation = entity.links.get(said.get("port", ""), []), said.get("relation")
+        place = _number(said.get("index") or said.get("insideIndex"))
+        if "relation1" in said and "relation2" in said:
+            ends = {said["relation1"], said["relation2"]}
+            entity.joined = [pair for pair in entity.joined if {*pair[:2]} != ends]
+        elif place is not None and place < len(links):
+            del links[place]
+        elif relation is not None:
+            links[:] = [each for each in links if each.relation != relation]
+
+
+def _number(text: str | None) -> int | None:
+    return int(text) if text is not None and text.isdecimal() and len(text) < 7 else None

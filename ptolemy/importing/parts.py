@@ -1,128 +1,227 @@
-"""The state of the import: what is known about composites, and the results for their parts."""
+"""The parts of a model that is being imported: one for each entity, with what is known of it and what becomes of it."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
-from typing import Any, Protocol
+from typing import Any
 
-from .counterpart import Counterpart
-from .entities import Entity, kind
-from .names import Names
+from epicycle.actors import Actor as OwnActor
+
+from .budget import spend
+from .entities import Entity, Property, director_of
+from .names import Names, snake
 from .notes import Notes
-from .relations import End, Net, PortFace, Wiring
 from .scope import Scope
 from .syntax import ExpressionError
+from .table import UNSAID, Face, Row, row_of, row_of_type
+from .tables import WORDS
 from .writing import Flow
 
+_FACE = 5  # steps to look up a port, which is most of the work of wiring
+ASPECT_MODELS: frozenset[str] = WORDS["aspect models"]
+_SCHEDULERS: frozenset[str] = WORDS["schedulers"]
+_MACHINES: frozenset[str] = WORDS["machines"]
+_COMPOSITES: frozenset[str] = WORDS["composites"]
 
-@dataclass
+
+@dataclass(frozen=True)
+class End:
+    """One channel of a port at a net: of a part of the composite, or of the composite itself."""
+
+    part: Part
+    port: str
+    channel: int
+    is_own: bool  # of the composite itself
+    is_source: bool  # whether tokens come from here
+
+
+@dataclass(eq=False)
+class Net:
+    """The ports joined by one channel of a relation, in the order in which they were linked."""
+
+    ends: list[End] = field(default_factory=list)
+    order: int = 0
+
+
+@dataclass(eq=False)
 class Part:
-    """The result for a child of a composite: its name and entry, and its ports by their names in the file."""
-
-    name: str
-    entry: Flow
-    row: Counterpart | None = None  # only for an actor
-    ports: Mapping[str, str] = field(default_factory=dict)
-    unwired: frozenset[str] = frozenset()  # ports in the file without a counterpart
-    channels: Mapping[str, Sequence[str | None]] = field(default_factory=dict)  # our names, if channels are ports
-
-
-@dataclass
-class Level:
-    """One composite that is being imported."""
+    """One entity of a model, and what becomes of it."""
 
     entity: Entity
-    path: str  # as messages show it
-    at: str  # where it is in the written model: "" or a path with a final dot
-    outer: Level | None
+    outer: Part | None
     scope: Scope
-    names: Names  # of its actors
-    ports: Names
-    parameters: Names
+    role: str  # actor, composite, machine, aspect; request and response are ports of an aspect's model
+    row: Row | None = None  # only of an actor
+    controller: Entity | None = None  # only of a machine: with refinements, it is inside
+    parts: dict[str, Part] = field(default_factory=dict)
+    is_idle: bool = False  # it never fires, and is left out
+    variable_ports: list[str] = field(default_factory=list)  # parameters of a composite that get values from a port
+    widths: dict[str, int] = field(default_factory=dict)  # of the ports linked inside: "actor.port" or "port"
+    nets: list[Net] = field(default_factory=list)  # inside
+    inside: dict[str, list[tuple[int, Net]]] = field(default_factory=dict)  # the nets at its ports, by channel
+    outside: dict[str, list[tuple[int, Net]]] = field(default_factory=dict)
+    triggers: dict[str, str] = field(default_factory=dict)  # the input that fires an actor to which nothing is linked
+    # As it is written:
+    name: str = ""
+    at: str = ""  # where what is inside stands in the written model: "" or a path with a final dot
+    entry: Flow | None = None  # None if it is left out
+    names: Names = field(default_factory=Names)  # of what is inside
+    ports: Names = field(default_factory=Names)
     own_names: dict[str, str] = field(default_factory=dict)  # our names for parameters that may remain
-    used: set[str] = field(default_factory=set)
-    parts: dict[str, Part | None] = field(default_factory=dict)
-    requests: dict[str, str] = field(default_factory=dict)  # ports of an aspect's model, which are entities in the file
-    added_inputs: list[str] = field(default_factory=list)  # through which something inside reads an outer variable
-    added_outputs: list[str] = field(default_factory=list)  # through which something inside sets an outer variable
-    added_connections: list[str] = field(default_factory=list)
+    used: set[str] = field(default_factory=set)  # of these parameters
+    own_ports: Mapping[str, str] = field(default_factory=dict)  # of an actor: ours that are not in its row
+    unwired: set[str] = field(default_factory=set)  # ports in the file without a counterpart
+    unnamed: set[str] = field(default_factory=set)  # our ports of a machine that no guard or action names
+    added: tuple[list[str], list[str], list[str]] = field(default_factory=lambda: ([], [], []))
+    # Inputs, outputs and connections through which something inside reads and sets variables outside.
+    _with: dict[str, list[Part]] = field(default_factory=dict)
+    _linked: dict[str, list[str]] = field(default_factory=dict)  # the linked ports of each part inside
 
-    @cached_property
-    def linked(self) -> dict[str, list[str]]:
-        """The linked ports of each child."""
-        found: dict[str, list[str]] = {}
-        for path, links in self.entity.links.items():
-            actor, _, port = path.rpartition(".")
-            if links:
-                found.setdefault(actor, []).append(port)
-        return found
+    @property
+    def around(self) -> Part:
+        """What contains it, if it is not the model itself."""
+        assert self.outer is not None
+        return self.outer
+
+    @property
+    def root(self) -> Part:
+        """The model."""
+        return self if self.outer is None else self.outer.root
+
+    @property
+    def path(self) -> str:
+        """Where it is, for messages; "" for the model."""
+        return "" if self.outer is None else self.outer.told(self.entity.name)
 
     def told(self, name: str) -> str:
         """The path of something inside, for messages."""
         return f"{self.path}.{name}" if self.path else name
 
-
-@dataclass
-class Changing:
-    """One parameter that changes."""
-
-    owner: Entity
-    name: str
-    delayed: bool = True
-    is_port: bool = False  # whether its values come from a port of a composite
-    actor: str = ""  # our name of the Variable
-    setters: list[str] = field(default_factory=list)  # its sources, as seen from the owner
-    readers: list[tuple[str, str]] = field(default_factory=list)  # places where parameters follow it, and how
-    inputs: list[str] = field(default_factory=list)  # that it is connected to
-
-
-class CountsEnds(Protocol):
-    """Counts the actors that send into a net, and those that receive from it."""
-
-    def senders(self, composite: Entity, ends: list[End]) -> int: ...
-    def receivers(self, composite: Entity, ends: list[End]) -> int: ...
-
-
-class Converting(Protocol):
-    """The import of a model, as seen by the modules that do a part of it."""
-
-    model: Entity
-    notes: Notes
-    version: tuple[int, int]  # of Ptolemy
-    rows: dict[int, Counterpart | None]
-    levels: dict[int, Level]
-    idle: set[int]
-    triggers: dict[tuple[int, str], str]
-    wiring: Wiring
-
-    def face(self, entity: Entity, port: str) -> PortFace | None: ...
-    def scope_of(self, entity: Entity) -> Scope: ...
-    def container_of(self, entity: Entity) -> Entity | None: ...
-    def path_of(self, composite: Entity, child: Entity) -> str: ...
-    def is_linked(self, entity: Entity, port: str) -> bool: ...
-    def hand(self, refinement: Entity, name: str) -> None: ...
-    def nets_of(self, composite: Entity) -> list[Net]: ...
     @property
-    def counting(self) -> CountsEnds: ...
-    def nets_at(self, composite: Entity, actor: str, port: str, channel: int | None = None) -> list[Net]: ...
-    def end(self, level: Level, end: End) -> tuple[str, bool] | None: ...
-    def port_name(self, names: Names, port: str, channel: int) -> str: ...
-    def channels(self, entity: Entity, port: str) -> int: ...
-    def port_of(self, entity: Entity, part: Part, port: str, channel: int) -> str: ...
-    def level(self, entity: Entity, path: str, at: str = "", outer: Level | None = None) -> Level: ...
-    def body(self, level: Level) -> dict[str, Any]: ...
-    def parameters(self, level: Level) -> dict[str, Any]: ...
-    def instance(self, child: Entity, body: dict[str, Any], values: dict[str, Any]) -> Flow: ...
-    def composite_part(self, child: Entity, level: Level, name: str) -> Part: ...
+    def is_border(self) -> bool:
+        """Whether it stands for a port of an aspect's model."""
+        return self.role in ("request", "response")
+
+    @property
+    def linked(self) -> list[str]:
+        """Its ports that are linked outside."""
+        around = self.around
+        if not around._linked:
+            for path, links in around.entity.links.items():
+                actor, _, port = path.rpartition(".")
+                if links:
+                    around._linked.setdefault(actor, []).append(port)
+        return around._linked.get(self.entity.name, [])
+
+    def everything(self) -> Iterator[Part]:
+        """The part and everything inside it."""
+        yield self
+        for each in self.parts.values():
+            yield from each.everything()
+
+    def with_property(self, name: str) -> list[Part]:
+        """Everything inside at which a property of that name has a value."""
+        if name not in self._with:
+            self._with[name] = [each for each in self.everything() if (each.entity.text(name) or "").strip()]
+        return self._with[name]
+
+    def value(self, said: Property, notes: Notes, default: Any = None) -> Any:
+        """The value of one of its attributes before the run; the default, and a note, if it has none."""
+        try:
+            found = self.scope.value_of(said)
+        except ExpressionError as error:
+            notes.note(f"{self.told(said.name)} = {said.value!r}: {error}")
+            return default
+        return default if found is None else found
+
+    def give_priority(self, entry: Flow, notes: Notes) -> None:
+        """Put its priority into its entry, if it has one."""
+        for said in self.entity.properties.values():
+            is_priority = said.name == "_priority" or said.kind == "Priority"
+            if is_priority and (said.value or "").strip() and (value := self.value(said, notes)) is not None:
+                entry["priority"] = value
+
+    # -- ports ----------------------------------------------------------------------------------------------------
+
+    def face(self, port: str) -> Face | None:
+        """The direction of a port, and whether it is a multiport; None if nothing is wired to it."""
+        spend(_FACE)
+        row = self.row
+        if self.is_idle or (row is not None and port in row.ports and not row.has_port(port)):
+            return None
+        if self.is_border or port in self.variable_ports:
+            return Face("output" if self.role == "request" else "input")
+        if row is not None and port in row.ports:
+            return row.ports[port]
+        said = self.entity.ports.get(port)
+        if said is not None and (said.flag("input") or said.flag("output")):
+            return Face("input" if said.flag("input") else "output", said.flag("multiport"))
+        if row is not None:
+            said_parameter, parameter = self.entity.properties.get(port), row.parameters.get(port)
+            is_port = said_parameter is not None and said_parameter.kind.endswith("PortParameter")
+            return Face("input") if (is_port if parameter is None else parameter.kind != "nothing") else None
+        return None if self.role != "actor" else Face("output" if port.startswith("output") else "input", multi=True)
+
+    def count(self, port: str) -> int:
+        """How many ports one of its own becomes: one for each channel."""
+        face = self.face(port)
+        if face is None or not face.multi:
+            return 1
+        outside = 0 if self.outer is None else self.outer.widths.get(f"{self.entity.name}.{port}", 0)
+        return max(self.widths.get(port, 0), outside, 1)
+
+    def port_name(self, port: str, channel: int = 0) -> str:
+        """Our name for a channel of one of its ports."""
+        if self.row is None:
+            return self.ports.of(port) if channel == 0 else self.ports.of(f"{port}_{channel}")
+        if port in self.own_ports:
+            return self.own_ports[port]
+        said = self.row.ports.get(port) or self.row.parameters.get(port)
+        return snake(port) if said is None else said.ours
 
 
-def give_priority(entry: Flow, entity: Entity, scope: Scope, notes: Notes) -> None:
-    """Put the priority of a composite or machine into its entry, if it has one."""
-    for said in entity.properties.values():
-        if (said.name == "_priority" or kind(said) == "Priority") and (said.value or "").strip():
-            try:
-                entry["priority"] = scope.value_of(said)
-            except ExpressionError as error:
-                notes.note(f"{entity.name}.{said.name} = {said.value!r}: {error}")
+def is_composite(entity: Entity) -> bool:
+    """Whether it contains a graph."""
+    is_known = entity.java.startswith("ptolemy.actor.lib.hoc") or row_of(entity.java) is not None
+    return entity.kind in _COMPOSITES | ASPECT_MODELS or (bool(entity.entities) and not is_known)
+
+
+def role_of(entity: Entity) -> str:
+    """What an entity is, unless it is a machine."""
+    for role in ("request", "response"):
+        if entity.kind in WORDS[role]:
+            return role
+    is_in_package = any(each in entity.java for each in (".aspect.", ".resourceScheduler", ".aspects."))
+    if is_in_package or entity.kind in ASPECT_MODELS | _SCHEDULERS:
+        return "aspect"
+    return "composite" if is_composite(entity) else "actor"
+
+
+def controller_of(entity: Entity) -> Entity | None:
+    """The state machine of an entity: the entity itself, or the one inside a modal model; None without one."""
+    if entity.kind in _MACHINES:
+        return entity
+    director = director_of(entity)
+    name = "" if director is None else director.word("controllerName")
+    found = entity.entities.get(name or "_Controller")
+    return found if found is not None and found.kind in _MACHINES else None
+
+
+def parts_of(model: Entity, own: Mapping[str, type[OwnActor]]) -> Part:
+    """The part of a model, with everything inside it."""
+
+    def made(entity: Entity, outer: Part | None) -> Part:
+        controller = controller_of(entity)
+        role = "machine" if controller is not None else role_of(entity)
+        row = None
+        if role == "actor":
+            row = row_of_type(own[entity.kind]) if entity.kind in own else row_of(entity.java)
+        said = {} if row is None else row.parameters
+        defaults = {name: one.default for name, one in said.items() if one.default is not UNSAID}
+        scope = Scope(entity, None if outer is None else outer.scope, defaults)
+        part = Part(entity, outer, scope, role, row, controller)
+        part.parts = {name: made(each, part) for name, each in entity.entities.items()}
+        return part
+
+    return made(model, None)

@@ -3,62 +3,48 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from functools import cached_property
 from typing import Any
 
-from .budget import spend
-from .entities import Entity, Property
-from .operators import java_text
-from .syntax import ExpressionError, Tree, parse
-from .values import CONSTANTS, evaluate
+from epicycle.actors.expression import text_of
 
-TEXTS = ("StringParameter", "FileParameter", "StringAttribute", "PortParameterString", "TextAttribute", "DateAttribute",
-         "ColorAttribute", "CommitActionsAttribute", "OutputActionsAttribute", "FileOrDirectoryParameter")  # fmt: skip
-_VARIABLES = ("Parameter", "Variable", "ParameterSet")
+from .entities import Property, is_text, is_variable
+from .syntax import ExpressionError, Tree, parse
+from .translation import Code, Meaning, Value, meaning_of
+
 _REFERENCE = re.compile(r"\$(?:(\$)|\{([A-Za-z_][\w.]*)\}|\(((?:[^()]|\([^()]*\))+)\)|([A-Za-z_]\w*))")
 MAX_DEPTH = 50
-
-
-def is_text(said: Property) -> bool:
-    """Whether the value is used as written, except for ``$name``."""
-    return said.java.rpartition(".")[2] in TEXTS or said.text("_stringMode") == "true"
-
-
-def is_variable(said: Property) -> bool:
-    """Whether expressions may name it."""
-    kind = said.java.rpartition(".")[2]
-    return said.value is not None and (kind.endswith(_VARIABLES) or kind in ("", "Priority"))
+Changes = dict[tuple[int, str], Code]  # what stands for the parameters of entities that change in a run
 
 
 class Scope:
-    """The attributes of one entity, nested in those of its surroundings."""
+    """The attributes of one entity, nested in those of its surroundings.
+
+    Calling it gives the value of a name before the run; raises ``KeyError``, or ``ExpressionError`` if its own
+    expression has no value.
+    """
 
     def __init__(
         self, entity: Property, around: Scope | None = None, defaults: Mapping[str, object] | None = None
     ) -> None:
-        self.entity = entity
-        self.around = around
-        self.defaults = defaults or {}
-        self._values: dict[str, object] = {}
-        self._failed: dict[str, str] = {}
+        self.entity, self.around, self._defaults = entity, around, defaults or {}
+        self.changes: Changes = {} if around is None else around.changes
+        self._found: dict[tuple[str, bool], Meaning | ExpressionError] = {}
         self._open: set[str] = set()
 
-    def inside(self, entity: Entity, defaults: Mapping[str, object] | None = None) -> Scope:
-        """The scope of an entity inside this one."""
-        return Scope(entity, self, defaults)
-
-    def find(self, name: str) -> Property | None:
-        """The attribute that a name refers to, here or further out."""
+    def _outwards(self) -> Iterator[Scope]:
         scope: Scope | None = self
         while scope is not None:
-            if (found := scope.own(name)) is not None:
-                return found
+            yield scope
             scope = scope.around
-        return None
+
+    def home(self, name: str) -> Scope | None:
+        """Where a name is declared."""
+        return next((scope for scope in self._outwards() if scope.own(name) is not None), None)
 
     def own(self, name: str) -> Property | None:
-        """The attribute of that name here."""
+        """The attribute of that name here, or in an attribute that extends the scope."""
         found = self.entity.properties.get(name)
         if found is not None and is_variable(found):
             return found
@@ -66,89 +52,91 @@ class Scope:
 
     @cached_property
     def _extending(self) -> list[Property]:
-        """The attributes here that extend the scope."""
         extending = ("ScopeExtendingAttribute", "ScopeExtender")
         return [each for each in self.entity.properties.values() if each.java.endswith(extending)]
 
-    @cached_property
-    def set_by_class(self) -> dict[tuple[str, str], list[Property]]:
-        """The attributes with a value of everything inside, by the class of their owner and by name."""
-        found: dict[tuple[str, str], list[Property]] = {}
-        for each in self.entity.everything() if isinstance(self.entity, Entity) else ():
-            for name, said in each.properties.items():
-                if (said.value or "").strip():
-                    found.setdefault((each.java, name), []).append(said)
-        return found
+    # -- what names and texts mean ----------------------------------------------------------------------------------
 
-    def home(self, name: str) -> Scope | None:
-        """Where a name is declared."""
-        scope: Scope | None = self
-        while scope is not None:
-            if scope.own(name) is not None:
-                return scope
-            scope = scope.around
-        return None
+    def __call__(self, name: str) -> Any:
+        return _value(self._named(name, None, during_run=False))
 
-    def __call__(self, name: str) -> object:
-        """The value of a name; raises ``KeyError``, or ``ExpressionError`` if its own expression has no value."""
-        scope: Scope | None = self
-        while scope is not None:
-            if (found := scope.own(name)) is not None:
-                return scope._value(name, found)
-            if name in scope.defaults:
-                return scope.defaults[name]
-            scope = scope.around
+    def _named(self, name: str, asking: Property | None, *, during_run: bool) -> Meaning:
+        """What a name means; to the attribute that is asking, its own name means one further out."""
+        for scope in self._outwards():
+            if during_run and (id(scope.entity), name) in scope.changes:
+                return scope.changes[id(scope.entity), name]
+            if (found := scope.own(name)) is not None and found is not asking:
+                return scope._attribute(name, found, during_run=during_run)
+            if name in scope._defaults:
+                return Value(scope._defaults[name])
         raise KeyError(name)
 
-    def _value(self, name: str, said: Property) -> object:
-        if name in self._failed:
-            raise ExpressionError(self._failed[name])
-        if name not in self._values:
+    def _attribute(self, name: str, said: Property, *, during_run: bool) -> Meaning:
+        key = name, during_run and bool(self.changes)
+        if key not in self._found:
             if name in self._open or len(self._open) > MAX_DEPTH:
                 raise ExpressionError(f"{name!r} is defined in terms of itself")
             self._open.add(name)
             try:
-                self._values[name] = self.value_of(said)
+                self._found[key] = self.meaning_of(said, during_run=during_run)
             except ExpressionError as error:
-                if len(self._open) == 1:  # otherwise it may be too deep only from where it was asked for
-                    self._failed[name] = str(error)
-                raise
+                if len(self._open) > 1:  # it may be too deep only from where it was asked for
+                    raise
+                self._found[key] = error
             finally:
                 self._open.discard(name)
-        return self._values[name]
+        found = self._found[key]
+        if isinstance(found, ExpressionError):
+            raise ExpressionError(str(found))
+        return found
 
-    def value_of(self, said: Property) -> Any:
-        """The value of an attribute; raises ``ExpressionError``."""
+    def meaning_of(self, said: Property, *, during_run: bool = True) -> Meaning:
+        """What an attribute means in a run, or before it."""
         text = said.value or ""
         if is_text(said):
-            return self.filled(text, as_is=said.java.endswith("StringAttribute"))
-        return self.value(text)
+            return Value(text if said.java.endswith("StringAttribute") else self.filled(text))
+        return self.meaning(text, asking=said, during_run=during_run)
+
+    def meaning(
+        self, text: str | Tree, names: Mapping[str, Meaning] | None = None, *, asking: Property | None = None,
+        during_run: bool = True,
+    ) -> Meaning:  # fmt: skip
+        """What an expression means, in which some names have a meaning of their own; None if it is empty."""
+        if isinstance(text, str) and not text.strip():
+            return Value(None)
+        known = names or {}
+
+        def lookup(name: str) -> Meaning:
+            return known[name] if name in known else self._named(name, asking, during_run=during_run)
+
+        tree = parse(text) if isinstance(text, str) else text
+        return meaning_of(tree, lookup, {each.text for each in known.values() if isinstance(each, Code)})
+
+    def value_of(self, said: Property) -> Any:
+        """The value of an attribute before the run; raises ``ExpressionError``."""
+        return _value(self.meaning_of(said, during_run=False))
 
     def value(self, text: str) -> Any:
-        """The value of an expression; None if it is empty."""
-        return evaluate(self.tree(text), self) if text.strip() else None
+        """The value of an expression before the run; None if it is empty."""
+        return _value(self.meaning(text, during_run=False))
 
-    def tree(self, text: str) -> Tree:
-        """The expression, with ``$name`` in its texts resolved."""
-        spend(1 + len(text) // 10)
-        return parse(text)
-
-    def filled(self, text: str, *, as_is: bool = False) -> str:
+    def filled(self, text: str) -> str:
         """A text with its ``$name`` filled in."""
-        if as_is or "$" not in text:
-            return text
 
         def value(match: re.Match[str]) -> str:
             if match[1]:
                 return "$"
             name = match[2] or match[4]
             try:
-                return java_text(self(name) if name else self.value(match[3]))
-            except (KeyError, ExpressionError, TypeError):
+                found = self(name) if name else self.value(match[3])
+            except (KeyError, ExpressionError):
                 return match[0]
+            return match[0] if found is None else text_of(found)
 
         return _REFERENCE.sub(value, text)
 
-    def is_constant(self, name: str) -> bool:
-        """Whether a name is a constant of the language itself."""
-        return name in CONSTANTS and self.find(name) is None
+
+def _value(said: Meaning) -> Any:
+    if isinstance(said, Code):
+        raise ExpressionError(f"{said.text} changes during the run")
+    return said.value

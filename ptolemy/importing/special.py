@@ -4,224 +4,207 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING
+from typing import Any
 
-if TYPE_CHECKING:
-    from .actors import Actor
+from epicycle import actors
+from epicycle.actors import declared_parameters
 
-Special = Callable[["Actor"], None]
+from ..generators import LAWS
+from .actors import Actor
+from .names import Names
+from .syntax import ExpressionError, names_of, parse
+from .translation import Meaning, named
+from .writing import plain
 
-
-def finite_stop(actor: Actor) -> None:
-    """A stop time, if it is finite."""
-    stop = actor.get("stopTime", math.inf)
-    if not isinstance(stop, (int, float)) or math.isinf(stop) or stop >= 1e300:
-        return
-    actor.told.discard("stopTime")
-
-
-def old_clock(actor: Actor) -> None:
-    """The former Clock makes one cycle more than it states."""
-    finite_stop(actor)
-    count = actor.get("numberOfCycles", -1)
-    if isinstance(count, (int, float)) and count > 0:
-        actor.values["cycles"] = int(count) + 1
+Special = Callable[[Actor], None]
 
 
-def sequential_clock(actor: Actor) -> None:
-    """The clock of former versions, which counts its cycles from its first tick."""
-    offsets = actor.get("offsets", [0.0, 1.0])
-    actor.told.discard("offsets")
-    if offsets and offsets[0]:
-        actor.notes.note(
-            f"{actor.path}.offsets: in Ptolemy, cycles count from the first offset, {offsets[0]}; here, from 0"
-        )
-
-
-def _has_local_time(actor: Actor) -> bool:
-    """Whether the time where it is may differ from the time of the model."""
-    around, found = actor.scope.around, False
-    while around is not None and around.around is not None:
-        found = found or any(each.java.endswith("Director") for each in around.entity.properties.values())
-        around = around.around
-    return found
-
-
-def global_time(actor: Actor) -> None:
-    """The time of the model."""
-    if _has_local_time(actor):
-        actor.notes.note(f"{actor.path}: in Ptolemy, it sends the time of the model; here, that of its composite")
-
-
-def local_time(actor: Actor) -> None:
-    """The local time, unless it is set to send that of the model."""
-    if actor.get("useLocalTime", True) is False:
-        global_time(actor)
-
-
-def wall_clock(actor: Actor) -> None:
-    """It sends the real time since the run began, which a model cannot know."""
-    actor.notes.note(f"{actor.path}: in Ptolemy, it sends the real time since the start of the run, in s; here, 0.0")
-
-
-def depths(actor: Actor) -> None:
-    """It sends a table of everything that Ptolemy's director has scheduled."""
-    actor.notes.note(f"{actor.path}: in Ptolemy, it sends the depths of all actors and ports; here, an empty text")
-
-
-def ramp(actor: Actor) -> None:
+def _ramp(actor: Actor) -> None:
     """A Ramp with a float start, if its step or start may become a number that is not whole."""
-    ports = [name for name in ("init", "step") if actor.widths.get(name, 0)]
     init = actor.get("init", 0)
-    actor.told.discard("init")
-    if any(name not in actor.whole for name in ports) and type(init) is int:
-        actor.told.add("init")
+    ports = [name for name in ("init", "step") if actor.widths.get(name, 0)]
+    if type(init) is int and any(actor.kinds.get(name) is not int for name in ports):
         actor.values["init"] = float(init)
-
-
-def chosen_input(actor: Actor) -> None:
-    """A ConfigurationSelect, which passes on one of its inputs."""
-    names = ("trueInput", "falseInput")
-    chosen, other = names if actor.get("selector", False) is True else names[::-1]
-    actor.ports[chosen] = "input"
-    actor.unwired.add(other)
-
-
-def positive(*names: str) -> Special:
-    """Parameters that mean no limit if they are 0 or less."""
-
-    def convert(actor: Actor) -> None:
-        for name in names:
-            value = actor.get(name, 0)
-            if isinstance(value, (int, float)) and value > 0:
-                actor.told.discard(name)
-
-    return convert
-
-
-def single_event(actor: Actor) -> None:
-    """An event in the past never comes."""
-    time = actor.get("time", 0.0)
-    if isinstance(time, (int, float)) and time < 0:
-        actor.notes.note(f"{actor.path}.time = {time}: in Ptolemy, it sends nothing; here, it sends at 1e8 s")
-        actor.values["time"] = "1e8 s"
     else:
-        actor.told.discard("time")
+        actor.told.discard("init")
 
 
-def text_value(actor: Actor) -> None:
-    """The value of a StringConst is a text, used as written."""
-    actor.values["value"] = actor.text("value").replace("${", "$${")
+def _set_variable(actor: Actor) -> None:
+    """A SetVariable, which starts with the value set in the model."""
+    if actor.get("delayed", True) is False:
+        actor.values["delayed"] = False
+    try:
+        value = None if actor.scope.around is None else actor.scope.around(actor.text("variableName"))
+    except (KeyError, ExpressionError):
+        return
+    if value is not None:
+        actor.values["value"] = plain(value)
 
 
-_OF_PATTERNS = frozenset("\\^$.|?*+()[]{}")
+def _chosen_input(actor: Actor) -> None:
+    """A ConfigurationSelect, which passes on one of its inputs."""
+    is_true = actor.get("selector", False) is True
+    actor.part.unwired.add("falseInput" if is_true else "trueInput")
 
 
-def plain_pattern(*names: str) -> Special:
-    """Patterns that match themselves: regular expressions have no counterpart."""
+def _fields(direction: str) -> Special:
+    """The ports of a RecordAssembler, RecordDisassembler or RecordUpdater are the fields."""
 
     def convert(actor: Actor) -> None:
-        for name in names:
-            text = actor.text(name)
-            actor.told.discard(name)
-            if actor.widths.get(name, 0) and name == "pattern":
-                actor.notes.error(f"{actor.path}.{name}: regular expressions from a port have no counterpart")
-            elif _OF_PATTERNS & set(text):
-                actor.notes.error(f"{actor.path}.{name} = {text!r}: regular expressions have no counterpart")
+        known = Names(actor.row.ports)
+        for port in actor.part.entity.ports.values():
+            if port.flag(direction) and port.name not in actor.row.ports and actor.widths.get(port.name, 0):
+                actor.ports[port.name] = known.of(port.name)
+        actor.values["fields"] = [*actor.ports.values()]
+        for name, ours in known.renamed().items():
+            actor.notes.note(f"{actor.path}.{name} is renamed {ours}")
 
     return convert
 
 
-def replaced(actor: Actor) -> None:
-    """StringReplace for all matches, or for the first."""
-    plain_pattern("pattern", "replacement")(actor)
-    actor.told.add("regularExpression")
-    actor.values["function"] = "replace" if actor.get("replaceAll", True) is not False else "replace first"
+def _expression(actor: Actor) -> None:
+    """An Expression, whose inputs are ports added in the model."""
+    entity = actor.part.entity
+    actor.told.add("expression")
+    names = Names(("output", "gives", "hold"), in_expressions=True)
+    parameters = [name for name, said in entity.properties.items() if said.kind.endswith("PortParameter")]
+    # Inputs with an initial value: linked PortParameters, and ports with a default.
+    held = {name: entity.properties[name] for name in parameters if actor.widths.get(name, 0)}
+    for port in entity.ports.values():
+        if port.flag("input") and port.word("defaultValue"):
+            held[port.name] = port.properties["defaultValue"]
+    ports = [port.name for port in entity.ports.values() if port.flag("input") and port.name not in parameters]
+    actor.ports |= {name: names.of(name) for name in dict.fromkeys([*ports, *held])}
+    for name, ours in names.renamed().items():
+        actor.notes.note(f"{actor.path}.{name} is renamed {ours}")
+    known: dict[str, Meaning] = {name: named(ours, actor.kinds.get(name)) for name, ours in actor.ports.items()}
+    known |= {"time": named("time"), "iteration": named("iteration", int)}
+    try:
+        tree = parse(entity.text("expression") or "")
+        used = names_of(tree)
+        said = actor.following(actor.scope.meaning(tree, known))
+        for name in held.keys() & used:
+            actor.held[actor.ports[name]] = plain(actor.scope.value_of(held[name]))
+        if "iteration" in used and actor.held:
+            raise ExpressionError("'iteration' has no counterpart if inputs hold a value")
+    except (ExpressionError, ValueError) as error:
+        actor.notes.error(f"{actor.path}: expression: {error}")
+        return
+    actor.values |= {"iteration": True} if "iteration" in used else {}
+    actor.expression(said)
 
 
-def index_of(actor: Actor) -> None:
-    """StringIndexOf, searching from the start."""
-    if actor.widths.get("startIndex", 0) or actor.get("startIndex", 0) != 0:
-        actor.notes.error(f"{actor.path}.startIndex: a search that does not start at 0 has no counterpart")
-    if actor.get("searchForwards", True) is False:
-        actor.notes.error(f"{actor.path}.searchForwards = false has no counterpart")
+# -- random numbers ---------------------------------------------------------------------------------------------------
 
 
-def record_updater(actor: Actor) -> None:
-    """A RecordUpdater, whose other inputs are fields."""
-    names = [port.name for port in actor.entity.ports.values() if port.flag("input") and port.name != "input"]
-    actor.ports |= {name: name for name in names}
-    actor.values |= {"fields": names, "onto": "input"}
+def _law(actor: Actor) -> None:
+    """The distribution of a random actor, of which ports may change the parameters."""
+    said = dict(actor.row.settings["law"])
+    found: dict[str, Any] = {"type": said.pop("type")}
+    actor.values["type"] = "Random"
+    for ours, text in said.items():
+        value = actor.value(text)
+        fed = [name for name in names_of(parse(text)) if actor.widths.get(name, 0)]
+        if fed and fed != [text]:
+            actor.notes.error(f"{actor.path}.{fed[0]}: a distribution that changes during the run has no counterpart")
+        elif fed:
+            actor.values["type"] = "VaryingRandom"
+            actor.values.setdefault("varying", []).append(ours)
+            actor.ports[text] = ours
+            value = actor.held.pop(text, None)
+        parameter = declared_parameters(getattr(actors, found["type"]))[ours]
+        if value is not None and (parameter.required or parameter.default != value):
+            found[ours] = value
+    actor.values["distribution"] = found
+    _generator(actor)
 
 
-def choice(name: str, ours: str, default: str, words: Mapping[str, str]) -> Special:
-    """A parameter with a choice of words, in lower or upper case."""
-    known = {word.lower(): each for word, each in words.items()}
+def java_hash(text: str) -> int:
+    """The hash of a text in Java."""
+    found = 0
+    for character in text:
+        found = (31 * found + ord(character)) % 2**32
+    return found - 2**32 if found >= 2**31 else found
+
+
+def _generator(actor: Actor) -> None:
+    """The numbers of Java's generators, if the model fixes them by its own seed or the shared one."""
+    root = actor.part.root
+    own, shared = actor.get("privateSeed"), actor.get("seed")
+    for each in root.with_property("seed") if shared is None else ():  # the value set at one holds for all
+        if each.row is not None and each.row.type in ("VaryingRandom", "PoissonClock"):
+            shared = shared or each.value(each.entity.properties["seed"], actor.notes)
+    kind = "DRand" if ".colt." in actor.part.entity.java else "JavaRandom"
+    law = actor.values.get("distribution", {}).get("type", "Exponential")  # which a PoissonClock draws
+    if (made := actor.text("generatorClass", "DRand")) != "DRand":
+        actor.notes.note(f"{actor.path}.generatorClass = {made!r} has no counterpart; the numbers will differ")
+    elif law not in LAWS and (own or shared):
+        actor.notes.note(f"{actor.path}: the numbers of its {law} distribution will differ")
+    elif isinstance(own, int) and not isinstance(own, bool):
+        actor.values["generator"] = {"type": kind, "seed": own}
+    elif isinstance(shared, int) and shared:
+        actor.values["generator"] = {"type": kind, "seed": shared + java_hash(f".{root.entity.name}.{actor.path}")}
+
+
+# -- checks -----------------------------------------------------------------------------------------------------------
+
+
+def _test(*, strict: bool) -> Special:
+    """A Test or NonStrictTest: expected values, on one channel or on several together."""
 
     def convert(actor: Actor) -> None:
-        word = actor.text(name, default)
-        if word.lower() not in known:
-            actor.notes.error(f"{actor.path}.{name} = {word!r} has no counterpart")
-        else:
-            actor.values[ours] = known[word.lower()]
+        actor.told.add("correctValues")
+        said, written, why = actor.said("correctValues"), None, "is in training mode and checks nothing"
+        if _shared(actor, "trainingMode") is not True:
+            try:
+                values = [True] if said is None else actor.scope.value_of(said)
+                written = plain(_without_nan(values if isinstance(values, list) else [values]))
+            except (ExpressionError, ValueError) as error:
+                why = f"checks nothing: correctValues: {error}"
+        if not isinstance(written, list):
+            actor.notes.note(f"{actor.path} {why}")
+            actor.values = {"type": "Recorder"}
+            actor.told |= actor.row.parameters.keys()
+            return
+        width = actor.widths.get("input", 1)
+        if strict and width == 1:  # an array holds the values of all channels, here of one
+            written = [each[0] if type(each) is list and len(each) == 1 else each for each in written]
+        elif strict and written and all(type(each) is list for each in written):
+            actor.values["together"] = True
+        complete = _shared(actor, "requireAllCorrectValues")
+        actor.values = {"values": written, **actor.values}
+        actor.values |= {"complete": complete} if isinstance(complete, bool) else {}
 
     return convert
 
 
-def sequence(actor: Actor) -> None:
-    """A Sequence that repeats never holds its last value."""
-    if actor.get("repeat", False) is True:
-        actor.told.add("holdLastOutput")
-    actor.told.discard("repeat")
+def _without_nan(value: Any) -> Any:
+    """Expected values with None for NaN, which any number matches."""
+    if isinstance(value, (list, dict)):
+        items = value.items() if isinstance(value, dict) else enumerate(value)
+        found = {key: _without_nan(each) for key, each in items}
+        return found if isinstance(value, dict) else [*found.values()]
+    return None if isinstance(value, float) and math.isnan(value) else value
 
 
-def execution_time(actor: Actor) -> None:
-    """It sends the real time that a computation took, which a model cannot know."""
-    actor.notes.note(f"{actor.path}: in Ptolemy, it sends the real time of a computation, in ms; here, 0")
+def _shared(actor: Actor, name: str) -> object:
+    """A parameter that all actors of a class share: the last one in the file sets it for all."""
+    actor.told.add(name)
+    for each in reversed(actor.part.root.with_property(name)):
+        if each.entity.java == actor.part.entity.java:
+            return actor.part.value(each.entity.properties[name], actor.notes)
+    return None
 
 
-def fields(direction: str) -> Special:
-    """A RecordAssembler or RecordDisassembler: its ports are the fields."""
-
-    def convert(actor: Actor) -> None:
-        names = [
-            port.name for port in actor.entity.ports.values() if port.flag(direction) and actor.widths.get(port.name)
-        ]
-        actor.ports |= {name: name for name in names}
-        actor.values["fields"] = names
-
-    return convert
-
-
-def quantum(actor: Actor) -> None:
-    """The quantum of a QuantizedSampler, whose sign does not matter."""
-    actor.values["by"] = abs(actor.get("quantum", 1.0))
-
-
-def limiter(actor: Actor) -> None:
-    """Keep only finite limits."""
-    for name, ours in (("top", "high"), ("bottom", "low")):
-        value = actor.get(name, 1.0 if name == "top" else 0.0)
-        if isinstance(value, (int, float)) and not math.isinf(value) and abs(value) < 1.7e308:
-            actor.values[ours] = value
-
-
-def pid(actor: Actor) -> None:
-    """PID, whose input is the error: the gains change their sign."""
-    for name, ours, default in (("Kp", "proportional", 1.0), ("Ki", "integral", 0.0), ("Kd", "derivative", 0.0)):
-        value = actor.get(name, default)
-        actor.values[ours] = -value if value else 0.0
-    actor.values["integration"] = "trapezoid"
-
-
-def no_trigger(*names: str) -> Special:
-    """Parameters that make no difference at their default, and have no counterpart otherwise."""
-
-    def convert(actor: Actor) -> None:
-        for said in names:
-            name, _, default = said.partition("=")
-            value = actor.get(name, actor.scope.value(default))
-            if value != actor.scope.value(default):
-                actor.notes.note(f"{actor.path}.{name} = {value!r} has no counterpart")
-
-    return convert
+SPECIAL: Mapping[str, Special] = {
+    "ramp": _ramp,
+    "set_variable": _set_variable,
+    "chosen_input": _chosen_input,
+    "input_fields": _fields("input"),
+    "output_fields": _fields("output"),
+    "expression": _expression,
+    "law": _law,
+    "generator": _generator,
+    "strict_test": _test(strict=True),
+    "non_strict_test": _test(strict=False),
+}

@@ -4,149 +4,67 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from typing import NoReturn, TypeAlias
+from typing import Any, NoReturn
 
-MAX_LENGTH = 100_000
-MAX_DEPTH = 40
-MAX_TERMS = 200
+from .budget import spend
+
+MAX_LENGTH, MAX_DEPTH, LARGEST = 100_000, 40, 2**63
 
 
 class ExpressionError(Exception):
-    """Text that is not an expression, or one that cannot be converted or evaluated; the message states why."""
+    """Text that is not an expression, or one that has no value or counterpart; the message states why."""
 
 
 @dataclass(frozen=True)
-class Const:
-    """A literal."""
+class Tree:
+    """One part of an expression: its form, its operands, and what else it states.
 
-    value: object
+    The form is an operator (``?`` has three operands, ``-`` one or two) or one of ``value``, ``name``, ``call`` (the
+    first operand is called), ``method`` and ``field`` (of the first operand), ``array``, ``matrix`` (an array for each
+    row), ``steps`` (``[first : step : last]``) and ``record`` (``said`` names the fields).
+    """
 
+    form: str
+    parts: tuple[Tree, ...] = ()
+    said: Any = None
 
-@dataclass(frozen=True)
-class Name:
-    """A constant, a parameter, or a port."""
-
-    name: str
-
-
-@dataclass(frozen=True)
-class Unary:
-    """``-x``, ``!x`` or ``~x``."""
-
-    sign: str
-    operand: Tree
-
-
-@dataclass(frozen=True)
-class Binary:
-    """Two operands with an operator between them."""
-
-    sign: str
-    left: Tree
-    right: Tree
-
-
-@dataclass(frozen=True)
-class Choice:
-    """``test ? one : other``."""
-
-    test: Tree
-    one: Tree
-    other: Tree
-
-
-@dataclass(frozen=True)
-class Call:
-    """A function, or the value of a parameter, followed by arguments: ``max(a, b)``, ``array(0)``."""
-
-    function: Tree
-    arguments: tuple[Tree, ...]
-
-
-@dataclass(frozen=True)
-class Method:
-    """``x.length()``, or ``record.field``, for which the arguments are None."""
-
-    of: Tree
-    name: str
-    arguments: tuple[Tree, ...] | None
-
-
-@dataclass(frozen=True)
-class Array:
-    """``{1, 2}``."""
-
-    items: tuple[Tree, ...]
-
-
-@dataclass(frozen=True)
-class Record:
-    """``{a = 1, b = 2}``."""
-
-    fields: tuple[tuple[str, Tree], ...]
-
-
-@dataclass(frozen=True)
-class Matrix:
-    """``[1, 2; 3, 4]``."""
-
-    rows: tuple[tuple[Tree, ...], ...]
-
-
-@dataclass(frozen=True)
-class Steps:
-    """``[first : step : last]``, a matrix of one row."""
-
-    first: Tree
-    step: Tree
-    last: Tree
-
-
-@dataclass(frozen=True)
-class Lambda:
-    """``function(x, y: int) x + y``, without the types."""
-
-    names: tuple[str, ...]
-    body: Tree
-
-
-Tree: TypeAlias = Const | Name | Unary | Binary | Choice | Call | Method | Array | Record | Matrix | Steps | Lambda
 
 _TOKEN = re.compile(
     r"""\s*(?:(?P<comment>//[^\n]*|/\*.*?\*/)
-    |(?P<number>0[xX][0-9a-fA-F]+|(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)(?P<suffix>(?:[lLuUbBfFdDpPiIjJsS]+(?!\w))?)
+    |(?P<number>(?:0[xX][0-9a-fA-F]+|(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)(?:[lLuUbBfFdDpPiIjJsS]+(?!\w))?)
     |(?P<text>"(?:[^"\\]|\\.)*"|'(?:[^'\\]|\\.)*')
     |(?P<name>[A-Za-z_$](?:[\w$@]|::)*)
     |(?P<sign>>>>|\|\||&&|==|!=|<=|>=|<<|>>|\{\||\|\}|[-+*/%^!~<>?:;,.(){}\[\]=|&\#@]))""",
     re.VERBOSE | re.DOTALL,
 )
 _ESCAPES = {"n": "\n", "t": "\t", "r": "\r", "b": "\b", "f": "\f"}
-_LEVELS: dict[object, int] = {
-    sign: level
-    for level, signs in enumerate(("||", "&&", "|", "#", "&", "== !=", "< <= > >=", "<< >> >>>", "+ -", "* / %"))
-    for sign in signs.split()
-}  # how tightly operators bind
-_CONSTANTS = {"true": True, "True": True, "TRUE": True, "false": False, "False": False, "FALSE": False}
+_LEVELS = ("||", "&&", "|", "#", "&", "== !=", "< <= > >=", "<< >> >>>", "+ -", "* / %")
+_LEVEL_OF = {sign: level for level, signs in enumerate(_LEVELS) for sign in signs.split()}  # how tightly they bind
+_TRUTH = {"true": True, "True": True, "TRUE": True, "false": False, "False": False, "FALSE": False}
 
 
 def parse(text: str) -> Tree:
     """The tree of an expression; raises ``ExpressionError``."""
+    spend(1 + len(text) // 10)
     if len(text) > MAX_LENGTH:
         raise ExpressionError(f"the expression has more than the maximum of {MAX_LENGTH:,} characters")
-    try:
-        return _Parser(text).whole()
-    except RecursionError:  # the caller may be deep in the stack already
-        raise ExpressionError(f"{_short(text)} is nested too deeply") from None
+    return _Parser(text).whole()
 
 
-def unescaped(text: str) -> str:
-    """The text between quotes, with its escapes resolved."""
-    return re.sub(r"\\(u[0-9a-fA-F]{4}|.)", _character, text, flags=re.DOTALL)
+def names_of(tree: Tree) -> set[str]:
+    """All names in an expression, including those of functions."""
+    found, waiting = set(), [tree]
+    while waiting:
+        each = waiting.pop()
+        waiting += each.parts
+        if each.form == "name":
+            found.add(each.said)
+    return found
 
 
-def _character(match: re.Match[str]) -> str:
-    said = match[1]
-    return chr(int(said[1:], 16)) if len(said) > 1 else _ESCAPES.get(said, said)
+def conjuncts(tree: Tree) -> list[Tree]:
+    """The conditions that an expression joins by "and"."""
+    return [each for part in tree.parts for each in conjuncts(part)] if tree.form in ("&&", "&") else [tree]
 
 
 class _Parser:
@@ -154,57 +72,33 @@ class _Parser:
 
     def __init__(self, text: str) -> None:
         self._text = text
-        self._tokens: list[tuple[str, object]] = []
-        self._place = 0
-        self._depth = 0
+        self._tokens: list[tuple[str, Any]] = []
+        self._place = self._depth = 0
         at, end = 0, len(text.rstrip())
         while at < end:
             match = _TOKEN.match(text, at)
             if match is None:
                 raise ExpressionError(f"{_short(text)} cannot be read at {_short(text[at:].strip())}")
-            at = match.end()
-            self._read(match)
+            at, kind = match.end(), match.lastgroup or ""
+            if kind != "comment":
+                self._tokens.append(_token(kind, match[kind]))
         self._tokens.append(("end", ""))
 
-    def _read(self, match: re.Match[str]) -> None:
-        if match["number"] is not None:
-            self._tokens.append(("value", self._number(match["number"], match["suffix"].lower())))
-        elif match["text"] is not None:
-            self._tokens.append(("value", unescaped(match["text"][1:-1])))
-        elif match["name"] is not None:
-            self._tokens.append(("name", match["name"]))
-        elif match["sign"] is not None:
-            self._tokens.append(("sign", match["sign"]))
-
-    def _number(self, text: str, suffix: str) -> object:
-        if "i" in suffix or "j" in suffix:
-            raise ExpressionError(f"{text}{suffix}: complex numbers are not supported")
-        try:
-            if text[:2].lower() == "0x":
-                return int(text, 16)
-            if "." in text or "e" in text.lower() or suffix in ("f", "d", "p"):
-                return float(text)
-            return int(text, 8 if text[0] == "0" else 10)  # as in Java
-        except ValueError:
-            raise ExpressionError(f"{_short(text)} is not a number") from None
-
-    # -- tokens ---------------------------------------------------------------------------------------------------
-
-    def _peek(self, ahead: int = 0) -> object:
+    def _peek(self, ahead: int = 0) -> str:
         """The next operator; "" if the next token is not one."""
         kind, value = self._tokens[min(self._place + ahead, len(self._tokens) - 1)]
         return value if kind == "sign" else ""
 
-    def _take(self) -> tuple[str, object]:
+    def _take(self) -> tuple[str, Any]:
         token = self._tokens[self._place]
         self._place = min(self._place + 1, len(self._tokens) - 1)
         return token
 
-    def _skip(self, sign: str) -> bool:
-        if self._peek() == sign:
-            self._place += 1
-            return True
-        return False
+    def _skip(self, *signs: str) -> str:
+        """The next operator, if it is one of these; otherwise ""."""
+        sign = self._peek()
+        self._place += sign in signs
+        return sign if sign in signs else ""
 
     def _expect(self, sign: str) -> None:
         if not self._skip(sign):
@@ -212,8 +106,6 @@ class _Parser:
 
     def _fail(self, why: str) -> NoReturn:
         raise ExpressionError(f"{_short(self._text)} cannot be read: {why}")
-
-    # -- grammar --------------------------------------------------------------------------------------------------
 
     def whole(self) -> Tree:
         """The whole expression; nothing may follow it."""
@@ -229,149 +121,132 @@ class _Parser:
         if self._depth > MAX_DEPTH:
             self._fail(f"nested deeper than {MAX_DEPTH} levels")
         if self._tokens[self._place] == ("name", "function") and self._peek(1) == "(":
-            made = self._lambda()
-            self._depth -= 1
-            return made
-        test = self._level(0)
+            self._fail("functions that a model defines are not supported")
+        found = self._level(0)
         if self._skip("?"):
             one = self._choice()
             self._expect(":")
-            test = Choice(test, one, self._choice())
+            found = Tree("?", (found, one, self._choice()))
         self._depth -= 1
-        return test
-
-    def _lambda(self) -> Tree:
-        self._take()
-        self._expect("(")
-        names: list[str] = []
-        while not self._skip(")"):
-            if names:
-                self._expect(",")
-            kind, name = self._take()
-            if kind != "name":
-                self._fail("expected the name of an argument")
-            names.append(str(name))
-            if self._skip(":"):
-                self._choice()
-        return Lambda(tuple(names), self._choice())
+        return found
 
     def _level(self, least: int) -> Tree:
-        left = self._power()
-        count = 0
-        while (level := _LEVELS.get(sign := self._peek(), -1)) >= least:
+        left = self._unary()
+        while self._skip("^"):  # a sign binds more tightly than a power: -2 to the power of 2 is 4
+            left = Tree("^", (left, self._unary()))
+        while (level := _LEVEL_OF.get(sign := self._peek(), -1)) >= least:
             self._place += 1
-            left = Binary(str(sign), left, self._level(level + 1))
-            count += 1
-            if count > MAX_TERMS:
-                self._fail("it is too long")
+            left = Tree(sign, (left, self._level(level + 1)))
         return left
-
-    def _power(self) -> Tree:
-        """A sign binds more tightly than a power: -2 to the power of 2 is 4."""
-        found = self._unary()
-        count = 0
-        while self._skip("^"):
-            count += 1
-            if count > MAX_DEPTH:
-                self._fail("it is too long")
-            found = Binary("^", found, self._unary())
-        return found
 
     def _unary(self) -> Tree:
         signs = []
-        while (sign := self._peek()) in ("-", "!", "~", "+"):
-            self._place += 1
-            signs.append(str(sign))
-            if len(signs) > MAX_DEPTH:
-                self._fail(f"nested deeper than {MAX_DEPTH} levels")
+        while sign := self._skip("-", "!", "~", "+"):
+            signs.append(sign)
         found = self._element()
         for sign in reversed(signs):
-            if sign != "+":
-                plain = sign == "-" and isinstance(found, Const) and type(found.value) in (int, float)
-                found = Const(-found.value) if plain else Unary(sign, found)  # type: ignore[union-attr, operator]
+            if sign == "-" and found.form == "value" and type(found.said) in (int, float):
+                found = Tree("value", (), -found.said)
+            elif sign != "+":
+                found = Tree(sign, (found,))
         return found
 
     def _element(self) -> Tree:
         found = self._primary()
-        count = 0
-        while True:
-            count += 1
-            if count > MAX_DEPTH:
-                self._fail("it is too long")
-            if self._skip("("):
-                found = Call(found, self._arguments(")"))
-            elif self._skip("."):
-                kind, name = self._take()
-                if kind != "name":
-                    self._fail("expected a name after '.'")
-                found = Method(found, str(name), self._arguments(")") if self._skip("(") else None)
-            else:
-                return found
+        while sign := self._skip("(", "."):
+            if sign == "(":
+                found = Tree("call", (found, *self._items(")")))
+                continue
+            kind, name = self._take()
+            if kind != "name":
+                self._fail("expected a name after '.'")
+            is_method = self._skip("(")
+            found = Tree("method" if is_method else "field", (found, *(self._items(")") if is_method else ())), name)
+        return found
 
-    def _arguments(self, end: str) -> tuple[Tree, ...]:
-        found: list[Tree] = []
+    def _items(self, end: str) -> tuple[Tree, ...]:
         if self._skip(end):
             return ()
-        while True:
-            found.append(self._choice())
-            if self._skip(end):
-                return tuple(found)
+        found = [self._choice()]
+        while not self._skip(end):
             self._expect(",")
+            found.append(self._choice())
+        return tuple(found)
 
     def _primary(self) -> Tree:
         kind, value = self._take()
-        if kind == "value":
-            return Const(value)
-        if kind == "name":
-            return Const(_CONSTANTS[str(value)]) if value in _CONSTANTS else Name(str(value))
+        if kind in ("value", "name"):
+            return Tree(kind, (), value)
         if value == "(":
             found = self._choice()
             self._expect(")")
             return found
-        if value == "{":
-            return self._braces("}")
-        if value == "[":
-            return self._brackets()
-        if value == "{|":
-            return self._braces("|}")  # a union, as a record with its one field
-        return self._fail("it ends too early" if kind == "end" else f"unexpected {value!r}")
+        ends = {"{": "}", "[": "]", "{|": "|}"}  # a union is a record with its one field
+        if value not in ends:
+            self._fail("it ends too early" if kind == "end" else f"unexpected {value!r}")
+        if self._is_field():
+            return self._record(ends[value])
+        return self._matrix() if value == "[" else Tree("array", self._items(ends[value]))
 
     def _is_field(self) -> bool:
-        kind = self._tokens[self._place][0]
-        return kind in ("name", "value") and self._peek(1) == "="
+        return self._tokens[self._place][0] in ("name", "value") and self._peek(1) == "="
 
-    def _braces(self, end: str) -> Tree:
-        if not self._is_field():
-            return Array(self._arguments(end))
-        fields: list[tuple[str, Tree]] = []
+    def _record(self, end: str) -> Tree:
+        fields: dict[str, Tree] = {}
         while self._is_field():
             name = str(self._take()[1])
             self._expect("=")
-            fields.append((name, self._choice()))
+            fields[name] = self._choice()
             if self._skip(end):
-                return Record(tuple(fields))
+                return Tree("record", tuple(fields.values()), tuple(fields))
             self._expect(",")
         return self._fail("expected a field 'name = value'")
 
-    def _brackets(self) -> Tree:
-        if self._is_field():
-            return self._braces("]")
-        first = self._choice()
+    def _matrix(self) -> Tree:
+        rows = [[self._choice()]]
         if self._skip(":"):
             step = self._choice()
             self._expect(":")
-            last = self._choice()
+            steps = Tree("steps", (rows[0][0], step, self._choice()))
             self._expect("]")
-            return Steps(first, step, last)
-        rows, row = [], [first]
+            return steps
         while not self._skip("]"):
             if self._skip(";"):
-                rows.append(tuple(row))
-                row = [self._choice()]
+                rows.append([])
             else:
                 self._expect(",")
-                row.append(self._choice())
-        return Matrix((*rows, tuple(row)))
+            rows[-1].append(self._choice())
+        return Tree("matrix", tuple(Tree("array", tuple(row)) for row in rows))
+
+
+def _token(kind: str, text: str) -> tuple[str, Any]:
+    if kind == "number":
+        return "value", _number(text)
+    if kind == "text":
+        return "value", re.sub(r"\\(u[0-9a-fA-F]{4}|.)", _character, text[1:-1], flags=re.DOTALL)
+    return ("value", _TRUTH[text]) if kind == "name" and text in _TRUTH else (kind, text)
+
+
+def _number(said: str) -> float:
+    is_hexadecimal = said[:2].lower() == "0x"
+    text = said.rstrip("lLuUsS") if is_hexadecimal else said.rstrip("lLuUbBfFdDpPiIjJsS")
+    suffix = said[len(text) :].lower()
+    if "i" in suffix or "j" in suffix:
+        raise ExpressionError(f"{said.lower()}: complex numbers are not supported")
+    try:
+        if not is_hexadecimal and ("." in text or "e" in text.lower() or suffix in ("f", "d", "p")):
+            return float(text)
+        found = int(text, 16 if is_hexadecimal else 8 if text[0] == "0" else 10)  # as in Java
+    except ValueError:
+        raise ExpressionError(f"{_short(text)} is not a number") from None
+    if found > LARGEST:
+        raise ExpressionError("a whole number must be at least -2^63 and less than 2^63")
+    return found
+
+
+def _character(match: re.Match[str]) -> str:
+    said = match[1]
+    return chr(int(said[1:], 16)) if len(said) > 1 else _ESCAPES.get(said, said)
 
 
 def _short(text: str) -> str:

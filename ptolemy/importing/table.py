@@ -1,116 +1,106 @@
-"""The table of counterparts: which of our actors replaces which of Ptolemy II's.
-
-``"input* name=ours | output"`` lists inputs and outputs; ``*`` marks a multiport; a name without ``=`` is ours in snake
-case.  A parameter states its kind, then ``:ours`` if the name differs, and ``=default`` if Ptolemy's default differs or
-ours has none.  All rows assume a model with ``like: ptolemy``.
-"""
+"""The table of counterparts, ``rows.yaml``: which of our actors stands for one of Ptolemy's, and with what settings."""
 
 from __future__ import annotations
 
+import ast
+import re
 from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from typing import Any, NamedTuple
 
-from . import checks
-from . import special as how
-from .computing_rows import COMPUTING
-from .counterpart import Counterpart, counterpart, view
-from .flow_rows import FLOW, TIME
-from .source_rows import RANDOM, SOURCES
+from epicycle.actors import Actor as OwnActor
+from epicycle.actors import declared_parameters, declared_ports, has_own_ports
 
-_SINKS: Mapping[str, Counterpart] = {
-    "Test": counterpart(
-        "Test",
-        "input* | output",
-        special=checks.strict_test,
-        tolerance="number",
-        requireAllCorrectValues="flag:complete",
-    ),
-    "NonStrictTest": counterpart(
-        "Test",
-        "input | output",
-        special=checks.non_strict_test,
-        tolerance="number",
-        requireAllCorrectValues="flag:complete",
-    ),
-    "Recorder": counterpart("Recorder", "input* |", special=how.positive("capacity"), capacity="whole"),
-    "Stop": counterpart("Stop", "input* |"),
-}
+from ..dialect import known_types
+from .names import snake
+from .tables import table
 
-_VIEWS = frozenset(
-    {
-        "Display",
-        "MonitorValue",
-        "Discard",
-        "TimedPlotter",
-        "SequencePlotter",
-        "XYPlotter",
-        "XYScope",
-        "TimedScope",
-        "SequenceScope",
-        "HistogramPlotter",
-        "BarGraph",
-        "RealTimePlotter",
-        "ArrayPlotter",
-        "PlotterBase",
-        "Console",
-        "FileWriter",
-        "LineWriter",
-        "DoubleMatrixWriter",
-        "ExpressionWriter",
-        "CSVWriter",
-        "SequentialTimedPlotter",
-        "SequentialScope",
-        "Publisher0",
-        "MatrixViewer",
-        "LEDMatrix",
-        "ComputeHistogramPlotter",
-        "TableDisplay",
-        "AWTDisplay",
-        "ArrayPlotterXY",
-        "DiscardDoubles",
-        "DiscardDoublesArray",
-        "FileWrite",
-        "ImageDisplay",
-        "LEDArray",
-        "MatrixVisualizer",
-        "ModelDisplay",
-        "Plotter",
-        "SketchedSink",
-        "TimedDisplay",
-        "TimedMonitorValue",
-        "TokenWriter",
-        "TextWriter",
-        "XMLWriter",
-        "Exit",
-        "Pause",
-        "TypeTest",  # checks types, which are resolved differently here
-    }
-)
-_ALSO = {
-    "SimpleDelay": "TimeDelay",
-    "TriggeredClock": "Clock",
-    "MovingMaximum": "RunningMaximum",
-    "OrderedRecordAssembler": "RecordAssembler",
-    "TimedDelay": "TimeDelay",
-    "VariableDelay": "TimeDelay",
-    "IntRamp": "Ramp",
-    "ConstPlaceable": "Const",
-}
-
-_NAMED: Mapping[str, Counterpart] = {**SOURCES, **RANDOM, **TIME, **FLOW, **COMPUTING, **_SINKS}
-# The same name in two packages.
-_OTHERS: Mapping[str, str] = {"ptolemy.domains.de.lib.Sampler": "MostRecent"}
+UNSAID: Any = object()
+_PORT = re.compile(r"(?P<name>\w+)(?P<multi>\*?)(?:=(?P<ours>\w+))?\Z")
+_PARAMETER = re.compile(r"(?P<kind>[a-z]+)(?::(?P<ours>\w+))?(?:=(?P<default>[^|]*[^| ]))?(?: *\|(?P<words>.*))?\Z")
+_SETTINGS = ("type", "ports", "set", "compute", "expression", "law", "given", "needs", "how", "note")
 _PACKAGES = ("ptolemy.", "org.ptolemy.", "kepler.")
-# Packages in which names of the table mean something else.
+# Packages in which names of the table mean something else, and such of which only sinks are known.
 _FOREIGN = ("ptolemy.actor.lib.vhdl.", "ptolemy.matlab.", "ptolemy.domains.ci.", "ptolemy.domains.ptera.")
+_CONTINUOUS = ("ptolemy.domains.continuous.", "ptolemy.domains.ct.")
 
 
-def counterpart_of(java: str) -> Counterpart | None:
+class Face(NamedTuple):
+    """What is known of a port: its direction, whether it is a multiport, and our name in a row of the table."""
+
+    direction: str  # input or output
+    multi: bool = False
+    ours: str = ""
+
+
+class Setting(NamedTuple):
+    """A parameter of Ptolemy's: its counterpart, the kind of its value, and its default if ours is another."""
+
+    ours: str
+    kind: str = "value"
+    default: object = UNSAID
+    words: Mapping[str, str] | None = None  # by their lower case
+
+
+@dataclass(frozen=True)
+class Row:
+    """A row of the table; ``settings`` are those that the head of the table lists."""
+
+    type: str
+    ports: Mapping[str, Face]
+    parameters: Mapping[str, Setting]
+    settings: Mapping[str, Any]
+    is_view: bool = False
+
+    def has_port(self, name: str) -> bool:
+        """Whether a port has a counterpart in our actor."""
+        kind = known_types().actors.get(self.type)
+        return kind is None or has_own_ports(kind) or self.ports[name].ours in declared_ports(kind)
+
+
+def row_of(java: str) -> Row | None:
     """The row for a Java class; None if there is none."""
-    name = _OTHERS.get(java) or java.rpartition(".")[2]
-    if not java.startswith(_PACKAGES) or java.startswith(_FOREIGN):
-        return None
-    if java.startswith("ptolemy.domains.continuous.") or ".ct." in java:
-        return None if name not in _SINKS and name not in _VIEWS else _NAMED.get(name) or view()
-    if name in _VIEWS:
-        return view()
-    return _NAMED.get(_ALSO.get(name, name))
+    name = java if java in table("rows") else java.rpartition(".")[2]
+    row = _row(name) if java.startswith(_PACKAGES) and not java.startswith(_FOREIGN) else None
+    is_sink = row is not None and (row.is_view or row.type in ("Test", "Recorder", "Stop"))
+    return row if is_sink or not java.startswith(_CONTINUOUS) else None
+
+
+@cache
+def _row(name: str) -> Row | None:
+    said = "Recorder" if name in table("rows")["views"].split() else table("rows").get(name)
+    if name == "views" or not isinstance(said, dict):
+        found = _row(said) if isinstance(said, str) and name != "views" else None
+        return found if found is None or said != "Recorder" else Row("Recorder", found.ports, {}, {}, is_view=True)
+    settings = {key: said[key] for key in _SETTINGS if key in said}
+    kind = said.get("type", "Expression" if "expression" in said else name)
+    ports: dict[str, Face] = {}
+    for direction, names in zip(("input", "output"), said.get("ports", "input | output").split("|"), strict=False):
+        for match in map(_PORT.match, names.split()):
+            assert match is not None, said
+            ours = match["ours"] or (match["name"] if kind == "Expression" else snake(match["name"]))
+            ports[match["name"]] = Face(direction, bool(match["multi"]), ours)
+    return Row(kind, ports, {key: _setting(key, said[key]) for key in said if key not in settings}, settings)
+
+
+def _setting(name: str, text: str) -> Setting:
+    match = _PARAMETER.match(text)
+    assert match is not None, text
+    ours, default = match["ours"] or snake(name), match["default"]
+    if match["words"]:
+        pairs = [each.partition("/") for each in match["words"].split()]
+        words = {theirs.lower(): (other or theirs).replace("_", " ") for theirs, _, other in pairs}
+        return Setting(ours, match["kind"], default, words)
+    return Setting(ours, match["kind"], UNSAID if default is None else ast.literal_eval(default))
+
+
+def row_of_type(kind: type[OwnActor]) -> Row:
+    """The row of a user's actor, for a Java class of that name: all names are ours in camel case."""
+    ports = {_camel(name): Face(port.direction, port.multi, name) for name, port in declared_ports(kind).items()}
+    return Row(kind.__name__, ports, {_camel(name): Setting(name) for name in declared_parameters(kind)}, {})
+
+
+def _camel(name: str) -> str:
+    first, *rest = name.split("_")
+    return first + "".join(each.capitalize() for each in rest)

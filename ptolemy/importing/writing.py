@@ -6,6 +6,7 @@ import json
 import math
 import re
 from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 WIDTH = 118
 _PLAIN = re.compile(r"[A-Za-z_./][A-Za-z0-9_./*%()\[\], +^<>=;-]*\Z")
@@ -17,6 +18,29 @@ _QUANTITY = re.compile(r"-?\d+(\.\d+)?(e-?\d+)? (s|ms|us|ns)\Z")
 
 class Flow(dict[str, object]):
     """A mapping that is written on one line if it fits."""
+
+
+def plain(value: Any) -> object:
+    """A value of Ptolemy's in its YAML form; raises ``ValueError``."""
+    if isinstance(value, list):
+        return [plain(each) for each in value]
+    if isinstance(value, dict):
+        return {name: plain(each) for name, each in value.items()}
+    if isinstance(value, float) and math.isnan(value):
+        raise ValueError("NaN cannot be written")
+    if value is not None and not isinstance(value, (bool, int, float, str)):
+        raise ValueError("a function cannot be written")
+    return value.replace("${", "$${") if isinstance(value, str) else value
+
+
+def seconds(value: Any) -> object:
+    """A time in s, in the form in which models state it; raises ``ValueError``."""
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        raise ValueError(f"{value!r} is not a time")
+    if math.isinf(value):
+        return float(value)
+    number = int(value) if float(value).is_integer() and abs(value) < 1e15 else value
+    return f"{number!r} s"
 
 
 def scalar(value: object, *, flow: bool = False) -> str:

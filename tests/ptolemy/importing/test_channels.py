@@ -28,6 +28,15 @@ def test_publishers_and_subscribers(tmp_path: Path) -> None:
     assert "connections:\n  - Clock.output -> Recorder.input\n" in written(tmp_path, text)
 
 
+def test_a_publisher_that_checks(tmp_path: Path) -> None:
+    checks = entity("P", f"{LIB}PublisherTest", prop("channel", "$name", TEXT), prop("correctValues", "{1, 1}"))
+    actors = entity("Clock", "DiscreteClock") + checks + entity("Recorder", "Recorder")
+    actors += entity("S", f"{LIB}Subscriber", prop("channel", "x", TEXT))
+    text = model(prop("name", '"x"'), actors, wires("Clock.output P.input", "S.output Recorder.input"), stop=1)
+    assert "  P: {type: Test, values: [1, 1], tolerance: 1.0}\n" in written(tmp_path, text)
+    assert recorded(tmp_path, text) == [(0.0, 1, 1), (1.0, 1, 1)]
+
+
 def published(name: str, *said: str) -> str:
     return entity(name, f"{LIB}{name}", prop("channel", "the news", TEXT), *said)
 

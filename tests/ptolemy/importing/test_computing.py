@@ -72,11 +72,6 @@ SORTED = {"input": "{{3, 1, 3, 2}} at {0.0}"}
         ("sdf.DownSample", {"factor": 3, "phase": 2}, COUNT, [1]),
         ("sdf.UpSample", {"factor": 3, "phase": 1}, {"input": "{1.5} at {0.0}"}, [0.0, 1.5, 0.0]),
         ("sdf.UpSample", {}, {"input": "{1} at {0.0}"}, [0, 1]),
-        ("sdf.Chop", {"numberToRead": 2, "numberToWrite": 3, "offset": 1}, COUNT, [0, 1, 2, 2, 3, 4]),
-        ("sdf.Chop", {"numberToRead": 2, "numberToWrite": 4, "offset": 1, "usePastInputs": "false"}, COUNT,
-         [0, 1, 2, 0, 0, 3, 4, 0]),
-        ("sdf.Chop", {"numberToRead": 4, "numberToWrite": 2, "offset": -1}, COUNT, [2, 3]),
-        ("sdf.Repeat", {"blockSize": 2}, COUNT, [1, 2, 1, 2, 3, 4, 3, 4]),
         ("sdf.DelayLine", {"initialValues": "{7, 8, 9}"}, COUNT, [[1, 7, 8], [2, 1, 7], [3, 2, 1], [4, 3, 2]]),
     ],
 )  # fmt: skip

@@ -59,7 +59,7 @@ def test_other_files_are_named_and_not_read(tmp_path: Path) -> None:
     [
         ("", "m.xml:1: not well-formed XML: no element found"),
         ("<entity", "m.xml:1: not well-formed XML: unclosed token"),
-        ("<a>" * 101 + "</a>" * 101, "m.xml:1: elements are nested deeper than 100 levels"),
+        ('<entity name="a">' * 101 + "</entity>" * 101, "m.xml:1: elements are nested deeper than 100 levels"),
         ("<html/>", "m.xml:1: <html> is not a model: MoML starts with <entity>"),
         ('<entity class="x"/>', "m.xml:1: <entity> has no name"),
         ('<?xml version="1.0" encoding="klingon"?><a/>', "m.xml: not well-formed XML: unknown encoding: klingon"),

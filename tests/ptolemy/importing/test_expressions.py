@@ -7,13 +7,11 @@ from typing import Any
 
 import pytest
 
-from epicycle.actors.expression import evaluate as own_evaluate
+from epicycle.actors.expression import evaluate
 from epicycle.ptolemy.importing.entities import Property
-from epicycle.ptolemy.importing.operators import Rows, java_text
 from epicycle.ptolemy.importing.scope import Scope
 from epicycle.ptolemy.importing.syntax import ExpressionError, parse
-from epicycle.ptolemy.importing.translate import translated
-from epicycle.ptolemy.importing.values import evaluate
+from epicycle.ptolemy.importing.translation import Array, Code, Meaning, Value, meaning_of, named
 
 PARAMETERS: dict[str, Any] = {
     "n": 3,
@@ -23,19 +21,18 @@ PARAMETERS: dict[str, Any] = {
     "rec": {"a": 1, "b": [4, 5]},
     "yes": True,
 }
-for _name, _text in (
-    ("endless", "function(x) endless(x)"),
-    ("twice", "function(x) x * 2"),
-    ("factorial", "function(k) k < 2 ? 1 : k * factorial(k - 1)"),
-):
-    PARAMETERS[_name] = evaluate(parse(_text), lambda name: PARAMETERS[name])
+
+
+def meaning(text: str, names: dict[str, Meaning] | None = None) -> Meaning:
+    """What an expression means over the parameters, and over names that have another meaning."""
+    known: dict[str, Meaning] = {name: Value(each) for name, each in PARAMETERS.items()} | (names or {})
+    return meaning_of(parse(text), known.__getitem__, {"k"} if names else ())
 
 
 def value(text: str) -> Any:
-    def scope(name: str) -> object:
-        return PARAMETERS[name]
-
-    return evaluate(parse(text), scope)
+    found = meaning(text)
+    assert isinstance(found, Value)
+    return found.value
 
 
 @pytest.mark.parametrize(
@@ -61,22 +58,15 @@ def value(text: str) -> Any:
         ("true || false", True),
         ("n == 3.0", True),
         ("1 != 1", False),
-        ("3 & 5", 1),
-        ("3 | 5", 7),
-        ("3 # 5", 6),
-        ("1 << 4", 16),
-        ("32 >> 2", 8),
-        ("~0", -1),
         ('"a" + 1 + 2.0', "a12.0"),
         ("'a' + true", "atrue"),
         ("{1, 2.0}", [1.0, 2.0]),
         ("{}", []),
         ('{a = 1, b = "x"}', {"a": 1, "b": "x"}),
-        ("{|a = 1 | 2|}", {"a": 3}),
         ("{1, 2} + {3, 4}", [4, 6]),
         ("2 * {1, 2}", [2, 4]),
-        ("[1, 2; 3, 4]", Rows([[1, 2], [3, 4]])),
-        ("[0 : 2 : 5]", Rows([[0, 2, 4]])),
+        ("[1, 2; 3, 4]", [[1, 2], [3, 4]]),
+        ("[0 : 2 : 5]", [[0, 2, 4]]),
         ("items(1)", 2),
         ("items.get(2)", 3),
         ("items.length()", 3),
@@ -94,16 +84,10 @@ def value(text: str) -> Any:
         ("Infinity", math.inf),
         ("MaxInt", 2147483647),
         ("sqrt(16)", 4.0),
-        ("cast(int, 2.7)", 2),
-        ("cast(double, 2)", 2.0),
-        ("cast(string, 2.5)", "2.5"),
         ("repeat(3, 0)", [0, 0, 0]),
         ("x * n", 1.5),
         ("append({1}, {2})", [1, 2]),
         ("subarray(items, 1, 2)", [2, 3]),
-        ("1.0 / 0.0", math.inf),
-        ('1E10 + ""', "1.0E10"),
-        ('0.0001 + ""', "1.0E-4"),
         ('(n > 2 && yes) ? name : ""', "joe"),
         ("1 // one\n + 2", 3),
         ("1 /* one */ + 2", 3),
@@ -121,51 +105,24 @@ def value(text: str) -> Any:
         ("2 - -2^2", -2),
         ("-7 % -3", -1),
         ("7 % -3", 1),
-        ("-1 >>> 28", 15),
+        # a text has a number as the model language writes it
+        ('1E10 + ""', "10000000000.0"),
+        ('"" + 2.50', "2.5"),
         # elements have one type
         ('{1, "a", true}', ["1", "a", "true"]),
         ("{{1}, {2.0}}", [[1.0], [2.0]]),
-        ("{{a = 1, b = 2}, {a = 2.0}}", [{"a": 1.0}, {"a": 2.0}]),
-        ("[1, 2.0]", Rows([[1.0, 2.0]])),
-        ('1 == "1"', True),
+        ("[1, 2.0]", [[1.0, 2.0]]),
         # matrices
-        ("[1, 2; 3, 4] * [1; 1]", Rows([[3], [7]])),
-        ("2 * [1, 2]", Rows([[2, 4]])),
         ("[1, 2; 3, 4](1, 0)", 3),
-        ("identityMatrixInt(2)", Rows([[1, 0], [0, 1]])),
-        ('"" + [1, 2; 3, 4]', "[1, 2; 3, 4]"),
-        ("transpose([1, 2])", Rows([[1], [2]])),
-        # doubles in texts have up to 13 decimals, and an exponent from a million on
-        ('"" + (0.1 + 0.2)', "0.3"),
-        ('"" + 1234567.0', "1.234567E6"),
-        ('"" + 0.001', "1.0E-3"),
-        ('"" + 100.0', "100.0"),
-        # functions
-        ("(function(x:int, y) x + 2 * y)(1, 2)", 5),
-        ("twice(4)", 8),
-        ("map(twice, items)", [2, 4, 6]),
-        ("map(function(x, y) x * y, {1, 2}, {3, 4})", [3, 8]),
-        ("filter(function(x) x > 1, items)", [2, 3]),
-        ("fold(function(x, y) x + y, 0, items)", 6),
-        ("iterate(function(x) x + n, 3, 0)", [0, 3, 6]),
-        ('eval("n + 1")', 4),
-        ("factorial(5)", 120),
         ("toRadians(180.0)", math.pi),
         ("signum(-2)", -1.0),
         ("hypot(3, 4)", 5.0),
-        ("log(0.0)", -math.inf),
         ("find({true, false, true})", [0, 2]),
-        ("merge({a = 1}, {a = 2, b = 3})", {"a": 1, "b": 3}),
         ("items.subarray(1)", [2, 3]),
-        ("items.extract({true, false, true})", [1, 3]),
+        ("items.extract({0, 2})", [1, 3]),
         ("items.reverse()", [3, 2, 1]),
-        ("name.toUpperCase()", "JOE"),
-        ('"a,b".split(",")', ["a", "b"]),
         ("x.isCloseTo(0.6, 0.2)", True),
-        ("cast({double}, items)", [1.0, 2.0, 3.0]),
-        ('cast(boolean, "true")', True),
         ("max(1, 2.0)", 2.0),
-        ("n(0)", 3),
     ],
 )
 def test_values(text: str, expected: Any) -> None:
@@ -182,20 +139,30 @@ def test_values(text: str, expected: Any) -> None:
         ("1 2", "'1 2' cannot be read: unexpected 2"),
         ("1 ` 2", "'1 ` 2' cannot be read at '` 2'"),
         ("2i + 1", "2i: complex numbers are not supported"),
-        (
-            "map(function(x) map(function(y) y, repeat(400, 1)), repeat(400, 1))",
-            "a list of more than 100,000 elements is too long",
-        ),
-        ("endless(1)", "the expression is nested too deeply"),
-        ("(function(x) x)(1, 2)", "it cannot be evaluated: wrong number of arguments: the function takes 1, not 2"),
-        ("function(1) 2", "'function(1) 2' cannot be read: expected the name of an argument"),
+        ("function(1) 2", "'function(1) 2' cannot be read: functions that a model defines are not supported"),
         ("unheard", "unknown name 'unheard'"),
         ("random()", "the function 'random' is not supported"),
-        ("items(7)", "there is no element at index 7"),
-        ("1 / 0", "it cannot be evaluated: division by zero"),
-        ("9^9^9^9^9", "a whole number must be at least -2^63 and less than 2^63"),
-        ("true + 1", "it cannot be evaluated: True is not a number"),
-        ("repeat(1000000, 1)", "it has more than the maximum of 10,000 elements"),
+        (
+            "items(7)",
+            "it cannot be evaluated: [1, 2, 3][7]: there is no element 7 in a list of 3 elements, counted from 0",
+        ),
+        ("1 / 0", "it cannot be evaluated: 1 / 0 divides by zero"),
+        ("1.0 / 0.0", "it cannot be evaluated: 1.0 / 0.0 divides by zero"),  # as in the run
+        ("log(0.0)", "it cannot be evaluated: log(0.0): log is not defined for 0.0"),
+        ("9^9^9^9^9", "it cannot be evaluated: the result of 387420489 ** 9 is too large"),
+        ("0xfffffffffffffffffffff", "a whole number must be at least -2^63 and less than 2^63"),
+        ("true + 1", "the operator '+' of truth values is not supported"),
+        ("3 & 5", "the operator '&' is not supported"),
+        ("[1, 2] * [3, 4]", "operators of matrices, and of arrays in arrays, are not supported"),
+        ("{1, 2} + {1, 2, 3}", "the arrays have different lengths"),
+        ("parseInt('1', 2)", "wrong number of arguments: parseInt does not take 2"),
+        ("nil + 1", "nothing cannot be a value here"),
+        ("1 ? 2 : 3", "1 is not a truth value"),
+        ("1" + "+1" * 2000, "the expression is nested too deeply"),
+        (
+            "repeat(1000000, 1)",
+            "it cannot be evaluated: [1] * 1000000: a list of more than 100,000 elements is too long",
+        ),
         ("[0 : 1 : 1000000]", "it has more than the maximum of 10,000 elements"),
         ("(" * 70 + "1" + ")" * 70, f"{'(' * 57 + '...'!r} cannot be read: nested deeper than 40 levels"),
     ],
@@ -213,7 +180,7 @@ def test_what_has_no_value(text: str, message: str) -> None:
         ("a * (b + 1)", "a * (b + 1)"),
         ("a - (b - 1)", "a - (b - 1)"),
         ("a - b - 1", "a - b - 1"),
-        ("a > 1 && !t", "a > 1 and not t"),
+        ("a > 1 && !t", "a > 1 and (not t)"),
         ("t || a == b", "t or a == b"),
         ("t ? a : b", "a if t else b"),
         ("(t ? a : b) + 1", "(a if t else b) + 1"),
@@ -229,34 +196,47 @@ def test_what_has_no_value(text: str, message: str) -> None:
         ("max(a, n)", "max(a, 3)"),
         ("floor(a)", "float(floor(a))"),
         ('"t = " + a', "'t = ' + str(a)"),
-        ("a % 2", "(a % 2 if a >= 0 else -(-a % 2))"),
+        ("a % 2", "a % 2 if a >= 0 else -(-a % 2)"),
         ("a % 2 == 0", "a % 2 == 0"),
-        ("-a % 2", "((-a) % 2 if (-a) >= 0 else -(-(-a) % 2))"),
+        ("-a % 2", "-a % 2 if -a >= 0 else -(--a % 2)"),
         ("7 % b", "7 % abs(b)"),
-        ("twice(a + 1)", "(a + 1) * 2"),
-        ("(function(x) x + b)(a)", "a + b"),
-        ("map(function(x) x + a, array)", "[x + a for x in array]"),
-        ("filter(function(a) a > 7, array)", "[a_ for a_ in array if a_ > 7]"),
         ("atan(a)", "atan2(a, 1)"),
-        ("array.equals({7, 8, 9})", "((array) == ([7, 8, 9]))"),
+        ("array.equals({7, 8, 9})", "array == [7, 8, 9]"),
         ("a * -1", "a * -1"),
         ("Infinity * a", "inf * a"),
-        ("cast(int, a)", "int(a)"),
         ("log10(a)", "log(a, 10)"),
     ],
 )
 def test_how_it_is_said(text: str, expected: str) -> None:
-    names = {name: name for name in ("a", "b", "t", "r", "array")}
-
-    def scope(name: str) -> object:
-        return PARAMETERS[name]
-
-    found = translated(parse(text), names, scope)
-    assert found == expected
+    """And what is said has the value that it has before the run, of the same names."""
     given = {"a": 2, "b": 5, "t": True, "r": {"f": 1.5}, "array": [7, 8, 9]}
-    ours = own_evaluate(found, given)
-    theirs = evaluate(parse(text), lambda name: given[name] if name in given else PARAMETERS[name])
-    assert (ours, type(ours)) == (theirs, type(theirs))
+    found = meaning(text, {name: named(name) for name in given})
+    assert isinstance(found, Code)
+    assert found.text == expected
+    ours = evaluate(found.text, given)
+    before = meaning(text, {name: Value(each) for name, each in given.items()})
+    assert isinstance(before, Value)
+    assert (ours, type(ours)) == (before.value, type(before.value))
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("w / 2", "int(w / 2)"),
+        ("f / 2", "f / 2"),
+        ("w + 1 / w", "w + int(1 / w)"),
+        ("'is ' + s + w", "'is ' + s + str(w)"),
+        ("{w, f}", "[float(w), f]"),
+        ("list * 2", "[list[k_] * 2 for k_ in range(len(list))]"),
+        ("list / 2", "[int(list[k_] / 2) for k_ in range(len(list))]"),
+        ("list(0) / w", "int(list[0] / w)"),
+    ],
+)  # fmt: skip
+def test_what_is_known_of_the_kinds_of_values(text: str, expected: str) -> None:
+    kinds = {"w": int, "f": float, "s": str, "list": Array(int)}
+    found = meaning(text, {name: named(name, kind) for name, kind in kinds.items()})
+    assert isinstance(found, Code)
+    assert found.text == expected
 
 
 @pytest.mark.parametrize(
@@ -265,11 +245,22 @@ def test_how_it_is_said(text: str, expected: str) -> None:
         ("$n and ${n}.5", "3 and 3.5"),
         ("$(n + max(n, 7))!", "10!"),
         ("$$5, $unheard, $(1 +)", "$5, $unheard, $(1 +)"),
-        ("$x: $items", "0.5: {1, 2, 3}"),
+        ("$x: $yes", "0.5: true"),
     ],
 )
 def test_texts_with_names_in_them(text: str, expected: str) -> None:
-    said = {
-        name: Property(name, "ptolemy.data.expr.Parameter", java_text(PARAMETERS[name])) for name in ("n", "x", "items")
-    }
+    values = {"n": "3", "x": "0.5", "yes": "true"}
+    said = {name: Property(name, "ptolemy.data.expr.Parameter", each) for name, each in values.items()}
     assert Scope(Property("m", properties=said)).filled(text) == expected
+
+
+def test_the_own_name_of_a_parameter_is_one_further_out() -> None:
+    def entity(**values: str) -> Property:
+        said = {name: Property(name, "ptolemy.data.expr.Parameter", each) for name, each in values.items()}
+        return Property("m", properties=said)
+
+    inner = Scope(entity(delay="delay * 2", a="b", b="a"), Scope(entity(delay="3")))
+    assert inner("delay") == 6
+    with pytest.raises(ExpressionError) as caught:
+        inner("a")
+    assert str(caught.value) == "'a' is defined in terms of itself"

@@ -106,7 +106,6 @@ CASES: dict[str, tuple[str, Fed, dict[str, object], list[tuple[float, Any]]]] = 
         {"values": "{1, 2}", "repeat": "true", "holdLastOutput": "true"},
         [(0, 1), (2, 2), (3, 1)],
     ),
-    "the microstep has a trigger": (f"{DE}GetCurrentMicrostep", {"trigger": {0: "1"}}, {}, [(0, 1)]),
     "truth values become 1 and 0": (
         f"{LIB}conversions.BooleanToAnything", {"input": {0: "true", 1: "false"}}, {}, [(0, 1), (1, 0)],
     ),

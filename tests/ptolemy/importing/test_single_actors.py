@@ -157,21 +157,20 @@ def test_a_port_parameter_of_a_composite(tmp_path: Path) -> None:
     assert [token for _, _, token in recorded(tmp_path, text)] == [5, 6]
 
 
-def test_functions_of_the_model_are_written_out(tmp_path: Path) -> None:
+def test_functions_that_a_model_defines_are_refused(tmp_path: Path) -> None:
     text = model(
         entity("c", "DiscreteClock", values="{1, 2}"),
         entity("a", "Const", value="f(2)"),
-        entity("E", "Expression", port("x", "input"), expression="f(x) * 2"),
         entity("R", "Recorder"),
-        wires("c.output a.trigger E.x", "a.output R.input", "E.output R.input"),
-        f="function(x:int) x + n",
-        n=3,
-        stop=1,
+        wires("c.output a.trigger", "a.output R.input"),
+        f="function(x:int) x + 1",
     )
-    found = written(tmp_path, text)
-    assert "  a: {type: Const, value: 5}\n" in found
-    assert '  E: {type: Expression, expression: "(x + 3) * 2"}\n' in found
-    assert "parameters:" not in found
+    with pytest.raises(MomlError) as caught:
+        imported(tmp_path, text)
+    assert str(caught.value) == (
+        "m.xml cannot be imported:\n   - a.value = 'f(2)': 'function(x:int) x + 1' cannot be read: "
+        "functions that a model defines are not supported"
+    )
 
 
 @pytest.mark.parametrize(
@@ -180,8 +179,6 @@ def test_functions_of_the_model_are_written_out(tmp_path: Path) -> None:
         ("nil", "nil cannot be written"),
         ("{1, nil}", "nil cannot be written"),
         ("NaN", "NaN cannot be written"),
-        ("f", "a function cannot be written"),
-        ("'q' + f", "it cannot be evaluated: it has no text form"),
     ],
 )
 def test_values_that_cannot_be_written(tmp_path: Path, said: str, why: str) -> None:
@@ -190,7 +187,6 @@ def test_values_that_cannot_be_written(tmp_path: Path, said: str, why: str) -> N
         entity("a", "Const", value=said),
         entity("R", "Recorder"),
         wires("c.output a.trigger", "a.output R.input"),
-        f="function(x:int) x",
     )
     with pytest.raises(MomlError) as caught:
         imported(tmp_path, text)
