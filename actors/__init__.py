@@ -13,7 +13,6 @@ if TYPE_CHECKING:
     from .constructors import *  # the same classes, each with a constructor that names its parameters
     from .control import FilterDesign
     from .distributions import Distribution
-    from .generators import Generator
     from .modes import Mode, on_entry, on_exit, transition
     from .replay import ReplayError
     from .robotics import (
@@ -54,7 +53,6 @@ else:
     )
     from .flow import BooleanSwitch, Merge, MostRecent, Repeat, Router, Sampler, Select, Switch, Synchronizer
     from .functions import Expression, Function, LookupTable
-    from .generators import DRand, Generator, JavaRandom
     from .logic import Comparator, Equals, LogicGate
     from .passing import (
         BooleanSelect,
@@ -81,39 +79,38 @@ else:
 
 __all__ = [
     "ABSENT", "CORE", "CORE_MODULES", "CORE_REASON", "FORMER", "MAX_DEPTH", "NANOSECONDS_PER_SECOND", "NEVER",
-    "NO_TOKENS", "ODE", "PID", "REQUIRED", "SAME", "Accumulator", "Ackermann", "Actor", "AddSubtract", "ArqReceiver",
+    "NO_TOKENS", "ODE", "PID", "REQUIRED", "Accumulator", "Ackermann", "Actor", "AddSubtract", "ArqReceiver",
     "ArqSender", "Barrier", "Batch", "Beliefs", "Bernoulli", "Binomial", "BlockExpression", "BodyState",
     "BooleanSelect", "BooleanSwitch", "BroadcastChannel", "Butterworth", "Casadi", "Cauchy", "Changes", "ChannelError",
     "ChiSquare", "Choice", "CircularMotion", "ClearanceMonitor", "Clock", "Collect", "Commutator", "Comparator",
-    "Configurable", "Const", "Constant", "Context", "Counter", "CurrentMicrostep", "CurrentTime", "DRand", "DeadZone",
-    "Default", "Derivative", "Detections", "Difference", "DiscreteFilter", "Display", "DistanceMonitor", "Distribution",
+    "Configurable", "Const", "Constant", "Context", "Counter", "CurrentMicrostep", "CurrentTime", "DeadZone", "Default",
+    "Derivative", "Detections", "Difference", "DiscreteFilter", "Display", "DistanceMonitor", "Distribution",
     "DoubleIntegrator", "Dynamics", "Emitter", "Environment", "EpicycleError", "Equals", "Estimate", "Estimator",
     "Exponential", "Expression", "ExtendedEstimator", "Extreme", "Fault", "FaultError", "Filter", "FilterDesign",
-    "FilterError", "FilterPyEstimator", "FirstOfInstant", "FirstOrder", "Flooding", "Function", "Gamma", "Generator",
-    "GoalMonitor", "Histogram", "HoldingExpression", "Hysteresis", "InertialSensor", "Inform", "Inhibit", "InputPort",
-    "IntegratedOUEstimator", "Integrator", "IsPresent", "JPDATracker", "JavaRandom", "Latest", "LatestOfAll", "Limiter",
-    "Line", "Link", "LogNormal", "LogicGate", "LookupTable", "Machine", "MappingParameter", "Match", "MathFunction",
+    "FilterError", "FilterPyEstimator", "FirstOfInstant", "FirstOrder", "Flooding", "Function", "Gamma", "GoalMonitor",
+    "Histogram", "HoldingExpression", "Hysteresis", "InertialSensor", "Inform", "Inhibit", "InputPort",
+    "IntegratedOUEstimator", "Integrator", "IsPresent", "JPDATracker", "Latest", "LatestOfAll", "Limiter", "Line",
+    "Link", "LogNormal", "LogicGate", "LookupTable", "Machine", "MappingParameter", "Match", "MathFunction",
     "Measurement", "Merge", "ModalActor", "Mode", "Moment", "MostRecent", "MotionState", "MovingAverage",
     "MovingStatistics", "MultiTargetSensor", "MultiplyDivide", "NegativeBinomial", "NetworkSwitch", "Normal",
-    "Objective", "Observation", "OutputPort", "Parameter", "ParameterError", "ParticleEstimator", "Pending", "Place",
-    "Plan", "Poisson", "PoissonClock", "Pool", "Pools", "PortError", "PortParameter", "Pose", "Posts", "Previous",
-    "Problem", "Process", "Pulse", "Quantity", "Quantizer", "Queue", "Ramp", "Random", "RandomInteger",
-    "RangeBearingSensor", "RangeScanner", "Ranks", "ReachGoal", "RecordAssembler", "RecordDisassembler", "Recorder",
-    "Register", "Repeat", "Replay", "ReplayError", "ResettableTimer", "RobustController", "Router", "SafeController",
-    "SampledEstimate", "Sampler", "Scale", "Select", "Sensor", "SensorModel", "SeparationMonitor", "Sequence",
-    "Sequencer", "Server", "SetFields", "SetVariable", "SharedQueue", "SingleEvent", "Solver", "Span", "Spread",
-    "StateMachine", "StateSpace", "Station", "StayNear", "Stop", "Stream", "Streams", "StudentT", "Switch",
-    "Synchronizer", "Tag", "Test", "TextFunction", "TimeAverage", "TimeCompare", "TimeDelay", "TimeGap", "Timer",
-    "Times", "TrackingError", "Tracks", "Trajectory", "TransferFunction", "Triangular", "Unbatch", "Unicycle",
-    "Uniform", "UnitError", "UnscentedEstimator", "Variable", "VaryingRandom", "Vehicle", "VonMises", "WaitingLine",
-    "WaitingTime", "Wake", "Way", "WaypointFollower", "WaypointMotion", "When", "abridged", "accepts",
-    "array_parameter", "bounds_text", "brief", "convert", "counted", "counted_in_si", "cut", "declared_parameters",
-    "declared_ports", "did_you_mean", "digits", "elementary", "has_own_ports", "in_si", "irregular", "is_alone",
-    "is_too_deep", "nearest", "new_tag", "new_wake", "normal_quantile", "normal_share", "on_entry", "on_exit",
-    "open_regular", "parse_unit", "part_finders", "paths", "plain", "present", "random_stream", "read_regular",
-    "read_table", "readable", "rounds", "shaped", "shortened", "symbolic", "texts_parameter", "to_nanoseconds",
-    "to_seconds", "token_type", "transition", "type_name", "unknown_parameter", "variants", "visible",
-    "visible_character", "visible_lines",
+    "Objective", "Observation", "OutputPort", "Parameter", "ParameterError", "ParticleEstimator", "Pending", "Plan",
+    "Poisson", "PoissonClock", "Pool", "Pools", "PortError", "PortParameter", "Pose", "Previous", "Problem", "Process",
+    "Pulse", "Quantity", "Quantizer", "Queue", "Ramp", "Random", "RandomInteger", "RangeBearingSensor", "RangeScanner",
+    "Ranks", "ReachGoal", "RecordAssembler", "RecordDisassembler", "Recorder", "Register", "Repeat", "Replay",
+    "ReplayError", "ResettableTimer", "RobustController", "Router", "SafeController", "SampledEstimate", "Sampler",
+    "Scale", "Select", "Sensor", "SensorModel", "SeparationMonitor", "Sequence", "Sequencer", "Server", "SetFields",
+    "SetVariable", "SharedQueue", "SingleEvent", "Solver", "Span", "Spread", "StateMachine", "StateSpace", "Station",
+    "StayNear", "Stop", "Stream", "Streams", "StudentT", "Switch", "Synchronizer", "Tag", "Test", "TextFunction",
+    "TimeAverage", "TimeCompare", "TimeDelay", "TimeGap", "Timer", "Times", "TrackingError", "Tracks", "Trajectory",
+    "TransferFunction", "Triangular", "Unbatch", "Unicycle", "Uniform", "UnitError", "UnscentedEstimator", "Variable",
+    "VaryingRandom", "Vehicle", "VonMises", "WaitingLine", "WaitingTime", "Wake", "Way", "WaypointFollower",
+    "WaypointMotion", "When", "abridged", "accepts", "array_parameter", "bounds_text", "brief", "convert", "counted",
+    "counted_in_si", "cut", "declared_parameters", "declared_ports", "did_you_mean", "digits", "elementary",
+    "has_own_ports", "in_si", "irregular", "is_alone", "is_too_deep", "nearest", "new_tag", "new_wake",
+    "normal_quantile", "normal_share", "on_entry", "on_exit", "open_regular", "parse_unit", "part_finders", "paths",
+    "plain", "present", "random_stream", "read_regular", "read_table", "readable", "rounds", "shaped", "shortened",
+    "symbolic", "texts_parameter", "to_nanoseconds", "to_seconds", "token_type", "transition", "type_name",
+    "unknown_parameter", "variants", "visible", "visible_character", "visible_lines",
 ]  # fmt: skip
 
 

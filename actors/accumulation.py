@@ -3,78 +3,55 @@ Difference."""
 
 from __future__ import annotations
 
-from functools import reduce
 from typing import Any
 
 from .core import Actor, EpicycleError, InputPort, OutputPort, Parameter, elementary, present, rounds, to_seconds
-from .items import added
-from .matching import taken
 
 
 class Counter(Actor):
     """Counts tokens of any kind: up for each at ``increment``, down for each at ``decrement``.
 
-    The count is sent once for each tag at which tokens came. Where the ports keep their tokens, as in Ptolemy, it is
-    sent once for the first tokens of all channels, once for the second ones, and so on.  Ptolemy: ``Counter``.
+    The count is sent once for each tag at which tokens came.  Ptolemy: ``Counter``.
     """
 
-    increment = InputPort(multi=True, required=False, ptolemy={"keep": True}, doc="each token increases the count by 1")
-    decrement = InputPort(multi=True, required=False, ptolemy={"keep": True}, doc="each token decreases the count by 1")
-    reset = InputPort(
-        required=False, ptolemy={"keep": True}, doc="resets the count, before the tokens of the tag are counted"
-    )
+    increment = InputPort(multi=True, required=False, doc="each token increases the count by 1")
+    decrement = InputPort(multi=True, required=False, doc="each token decreases the count by 1")
+    reset = InputPort(required=False, doc="resets the count, before the tokens of the tag are counted")
     output = OutputPort(int, doc="the number")
 
     initial = Parameter(int, 0, doc="the count at the start and after a reset")
-    reset_by = Parameter(
-        str, "any", choices=("any", "true"), ptolemy="true", doc="which tokens reset: any, or only true ones"
-    )
-    reset_last = Parameter(
-        bool,
-        False,
-        ptolemy=True,
-        doc="whether a reset takes effect after the tokens of its tag are counted, not before",
-    )
+    reset_by = Parameter(str, "any", choices=("any", "true"), doc="which tokens reset: any, or only true ones")
 
     def initialize(self) -> None:
         self._number = self.initial
 
     def fire(self) -> None:
-        resets = [self.reset.get()] if self.reset.keep and self.reset.waiting() else self.reset.tokens
-        is_reset = any(token is True or self.reset_by == "any" for token in resets)
-        if is_reset and not self.reset_last:
+        is_reset = any(token is True or self.reset_by == "any" for token in self.reset.tokens)
+        if is_reset:
             self._number = self.initial
-        up, down = self._counted(self.increment), self._counted(self.decrement)
+        up, down = len(self.increment.tokens), len(self.decrement.tokens)
         self._number += up - down
-        if is_reset and self.reset_last:
-            self._number = self.initial
         if is_reset or up or down:
             self.output.send(self._number)
-
-    @staticmethod
-    def _counted(port: InputPort[Any]) -> int:
-        return taken(port) if port.keep else len(port.tokens)
 
 
 class Accumulator(Actor):
     """The sum of all tokens so far, including those of the present tag.
 
-    Under ``like: ptolemy``, lists are also added, item by item.  Ptolemy: ``Accumulator``.
+    Ptolemy: ``Accumulator``.
     """
 
-    input = InputPort(float, multi=True, ptolemy={"type": Any}, doc="the numbers to add")
+    input = InputPort(float, multi=True, doc="the numbers to add")
     reset = InputPort(multi=True, required=False, doc="resets the sum, before the tokens of the tag are added")
-    output = OutputPort(float, ptolemy={"type": Any}, doc="the sum, sent for each round of tokens and at a reset")
+    output = OutputPort(float, doc="the sum, sent for each round of tokens and at a reset")
 
     initial: Parameter[float] = Parameter(int | float, 0, doc="the sum at the start and after a reset")
-    reset_by = Parameter(
-        str, "any", choices=("any", "true"), ptolemy="true", doc="which tokens reset: any, or only true ones"
-    )
+    reset_by = Parameter(str, "any", choices=("any", "true"), doc="which tokens reset: any, or only true ones")
     low: Parameter[float | None] = Parameter(int | float, None, doc="the lowest value of the sum")
     high: Parameter[float | None] = Parameter(int | float, None, doc="the highest value of the sum")
 
     def initialize(self) -> None:
-        self._sum: Any = self.initial
+        self._sum = self.initial
 
     def fire(self) -> None:
         if self.reset.present:
@@ -83,12 +60,12 @@ class Accumulator(Actor):
             if not self.input.present:
                 self._send()
         for (tokens,) in rounds(self.input):
-            there = present(tokens)
-            if all(isinstance(each, (int, float)) for each in there) and isinstance(self._sum, (int, float)):
-                self._sum += elementary.total(there)
-            else:
-                self._sum = reduce(added, there, self._sum)
+            self.add(present(tokens))
             self._send()
+
+    def add(self, tokens: list[Any]) -> None:
+        """Add the tokens of a round to the sum."""
+        self._sum += elementary.total(tokens)
 
     def _send(self) -> None:
         if self.low is not None and self._sum < self.low:
@@ -205,7 +182,7 @@ class Difference(Actor):
     """
 
     input = InputPort(float, doc="the numbers")
-    output = OutputPort(float, ptolemy={"type": Any}, doc="x[k] - x[k-1]")
+    output = OutputPort(float, doc="x[k] - x[k-1]")
 
     initial: Parameter[float | None] = Parameter(int | float, None, doc="used as the token before the first")
 

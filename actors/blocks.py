@@ -18,7 +18,6 @@ from .core import (
     rounds,
 )
 from .expression import FormulaParameter, operand
-from .matching import matched
 
 
 class HoldingExpression(Actor):
@@ -26,8 +25,7 @@ class HoldingExpression(Actor):
 
     Every name in the expression is an input port, as of an ``Expression``.  Those in ``held`` need not be connected:
     they have the value given there until a token comes, and from then on that of the latest token.  The value is sent
-    whenever there is a token at each of the other inputs (under ``like: ptolemy``, tokens wait there for each other);
-    if all inputs are held, whenever a token comes.
+    whenever there is a token at each of the other inputs; if all inputs are held, whenever a token comes.
     Ptolemy: actors with a ``PortParameter``, such as ``ArrayElement``: ``input[index]`` with ``held: {index: 0}``.
     """
 
@@ -48,24 +46,16 @@ class HoldingExpression(Actor):
         return {
             name: InputPort(required=False, doc="a name in the expression, which holds its value")
             if name in self.held
-            else InputPort(ptolemy={"keep": True}, doc="a name in the expression")
+            else InputPort(doc="a name in the expression")
             for name in names
         }
 
     def initialize(self) -> None:
         self._ports = [port for port in self.inputs.values() if port.width]
-        self._waiting = [port for port in self._ports if port.keep]
         self._needed = {name for name in self.inputs if name not in self.held}
         self._values: dict[str, Any] = {name: operand(value) for name, value in self.held.items()}
 
     def fire(self) -> None:
-        if self._waiting:
-            held = [port for port in self._ports if not port.keep and port.present]
-            self._values.update({port.name: operand(port.value) for port in held})
-            for values in matched(self._waiting):
-                taken = {name: operand(token) for name, token in values.items()}
-                self.output.send(self.expression({**self._values, **taken, "time": self.now}))
-            return
         for entries in rounds(*self._ports):
             came = {port.name: operand(token) for port, (token,) in zip(self._ports, entries, strict=True)
                     if token is not ABSENT}  # fmt: skip

@@ -21,7 +21,6 @@ from .distributions import Bernoulli as _Bernoulli, Binomial as _Binomial, Cauch
 from .entities import Batch as _Batch, Collect as _Collect, Match as _Match, RecordAssembler as _RecordAssembler, RecordDisassembler as _RecordDisassembler, SetFields as _SetFields, Spread as _Spread, Unbatch as _Unbatch
 from .flow import BooleanSwitch as _BooleanSwitch, Merge as _Merge, MostRecent as _MostRecent, Repeat as _Repeat, Router as _Router, Sampler as _Sampler, Select as _Select, Switch as _Switch, Synchronizer as _Synchronizer
 from .functions import Expression as _Expression, Function as _Function, LookupTable as _LookupTable
-from .generators import DRand as _DRand, Generator, JavaRandom as _JavaRandom
 from .links import ArqReceiver as _ArqReceiver, ArqSender as _ArqSender, Link as _Link, NetworkSwitch as _NetworkSwitch
 from .logic import Comparator as _Comparator, Equals as _Equals, LogicGate as _LogicGate
 from .modes.machine import StateMachine as _StateMachine
@@ -176,7 +175,7 @@ class Constant(_Constant):
 
 class Counter(_Counter):
     """Counts tokens of any kind: up for each at `increment`, down for each at `decrement`."""
-    def __init__(self, path: str, *, initial: _Whole = ..., reset_by: Literal['any', 'true'] = ..., reset_last: bool = ...) -> None: ...
+    def __init__(self, path: str, *, initial: _Whole = ..., reset_by: Literal['any', 'true'] = ...) -> None: ...
 
 class CurrentMicrostep(_CurrentMicrostep):
     """Sends the present microstep for each trigger."""
@@ -186,17 +185,13 @@ class CurrentTime(_CurrentTime):
     """Sends the present time for each trigger, also for each of several that come together."""
     def __init__(self, path: str) -> None: ...
 
-class DRand(_DRand):
-    """The generator of the Colt library, from which the actors of Ptolemy II named Colt draw their numbers."""
-    def __init__(self, *, seed: _Whole) -> None: ...
-
 class DeadZone(_DeadZone):
     """Outputs zero between two values, and the excess beyond them: play, or a valve with overlap."""
     def __init__(self, path: str, *, low: _Number, high: _Number) -> None: ...
 
 class Default(_Default):
     """Passes on the token at `preferred`, or, if there is none, the one at `alternate`."""
-    def __init__(self, path: str, *, both: bool = ...) -> None: ...
+    def __init__(self, path: str) -> None: ...
 
 class Derivative(_Derivative):
     """The rate of change of a signal from token to token."""
@@ -314,10 +309,6 @@ class JPDATracker(_JPDATracker):
     """Tracks an unknown number of targets by joint probabilistic data association (JPDA) and the unscented filter."""
     def __init__(self, path: str, *, period: _Number = ..., gate: _Number = ..., birth_density: _Number = ..., birth_variance: _Number = ..., confirm_hits: _Whole = ..., confirm_steps: _Whole = ..., confirm_probability: _Number = ..., delete_probability: _Number = ..., lifetime: _Number = ..., max_deviation: _Number = ..., merge_distance: _Number = ..., max_tracks: _Whole = ..., max_delay: _Number = ..., noise_direction: Literal['expected', 'predicted'] = ..., position_noise: _Number = ..., velocity_noise: _Number = ..., kappa: _Number = ...) -> None: ...
 
-class JavaRandom(_JavaRandom):
-    """`java.util.Random`, from which most random actors of Ptolemy II draw their numbers."""
-    def __init__(self, *, seed: _Whole) -> None: ...
-
 class LatestOfAll(_LatestOfAll):
     """Sends the latest token of every channel whenever a token comes on any of them."""
     def __init__(self, path: str, *, initial: object = ...) -> None: ...
@@ -356,7 +347,7 @@ class MathFunction(_MathFunction):
 
 class Merge(_Merge):
     """Joins the tokens of all its channels into one stream, one token per microstep."""
-    def __init__(self, path: str, *, discard: bool = ..., whole_channel: bool = ...) -> None: ...
+    def __init__(self, path: str, *, discard: bool = ...) -> None: ...
 
 class ModalActor(_ModalActor):
     """Base class of actors with modes whose transitions are methods."""
@@ -380,7 +371,7 @@ class MultiTargetSensor(_MultiTargetSensor):
 
 class MultiplyDivide(_MultiplyDivide):
     """The product of the tokens at `multiply`, divided by each token at `divide`."""
-    def __init__(self, path: str, *, whole: bool = ...) -> None: ...
+    def __init__(self, path: str) -> None: ...
 
 class NegativeBinomial(_NegativeBinomial):
     """The negative binomial distribution: the number of failures before a number of successes."""
@@ -400,7 +391,7 @@ class ODE(_ODE):
 
 class PID(_PID):
     """A controller with a proportional, an integral and a derivative part, which acts at each measurement."""
-    def __init__(self, path: str, *, setpoint: _Number = ..., proportional: _Number = ..., integral: _Number = ..., derivative: _Number = ..., integration: Literal['hold', 'trapezoid'] = ..., filter_time: _Number = ..., setpoint_weight: _Number = ..., derivative_weight: _Number = ..., low: _Number = ..., high: _Number = ..., anti_windup: Literal['clamping', 'back_calculation', 'none'] = ..., tracking_time: _Number | None = ..., initial: _Number = ..., late_reset: bool = ...) -> None: ...
+    def __init__(self, path: str, *, setpoint: _Number = ..., proportional: _Number = ..., integral: _Number = ..., derivative: _Number = ..., integration: Literal['hold', 'trapezoid'] = ..., filter_time: _Number = ..., setpoint_weight: _Number = ..., derivative_weight: _Number = ..., low: _Number = ..., high: _Number = ..., anti_windup: Literal['clamping', 'back_calculation', 'none'] = ..., tracking_time: _Number | None = ..., initial: _Number = ...) -> None: ...
 
 class ParticleEstimator(_ParticleEstimator):
     """A bootstrap particle filter: any belief, and any sensor."""
@@ -412,7 +403,7 @@ class Poisson(_Poisson):
 
 class PoissonClock(_PoissonClock):
     """Ticks at random: the times between ticks are independent and exponentially distributed."""
-    def __init__(self, path: str, *, mean_interval: _Number = ..., fire_at_start: bool = ..., generator: Generator | abc.Mapping[str, object] | None = ..., one_at_a_time: bool = ..., values: abc.Sequence[object] | None = ..., stop_time: _Number | None = ...) -> None: ...
+    def __init__(self, path: str, *, mean_interval: _Number = ..., fire_at_start: bool = ..., values: abc.Sequence[object] | None = ..., stop_time: _Number | None = ...) -> None: ...
 
 class Pool(_Pool):
     """Units of a resource: a token at `acquire` requests some and comes back from `granted` when it has them; a token at `release` returns them."""
@@ -436,15 +427,15 @@ class Quantizer(_Quantizer):
 
 class Queue(_Queue):
     """Keeps tokens, first in, first out, and releases one for each trigger."""
-    def __init__(self, path: str, *, capacity: _Whole | None = ..., persistent_trigger: bool = ..., one_at_a_time: bool = ...) -> None: ...
+    def __init__(self, path: str, *, capacity: _Whole | None = ..., persistent_trigger: bool = ...) -> None: ...
 
 class Ramp(_Ramp):
     """Counts triggers: sends `init` for the first one, and `step` more for each further one."""
-    def __init__(self, path: str, *, init: _Number = ..., step: _Number = ..., late_step: bool = ..., limit: _Whole | None = ...) -> None: ...
+    def __init__(self, path: str, *, init: _Number = ..., step: _Number = ..., limit: _Whole | None = ...) -> None: ...
 
 class Random(_Random):
     """Sends a token drawn from `distribution` for each trigger, independently of all others."""
-    def __init__(self, path: str, *, distribution: Distribution | abc.Mapping[str, object], generator: Generator | abc.Mapping[str, object] | None = ...) -> None: ...
+    def __init__(self, path: str, *, distribution: Distribution | abc.Mapping[str, object]) -> None: ...
 
 class RandomInteger(_RandomInteger):
     """All integers from `low` to `high` with equal probability, both included."""
@@ -532,7 +523,7 @@ class Sequencer(_Sequencer):
 
 class Server(_Server):
     """Serves tokens in the order of their arrival, `servers` of them at a time, and sends each when its service ends."""
-    def __init__(self, path: str, *, service_time: _Number = ..., distribution: Distribution | abc.Mapping[str, object] | None = ..., servers: _Whole | None = ..., capacity: _Whole | None = ..., one_at_a_time: bool = ...) -> None: ...
+    def __init__(self, path: str, *, service_time: _Number = ..., distribution: Distribution | abc.Mapping[str, object] | None = ..., servers: _Whole | None = ..., capacity: _Whole | None = ...) -> None: ...
 
 class SetFields(_SetFields):
     """Sets fields of tokens: a token with fields is a mapping, as YAML writes it and expressions read it."""
@@ -556,7 +547,7 @@ class Spread(_Spread):
 
 class StateMachine(_StateMachine):
     """A state machine with one transition per line, and variables that may flow."""
-    def __init__(self, path: str, *, modes: object, transitions: object = ..., initial: str | None = ..., variables: abc.Mapping[str, object] = ..., held: abc.Mapping[str, object] = ..., one_at_a_time: bool = ..., set_last: bool = ..., method: Literal['RK45', 'RK23', 'DOP853', 'Radau', 'BDF'] = ..., relative_tolerance: _Number = ..., absolute_tolerance: _Number = ..., max_step: _Number | None = ...) -> None: ...
+    def __init__(self, path: str, *, modes: object, transitions: object = ..., initial: str | None = ..., variables: abc.Mapping[str, object] = ..., held: abc.Mapping[str, object] = ..., method: Literal['RK45', 'RK23', 'DOP853', 'Radau', 'BDF'] = ..., relative_tolerance: _Number = ..., absolute_tolerance: _Number = ..., max_step: _Number | None = ...) -> None: ...
 
 class StateSpace(_StateSpace):
     """A linear system in state space, `dx/dt = A x + B u`, `y = C x + D u`."""
@@ -588,7 +579,7 @@ class Synchronizer(_Synchronizer):
 
 class Test(_Test):
     """Compares tokens with expected values, in order, and ends the run with an error if they differ."""
-    def __init__(self, path: str, *, values: abc.Sequence[object], times: _Row | None = ..., tolerance: _Number = ..., complete: bool = ..., together: bool = ..., follow: bool = ..., lenient: bool = ...) -> None: ...
+    def __init__(self, path: str, *, values: abc.Sequence[object], times: _Row | None = ..., tolerance: _Number = ..., complete: bool = ..., together: bool = ..., follow: bool = ...) -> None: ...
 
 class TextFunction(_TextFunction):
     """Applies a function to texts whenever one of its inputs gets a token; each input keeps its latest token."""
@@ -604,7 +595,7 @@ class TimeCompare(_TimeCompare):
 
 class TimeDelay(_TimeDelay):
     """Sends each token after a delay; with delay 0 at the next microstep."""
-    def __init__(self, path: str, *, delay: _Number = ..., steps: bool = ...) -> None: ...
+    def __init__(self, path: str, *, delay: _Number = ...) -> None: ...
 
 class TimeGap(_TimeGap):
     """Sends the time since the previous token; nothing for the first one."""
@@ -612,7 +603,7 @@ class TimeGap(_TimeGap):
 
 class Timer(_Timer):
     """Sends a value after the number of seconds in each token; any number of times may run in parallel."""
-    def __init__(self, path: str, *, one_at_a_time: bool = ..., value: object = ...) -> None: ...
+    def __init__(self, path: str, *, value: object = ...) -> None: ...
 
 class TrackingError(_TrackingError):
     """The GOSPA metric of tracks: the distance between the positions of the true bodies and those of the tracks."""
@@ -648,7 +639,7 @@ class Variable(_Variable):
 
 class VaryingRandom(_VaryingRandom):
     """A `Random` whose distribution changes during the run: some of its parameters have inputs with their names."""
-    def __init__(self, path: str, *, varying: _Texts, distribution: Distribution | abc.Mapping[str, object], generator: Generator | abc.Mapping[str, object] | None = ...) -> None: ...
+    def __init__(self, path: str, *, varying: _Texts, distribution: Distribution | abc.Mapping[str, object]) -> None: ...
 
 class Vehicle(_Vehicle):
     """A double integrator in the paper's discrete form."""

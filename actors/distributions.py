@@ -15,8 +15,7 @@ from .core import (
     elementary,
     token_type,
 )
-from .core.choices import cumulated, weighted
-from .generators import Numbers
+from .core.choices import cumulated
 
 
 class Distribution(Configurable):
@@ -244,10 +243,7 @@ class Choice(Distribution):
             )
 
     def draw(self, random: Stream) -> Any:
-        numbers: Any = random
-        if isinstance(numbers, Numbers):
-            return self.values[numbers.weighted(self._sums)]
-        return self.values[weighted(random, self._sums)]
+        return self.values[random.weighted(self._sums)]
 
 
 def _check_order(low_name: str, low: float, high_name: str, high: float) -> None:

@@ -14,7 +14,6 @@ from .core import (
     ParameterError,
     PortError,
     PortParameter,
-    Tag,
     array_parameter,
     brief,
     counted,
@@ -28,33 +27,28 @@ class Merge(Actor):
     """Joins the tokens of all its channels into one stream, one token per microstep.
 
     Of tokens at the same tag, that of the lowest channel is sent first, the others at the following microsteps; with
-    ``discard``, the others are lost.  With ``whole_channel``, as in Ptolemy, all tokens of a channel are sent at once.
-    Ptolemy: ``Merge``.
+    ``discard``, the others are lost.  Ptolemy: ``Merge``.
     """
 
     input = InputPort(multi=True, doc="the streams")
     output = OutputPort(doc="the tokens, one at a time")
 
     discard = Parameter(bool, False, doc="whether only the first token of a tag is sent")
-    whole_channel = Parameter(
-        bool, False, ptolemy=True, doc="whether tokens that come together on one channel leave together"
-    )
 
     def initialize(self) -> None:
         self._waiting: list[deque[Any]] = [deque() for _ in range(self.input.width)]
-        self._left: Tag | None = None  # the tag at which a whole channel was sent and others had to wait
 
-    def fire(self) -> None:
+    def come(self) -> None:
+        """Let the tokens of the present tag wait."""
         for queue, tokens in zip(self._waiting, self.input.by_channel(), strict=True):
             queue.extend(tokens)
+
+    def fire(self) -> None:
+        self.come()
         first = next((queue for queue in self._waiting if queue), None)
-        if first is None or self._left == self.tag:
+        if first is None:
             return
         self.output.send(first.popleft())
-        if self.whole_channel:
-            while first:
-                self.output.send(first.popleft())
-            self._left = self.tag if any(self._waiting) and not self.discard else None
         if self.discard:
             for queue in self._waiting:
                 queue.clear()
@@ -168,7 +162,6 @@ class Switch(Actor):
         str,
         "error",
         choices=("error", "nothing"),
-        ptolemy="nothing",
         doc="what is sent while control does not name a channel",
     )
 
@@ -210,8 +203,8 @@ class BooleanSwitch(Actor):
 class Select(Actor):
     """Passes on the tokens of the channel that the latest ``control`` token names; those of the others are lost.
 
-    If unread tokens are ``kept``, those of the others wait until they are chosen.  Each firing then takes one token of
-    ``control`` and passes one token on; a number that does not name a channel passes none.
+    If unread tokens are ``kept``, those of the others wait until they are chosen.  Each token of ``control`` then lets
+    one token pass, the last one all that follow on its channel; a number that does not name a channel lets none pass.
     Ptolemy: ``Multiplexor`` and ``BooleanMultiplexor`` (true is channel 1), with tokens kept ``Select``.
     """
 
@@ -219,34 +212,38 @@ class Select(Actor):
     control = InputPort(int, doc="number of the channel, from 0")
     output = OutputPort(doc="the tokens of the chosen channel")
 
-    unread = Parameter(
-        str, "lost", choices=("lost", "kept"), ptolemy="kept", doc="what happens to tokens that are not chosen"
-    )
+    unread = Parameter(str, "lost", choices=("lost", "kept"), doc="what happens to tokens that are not chosen")
     initial: Parameter[int | None] = Parameter(
         int, 0, min=0, optional=True, doc="the channel until the first token of control comes; no channel if null"
     )
 
-    def check(self) -> None:
-        self.input.keep = self.control.keep = self.unread == "kept"
-
     def initialize(self) -> None:
         self._channel = self.initial
+        self._controls: deque[int] = deque()
+        self._waiting: list[deque[Any]] = [deque() for _ in range(self.input.width)]
 
     def fire(self) -> None:
         if self.unread == "kept":
-            if self.control.waiting():
-                self._channel = self.control.get()
-            if (
-                self._channel is not None
-                and 0 <= self._channel < self.input.width
-                and self.input.waiting(self._channel)
-            ):
-                self.output.send(self.input.get(self._channel))
+            self._controls.extend(self.control.tokens)
+            for queue, tokens in zip(self._waiting, self.input.by_channel(), strict=True):
+                queue.extend(tokens)
+            while self._pass_on():
+                pass
             return
         if self.control.present:
             self._channel = _channel(self.control.value, self.control, self.input.width, "input")
         for token in () if self._channel is None else self.input.by_channel()[self._channel]:
             self.output.send(token)
+
+    def _pass_on(self) -> bool:
+        """Take the next control token and pass one token on; false if there is neither."""
+        is_told = bool(self._controls)
+        if is_told:
+            self._channel = self._controls.popleft()
+        if self._channel is None or not 0 <= self._channel < self.input.width or not self._waiting[self._channel]:
+            return is_told
+        self.output.send(self._waiting[self._channel].popleft())
+        return True
 
 
 class Repeat(Actor):

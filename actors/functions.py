@@ -28,7 +28,6 @@ from .core import (
     token_type,
 )
 from .expression import FormulaParameter
-from .matching import matched
 
 FUNCTION_GROUP = "epicycle.functions"
 _KINDS: dict[str, Any] = {"number": float, "truth value": bool, "text": str, "any value": Any}
@@ -49,9 +48,8 @@ class Expression(Actor):
     ``${...}`` is replaced by the text of its value, so write a value that may be negative in parentheses: ``(${a}) **
     2``.
 
-    Nothing is sent before every input has had a token.  Where the inputs keep their tokens, as in Ptolemy, each token
-    is used once: the k-th tokens of all inputs together.  Ptolemy: ``Expression``, and most actors that compute one
-    token from another: ``input[index]`` is its ``ArrayElement``.
+    Nothing is sent before every input has had a token.  Ptolemy: ``Expression``, and most actors that compute one token
+    from another: ``input[index]`` is its ``ArrayElement``.
     """
 
     output: OutputPort[Any] = OutputPort(float, doc="the value of the expression")
@@ -61,7 +59,6 @@ class Expression(Actor):
         str,
         None,
         choices=tuple(_KINDS),
-        ptolemy="any value",
         doc="type of the value; if left out, a truth value for a comparison, a number otherwise",
     )
     hold = Parameter(bool, True, doc="whether an input without a token is used with its latest one")
@@ -74,7 +71,7 @@ class Expression(Actor):
     def own_ports(self) -> dict[str, InputPort[Any] | OutputPort[Any]]:
         known = ("time", "iteration") if self.iteration else ("time",)
         names = [name for name in self.expression.names if name not in known]
-        return {name: InputPort(ptolemy={"keep": True}, doc="a name in the expression") for name in names}
+        return {name: InputPort(doc="a name in the expression") for name in names}
 
     def initialize(self) -> None:
         self._ports = list(self.inputs.values())
@@ -82,8 +79,7 @@ class Expression(Actor):
         self._count = 0
 
     def fire(self) -> None:
-        keeps = any(port.keep for port in self._ports)
-        for values in matched(self._ports) if keeps else self._latest.rounds():
+        for values in self._latest.rounds():
             self.output.send(self._value(values))
 
     def _value(self, values: dict[str, Any]) -> Any:
@@ -233,7 +229,6 @@ class LookupTable(Actor):
         str,
         "error",
         choices=("error", "nearest", "nothing"),
-        ptolemy="nothing",
         doc="what is sent for an input outside the table",
     )
 

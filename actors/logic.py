@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any, Final
 
 from .core import ABSENT, Actor, InputPort, Latest, OutputPort, Parameter, present, rounds
-from .matching import alike, matched
+from .expression import operand
 
 GATES: Final[dict[str, Callable[[list[bool]], bool]]] = {
     "and": all,
@@ -61,13 +61,12 @@ COMPARISONS: Final[dict[str, Callable[[Any, Any, float], bool]]] = {
 class Comparator(Actor):
     """Compares ``left`` with ``right``, or with ``value`` if nothing is connected to ``right``.
 
-    A tolerance relaxes the comparison: ``left >= right`` holds down to ``right - tolerance``.  Where the ports keep
-    their tokens, as in Ptolemy, each is compared once: the k-th token of one side with the k-th of the other.
-    Ptolemy: ``Comparator``.
+    A tolerance relaxes the comparison: ``left >= right`` holds down to ``right - tolerance``.  Ptolemy:
+    ``Comparator``.
     """
 
-    left: InputPort[Any] = InputPort(float | bool | str, ptolemy={"keep": True}, doc="the left side")
-    right: InputPort[Any] = InputPort(float | bool | str, required=False, ptolemy={"keep": True}, doc="the right side")
+    left: InputPort[Any] = InputPort(float | bool | str, doc="the left side")
+    right: InputPort[Any] = InputPort(float | bool | str, required=False, doc="the right side")
     output = OutputPort(bool, doc="whether the comparison holds")
 
     comparison = Parameter(str, choices=tuple(COMPARISONS), doc="which comparison")
@@ -80,7 +79,7 @@ class Comparator(Actor):
 
     def fire(self) -> None:
         compare = COMPARISONS[self.comparison]
-        for values in matched([self.left, self.right]) if self.left.keep else self._latest.rounds():
+        for values in self._latest.rounds():
             self.output.send(compare(values["left"], values.get("right", self.value), self.tolerance))
 
 
@@ -101,3 +100,18 @@ class Equals(Actor):
         for (tokens,) in rounds(self.input):
             first, *others = present(tokens)
             self.output.send(all(alike(other, first, self.tolerance) for other in others))
+
+
+def alike(token: Any, other: Any, tolerance: float) -> bool:
+    """Whether tokens are equal except that numbers may differ by a tolerance; lists and fields are compared item by
+    item."""
+    token, other = operand(token), operand(other)
+    if isinstance(token, list) and isinstance(other, list):
+        return len(token) == len(other) and all(map(alike, token, other, [tolerance] * len(token)))
+    if isinstance(token, Mapping) and isinstance(other, Mapping):
+        return token.keys() == other.keys() and all(alike(token[key], other[key], tolerance) for key in token)
+    if isinstance(token, bool) or isinstance(other, bool):
+        return token is other
+    if isinstance(token, (int, float)) and isinstance(other, (int, float)):
+        return token == other or abs(token - other) <= tolerance
+    return bool(token == other)

@@ -9,7 +9,6 @@ from typing import Any
 from .core import ABSENT, Actor, EpicycleError, InputPort, OutputPort, Parameter, brief, present, rounds
 from .expression import TokenFormulaParameter
 from .flow import ByChannel, MostRecent
-from .matching import matched
 
 
 class Filter(ByChannel):
@@ -153,32 +152,33 @@ class BooleanSelect(Actor):
     Ptolemy: ``BooleanSelect``, with tokens lost ``BooleanMultiplexor``.
     """
 
-    true_input = InputPort(multi=True, keep=True, required=False, doc="tokens that pass for a true control token")
-    false_input = InputPort(multi=True, keep=True, required=False, doc="tokens that pass for a false one")
-    control = InputPort(bool, keep=True, doc="which input is next: true or false")
+    true_input = InputPort(multi=True, required=False, doc="tokens that pass for a true control token")
+    false_input = InputPort(multi=True, required=False, doc="tokens that pass for a false one")
+    control = InputPort(bool, doc="which input is next: true or false")
     output = OutputPort(multi=True, doc="the chosen tokens, channel by channel")
 
     unread = Parameter(str, "kept", choices=("kept", "lost"), doc="what happens to tokens that are not chosen")
 
-    def check(self) -> None:
-        self.true_input.keep = self.false_input.keep = self.control.keep = self.unread == "kept"
-
     def initialize(self) -> None:
         self._control: bool | None = None
+        self._controls: deque[bool] = deque()
+        ports = {True: self.true_input, False: self.false_input}
+        self._waiting: dict[bool, list[deque[Any]]] = {
+            choice: [deque() for _ in range(port.width)] for choice, port in ports.items()
+        }
 
     def fire(self) -> None:
         if self.unread == "lost":
             self._hand_on()
             return
-        if self._control is None and self.control.present:
-            self._control = self.control.get()
-        if self._control is None:
-            return
-        chosen = self.true_input if self._control else self.false_input
-        if all(chosen.waiting(channel) for channel in range(chosen.width)):
-            for channel in range(chosen.width):
-                self.output.send(chosen.get(channel), None if chosen.width == 1 else channel)
-            self._control = None
+        self._controls.extend(self.control.tokens)
+        for port, queues in zip((self.true_input, self.false_input), self._waiting.values(), strict=True):
+            for queue, tokens in zip(queues, port.by_channel(), strict=True):
+                queue.extend(tokens)
+        while self._controls and all(chosen := self._waiting[self._controls[0]]):
+            self._controls.popleft()
+            for channel, queue in enumerate(chosen):
+                self.output.send(queue.popleft(), None if len(chosen) == 1 else channel)
 
     def _hand_on(self) -> None:
         """Send the tokens of the input that the latest control token chose."""
@@ -226,20 +226,25 @@ class Sequencer(Actor):
     Ptolemy: ``Sequencer``, where the number is called ``sequenceNumber``.
     """
 
-    input = InputPort(keep=True, doc="the tokens")
-    number = InputPort(int, keep=True, doc="the number of each token in the sequence")
+    input = InputPort(doc="the tokens")
+    number = InputPort(int, doc="the number of each token in the sequence")
     output = OutputPort(doc="the tokens in the order of their numbers")
 
     first = Parameter(int, 0, doc="the first number")
 
     def initialize(self) -> None:
+        self._tokens: deque[Any] = deque()
+        self._numbers: deque[int] = deque()
         self._waiting: dict[int, Any] = {}
         self._next = self.first
 
     def fire(self) -> None:
-        for values in matched([self.input, self.number]):
-            if values["number"] >= self._next:
-                self._waiting[values["number"]] = values["input"]
+        self._tokens.extend(self.input.tokens)
+        self._numbers.extend(self.number.tokens)
+        while self._tokens and self._numbers:
+            token, number = self._tokens.popleft(), self._numbers.popleft()
+            if number >= self._next:
+                self._waiting[number] = token
         while self._next in self._waiting:
             self.output.send(self._waiting.pop(self._next))
             self._next += 1
@@ -253,17 +258,9 @@ class Default(Actor):
 
     preferred = InputPort(doc="tokens that take precedence")
     alternate = InputPort(doc="tokens that pass if none comes at 'preferred' at the same tag")
-    output = OutputPort(ptolemy={"depends_on": ("preferred",)}, doc="the preferred or the alternate token")
-
-    both = Parameter(
-        bool, False, ptolemy=True, doc="whether a token at 'alternate' follows the preferred one, at the same tag"
-    )
+    output = OutputPort(doc="the preferred or the alternate token")
 
     def fire(self) -> None:
-        if self.both:
-            for token in (*self.preferred.tokens, *self.alternate.tokens):
-                self.output.send(token)
-            return
         for preferred, alternate in rounds(self.preferred, self.alternate):
             for token in (present(preferred) or present(alternate))[:1]:
                 self.output.send(token)

@@ -20,22 +20,17 @@ from .core import (
     to_seconds,
 )
 from .distributions import Distribution
-from .matching import taken
 
 
 class Queue(Actor):
     """Keeps tokens, first in, first out, and releases one for each trigger.
 
-    At one tag, tokens come in before triggers release them.  With ``one_at_a_time``, as in Ptolemy, a firing takes one
-    token and one trigger (all channels together count as one), and sends ``size`` at its end, changed or not; at most
-    one trigger waits; ``output`` does not depend on ``input`` within the same tag, although a token may pass at once.
-    A token that comes to a full queue together with a trigger is included in ``size``, and lost; a trigger that comes
-    only on a channel other than the first waits for the next firing.  Ptolemy: ``Queue``.
+    At one tag, tokens come in before triggers release them.  Ptolemy: ``Queue``.
     """
 
     input = InputPort(doc="tokens to keep")
     trigger = InputPort(multi=True, required=False, doc="releases the first token; does nothing if there is none")
-    output = OutputPort(ptolemy={"depends_on": ("trigger",)}, doc="the tokens in order of arrival")
+    output = OutputPort(doc="the tokens in order of arrival")
     size = OutputPort(int, doc="number of tokens in the queue, whenever it changes")
     rejected = OutputPort(depends_on=("input",), doc="tokens that found the queue full")
 
@@ -43,23 +38,12 @@ class Queue(Actor):
         int, None, min=1, doc="most tokens that the queue holds; unlimited if left out"
     )
     persistent_trigger = Parameter(bool, False, doc="whether a trigger that finds no token waits for the next one")
-    one_at_a_time = Parameter(
-        bool, False, ptolemy=True, doc="whether a firing takes one token and one trigger, and sends size once"
-    )
-
-    def check(self) -> None:
-        self.input.keep = self.trigger.keep = self.one_at_a_time
 
     def initialize(self) -> None:
         self._tokens: deque[Any] = deque()
         self._triggers = 0
 
     def fire(self) -> None:
-        if self.one_at_a_time:
-            if self.input.waiting() or self.trigger.waiting():
-                tokens = [self.input.get()] if self.input.waiting() else []
-                self._take(tokens, taken(self.trigger) > 0)
-            return
         for token in self.input.tokens:
             if self.capacity is not None and len(self._tokens) >= self.capacity:
                 self.rejected.send(token)
@@ -73,23 +57,6 @@ class Queue(Actor):
             self.size.send(len(self._tokens))
         if not self.persistent_trigger:
             self._triggers = 0
-
-    def _take(self, tokens: list[Any], is_triggered: bool) -> None:
-        """Take a token, if there is one, and release one."""
-        is_full = self.capacity is not None and len(self._tokens) >= self.capacity
-        size = len(self._tokens) + (bool(tokens) and (is_triggered or not is_full))
-        if (is_triggered or (self._triggers and tokens)) and size:
-            self._triggers = 0
-            size -= 1
-            self.output.send(self._tokens.popleft() if self._tokens else tokens.pop())
-        elif is_triggered:
-            self._triggers = int(self.persistent_trigger)
-        for token in tokens:
-            if is_full:
-                self.rejected.send(token)
-            else:
-                self._tokens.append(token)
-        self.size.send(size)
 
 
 class SharedQueue(Actor):
@@ -143,10 +110,7 @@ class Server(Actor):
     The service time of a token is determined when it arrives: ``service_time`` at that tag, or drawn from
     ``distribution``.  At one tag, served tokens leave before others come in.  In Kendall's notation
     G/G/servers/capacity.  The output does not depend on the input within the same tag, so the actor may be part of a
-    loop.
-
-    With ``one_at_a_time`` and a single server, as in Ptolemy, a firing takes one token and releases one whose service
-    has ended, and sends ``size`` at its end, changed or not.  Ptolemy: ``Server``.
+    loop.  Ptolemy: ``Server``.
     """
 
     input = InputPort(doc="tokens to serve")
@@ -167,9 +131,6 @@ class Server(Actor):
     capacity: Parameter[int | None] = Parameter(
         int, None, min=1, doc="most tokens that may wait or be served; unlimited if left out"
     )
-    one_at_a_time = Parameter(
-        bool, False, ptolemy=True, doc="whether a firing takes one token and releases one, and sends size once"
-    )
 
     def check(self) -> None:
         if self.capacity is not None and (self.servers is None or self.capacity < self.servers):
@@ -184,14 +145,8 @@ class Server(Actor):
         self._served: Pending[tuple[Any, float]] = Pending(self)  # a token, and its remaining time
         self._waiting: deque[tuple[Any, float]] = deque()
         self._size = 0  # tokens that wait or are served
-        self._free: int | None = None  # when the present service ends, one at a time
-        self._rest = 0.0
 
     def fire(self) -> None:
-        if self.one_at_a_time and self.servers == 1:
-            for token in self.input.tokens or (ABSENT,):
-                self._take(token)
-            return
         for token, rest in self._served.due():
             self._size -= 1
             self.output.send(token)
@@ -204,28 +159,11 @@ class Server(Actor):
                 self.rejected.send(token)
                 continue
             if self.servers is None or len(self._served) < self.servers:
-                self._serve(token, self._draw())
+                self._serve(token, self.draw_time())
             else:
-                self._waiting.append((token, self._draw()))
+                self._waiting.append((token, self.draw_time()))
             self._size += 1
             self.size.send(self._size)
-
-    def _take(self, token: Any) -> None:
-        """Take a token, if there is one, and release one whose service has ended."""
-        if token is not ABSENT and self.capacity is not None and len(self._waiting) >= self.capacity:
-            self.rejected.send(token)
-        elif token is not ABSENT:
-            self._waiting.append((token, self._draw()))
-        rest = 0.0
-        if self._waiting and self._free == self.tag.time:
-            self._free, rest = None, self._rest
-            self.output.send(self._waiting.popleft()[0])
-        self.size.send(len(self._waiting))
-        if self._waiting and self._free is None:
-            time = self._waiting[0][1] + rest
-            self._free = self.tag.time + to_nanoseconds(time)
-            self.wake_in(time)
-            self._rest = time - to_seconds(to_nanoseconds(time))
 
     def _serve(self, token: Any, time: float) -> None:
         # The rounding to whole nanoseconds is added to the next service, or it would accumulate while the server is
@@ -233,7 +171,8 @@ class Server(Actor):
         rest = time - to_seconds(to_nanoseconds(time))
         self._served.put((token, rest), time)
 
-    def _draw(self) -> float:
+    def draw_time(self) -> float:
+        """The service time of a token that arrives now."""
         if self.distribution is None:
             return self.service_time
         return self.distribution.draw_time(self.random, "a service time")

@@ -147,8 +147,7 @@ class Test(Actor):
     tolerance = Parameter(float, 1e-9, min=0, doc="largest difference of a number, or of a time in s")
     complete = Parameter(bool, True, doc="whether all values must have come by the end of the run")
     together = Parameter(bool, False, doc="whether a value is a list with a token for each channel")
-    follow = Parameter(bool, False, ptolemy=True, doc="whether further tokens may follow the expected ones")
-    lenient = Parameter(bool, False, ptolemy=True, doc="whether a number matches its text, and NaN matches any number")
+    follow = Parameter(bool, False, doc="whether further tokens may follow the expected ones")
 
     def check(self) -> None:
         if self.times is not None and len(self.times) != len(self.values):
@@ -188,7 +187,7 @@ class Test(Actor):
         if index >= len(self.values):
             raise EpicycleError(f"token {index} is {token!r}, expected only {counted(len(self.values), 'token')}")
         expected = self.values[index]
-        if not _alike(token, expected, self.tolerance, self.lenient):
+        if not self.matches(token, expected):
             raise EpicycleError(f"token {index} is {token!r}, expected {expected!r}{self._within()}")
         if self.times is not None and abs(self.now - self.times[index]) > self.tolerance:
             raise EpicycleError(
@@ -205,48 +204,33 @@ class Test(Actor):
                 f"{self.values[self._seen]!r}"
             )
 
-
-def _alike(token: Any, expected: Any, tolerance: float, lenient: bool) -> bool:
-    """Whether a token is as expected; lists, arrays and fields are compared item by item."""
-    if expected is None:
-        return True
-    if isinstance(token, (np.ndarray, np.generic)):
-        token = token.tolist()
-    if isinstance(expected, (list, tuple)):
-        is_list = isinstance(token, (list, tuple)) and len(token) == len(expected)
-        return is_list and all(
-            _alike(one, other, tolerance, lenient) for one, other in zip(token, expected, strict=True)
-        )
-    if isinstance(expected, Mapping) and isinstance(token, Mapping):
-        return token.keys() == expected.keys() and all(
-            _alike(token[name], expected[name], tolerance, lenient) for name in expected
-        )
-    if lenient and isinstance(expected, str) is not isinstance(token, str):
-        return _is_text_of(expected, token) if isinstance(expected, str) else _is_text_of(token, expected)
-    if isinstance(expected, bool) or isinstance(token, bool):
-        return token is expected
-    if isinstance(expected, (int, float)) and isinstance(token, (int, float)):
-        if token == expected:
+    def matches(self, token: Any, expected: Any) -> bool:
+        """Whether a token is as expected; lists, arrays and fields are compared item by item."""
+        if expected is None:
             return True
-        try:
-            if math.isnan(token) or math.isnan(expected):
-                return lenient
-            return token - tolerance <= expected <= token + tolerance
-        except OverflowError:  # whole numbers may be too large for a float
-            return False
-    return bool(token == expected)
+        if isinstance(token, (np.ndarray, np.generic)):
+            token = token.tolist()
+        if isinstance(expected, (list, tuple)):
+            is_list = isinstance(token, (list, tuple)) and len(token) == len(expected)
+            return is_list and all(map(self.matches, token, expected))
+        if isinstance(expected, Mapping) and isinstance(token, Mapping):
+            return token.keys() == expected.keys() and all(
+                self.matches(token[name], expected[name]) for name in expected
+            )
+        return self.equals(token, expected)
 
-
-def _is_text_of(text: str, value: Any) -> bool:
-    """Whether a text is a truth value or a number as written by Java."""
-    if isinstance(value, bool):
-        return text == ("true" if value else "false")
-    if isinstance(value, int):
-        return text == str(value)
-    try:
-        return isinstance(value, float) and not text.lstrip("-").isdigit() and float(text) == value
-    except ValueError:
-        return False
+    def equals(self, token: Any, expected: Any) -> bool:
+        """Whether a number, text or truth value is as expected."""
+        if isinstance(expected, bool) or isinstance(token, bool):
+            return token is expected
+        if isinstance(expected, (int, float)) and isinstance(token, (int, float)):
+            if token == expected:
+                return True
+            try:
+                return token - self.tolerance <= expected <= token + self.tolerance
+            except OverflowError:  # whole numbers may be too large for a float
+                return False
+        return bool(token == expected)
 
 
 class Stop(Actor):

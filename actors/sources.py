@@ -17,14 +17,11 @@ from .core import (
     array_parameter,
     declared_parameters,
     did_you_mean,
-    rounds,
     texts_parameter,
     to_nanoseconds,
-    to_seconds,
     token_type,
 )
 from .distributions import Distribution
-from .generators import Generator
 from .triggered import times
 
 
@@ -40,8 +37,6 @@ class _Ticking(Actor):
         float, None, unit="s", min=0, doc="time after which there are no more ticks"
     )
 
-    _ends_late = False  # whether its last tick is the first one after stop_time
-
     def check(self) -> None:
         if self.values is not None and not self.values:
             raise ParameterError("values: the list is empty; give at least one value")
@@ -56,7 +51,7 @@ class _Ticking(Actor):
 
     def _wake_at(self, time: int) -> Wake | None:
         """The wake-up for the next tick at ``time`` ns, if there is another one."""
-        if self.stop_time is not None and time > to_nanoseconds(self.stop_time) and not self._ends_late:
+        if self.stop_time is not None and time > to_nanoseconds(self.stop_time):
             return None
         return self.context.wake(self, time)
 
@@ -87,7 +82,7 @@ class Clock(_Ticking):
     new_period = Parameter(
         str, "next cycle", choices=("next cycle", "at once"), doc="from when on a new period applies"
     )
-    reset_period = Parameter(bool, False, ptolemy=True, doc="whether a start restores the period given in the model")
+    reset_period = Parameter(bool, False, doc="whether a start restores the period given in the model")
     late_trigger = Parameter(
         bool, False, doc="whether a trigger still enables a tick that was left out at an earlier microstep"
     )
@@ -194,9 +189,7 @@ class Clock(_Ticking):
 class PoissonClock(_Ticking):
     """Ticks at random: the times between ticks are independent and exponentially distributed.
 
-    A trigger causes a tick at once, from which the time to the next one is drawn.  With ``one_at_a_time``, as in
-    Ptolemy, each of several triggers that come together causes a tick, and the very last tick is the first one at or
-    after ``stop_time``.  Ptolemy: ``PoissonClock``.
+    A trigger causes a tick at once, from which the time to the next one is drawn.  Ptolemy: ``PoissonClock``.
     """
 
     is_source: ClassVar[bool] = True
@@ -205,65 +198,23 @@ class PoissonClock(_Ticking):
 
     mean_interval = Parameter(float, 1.0, unit="s", above=0, doc="mean time between two ticks")
     fire_at_start = Parameter(bool, True, doc="whether the first tick comes at the start")
-    generator: Parameter[Generator | None] = Parameter(
-        Generator, None, doc="generator of another program to use for the numbers"
-    )
-    one_at_a_time = Parameter(
-        bool, False, ptolemy=True, doc="whether each trigger causes a tick, and a last one comes at or after stop_time"
-    )
-
-    def check(self) -> None:
-        super().check()
-        self._numbers = None if self.generator is None else self.generator.numbers()
 
     def initialize(self) -> None:
         self._tick = 0
-        self._rest = 0.0
-        self._is_over = False
-        self._is_plain = not self.trigger.width and (self.stop_time is None or not self.one_at_a_time)
-        self._ends_late = self.one_at_a_time
-        self._wake = self._wake_at(self.tag.time + (0 if self.fire_at_start else self._interval()))
+        self._wake = self._wake_at(self.tag.time + (0 if self.fire_at_start else self.interval()))
 
-    def _interval(self) -> int:
-        if self._numbers is None:
-            return to_nanoseconds(self.random.exponential(self.mean_interval))
-        # The rounding to whole nanoseconds is added to the next wait, or the difference to the other program would
-        # accumulate.
-        interval = self._numbers.exponential(self.mean_interval) + self._rest
-        self._rest = interval - to_seconds(to_nanoseconds(interval))
-        return to_nanoseconds(interval)
+    def interval(self) -> int:
+        """The time to the next tick (ns)."""
+        return to_nanoseconds(self.random.exponential(self.mean_interval))
 
     def fire(self) -> None:
-        if not self._is_plain:
-            self._fire_for_triggers()
+        if self.trigger.width and self.stop_time is not None and self.tag.time > to_nanoseconds(self.stop_time):
             return
         if self._wake is not None and not self._wake.due:
             self._wake.cancel()
         self._send(self._tick)
         self._tick += 1
-        self._wake = self._wake_at(self.tag.time + self._interval())
-
-    def _fire_for_triggers(self) -> None:
-        """The firing where triggers cause ticks, or the last tick comes late."""
-        ticks = self._ticks() if self.trigger.width else 1
-        if self._is_over or not ticks:
-            return
-        if self._wake is not None and not self._wake.due:
-            self._wake.cancel()
-        for _ in range(ticks):
-            self._send(self._tick)
-            self._tick += 1
-            interval = self._interval()
-            if self.stop_time is not None and self._ends_late and self.tag.time >= to_nanoseconds(self.stop_time):
-                self._is_over, self._wake = True, None
-                return
-        self._wake = self._wake_at(self.tag.time + interval)
-
-    def _ticks(self) -> int:
-        """The number of ticks now, where triggers cause them."""
-        if self.one_at_a_time:
-            return max(1, len(list(rounds(self.trigger))))
-        return int(self.stop_time is None or self.tag.time <= to_nanoseconds(self.stop_time))
+        self._wake = self._wake_at(self.tag.time + self.interval())
 
 
 class SingleEvent(Actor):
@@ -301,18 +252,13 @@ class Random(Actor):
     output = OutputPort(doc="the drawn token")
 
     distribution: Parameter[Distribution] = Parameter(Distribution, doc="the distribution to draw from")
-    generator: Parameter[Generator | None] = Parameter(
-        Generator, None, doc="generator of another program to use for the numbers"
-    )
 
     def check(self) -> None:
         self.output.type = self.distribution.token_type
-        self._numbers = None if self.generator is None else self.generator.numbers()
 
     def fire(self) -> None:
-        numbers: Any = self.random if self._numbers is None else self._numbers
         for _ in range(times(self.trigger)):
-            self.output.send(self.distribution.draw(numbers))
+            self.output.send(self.distribution.draw(self.random))
 
 
 class VaryingRandom(Random):
@@ -341,6 +287,5 @@ class VaryingRandom(Random):
         if came:
             said = {name: getattr(self._law, name) for name in declared_parameters(type(self._law))}
             self._law = type(self._law)(**{**said, **came})
-        numbers: Any = self.random if self._numbers is None else self._numbers
         for _ in range(times(self.trigger)):
-            self.output.send(self._law.draw(numbers))
+            self.output.send(self._law.draw(self.random))

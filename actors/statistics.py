@@ -10,7 +10,6 @@ import math
 import operator
 from collections import deque
 from fractions import Fraction
-from typing import Any
 
 from .core import Actor, EpicycleError, InputPort, OutputPort, Parameter, ParameterError, to_nanoseconds
 
@@ -65,7 +64,7 @@ class MovingAverage(_Window):
     """
 
     reset = InputPort(required=False, doc="a true token empties the window, before the tokens of the tag are added")
-    output = OutputPort(float, ptolemy={"type": Any}, doc="the mean")
+    output = OutputPort(float, doc="the mean")
 
     whole = Parameter(bool, False, doc="whether the mean of whole numbers is rounded to a whole number, towards zero")
 
@@ -86,8 +85,8 @@ class MovingStatistics(_Window):
 
     mean = OutputPort(float, doc="the mean")
     std = OutputPort(float, doc="the sample standard deviation, sent from two tokens on")
-    min = OutputPort(float, ptolemy={"type": Any}, doc="the least")
-    max = OutputPort(float, ptolemy={"type": Any}, doc="the greatest")
+    min = OutputPort(float, doc="the least")
+    max = OutputPort(float, doc="the greatest")
     number = OutputPort(int, doc="number of tokens in the window")
 
     def initialize(self) -> None:

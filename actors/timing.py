@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from bisect import insort
 from collections import deque
 from typing import Any
 
@@ -15,7 +14,6 @@ from .core import (
     PortParameter,
     Tag,
     Wake,
-    to_nanoseconds,
     to_seconds,
     token_type,
 )
@@ -25,8 +23,7 @@ class TimeDelay(Actor):
     """Sends each token after a delay; with delay 0 at the next microstep.
 
     A token is delayed by the value of ``delay`` at its tag, so one may overtake another.  The output does not depend on
-    the inputs within the same tag, so the actor may be part of a loop.  With ``steps``, a token keeps its microstep,
-    and tokens due at the same time leave one by one, at successive microsteps.  Ptolemy: ``TimeDelay``, ``TimedDelay``,
+    the inputs within the same tag, so the actor may be part of a loop.  Ptolemy: ``TimeDelay``, ``TimedDelay``,
     ``VariableDelay``.
     """
 
@@ -34,48 +31,15 @@ class TimeDelay(Actor):
     output = OutputPort(depends_on=(), doc="each token after its delay")
 
     delay = PortParameter(float, 1.0, unit="s", min=0, doc="how long each token is held")
-    steps = Parameter(bool, False, ptolemy=True, doc="whether tokens keep their microsteps and leave one by one")
 
     def initialize(self) -> None:
-        self._held: Pending[Any] | _Steps = _Steps(self) if self.steps else Pending(self)
+        self._held: Pending[Any] = Pending(self)
 
     def fire(self) -> None:
         for token in self._held.due():
             self.output.send(token)
         for token in self.input.tokens:
             self._held.put(token, self.delay)
-
-
-class _Steps:
-    """The tokens of a delay that keeps microsteps, as in Ptolemy, where an actor fires once for each token.
-
-    In each firing, at most one due token leaves; the others are tried again at the next microstep.  Among tokens that
-    leave at the same time, a new one is the last, or the first if its microstep is below that of the last.
-    """
-
-    def __init__(self, actor: TimeDelay) -> None:
-        self._actor = actor
-        self._line: list[tuple[Tag, Any]] = []  # in the order in which they leave
-
-    def put(self, token: Any, delay: float) -> None:
-        """Keep a token for ``delay`` seconds; 0 is the next microstep."""
-        now, wake, line = self._actor.tag, self._actor.wake_in(delay), self._line
-        tag = Tag(wake.time, now.microstep if wake.time > now.time else wake.microstep)
-        is_last = not line or tag.microstep >= line[-1][0].microstep
-        place = len(line)
-        while place and (line[place - 1][0].time > tag.time or (line[place - 1][0].time == tag.time and not is_last)):
-            place -= 1
-        line.insert(place, (tag, token))
-
-    def due(self) -> list[Any]:
-        """Take out the tokens that leave now."""
-        now, line, found = self._actor.tag, self._line, list[Any]()
-        most = max(1, len(self._actor.input.tokens))
-        while line and line[0][0] <= now and len(found) < most:
-            found.append(line.pop(0)[1])
-        if line and line[0][0].time <= now.time:
-            self._actor.wake_in(0)
-        return found
 
 
 class _Timing(Actor):
@@ -93,42 +57,20 @@ class _Timing(Actor):
 class Timer(_Timing):
     """Sends a value after the number of seconds in each token; any number of times may run in parallel.
 
-    With ``one_at_a_time``, as in Ptolemy, a firing sends one value; others due at the same time follow at the next
-    microsteps.
     Ptolemy: ``Timer``.
     """
 
-    one_at_a_time = Parameter(
-        bool, False, ptolemy=True, doc="whether values due at the same time leave at successive microsteps"
-    )
-
     def initialize(self) -> None:
         self._running: Pending[None] = Pending(self)
-        self._ends: list[int] = []  # ascending, when values are sent one at a time
 
     def fire(self) -> None:
-        if self.one_at_a_time:
-            for delay in self.input.tokens or (None,):
-                self._take(delay)
-            return
         for _ in self._running.due():
             self.output.send(self.value)
         for delay in self.input.tokens:
-            self._running.put(None, self._checked(delay))
+            self._running.put(None, self.checked(delay))
 
-    def _take(self, delay: float | None) -> None:
-        """Send one value that is due, and take a token, if there is one."""
-        now = self.tag.time
-        if self._ends and self._ends[0] == now:
-            del self._ends[0]
-            self.output.send(self.value)
-        if self._ends and self._ends[0] == now:
-            self.wake_in(0)
-        if delay is not None:
-            self.wake_in(self._checked(delay))
-            insort(self._ends, now + to_nanoseconds(delay))
-
-    def _checked(self, delay: float) -> float:
+    def checked(self, delay: float) -> float:
+        """A time that a token gives; raises ``ValueError`` for one below 0."""
         if delay < 0:
             raise ValueError(f"{self.input.path} is {delay:g} s, but a timer needs a time >= 0")
         return delay

@@ -83,9 +83,6 @@ class Ramp(_Answering):
 
     init: PortParameter[float] = PortParameter(int | float, 0, doc="the first number; a token sets the next one")
     step: PortParameter[float] = PortParameter(int | float, 1, doc="difference between successive numbers")
-    late_step = Parameter(
-        bool, False, ptolemy=True, doc="whether a new step takes effect after the next number, not before"
-    )
 
     def check(self) -> None:
         self.output.type = int if isinstance(self.init, int) and isinstance(self.step, int) else float
@@ -93,20 +90,22 @@ class Ramp(_Answering):
     def initialize(self) -> None:
         super().initialize()
         self._last: float | None = None  # before the first number, and when a token has set the next one
-        self._step: float = 0  # after the last number
 
     def fire(self) -> None:
         if self.inputs["init"].present:
             self._last = None
         for _ in range(self.answers()):
-            step = self._step if self.late_step else self.step
-            self._last, self._step = self.init if self._last is None else self._last + step, self.step
+            self._last = self.following()
             if self.output.type is int and not isinstance(self._last, int):
                 raise EpicycleError(
                     f"init and step are whole numbers, but a step of {self.step!r} came; write 'init: "
                     f"{self.init:.1f}' to allow fractions"
                 )
             self.output.send(self._last)
+
+    def following(self) -> float:
+        """The next number."""
+        return self.init if self._last is None else self._last + self.step
 
 
 class Sequence(Actor):

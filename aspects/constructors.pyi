@@ -36,7 +36,7 @@ class Bias(_Bias):
 
 class Bus(_Bus):
     """Carries one message at a time for all its ports: a server with one queue, by priority and not preemptive."""
-    def __init__(self, *, factor: _Number, steps: bool = ..., medium: str | None = ..., message_length: _Number = ..., number_length: _Number = ..., length_field: str | None = ..., priority: _Number = ..., priority_field: str | None = ..., capacity: _Whole | None = ..., overflow: Literal['newest', 'oldest'] = ..., from_: _Number = ..., until: _Number | None = ..., every: _Number | None = ..., when: str | PortFormula | None = ...) -> None: ...
+    def __init__(self, *, factor: _Number, medium: str | None = ..., message_length: _Number = ..., number_length: _Number = ..., length_field: str | None = ..., priority: _Number = ..., priority_field: str | None = ..., capacity: _Whole | None = ..., overflow: Literal['newest', 'oldest'] = ..., from_: _Number = ..., until: _Number | None = ..., every: _Number | None = ..., when: str | PortFormula | None = ...) -> None: ...
 
 class ClockDrift(_ClockDrift):
     """Makes a clock run too fast or too slowly."""

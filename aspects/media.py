@@ -97,7 +97,7 @@ class Bus(Medium):
     """Carries one message at a time for all its ports: a server with one queue, by priority and not preemptive.
 
     Carrying a message takes ``factor`` * length.  It arrives at the end of that time; if it takes no time, it leaves no
-    trace or, with ``steps``, takes a microstep.  At the output of its sender, a broadcast is carried once, at the
+    trace.  At the output of its sender, a broadcast is carried once, at the
     inputs of its receivers once for each.  Events: ``delayed``, when it arrives, with the seconds since it came;
     ``dropped``, if there is no place.  Reported over the time from 0 to the end of the run: ``utilisation``, the share
     in which the bus is busy; ``mean_wait``, the mean time from arrival to the start of carrying; ``mean_queue``, the
@@ -113,15 +113,18 @@ class Bus(Medium):
     reports: ClassVar[dict[str, str]] = {"utilisation": "1", "mean_wait": "s", "mean_queue": "1"}
 
     factor = Parameter(float, min=0.0, unit="s", doc="time to carry a message of length 1")
-    steps = Parameter(bool, False, ptolemy=True, doc="whether a message that takes no time takes a microstep")
 
     def pass_token(self, token: Any, point: JoinPoint) -> None:
-        bus: Server = point.shared.setdefault("bus", Server(steps=self.steps))
+        bus: Server = point.shared.setdefault("bus", self.server())
         duration = to_nanoseconds(self.factor * self.length_of(token))
         if dropped := bus.arrive(
             Message(self.priority_of(token), token, point, duration), self.capacity, self.overflow
         ):
             dropped.point.act("dropped", dropped.passing)
+
+    def server(self) -> Server:
+        """A new server."""
+        return Server()
 
     def report(self, shared: dict[Any, Any], end: int) -> dict[str, float | None]:
         bus: Server = shared.get("bus", Server())

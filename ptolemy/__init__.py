@@ -1,4 +1,7 @@
-"""Ptolemy II: imports its models, and runs them by its rules.  A plug-in: nothing else in Epicycle knows it."""
+"""Ptolemy II: imports its models, and runs them by its rules.  A plug-in: nothing else in Epicycle knows it.
+
+``from epicycle.ptolemy import Queue`` is the actor of that name under ``like: ptolemy``.
+"""
 
 from __future__ import annotations
 
@@ -16,4 +19,10 @@ def __getattr__(name: str) -> Any:
         from . import importing
 
         return getattr(importing, name)
+    if name[:1].isupper():
+        from .dialect import Ptolemy
+
+        for each in Ptolemy.types():
+            if each.__name__ == name:
+                return each
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

@@ -89,7 +89,8 @@ def parser(arguments: Sequence[str] = ()) -> argparse.ArgumentParser:
     top.add_argument("--version", action=_Version, help="show the version and the core that makes the runs")
     parsers = top.add_subparsers(required=True, metavar="COMMAND")
     for each in commands(arguments):
-        command = parsers.add_parser(each.name, help=each.summary, description=each.description)
+        summary = each.summary.replace("%", "%%")  # which argparse would expand
+        command = parsers.add_parser(each.name, help=summary, description=each.description)
         for add in each.options if each.name in arguments else ():
             add(command)
         command.add_argument("--debug", action="store_true", help="show the full traceback of an error")

@@ -17,11 +17,14 @@ import yaml
 import epicycle
 import epicycle.runner
 from epicycle.runner.catalogue import packaged_models
+from tests.plugins import ABSENT
 from website.reference import FOLDER, reference
 
 ROOT = Path(__file__).parents[1]
 CONFIG = ROOT / "website" / "mkdocs.yml"
 ABOVE = {"index.md": "README.md", "contributing.md": "CONTRIBUTING.md", "changelog.md": "CHANGELOG.md"}
+if "ptolemy" not in ABSENT:
+    ABOVE["ptolemy_room.md"] = "ptolemy/README.md"
 REFERENCE = (ROOT / "docs" / "reference.md").read_text(encoding="utf-8")
 SPLIT = reference(REFERENCE)
 MADE = {"gallery/index.md", "tutorial/14_notebook.md", *(f"{FOLDER}/{name}" for name in SPLIT.pages)}  # by website/

@@ -16,7 +16,12 @@ from website.reference import FOLDER, reference
 
 ROOT = Path(__file__).parents[1]
 PARTS = ROOT / "site-parts"  # temporary files; mkdocs.yml names the folder, too
-ABOVE = {"README.md": "index.md", "CONTRIBUTING.md": "contributing.md", "CHANGELOG.md": "changelog.md"}
+ABOVE = {
+    "README.md": "index.md",
+    "CONTRIBUTING.md": "contributing.md",
+    "CHANGELOG.md": "changelog.md",
+    "ptolemy/README.md": "ptolemy_room.md",
+}
 REFERENCE = reference((ROOT / "docs" / "reference.md").read_text(encoding="utf-8"))
 
 
@@ -62,16 +67,18 @@ def on_post_build(config: Any) -> None:
 
 
 def as_page(document: str) -> str:
-    """A document of the root folder with its links adapted to its place on the site."""
+    """A document outside docs/ with its links adapted to its place on the site."""
     for source, page in ABOVE.items():
         document = document.replace(f"]({source}", f"]({page}")
-    return linked(re.sub(r"\]\(docs/", "](", document))
+    return linked(re.sub(r"\]\((\.\./)?docs/", "](", document))
 
 
 def on_page_markdown(markdown: str, *, page: Any, **_: Any) -> str:
     """Adapt the links of a page, and let mkdocstrings fill in that of the Python API."""
     if page.file.src_uri == "api.md":
         markdown = re.sub(r"^- `(epicycle[.\w]+)`.*$", r"::: \1\n", markdown, flags=re.M)
+    for source, target in ABOVE.items():
+        markdown = markdown.replace(f"](../{source}", f"]({target}")
     return linked(markdown)
 
 

@@ -113,9 +113,6 @@ class PID(Actor):
         doc="time constant of back_calculation; sqrt(Kd / Ki) if left out, or Kp / Ki without Kd",
     )  # fmt: skip
     initial = Parameter(float, 0.0, doc="I at the start and after a reset")
-    late_reset = Parameter(
-        bool, False, ptolemy=True, doc="whether a reset takes effect after the measurement of its tag, not before"
-    )
 
     def check(self) -> None:
         if self.low > self.high:
@@ -147,8 +144,11 @@ class PID(Actor):
         return self.proportional, self.integral, self.derivative
 
     def fire(self) -> None:
-        if self.reset.present and not self.late_reset:
+        if self.reset.present:
             self._forget()
+        self._work()
+
+    def _work(self) -> None:
         self._add_up()
         if self.feedforward.present:
             self._added = finite_number(self.feedforward, self.feedforward.value)
@@ -166,8 +166,6 @@ class PID(Actor):
             self._error = self.setpoint - self._measured
         for token in self.measurement.tokens:
             self._control(finite_number(self.measurement, token))
-        if self.reset.present and self.late_reset:
-            self._forget()
 
     def _add_up(self) -> None:
         """Bring I to the present time; the error and the output have been constant since."""

@@ -13,9 +13,8 @@ actor upstream (along connections without delay, and outputs that depend on inpu
 with this tag: all tokens of the tag are there, and an absent token will not come.  So it is called once per tag; only
 an actor with an output that does not depend on some input within the tag is called separately for the tokens of such
 inputs.  In ``fire`` an actor may read its inputs (``port.present``, ``port.value``, ``port.tokens``), send any number
-of tokens, change its state and request wake-ups.  Tokens that it does not read are dropped when it returns, unless the
-port keeps them (``InputPort(keep=True)``, ``port.get()``).  A token that it sends is received within the same tag
-unless the connection has a delay.
+of tokens, change its state and request wake-ups.  Tokens that it does not read are dropped when it returns.  A token
+that it sends is received within the same tag unless the connection has a delay.
 
 ``wake_in(seconds)`` and ``wake_at(seconds)`` request a later firing: a wake-up for the present time comes at the same
 time, one microstep on; one in the future at microstep 1.  A request for the past means now.  A ``Wake`` can be
@@ -173,13 +172,6 @@ class Actor(Configurable):
         known[id(self.context)] = _NoContext(made)
         return made
 
-    def follow_ptolemy(self) -> None:
-        """Engine: parameters that were not given, and the ports, become as in Ptolemy, where the declarations say
-        how."""
-        Configurable.follow_ptolemy(self)
-        for port in (*self.inputs.values(), *self.outputs.values()):
-            port.follow_ptolemy()
-
     def move(self, path: str) -> None:
         """Engine: set the full path in the model that the actor is added to."""
         self.path = path
@@ -206,8 +198,6 @@ class Actor(Configurable):
         for port in self.inputs.values():
             if isinstance(port, ParameterPort):
                 port.reset()
-            if port.keep:
-                port.prepare()
         self.initialize()
 
     def halt(self) -> None:

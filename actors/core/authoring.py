@@ -1,7 +1,6 @@
 """Common needs of authors of actors: tokens that belong together, and work that waits for its time.
 
-The k-th tokens of all channels form the k-th round, so one token per channel and tag gives one round. In Ptolemy,
-accordingly, an actor takes one token per channel and is fired again for the rest.
+The k-th tokens of all channels form the k-th round, so one token per channel and tag gives one round.
 """
 
 from __future__ import annotations

@@ -9,7 +9,6 @@ cdef class Ranks:
     cdef long long* items
     cdef readonly Py_ssize_t size
     cdef Py_ssize_t room
-    cdef public object posts
     cdef int push(self, long long rank) except -1
     cdef long long pop(self) except? -1
 

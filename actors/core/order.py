@@ -10,19 +10,17 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from .moment import Wake, When
-    from .posts import Posts
 
 NEVER = 2**63 - 1  # ns
 
 
 class Ranks:
-    """Whole numbers, the smallest first; with ``posts``, the one that is first there."""
+    """Whole numbers, the smallest first."""
 
-    __slots__ = ("content", "posts")
+    __slots__ = ("content",)
 
     def __init__(self) -> None:
         self.content: list[int] = []
-        self.posts: Posts | None = None
 
     @property
     def size(self) -> int:
@@ -31,17 +29,10 @@ class Ranks:
 
     def push(self, rank: int) -> None:
         """Add an entry."""
-        if self.posts is not None:
-            self.posts.push(rank)
-            self.content.append(rank)  # their number; the posts know which
-        else:
-            heappush(self.content, rank)
+        heappush(self.content, rank)
 
     def pop(self) -> int:
         """Remove the smallest one."""
-        if self.posts is not None:
-            self.content.pop()
-            return self.posts.pop()
         return heappop(self.content)
 
 

@@ -10,7 +10,7 @@ cdef long long LAST = 2**63 - 1
 
 
 cdef class Ranks:
-    __slots__ = ("content", "posts")
+    __slots__ = ("content",)
 
     def __dealloc__(self):
         PyMem_Free(self.items)
@@ -34,10 +34,6 @@ cdef class Ranks:
                 raise MemoryError
             self.items, self.room = items, 2 * self.room + 8
         self.size += 1
-        if self.posts is not None:
-            items[place] = rank
-            self.posts.push(rank)
-            return 0
         while place > 0:
             above = (place - 1) >> 1
             if items[above] <= rank:
@@ -52,8 +48,6 @@ cdef class Ranks:
         cdef long long least = items[0], last
         cdef Py_ssize_t place = 0, below
         self.size -= 1
-        if self.posts is not None:
-            return self.posts.pop()
         last = items[self.size]
         while True:
             below = 2 * place + 1

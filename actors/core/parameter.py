@@ -33,15 +33,7 @@ class _Required:
         return "required"
 
 
-class _Same:
-    """The default in Ptolemy of a parameter that has the same one there."""
-
-    def __repr__(self) -> str:
-        return "the same"
-
-
 REQUIRED: Any = _Required()
-SAME: Any = _Same()
 _EXACT = 2**53  # up to here, all whole numbers are exact as floats
 _WORDS: dict[Any, str] = {
     float: "number",
@@ -80,8 +72,7 @@ class Parameter(Generic[T]):
     is a number that stays an integer if it is one.
     A text is one of ``choices``; ``renamed`` gives the present names of former ones.
     Numbers are at least ``min``, or else greater than ``above``, and at most ``max``.
-    A parameter that accepts values of several kinds has one parameter for each kind as its ``forms``.  ``ptolemy`` is
-    the default under a director with ``like: ptolemy``, if it differs.
+    A parameter that accepts values of several kinds has one parameter for each kind as its ``forms``.
     """
 
     def __init__(
@@ -97,14 +88,12 @@ class Parameter(Generic[T]):
         renamed: Mapping[str, str] | None = None,
         shape: tuple[int | None, ...] | None = None,
         optional: bool = False,
-        ptolemy: T | None = SAME,
         doc: str = "",
     ) -> None:
         if self.__class__ is Parameter:  # others describe their types themselves
             _check_type(type)
         self.type: Any = type
         self.default = default
-        self.ptolemy = ptolemy
         self.unit = unit
         self.min = min
         self.above = above
@@ -112,7 +101,7 @@ class Parameter(Generic[T]):
         self.choices = tuple(choices)
         self.renamed = dict(renamed or {})
         self.shape = shape
-        self.optional = optional or default is None or ptolemy is None
+        self.optional = optional or default is None
         self.doc = doc
         self.name = ""
         self.forms: tuple[Parameter[Any], ...] = ()
@@ -151,19 +140,7 @@ class Parameter(Generic[T]):
     @cached_property
     def default_value(self) -> T | None:
         """The default as stored in an instance."""
-        return self._stored(self.default)
-
-    @property
-    def differs(self) -> bool:
-        """Whether the default differs in Ptolemy."""
-        return self.ptolemy is not SAME
-
-    @cached_property
-    def ptolemy_value(self) -> T | None:
-        """The default in Ptolemy as stored in an instance."""
-        return self._stored(self.ptolemy)
-
-    def _stored(self, default: T | None) -> T | None:
+        default = self.default
         return default if default is None or isinstance(default, Configurable) else self.convert(default)
 
     def describe_type(self) -> str:
@@ -333,21 +310,10 @@ class Configurable:
         Set here what follows from the parameters, such as the type of a port.
         """
 
-    def follow_ptolemy(self) -> None:
-        """Engine: give parameters that were not set their defaults in Ptolemy."""
-        given: frozenset[str] = vars(self).get("_configured", frozenset())
-        changed = [each for name, each in declared_parameters(type(self)).items() if each.differs and name not in given]
-        for parameter in changed:
-            parameter.store(self, parameter.ptolemy_value)
-        if changed:
-            self.check()
-
     def _configure(self, values: Mapping[str, object]) -> None:
         declared = declared_parameters(type(self))
         # `from_=3` in Python, where `from` is a keyword.
         values = {name[:-1] if iskeyword(name[:-1]) else name: value for name, value in values.items()}
-        if any(parameter.differs for parameter in declared.values()):
-            self._configured = frozenset(values)
         for name in values:
             if name not in declared:
                 has_guess = name not in self.refused and bool(did_you_mean(name, declared))  # which ends a sentence

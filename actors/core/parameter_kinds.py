@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import Fault
-from .parameter import REQUIRED, SAME, Parameter, ParameterError
+from .parameter import REQUIRED, Parameter, ParameterError
 
 
 def array_parameter(
@@ -20,14 +20,12 @@ def array_parameter(
     min: float | None = None,
     above: float | None = None,
     max: float | None = None,
-    ptolemy: object = SAME,
     doc: str = "",
 ) -> Parameter[NDArray[np.float64]]:
     """A parameter whose value is a read-only array of floats; ``None`` in ``shape`` is any length."""
     given: Any = default
-    there: Any = ptolemy
     bounds: dict[str, Any] = {"min": min, "above": above, "max": max}
-    return Parameter(cast(Any, float), given, unit=unit, shape=shape, ptolemy=there, doc=doc, **bounds)
+    return Parameter(cast(Any, float), given, unit=unit, shape=shape, doc=doc, **bounds)
 
 
 def texts_parameter(default: object = REQUIRED, *, doc: str = "") -> Parameter[tuple[str, ...]]:

@@ -18,8 +18,8 @@ cdef class _Told(Emitter):
 
 
 cdef class Terms:
-    cdef public object depends_on, doc, ptolemy, type
-    cdef public bint keep, multi, required, triggers
+    cdef public object depends_on, doc, type
+    cdef public bint multi, required, triggers
     cdef public str name
     cpdef Terms but(self, str option, value)
 
@@ -36,23 +36,12 @@ cdef class Port:
     cpdef begin(self, like)
 
 
-cdef class Kept:
-    cdef public list lines
-    cdef public Py_ssize_t count, number
-    cpdef put(self, token, channel)
-    cpdef get(self, channel)
-    cpdef list in_order(self)
-
-
 cdef class InputPort(Port):
     cdef public list arrived, channels, shown
-    cdef public Kept kept
     cpdef begin(self, like)
     cpdef open(self)
     cpdef receive(self, token, channel)
-    cpdef prepare(self)
     cpdef clear(self)
-    cpdef put_in_line(self)
     cpdef take(self)
     cpdef give(self, taken)
 

@@ -1,15 +1,13 @@
 """Ports: the typed ends of wires.  They are declared on an actor's class and bound to each instance.
 
-An input port holds only the tokens of the present tag: after the actor has fired they are gone.  One that keeps them
-(``keep``) holds all tokens until they are taken out. An output port passes a token on at once; the engine knows the
-receivers, delays and aspects.
+An input port holds only the tokens of the present tag: after the actor has fired they are gone. An output port passes
+a token on at once; the engine knows the receivers, delays and aspects.
 """
 
 from __future__ import annotations
 
 import types
-from collections import deque
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, ClassVar, Generic
 
 from .errors import EpicycleError
@@ -68,22 +66,21 @@ class _Told(Emitter):
 class Terms:
     """What is declared of a port: the same object for the port of an actor class and those of all its instances."""
 
-    __slots__ = ("depends_on", "doc", "keep", "multi", "name", "ptolemy", "required", "triggers", "type")
+    __slots__ = ("depends_on", "doc", "multi", "name", "required", "triggers", "type")
 
-    def __init__(self, type: Any, multi: bool, ptolemy: Mapping[str, object] | None, doc: str) -> None:
+    def __init__(self, type: Any, multi: bool, doc: str) -> None:
         self.name = ""
         self.type = type
         self.multi = multi
-        self.ptolemy = ptolemy
         self.doc = doc
-        self.required = self.triggers = self.keep = False  # of inputs
+        self.required = self.triggers = False  # of inputs
         self.depends_on: tuple[str, ...] | None = None  # of outputs
 
     def but(self, option: str, value: object) -> Terms:
         """The same, except for one of them."""
-        made = Terms(self.type, self.multi, self.ptolemy, self.doc)
+        made = Terms(self.type, self.multi, self.doc)
         made.name, made.depends_on = self.name, self.depends_on
-        made.required, made.triggers, made.keep = self.required, self.triggers, self.keep
+        made.required, made.triggers = self.required, self.triggers
         setattr(made, option, value)
         return made
 
@@ -117,7 +114,6 @@ class Port(Generic[T]):
     name = _Term[str]("name")
     type = _Term[Any]("type")
     multi = _Term[bool]("multi")
-    ptolemy = _Term["Mapping[str, object] | None"]("ptolemy")
     doc = _Term[str]("doc")
 
     def __init__(
@@ -126,10 +122,9 @@ class Port(Generic[T]):
         *,
         shape: tuple[int | None, ...] | None,
         multi: bool,
-        ptolemy: Mapping[str, object] | None,
         doc: str,
     ) -> None:
-        self.terms = Terms(type if shape is None else shaped(type, shape), multi, ptolemy, doc)
+        self.terms = Terms(type if shape is None else shaped(type, shape), multi, doc)
         self.path = ""
         self.actor: Any = None
         self.width = 0
@@ -158,45 +153,8 @@ class Port(Generic[T]):
     def begin(self, like: Any) -> None:
         """Take the state that the port of an instance begins with."""
 
-    def follow_ptolemy(self) -> None:
-        """Engine: make the port as in Ptolemy, if the declaration says how."""
-        for option, value in (self.ptolemy or {}).items():
-            self.change(option, value)
-
     def __repr__(self) -> str:
         return f"<{self.direction} port {self.path or self.name}: {type_name(self.type)}>"
-
-
-class Kept:
-    """Tokens kept in a port: a queue for each channel."""
-
-    __slots__ = ("count", "lines", "number")
-
-    def __init__(self, width: int) -> None:
-        self.lines: list[deque[tuple[int, Any]]] = [deque() for _ in range(max(width, 1))]
-        self.count = 0
-        self.number = 0  # of the next token, for the order of arrival
-
-    def put(self, token: Any, channel: int) -> None:
-        """Add a token."""
-        self.lines[channel].append((self.number, token))
-        self.number += 1
-        self.count += 1
-
-    def get(self, channel: int) -> Any:
-        """Take out the first token of a channel."""
-        self.count -= 1
-        return self.lines[channel].popleft()[1]
-
-    def in_order(self) -> list[tuple[int, Any, int]]:
-        """All tokens in the order of arrival: number, token, channel."""
-        found = [(number, token, channel) for channel, line in enumerate(self.lines) for number, token in line]
-        found.sort(key=_number)
-        return found
-
-
-def _number(entry: tuple[int, Any, int]) -> int:
-    return entry[0]
 
 
 class InputPort(Port[T]):
@@ -205,24 +163,20 @@ class InputPort(Port[T]):
     ``shape`` is that of a ``numpy`` array, as for parameters: ``(2,)`` a pair, ``(None, 2)`` rows of pairs.
     ``required``: a model is invalid if nothing is connected to it.  ``multi``: any number of connections, each a
     channel, in the order in which they are declared.  ``triggers``: a token makes the actor do its work; if false, the
-    actor only stores it, which takes no time, and uses it later.  ``keep``: a token stays until ``get`` takes it out;
-    as long as a firing takes some out and leaves others, the actor fires again at the same tag.  ``ptolemy`` holds the
-    options that differ under a director with ``like: ptolemy``: ``ptolemy={"keep": True}``.
+    actor only stores it, which takes no time, and uses it later.
     """
 
-    __slots__ = ("arrived", "channels", "kept", "shown")
+    __slots__ = ("arrived", "channels", "shown")
 
     direction = "input"
 
     if TYPE_CHECKING:
         arrived: list[Any]  # since the last firing
         channels: list[int] | None  # of these tokens, if there are several connections
-        kept: Kept | None  # earlier tokens that are kept, or wait to be taken out
         shown: list[Any]  # the same as arrived, or empty while they are hidden
 
     required = _Term[bool]("required")
     triggers = _Term[bool]("triggers")
-    keep = _Term[bool]("keep")
 
     def __init__(
         self,
@@ -232,70 +186,43 @@ class InputPort(Port[T]):
         multi: bool = False,
         required: bool = True,
         triggers: bool = True,
-        keep: bool = False,
-        ptolemy: Mapping[str, object] | None = None,
         doc: str = "",
     ) -> None:
-        Port.__init__(self, type, shape=shape, multi=multi, ptolemy=ptolemy, doc=doc)
+        Port.__init__(self, type, shape=shape, multi=multi, doc=doc)
         terms = self.terms
-        terms.required, terms.triggers, terms.keep = required, triggers, keep
+        terms.required, terms.triggers = required, triggers
         InputPort.begin(self, self)
 
     def begin(self, like: Any) -> None:
         self.arrived = self.shown = NO_TOKENS
-        self.channels = self.kept = None
+        self.channels = None
 
     @property
     def present(self) -> bool:
-        """Whether a token arrived at the present tag, or, if the port keeps tokens, waits."""
-        return bool(self.shown) or (self.kept is not None and self.kept.count > 0 and self.shown is self.arrived)
+        """Whether a token arrived at the present tag."""
+        return bool(self.shown)
 
     @property
     def value(self) -> T:
         """The token of the present tag, the latest if there are several; raises ``PortError`` if there is none."""
-        if not self.present:
+        if not self.shown:
             raise PortError(f"{self.path} has no token at this tag; check 'present' before reading 'value'")
-        token: T = self.shown[-1] if self.shown else self.tokens[-1]
+        token: T = self.shown[-1]
         return token
 
     @property
     def tokens(self) -> tuple[T, ...]:
         """All tokens of the present tag in the order of their arrival."""
-        if self.kept is None or self.shown is not self.arrived:
-            return tuple(self.shown)
-        return (*(token for _, token, _ in self.kept.in_order()), *self.shown)
+        return tuple(self.shown)
 
     def by_channel(self) -> list[list[T]]:
         """The tokens of the present tag, a list for each channel."""
         if self.width == 1:
             return [list(self.tokens)]
         result: list[list[T]] = [[] for _ in range(self.width)]
-        if self.kept is not None and self.shown is self.arrived:
-            for _, token, channel in self.kept.in_order():
-                result[channel].append(token)
         for token, channel in zip(self.shown, self.channels or (), strict=False):
             result[channel].append(token)
         return result
-
-    def waiting(self, channel: int = 0) -> int:
-        """The number of tokens of a channel that have not been taken out."""
-        if self.shown is not self.arrived:
-            return 0
-        if self.kept is None and self.width <= 1:
-            return 0 if channel else len(self.arrived)
-        self.put_in_line()
-        return 0 if self.kept is None or channel >= len(self.kept.lines) else len(self.kept.lines[channel])
-
-    def get(self, channel: int = 0) -> T:
-        """Take out the first token of a channel of a port that keeps tokens; raises ``PortError`` if there is none."""
-        if not self.waiting(channel):
-            raise PortError(f"{self.path} has no token on channel {channel}; check 'waiting' before calling 'get'")
-        if self.kept is None and len(self.arrived) == 1:
-            return self.arrived.pop()  # type: ignore[no-any-return]
-        self.put_in_line()
-        assert self.kept is not None
-        token: T = self.kept.get(channel)
-        return token
 
     def receive(self, token: Any, channel: int) -> None:
         """Engine: a token arrives."""
@@ -314,34 +241,12 @@ class InputPort(Port[T]):
             if is_shown:
                 self.shown = self.arrived
 
-    def prepare(self) -> None:
-        """Reset the port: no token has come yet."""
-        self.arrived = self.shown = []
-        self.channels = None
-        self.kept = None
-
     def clear(self) -> None:
         """Engine: forget the tokens that have come."""
         empty(self.arrived)
         if self.channels is not None:
             empty(self.channels)
-        self.kept = None
         self.shown = self.arrived
-
-    def put_in_line(self) -> None:
-        """Engine: keep the tokens that have come."""
-        if not self.arrived:
-            return
-        if self.kept is None:
-            self.kept = Kept(self.width)  # from now on: a port at which tokens have waited is likely to have more
-        if self.channels is None:
-            for token in self.arrived:
-                self.kept.put(token, 0)
-        else:
-            for token, channel in zip(self.arrived, self.channels, strict=True):
-                self.kept.put(token, channel)
-            empty(self.channels)
-        empty(self.arrived)
 
     @property
     def has_new(self) -> bool:
@@ -349,14 +254,14 @@ class InputPort(Port[T]):
         return bool(self.arrived)
 
     def take(self) -> tuple[list[Any], list[int]]:
-        """Engine: take out the tokens that have come since the last firing, as if they had not come yet."""
+        """Take out the tokens that have come since the last firing, and their channels if there are several."""
         taken = self.arrived, self.channels or []
         self.arrived = self.shown = []
         self.channels = None
         return taken
 
     def give(self, taken: tuple[list[Any], list[int]]) -> None:
-        """Engine: show tokens that were taken out, after those that the port keeps."""
+        """Engine: show tokens that were taken out."""
         self.arrived = self.shown = list(taken[0])
         self.channels = list(taken[1]) or None
 
@@ -365,7 +270,7 @@ class OutputPort(Port[T]):
     """A port where tokens leave: of any type if none is given.
 
     ``depends_on`` names the inputs that a token may depend on within the same tag; ``None`` means all of them, ``()``
-    none (an actor that delays), so that the port may be part of a loop.  ``ptolemy`` is as for inputs.
+    none (an actor that delays), so that the port may be part of a loop.
     """
 
     __slots__ = ("emitter",)
@@ -381,10 +286,9 @@ class OutputPort(Port[T]):
         shape: tuple[int | None, ...] | None = None,
         multi: bool = False,
         depends_on: tuple[str, ...] | None = None,
-        ptolemy: Mapping[str, object] | None = None,
         doc: str = "",
     ) -> None:
-        Port.__init__(self, type, shape=shape, multi=multi, ptolemy=ptolemy, doc=doc)
+        Port.__init__(self, type, shape=shape, multi=multi, doc=doc)
         self.terms.depends_on = depends_on
         self.emitter: Emitter | None = None
 

@@ -141,6 +141,10 @@ class RandomStream(Words):
 
         return self._drawn(draw, size, low, high, dtype=dtype)
 
+    def weighted(self, sums: Sequence[float]) -> int:
+        """An index with a probability in proportion to its weight; ``sums`` are the cumulated weights."""
+        return choices.weighted(self, sums)
+
     def choice(self, a: Any, size: Size = None, replace: bool = True, p: ArrayLike | None = None) -> Any:
         """One of the elements of ``a``, or of 0 ... ``a`` - 1; with weights ``p``; several with ``size``."""
         items = np.arange(a) if isinstance(a, (int, np.integer)) else a
@@ -257,6 +261,7 @@ if TYPE_CHECKING:
 
         def word(self) -> int: ...
         def below(self, bound: int) -> int: ...
+        def weighted(self, sums: Sequence[float]) -> int: ...
 
 else:
     Stream = RandomStream

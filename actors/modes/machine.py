@@ -72,11 +72,6 @@ class StateMachine(ModalActor):
     border, the comparison holds again only after it has not held.  ``trigger`` makes all variables be sent, each from
     its own output port.
 
-    With ``one_at_a_time``, as in Ptolemy, the machine fires again at the same tag for the remaining tokens, taking one
-    of each channel; it reacts again one microstep after each transition, which ``else`` can take; and immediate
-    transitions of its first mode come before all others.  With ``set_last``, guards and outputs use the values that
-    variables had before the reaction.
-
     Ptolemy: ``FSMActor``, ``ModalModel``.
     """
 
@@ -92,12 +87,6 @@ class StateMachine(ModalActor):
     variables = MappingParameter(Parameter(object), {}, doc="values that it keeps, with their initial values")
     held = MappingParameter(
         Parameter(object, None), {}, doc="inputs that keep their latest token, with a value before the first, or null"
-    )
-    one_at_a_time = Parameter(
-        bool, False, ptolemy=True, doc="whether tokens that arrive together get one firing each, at the same tag"
-    )
-    set_last = Parameter(
-        bool, False, ptolemy=True, doc="whether variables are set after all transitions of a reaction have sent"
     )
 
     method = Parameter(str, "DOP853", choices=tuple(STEPPERS), doc="the solver of flows; see ODE")
@@ -170,8 +159,6 @@ class StateMachine(ModalActor):
         self._inputs = [name for name in self.inputs if name != "trigger"]
         for name in self.held:
             _check_name(("held", name), name, "input", self._inputs)
-        for name in self._inputs:
-            self.inputs[name].keep = self.one_at_a_time
         for name, mode in self.modes.items():
             for variable in mode.flow:
                 _check_name(("modes", name, "flow", variable), variable, "variable", self.variables)
@@ -206,7 +193,6 @@ class StateMachine(ModalActor):
             max_step=self.max_step,
         )
         self._has_changed = False  # whether a comparison changes now
-        self._unset: list[Action] = []  # that will set variables after all transitions of the reaction
         self._prepared: Tag | None = None
         self._wake: Wake | None = None
 
@@ -218,7 +204,7 @@ class StateMachine(ModalActor):
         return self._reacted == self.tag
 
     def _prepare(self) -> None:
-        self._take_tokens()
+        self.take_tokens()
         if self._prepared != self.tag:
             self._prepared = self.tag
             self._has_changed = self._borders.advance(self.context.time)
@@ -244,14 +230,16 @@ class StateMachine(ModalActor):
         if self.trigger.present:
             self._tell()
         self._tokens = {}
-        if self.one_at_a_time:
-            self._reacted, self._has_changed = None, False
-        elif any(self._queues.values()):
-            self.wake_in(0)
+        self.rests()
         if self._wake is not None and not self.is_due(self._wake):
             self._wake.cancel()
         time = self._borders.next_time(self.context.time)
         self._wake = None if time is None else self.context.wake(self, time)
+
+    def rests(self) -> None:
+        """Called when a reaction is over: ask for another one if tokens are left."""
+        if any(self._queues.values()):
+            self.wake_in(0)
 
     @property
     def next_time(self) -> int | None:
@@ -259,20 +247,14 @@ class StateMachine(ModalActor):
         wakes = (self._wake, self._again, *self._timers.values())
         return min((wake.time for wake in wakes if wake is not None and not self.is_due(wake)), default=None)
 
-    def _take_tokens(self) -> None:
-        """Take the first waiting token of each input; with ``one_at_a_time``, of each of its channels."""
+    def take_tokens(self) -> None:
+        """Take the first waiting token of each input, unless that was done before the refinement fired."""
         for name in self._inputs:
-            if name in self._tokens:  # taken before the refinement fired
-                continue
-            port, queue = self.inputs[name], self._queues[name]
-            if port.keep:
-                for channel in range(port.width):
-                    if port.waiting(channel):
-                        self._tokens[name] = port.get(channel)
-                continue
-            queue.extend(port.tokens)
-            if queue:
-                self._tokens[name] = queue.popleft()
+            if name not in self._tokens:
+                queue = self._queues[name]
+                queue.extend(self.inputs[name].tokens)
+                if queue:
+                    self._tokens[name] = queue.popleft()
 
     def _hold_tokens(self) -> None:
         changed = {name: operand(self._tokens[name]) for name in self.held if name in self._tokens}
@@ -315,10 +297,12 @@ class StateMachine(ModalActor):
         for name, formula in actions:
             if name not in self.variables:
                 self.outputs[name].send(self._result(name, formula))
-            elif self.set_last:
-                self._unset.append((name, formula))
             else:
-                self._known[name] = self._result(name, formula)
+                self.sets(name, formula)
+
+    def sets(self, name: str, formula: Formula) -> None:
+        """Called by an action that sets a variable."""
+        self._known[name] = self._result(name, formula)
 
     def _result(self, name: str, formula: Formula) -> Any:
         if formula.source in self._tokens and name not in self.variables:
@@ -327,29 +311,6 @@ class StateMachine(ModalActor):
             return formula.function(*[self._value(name) for name in formula.names])
         except UNDECIDED:
             return formula.decided(self._values(formula))
-
-    def begins(self) -> None:
-        self._set()
-        if self.one_at_a_time:
-            self.follow(self._choose(self._chart.immediate[self._current]))
-            self._reacted = None
-        super().begins()
-
-    def commits(self) -> None:
-        self._set()
-
-    def _set(self) -> None:
-        """Set the variables whose actions were deferred."""
-        if self._unset:
-            for name, formula in self._unset:
-                self._known[name] = self._result(name, formula)
-            self._unset = []
-            self._enter_borders(self._current)
-
-    def goes_on(self) -> bool:
-        if self.one_at_a_time:
-            return self._reacted is not None and self._current not in self._chart.final
-        return super().goes_on()
 
     def probability_of(self, rule: Rule) -> float:
         found = number_of(rule.probability, self._values(rule.probability), f"{rule} probability")

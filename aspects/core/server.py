@@ -71,10 +71,9 @@ class WaitingLine(Generic[T]):
 
 
 class Server:
-    """Serves one task at a time, and keeps statistics; ``steps``: a task that takes no time takes a microstep."""
+    """Serves one task at a time, and keeps statistics."""
 
-    def __init__(self, *, steps: bool = False) -> None:
-        self.steps = steps
+    def __init__(self) -> None:
         self.line: WaitingLine[Task] = WaitingLine()
         self.begins = 0
         self.waited = 0  # of all tasks that have begun, until then
@@ -99,8 +98,7 @@ class Server:
         """
         now, served = task.came, self._served
         task.number, self._come = self._come, self._come + 1
-        is_in_time = served is not None and (served.duration > 0 or not self.steps)
-        if served is not None and is_in_time and self._begun + served.duration <= now:
+        if served is not None and served.duration > 0 and self._begun + served.duration <= now:
             self._finish((served, self._begun))  # it is over, although this has not been called yet
             served = self._served
         can_interrupt = preemptive or (preemptive is not None and self._begun == now)
@@ -129,10 +127,14 @@ class Server:
         self._served, self._begun = task, now
         self.begins += 1
         self.waited += now - task.came
-        if task.duration > 0 or self.steps:
-            task.point.later(to_seconds(task.duration), self._finish, (task, now))
-        else:
+        if self.is_instant(task):
             self._release(task, now)
+        else:
+            task.point.later(to_seconds(task.duration), self._finish, (task, now))
+
+    def is_instant(self, task: Task) -> bool:
+        """Whether a task is over as soon as it begins."""
+        return task.duration == 0
 
     def _finish(self, what: tuple[Task, int]) -> None:
         """End a task, unless it was interrupted after it began or resumed at that time."""

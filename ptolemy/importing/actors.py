@@ -10,8 +10,8 @@ from typing import Any
 from epicycle.actors import ParameterError, declared_parameters
 from epicycle.actors.expression import ExpressionError as OwnError
 from epicycle.actors.expression import evaluate
-from epicycle.runner.catalogue import built_in
 
+from ..dialect import known_types
 from .budget import spend
 from .entities import Property, is_aside, is_text, is_variable
 from .notes import Notes
@@ -225,7 +225,7 @@ class Actor:
 
     def _is_default(self, name: str, value: object) -> bool:
         """Whether our actor has this value by default under a director with ``like: ptolemy``."""
-        kind = built_in().actors.get(self.row.type)
+        kind = known_types().actors.get(self.row.type)
         parameter = None if kind is None or "type" in self.values else declared_parameters(kind).get(name)
         if parameter is None or parameter.required or (isinstance(value, str) and "${" in value):
             return False
@@ -233,7 +233,7 @@ class Actor:
             found = parameter.convert(value)
         except ParameterError:
             return False
-        default = parameter.ptolemy_value if parameter.differs else parameter.default_value
+        default = parameter.default_value
         return isinstance(found, (bool, int, float, str)) and type(found) is type(default) and found == default
 
 

@@ -9,7 +9,6 @@ from contextvars import ContextVar
 from epicycle.actors.expression import Budget
 
 MAX_STEPS = 1_000_000
-COPY = 5  # steps for a copy of an entity, port, property, relation or link
 
 _BUDGET: ContextVar[Budget | None] = ContextVar("_BUDGET", default=None)
 

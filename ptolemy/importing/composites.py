@@ -96,7 +96,7 @@ class Conversion:
             about_unknown(part, self.notes)
             return None
         if part.row.is_view and not is_watched(part):
-            self.notes.count("view")
+            self.notes.views += 1
             return None
         return self._actor(part)
 

@@ -7,8 +7,8 @@ from itertools import pairwise
 from typing import Any
 
 from epicycle.actors import declared_ports
-from epicycle.runner.catalogue import built_in
 
+from ..dialect import known_types
 from .notes import Notes
 from .parts import End, Net, Part
 from .reach import Reach
@@ -74,7 +74,7 @@ def _sends_by_channel(end: End) -> bool:
     row = end.part.row
     if row is None or end.port not in row.ports or not end.is_source:
         return False
-    kind = built_in().actors.get(row.type)
+    kind = known_types().actors.get(row.type)
     port = None if kind is None else declared_ports(kind).get(row.ports[end.port].ours)
     return kind is not None and (port is None or port.multi)
 

@@ -28,6 +28,7 @@ MAX_ELEMENTS = 300_000
 MAX_DEPTH = 100
 MAX_ENTITIES = 20_000
 MAX_CHANNEL = 1000
+_CHANGES = ("deleteEntity", "deletePort", "deleteProperty", "deleteRelation", "rename", "unlink")  # of what is there
 _DOCTYPE = re.compile(
     rb"""<!DOCTYPE\s+[\w.:-]+(?:\s+PUBLIC\s+(?:"[^"<>]*"|'[^'<>]*')|\s+SYSTEM)?(?:\s+(?:"[^"<>]*"|'[^'<>]*'))?\s*>"""
 )
@@ -144,6 +145,9 @@ class _Builder(ContentHandler):
     def _error(self, text: str) -> MomlError:
         return MomlError(f"{self._file}:{self._locator.getLineNumber()}: {text}")
 
+    def _refuse(self, tag: str) -> None:
+        self._notes.error(f"line {self._locator.getLineNumber()}: <{tag}> is not supported")
+
     def _tell(self, text: str) -> None:
         self._notes.note(f"line {self._locator.getLineNumber()}: {text}")
 
@@ -169,16 +173,8 @@ class _Builder(ContentHandler):
                 return self._child(entity, tag, said)
             case "link":
                 self._link(entity, said)
-            case "unlink":
-                self._unlink(entity, said)
-            case "deleteEntity":
-                entity.entities.pop(self._name(tag, said), None)
-                for port in [port for port in entity.links if port.rpartition(".")[0] == said["name"]]:
-                    del entity.links[port]
-            case "deleteRelation":
-                entity.relations.pop(self._name(tag, said), None)
-            case "deletePort" | "deleteProperty":
-                (entity.ports if tag == "deletePort" else entity.properties).pop(self._name(tag, said), None)
+            case _ if tag in _CHANGES:
+                self._refuse(tag)
             case "input" | "import":
                 self._tell(f"the file {said.get('source')!r} is not read")
             case _ if tag not in ("configure", "display", "doc", "location", "rendition", "vertex"):
@@ -230,8 +226,8 @@ class _Builder(ContentHandler):
         """Apply an element to a property, port or relation."""
         if tag in ("property", "director"):
             return self._property(owner, tag, said)
-        if tag == "deleteProperty":
-            owner.properties.pop(said.get("name", ""), None)
+        if tag in _CHANGES:
+            self._refuse(tag)
         elif tag == "entity" and "name" in said:  # a model inside an attribute
             owner.properties.setdefault(said["name"], Property(said["name"]))
         return None
@@ -259,17 +255,6 @@ class _Builder(ContentHandler):
             links = entity.links.setdefault(port, [])
             links += [Link(None, 0) for _ in range((place or 0) - len(links))]
             links.insert(len(links) if place is None else place, Link(relation, self._links))
-
-    def _unlink(self, entity: Entity, said: Mapping[str, str]) -> None:
-        links, relation = entity.links.get(said.get("port", ""), []), said.get("relation")
-        place = _number(said.get("index") or said.get("insideIndex"))
-        if "relation1" in said and "relation2" in said:
-            ends = {said["relation1"], said["relation2"]}
-            entity.joined = [pair for pair in entity.joined if {*pair[:2]} != ends]
-        elif place is not None and place < len(links):
-            del links[place]
-        elif relation is not None:
-            links[:] = [each for each in links if each.relation != relation]
 
 
 def _number(text: str | None) -> int | None:

@@ -10,11 +10,12 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 
-from .budget import COPY, spend
+from .budget import spend
 from .tables import WORDS, pattern
 
 COMPOSITE = "ptolemy.actor.TypedCompositeActor"
 PARAMETER = "ptolemy.data.expr.Parameter"
+BYTES = 10  # of a copy, for a step
 
 
 @dataclass
@@ -99,23 +100,11 @@ class Entity(Property):
 
 
 def copied(entity: Entity) -> Entity:
-    """A copy of an entity, paid by the number of its parts."""
-    spend(COPY * sum(1 for each in entity.everything() for _ in _parts(each)))
-    found: Entity = pickle.loads(pickle.dumps(entity))  # much faster than deepcopy
+    """A copy of an entity, paid by its size."""
+    data = pickle.dumps(entity)  # much faster than deepcopy
+    spend(len(data) // BYTES)
+    found: Entity = pickle.loads(data)
     return found
-
-
-def _parts(said: Property) -> Iterator[object]:
-    """What something consists of besides other entities: itself, and properties, ports, relations and links."""
-    yield said
-    inside: list[Property] = [*said.properties.values()]
-    if isinstance(said, Entity):
-        yield from said.joined
-        for links in said.links.values():
-            yield from links
-        inside += [*said.ports.values(), *said.relations.values(), *said.classes.values()]
-    for each in inside:
-        yield from _parts(each)
 
 
 def director_of(entity: Entity) -> Property | None:

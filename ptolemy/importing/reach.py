@@ -6,8 +6,8 @@ from collections import Counter
 from collections.abc import Iterator
 
 from epicycle.actors import InputPort, declared_ports
-from epicycle.runner.catalogue import built_in
 
+from ..dialect import known_types
 from .budget import spend
 from .directors import fires_whole
 from .entities import director_of
@@ -91,7 +91,7 @@ def leave_out_idle(model: Part, notes: Notes) -> None:
 
 def _lacks(part: Part, row: Row, reach: Reach) -> str | None:
     """The input for lack of which an actor never fires; None if it may."""
-    kind = built_in().actors.get(row.type)
+    kind = known_types().actors.get(row.type)
     if kind is None:
         return None
     needs = row.settings.get("needs", "").split()

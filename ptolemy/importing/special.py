@@ -9,6 +9,7 @@ from typing import Any
 from epicycle import actors
 from epicycle.actors import declared_parameters
 
+from ..generators import LAWS
 from .actors import Actor
 from .names import Names
 from .syntax import ExpressionError, names_of, parse
@@ -134,8 +135,11 @@ def _generator(actor: Actor) -> None:
         if each.row is not None and each.row.type in ("VaryingRandom", "PoissonClock"):
             shared = shared or each.value(each.entity.properties["seed"], actor.notes)
     kind = "DRand" if ".colt." in actor.part.entity.java else "JavaRandom"
+    law = actor.values.get("distribution", {}).get("type", "Exponential")  # which a PoissonClock draws
     if (made := actor.text("generatorClass", "DRand")) != "DRand":
         actor.notes.note(f"{actor.path}.generatorClass = {made!r} has no counterpart; the numbers will differ")
+    elif law not in LAWS and (own or shared):
+        actor.notes.note(f"{actor.path}: the numbers of its {law} distribution will differ")
     elif isinstance(own, int) and not isinstance(own, bool):
         actor.values["generator"] = {"type": kind, "seed": own}
     elif isinstance(shared, int) and shared:

@@ -11,8 +11,8 @@ from typing import Any, NamedTuple
 
 from epicycle.actors import Actor as OwnActor
 from epicycle.actors import declared_parameters, declared_ports, has_own_ports
-from epicycle.runner.catalogue import built_in
 
+from ..dialect import known_types
 from .names import snake
 from .tables import table
 
@@ -55,7 +55,7 @@ class Row:
 
     def has_port(self, name: str) -> bool:
         """Whether a port has a counterpart in our actor."""
-        kind = built_in().actors.get(self.type)
+        kind = known_types().actors.get(self.type)
         return kind is None or has_own_ports(kind) or self.ports[name].ours in declared_ports(kind)
 
 

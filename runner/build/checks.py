@@ -9,6 +9,7 @@ from typing import Any
 
 from epicycle.actors import InputPort, accepts, counted, type_name
 
+from ..catalogue import Dialect
 from ..graph import Detour, Hop, ModelGraph, Region, dependencies, find_loop, in_order
 from ..text import RAISE_IT, Problems, in_general
 from .draft import Draft
@@ -25,11 +26,23 @@ def check(draft: Draft, problems: Problems, *, whole: bool = True) -> None:
     graph = draft.graph
     if not check_passages(graph, problems):
         return
+    check_dialects(graph, problems)
     check_types(graph, problems)
     check_connections(draft, problems)
     check_loops(graph, problems)
     if whole and not len(problems):
         check_reach(graph, problems)
+
+
+def check_dialects(graph: ModelGraph, problems: Problems) -> None:
+    """Check that no two dialects want different directors: a run has one."""
+    wanting = [(path, each) for path, each in graph.dialects.items() if each is not Dialect and each.director()]
+    for path, each in wanting[1:]:
+        first = wanting[0][1]
+        if each.director() is not first.director():
+            message = f"{path} is like {each.name}, but other parts of the model are like {first.name}"
+            problems.add(message, graph.positions.get(path), "a run has one director, and each of these has its own")
+            return
 
 
 def check_passages(graph: ModelGraph, problems: Problems) -> bool:
@@ -207,8 +220,8 @@ def _add_loop(graph: ModelGraph, ways: list[list[Hop]], problems: Problems) -> N
         # path, the delay belongs to the outermost connection: a composite may be right where it is used elsewhere.
         blamed = min(ways[-1], key=lambda hop: (_scope(graph, hop).count("."), hop.order))
         hints = [
-            f"{path} has a director like Ptolemy's: all its outputs depend on all its inputs"
-            if graph.rules[path].are_ptolemys
+            f"{path} has a director like {graph.dialects[path].name}: all its outputs depend on all its inputs"
+            if graph.dialects[path].is_strict
             else f"{path} has its own director: it fires as one actor, when all inputs that act in the tag have come"
             for path in dict.fromkeys(actors)
             if path in graph.clocks

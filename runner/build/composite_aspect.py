@@ -180,7 +180,7 @@ def detours(graph: ModelGraph, aspects: Iterable[WovenAspect]) -> list[Detour]:
         position = graph.positions.get(f"aspect {woven.name}")
         order = graph.next_order + len(found)
         key = (source, destination, woven.name)
-        waits = woven.model is not None and graph.refires(woven.model.path)
+        waits = woven.model is not None and graph.is_strict(woven.model.path)
         found.setdefault(key, Detour(source, destination, None, position, order, woven.name, waits))
 
     for place in (place for place in at if place in graph.actors):  # what it requests comes in after its turn

@@ -114,7 +114,7 @@ def build(text: ModelText, known: Known, settler: Settler, limits: Limits) -> Mo
     values.of_model = root.parameters
     names = settler.parameters("", root, {}, {}, None)
     made = Unfolding(known, settler, Draft(ModelGraph(limits)))
-    made.rules(root, names)
+    made.dialect(root, names)
     try:
         made.body("", root, names)
     except TooLargeError:

@@ -14,19 +14,14 @@ from ..catalogue import Measure, MetricOptions, TakeName, take_fault
 from ..collection import without_collection
 from ..graph import (
     ActName,
-    Like,
     Metric,
     ModelGraph,
     Monitor,
-    Postings,
-    Rules,
-    Ties,
     Watched,
     WovenAspect,
     check_processors,
     firing_order,
     is_within,
-    postings,
 )
 from ..language import Locals, MetricText, MonitorText, ParameterText, Values, nanoseconds
 from ..shown import short
@@ -61,7 +56,7 @@ class Model(Scope, Tabled):
     {'ticks': 15}
 
     ``stop`` is in seconds or a text with a unit.  Ports are named by their paths, those of composites included.
-    ``ties="posted"`` and ``like="ptolemy"`` are the rules of its director, and of the actors that are added afterwards.
+    ``like`` is the name of a dialect for its director.
     A model that was loaded can be changed in the same way.  Its ``parameters`` record how it was made: actors have
     already taken their values from them, so set them with ``load_model(..., set=...)``, not here.
 
@@ -76,16 +71,15 @@ class Model(Scope, Tabled):
         stop: float | str | None = None,
         seed: int = 0,
         parameters: Mapping[str, object] | None = None,
-        ties: Ties | None = None,
-        like: Like | None = None,
+        like: str | None = None,
     ) -> None:
         super().__init__(self, "")
         self.name = name
         self.doc = doc
         self.draft = Draft()
         with raising() as problems:
-            rules = director_of(name, {"ties": ties, "like": like}, call_site(), problems)
-        self.draft.graph.rules[""] = Rules().inside(rules.get("ties"), rules.get("like"))
+            found = director_of(name, {"like": like}, call_site(), problems)
+        self.draft.graph.dialects |= {"": found["like"]} if found else {}
         self.parameters: dict[str, object] = dict(parameters or {})
         self.declared: dict[str, ParameterText] = {}  # what its file declares of the parameters
         self.aspects: list[WovenAspect] = []
@@ -102,7 +96,7 @@ class Model(Scope, Tabled):
         self.is_checked = False  # since the last change
         self.origin: Origin | None = None  # what it was made from, if that is all there is to it
         self._scopes: dict[str, Composite] = {}
-        self._order: tuple[dict[str, int], Postings | None] | None = None  # worked out since then
+        self._order: dict[str, int] | None = None  # worked out since then
         self.stop = stop
 
     @property
@@ -267,16 +261,9 @@ class Model(Scope, Tabled):
 
     def order(self) -> dict[str, int]:
         """Engine: the firing order of a checked model; the same for all its runs."""
-        return self._ordered()[0]
-
-    def postings(self) -> Postings | None:
-        """Engine: where ties are as they were posted, if they are anywhere."""
-        return self._ordered()[1]
-
-    def _ordered(self) -> tuple[dict[str, int], Postings | None]:
         if self._order is None:
             with without_collection():
-                self._order = firing_order(self.graph), postings(self.graph)
+                self._order = firing_order(self.graph)
         return self._order
 
     # -- changes: their arguments have been checked --------------------------------------------------
@@ -355,11 +342,8 @@ class Model(Scope, Tabled):
     def _tables(self) -> list[Table]:
         actors = []
         for path, actor in self.graph.actors.items():
-            declared = declared_parameters(type(actor)).items()
-            values = [(name, getattr(actor, name), parameter) for name, parameter in declared]
-            # Actors that exist for Ptolemy's sake are mentioned only if there are any.
-            plain = {name for name, value, each in values if each.differs and short(value) == short(each.default_value)}
-            given = (f"{name}={short(value)}" for name, value, _ in values if value is not None and name not in plain)
+            values = [(name, getattr(actor, name)) for name in declared_parameters(type(actor))]
+            given = (f"{name}={short(value)}" for name, value in values if value is not None)
             actors.append((path, type(actor).__name__, ", ".join(given)))
         connections = [
             (hop.source, hop.destination, "" if hop.delay is None else f"{hop.delay / 1e9:g} s")

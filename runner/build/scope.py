@@ -15,7 +15,7 @@ from typing import Any, Protocol, TypeVar, overload
 from epicycle.actors import Actor, accepts, type_name
 from epicycle.aspects import Aspect, CompositeAspect, CompositeExecutionAspect, FiringTime
 
-from ..graph import Like, ModelGraph, Ties, WovenAspect
+from ..graph import ModelGraph, WovenAspect
 from ..language import Values
 from ..text import NAME, NAMES_HAVE, Position, Problems, call_site, did_you_mean
 from .composite_aspect import check_nesting, weave_model
@@ -149,25 +149,22 @@ class Scope:
         director: bool = False,
         start: float | str | None = None,
         drift: float = 1.0,
-        ties: Ties | None = None,
-        like: Like | None = None,
+        like: str | None = None,
     ) -> Composite:
         """Add an empty composite, a scope for its own actors, with ports through which it is connected.
 
         With ``director``, it has its own director and fires as one actor; local time then begins at ``start`` s
-        (default: the time outside) and runs ``drift`` times as fast.  ``ties`` and ``like`` are the rules of this
-        director (default: those of the director outside).  Raises ``ModelError``.
+        (default: the time outside) and runs ``drift`` times as fast.  ``like`` is the dialect of this director
+        (default: that of the director outside).  Raises ``ModelError``.
         """
         position = call_site()
         made, ports = Composite(self._model, self._full(name)), [("input", each) for each in inputs]
         ports += [("output", each) for each in outputs]
         with raising() as problems:
             full = self._free(name, position, problems)
-            said = {"start": start, "drift": drift, "ties": ties, "like": like}
-            given = director_of(full, said, position, problems)
-            if not director and (ties or like):
-                key = "ties" if ties else "like"
-                message = f"{full}: {key!r} belongs to a director, and {full} has none of its own"
+            given = director_of(full, {"start": start, "drift": drift, "like": like}, position, problems)
+            if not director and like:
+                message = f"{full}: 'like' belongs to a director, and {full} has none of its own"
                 problems.add(message, position, "write director=True, or set it for the model")
         for number, (_, port) in enumerate(ports):
             made.check_port(port, [each for _, each in ports[:number]], position)
@@ -333,8 +330,6 @@ class Scope:
             firing_time = firing_time_of(time, aspect, position, problems)
         model = self._model
         if isinstance(aspect, Aspect):
-            if model.graph.rules_at(full).are_ptolemys:
-                aspect.follow_ptolemy()
             with raising() as problems:
                 named = Named(model.graph, self.path, position, problems).pointcuts(at, type(aspect))
                 pointcuts = Pointcuts(model.draft, Paths(model.draft), full, self.path, problems, type(aspect))

@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 
 from epicycle.actors import Configurable, Parameter, declared_parameters, to_nanoseconds
 
-from ..graph import LIKE, TIES, Rules
+from ..catalogue import LIKE
 from ..language import OUTSIDE, CompositeText, Locals, PartText, Setting, Settings, Values
 from ..text import (
     POISON,
@@ -100,12 +100,8 @@ class Settler:
                 changed |= {} if value is POISON else {name: value}
         return changed
 
-    def configured(
-        self, cls: type, part: PartText, local: Locals, label: str, rules: Rules, make: Callable[..., T]
-    ) -> T | Poison:
-        """An object of the class with the values of a part, and with defaults by the rules."""
-        declared = declared_parameters(cls).items()
-        defaults = {name: each.ptolemy_value for name, each in declared if each.differs and name not in part.values}
+    def configured(self, cls: type, part: PartText, local: Locals, label: str, make: Callable[..., T]) -> T | Poison:
+        """An object of the class with the values of a part."""
         return configure(
             cls,
             part.values,
@@ -115,7 +111,6 @@ class Settler:
             self.values,
             make=make,
             outside=lambda name: self._setting(f"{local.path}.{name}"),
-            evaluated=defaults if rules.are_ptolemys else {},
         )
 
     def is_enabled(self, name: str, part: PartText, local: Locals) -> bool:
@@ -173,6 +168,5 @@ def drift(value: object) -> float:
 OF_DIRECTORS: dict[str, Callable[[Any], Any]] = {
     "start": lambda start: None if start is None else local_nanoseconds(start),
     "drift": drift,
-    "ties": TIES.convert,
     "like": LIKE.convert,
 }

@@ -8,13 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, partial
 from typing import Any
 
 from epicycle.actors import Actor, FaultError, Parameter
 
-from ..catalogue import Catalogue, CatalogueError, read_type, token_types
+from ..catalogue import Catalogue, CatalogueError, Dialect, read_type, token_types
 from ..graph import Modal
 from ..language import CompositeText, Locals, PartText, PortText
 from ..text import POISON, RAISE_IT, Entry, Poison, Position, did_you_mean
@@ -41,6 +41,10 @@ class Known:
 
     composites: Mapping[str, CompositeText | Poison]  # poison if the base is missing
     catalogue: Catalogue
+
+    def like(self, dialect: type[Dialect]) -> Known:
+        """The possible types under a dialect."""
+        return replace(self, catalogue=self.catalogue.like(dialect))
 
     def valid_types(self, kind: str, asked: str) -> tuple[str, ...]:
         """The valid types: their names, or how to list them if there are too many, and how to add more."""
@@ -79,6 +83,7 @@ class Unfolding:
         self._trial = trial
         self._port_types: dict[str, Any] = {}
         self._tokens = cache(partial(token_types, known.catalogue))
+        self._like = {Dialect: known}
 
     def body(self, path: str, composite: CompositeText, names: Names, within: tuple[str, ...] = ()) -> None:
         """Make the actors of a composite, or of the model, and connect them; its aspects are noted."""
@@ -158,7 +163,7 @@ class Unfolding:
 
     def _type(self, path: str, part: PartText, within: tuple[str, ...]) -> CompositeText | type[Actor] | None:
         """The type of a part; None, and a problem, if it cannot have that type."""
-        known, wanted = self.known, part.type.text
+        known, wanted = self.known_at(path), part.type.text
         inner = known.composites.get(wanted)
         try:
             found = known.catalogue.actors.get(wanted) if inner is None else inner
@@ -179,6 +184,13 @@ class Unfolding:
         else:
             return found
         return None
+
+    def known_at(self, path: str) -> Known:
+        """The possible types of a part, under its director."""
+        dialect = self.draft.graph.dialect_at(path)
+        if dialect not in self._like:
+            self._like[dialect] = self.known.like(dialect)
+        return self._like[dialect]
 
     def _tell(self, message: str, position: Position | None, scope: str, *hints: str) -> None:
         self.problems.add(message, position, *hints, scope=scope)
@@ -228,14 +240,14 @@ class Unfolding:
             self.draft.graph.priorities[path] = found or 0
 
     def _actor(self, path: str, actor_type: type[Actor], part: PartText, names: Names) -> None:
-        rules, local = self.draft.graph.rules_at(path), Locals(path, names)
+        local = Locals(path, names)
 
         def make(**values: object) -> Actor:
             made = actor_type(path, **values)
             self.draft.graph.add_actor(made, part.position)
             return made
 
-        actor = self.settler.configured(actor_type, part, local, path, rules, make)
+        actor = self.settler.configured(actor_type, part, local, path, make)
         if isinstance(actor, Poison):
             self.draft.leave_out(path, actor_type)
         else:
@@ -267,12 +279,14 @@ class Unfolding:
             graph.add_director(path)
         elif composite.director is not None:
             graph.add_director(path, **self._director(path, path, composite.director, inside))
+        if path in graph.dialects and position is not None:
+            graph.positions[path] = position
         self.body(path, composite, inside, (*within, composite.name))
 
-    def rules(self, model: CompositeText, names: Names) -> None:
-        """The rules of the model's director."""
-        given = self._director(model.name, "", model.director or {}, names)
-        self.draft.graph.rules[""] = self.draft.graph.rules[""].inside(given.get("ties"), given.get("like"))
+    def dialect(self, model: CompositeText, names: Names) -> None:
+        """The dialect of the model's director."""
+        if like := self._director(model.name, "", model.director or {}, names).get("like"):
+            self.draft.graph.dialects[""] = like
 
     def _director(self, what: str, path: str, given: Mapping[str, Entry], names: Names) -> dict[str, Any]:
         """The settings of a director; wrong ones are left out."""

@@ -56,7 +56,6 @@ class _Weaver:
         self.made = made
         self.draft = made.draft
         self.graph = made.draft.graph
-        self.known = made.known
         self.settler = made.settler
         self.problems = made.problems
         self.paths = Paths(made.draft)
@@ -68,8 +67,8 @@ class _Weaver:
             return
         is_model = cls in (CompositeAspect, CompositeExecutionAspect)
         given = {key: entry for key, entry in part.values.items() if not is_model or key in OWN}
-        local, rules = Locals(name, names), self.graph.rules_at(name)
-        aspect = self.settler.configured(cls, replace(part, values=given), local, f"aspect {name}", rules, cls)
+        local = Locals(name, names)
+        aspect = self.settler.configured(cls, replace(part, values=given), local, f"aspect {name}", cls)
         if not part.at:
             hint = "add 'at:' with ports or patterns"
             self.problems.add(f"aspect {name} has no 'at'", part.position, hint, scope=scope)
@@ -97,7 +96,7 @@ class _Weaver:
 
     def _type(self, name: str, scope: str, part: PartText) -> type[Aspect] | None:
         """The type of an aspect; None, and a problem, if it cannot have that type."""
-        known, wanted = self.known, part.type.text
+        known, wanted = self.made.known_at(name), part.type.text
         try:
             cls = known.catalogue.aspects.get(wanted)
         except CatalogueError as error:

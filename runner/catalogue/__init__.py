@@ -1,7 +1,9 @@
 """What a model may name: types of actors, aspects and ports, kinds of metrics, and packaged files."""
 
 from .code import code_of
+from .dialect import Dialect
 from .figure import Figure, Mark, Shape, own_figures
+from .like import LIKE, dialects
 from .measure import (
     MSER5,
     TAKES,
@@ -52,12 +54,14 @@ from .types import (
 )
 
 __all__ = [
+    "LIKE",
     "MSER5",
     "TAKES",
     "TIME",
     "TOKENS",
     "Catalogue",
     "CatalogueError",
+    "Dialect",
     "Figure",
     "Mark",
     "Measure",
@@ -73,6 +77,7 @@ __all__ = [
     "code_of",
     "conversion_fault",
     "describe",
+    "dialects",
     "doc_of",
     "figure_types",
     "find",

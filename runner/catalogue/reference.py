@@ -28,10 +28,7 @@ from epicycle.aspects import Aspect
 
 @dataclass(frozen=True)
 class PortReference:
-    """A port of an actor type; ``depends_on`` is for outputs; None means all inputs.
-
-    ``ptolemy`` holds what differs under a director like Ptolemy's, by the names of these attributes.
-    """
+    """A port of an actor type; ``depends_on`` is for outputs; None means all inputs."""
 
     name: str
     direction: str
@@ -41,16 +38,13 @@ class PortReference:
     depends_on: tuple[str, ...] | None
     doc: str
     triggers: bool = True  # of an input: whether a token there triggers the actor
-    keep: bool = False  # of an input: whether tokens stay until they are taken out
-    ptolemy: Mapping[str, object] | None = None
 
 
 @dataclass(frozen=True)
 class ParameterReference:
     """A parameter of a type; ``type`` is in words, ``default`` as it would be written in a model file.
 
-    ``part`` is the base of the types that its value may have, if it is a mapping with a type.  ``ptolemy`` is the
-    default under a director like Ptolemy's, if ``differs``.
+    ``part`` is the base of the types that its value may have, if it is a mapping with a type.
     """
 
     name: str
@@ -65,8 +59,6 @@ class ParameterReference:
     max: float | None
     choices: tuple[str, ...]
     doc: str
-    differs: bool = False
-    ptolemy: object = None
 
 
 @dataclass(frozen=True)
@@ -113,8 +105,6 @@ def describe(name: str, cls: type[Configurable]) -> TypeReference:
                 getattr(port, "depends_on", None),
                 port.doc,
                 getattr(port, "triggers", True),
-                getattr(port, "keep", False),
-                _in_words(port.ptolemy),
             )
             for port in (declared_ports(cls).values() if issubclass(cls, Actor) else ())
         ),
@@ -125,13 +115,6 @@ def describe(name: str, cls: type[Configurable]) -> TypeReference:
         alters_parameters=issubclass(cls, Aspect) and cls.alters_parameters,
         reports=dict(cls.reports) if issubclass(cls, Aspect) else {},
     )
-
-
-def _in_words(options: Mapping[str, object] | None) -> dict[str, object] | None:
-    """Options of a port, its type by its name."""
-    if options is None:
-        return None
-    return {option: type_name(value) if option == "type" else value for option, value in options.items()}
 
 
 def _parameter(parameter: Parameter[object]) -> ParameterReference:
@@ -148,8 +131,6 @@ def _parameter(parameter: Parameter[object]) -> ParameterReference:
         parameter.max,
         parameter.choices,
         parameter.doc,
-        parameter.differs,
-        as_written(parameter.ptolemy) if parameter.differs else None,
     )
 
 
@@ -259,8 +240,9 @@ def first_sentence(doc: str) -> str:
 def _group(cls: type) -> tuple[str, str]:
     """The topic under which a type is listed, and its description; for a package's own types, its name and doc."""
     parts = cls.__module__.split(".")
-    # epicycle.actors.robotics.world is about robotics; acme_robots.lidar is of acme_robots.
-    depth = 3 if parts[0] == "epicycle" else 1
+    # epicycle.actors.robotics.world is about robotics; acme_robots.lidar of acme_robots, epicycle.more.lidar of more.
+    is_ours = parts[:2] in (["epicycle", each] for each in ("actors", "aspects", "runner"))
+    depth = 3 if is_ours else 2 if parts[0] == "epicycle" else 1
     own = parts[depth - 1] if len(parts) >= depth else parts[-1]
     for topic, (about, modules) in TOPICS.items() if depth == 3 else ():
         if own in modules:

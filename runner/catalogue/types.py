@@ -1,8 +1,8 @@
 """Which types a model may name: Epicycle's own, those of installed packages, and the caller's.
 
 A package offers types as entry points (``Name = "package.module:Name"``) of the groups ``epicycle.actors``,
-``epicycle.aspects``, ``epicycle.figures``, ``epicycle.study_figures``, and ``epicycle.parts`` for what stands as a
-value in a model, such as an ``Objective``.
+``epicycle.aspects``, ``epicycle.figures`` and ``epicycle.study_figures``; ``epicycle.parts`` for what stands as a
+value in a model, such as an ``Objective``; and dialects as those of ``epicycle.dialects``.
 
 They are known by name and imported when a model names them. Epicycle's own names always mean Epicycle's types; if a
 name is taken, or two packages offer it, ``package.Name`` selects one.  Parts go by the names of their classes alone.
@@ -12,9 +12,10 @@ from __future__ import annotations
 
 import re
 import sys
+from collections import ChainMap
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from importlib.metadata import EntryPoint, distributions, entry_points
 from importlib.util import module_from_spec, spec_from_file_location
@@ -29,12 +30,13 @@ from epicycle.actors import Actor, Configurable, EpicycleError, FaultError, Para
 from epicycle.aspects import Aspect, CompositeAspect, CompositeExecutionAspect, JoinPointAspect
 
 from ..text import note_package
+from .dialect import Dialect
 from .figure import Figure, own_figures
 from .packaged import unreadable
 
 _ENTRY = re.compile(r"[A-Za-z_][\w.]*\s*:\s*[A-Za-z_][\w.]*\s*(\[.*\])?\Z", re.ASCII)
 
-T = TypeVar("T", bound=Configurable)
+T = TypeVar("T")
 
 
 def _words(base: type) -> str:
@@ -80,8 +82,9 @@ class _Offer:
             raise self._error(f"{type(error).__name__}: {error}") from error
         if not (isinstance(found, type) and issubclass(found, self.base)) or isabstract(found):
             raise self._error(f"{self.point.value} is not a complete subclass of {self.base.__name__}")
-        if found.__name__ != self.point.name:
-            raise self._error(f"the class is called {found.__name__}, and its entry point must have the same name")
+        name = found.name if issubclass(found, Dialect) else found.__name__
+        if name != self.point.name:
+            raise self._error(f"the class is called {name}, and its entry point must have the same name")
         return found
 
     def _error(self, reason: str) -> CatalogueError:
@@ -188,19 +191,28 @@ class Types(Mapping[str, type[T]], Generic[T]):
     def with_types(self, own: Mapping[str, type[T]]) -> Types[T]:
         """The same with further types, which win over others with their name."""
         result = Types.__new__(Types)
-        result.__dict__.update(self.__dict__, _own={**self._own, **own} if own else self._own)
+        result.__dict__.update(self.__dict__, _own=_with(self._own, own))
         return result
 
 
 @dataclass(frozen=True)
 class Catalogue:
-    """Actor and aspect types by name."""
+    """Actor and aspect types by name; ``given`` are those of the caller, which win over all others."""
 
     actors: Mapping[str, type[Actor]]
     aspects: Mapping[str, type[Aspect]]
+    given: tuple[type, ...] = ()
 
     def with_types(self, types: Iterable[type]) -> Catalogue:
         """The catalogue with further types, by the names of their classes; the last one with a name counts."""
+        given = tuple(types)
+        return replace(self._with(given), given=(*self.given, *given))
+
+    def like(self, dialect: type[Dialect]) -> Catalogue:
+        """The types that have these names under a dialect."""
+        return self._with(dialect.types())._with(self.given)
+
+    def _with(self, types: Iterable[type]) -> Catalogue:
         actors: dict[str, type[Actor]] = {}
         aspects: dict[str, type[Aspect]] = {}
         for each in types:
@@ -210,12 +222,12 @@ class Catalogue:
                 aspects[each.__name__] = each
             elif not issubclass(each, Configurable):  # a part, such as an Objective, is known since it was defined
                 raise TypeError(f"{each.__name__} is neither an Actor nor an Aspect")
-        return Catalogue(_with(self.actors, actors), _with(self.aspects, aspects))
+        return replace(self, actors=_with(self.actors, actors), aspects=_with(self.aspects, aspects))
 
     def loaded(self) -> tuple[Catalogue, list[CatalogueError]]:
         """The catalogue with every type imported, and the problems of those that are left out."""
         (actors, wrong), (aspects, wrong_too) = load_all(self.actors), load_all(self.aspects)
-        return Catalogue(actors, aspects), [*wrong, *wrong_too]
+        return replace(self, actors=actors, aspects=aspects), [*wrong, *wrong_too]
 
 
 class _Public(Mapping[str, type[T]], Generic[T]):
@@ -286,8 +298,12 @@ def figure_types() -> Mapping[str, type[Figure]]:
     return with_offered(Figure, "epicycle.figures", own_figures())
 
 
-def _with(types: Mapping[str, type[T]], more: dict[str, type[T]]) -> Mapping[str, type[T]]:
-    return types.with_types(more) if isinstance(types, Types) else {**types, **more}
+def _with(types: Mapping[str, type[T]], more: Mapping[str, type[T]]) -> Mapping[str, type[T]]:
+    """Types by name, with more of them, which win; none is imported for that."""
+    if isinstance(types, Types):
+        return types.with_types(more)
+    known: Any = types
+    return ChainMap({**more}, known) if more else types
 
 
 def load_all(types: Mapping[str, type[T]]) -> tuple[dict[str, type[T]], list[CatalogueError]]:

@@ -5,10 +5,13 @@ from __future__ import annotations
 import argparse
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..printing import complain, console, tell, tell_json, tell_json_text
 from .options import CHANGES, DONE, JSON, MODEL, TYPES, command, load, option, own_types, whole
+
+if TYPE_CHECKING:
+    from ..catalogue import Catalogue
 
 # -- models -----------------------------------------------------------------------------------------------------------
 
@@ -138,18 +141,35 @@ def models(options: argparse.Namespace) -> int:
 # -- types ------------------------------------------------------------------------------------------------------------
 
 
+LIKE = option("--like", metavar="NAME", help="the types of models with 'director: {like: NAME}'")
+
+
+def _known_types(options: argparse.Namespace) -> Catalogue:
+    """The types that a model may name, under the dialect that is asked for."""
+    from epicycle.actors import EpicycleError, ParameterError
+
+    from ..catalogue import LIKE as DIALECT
+    from ..catalogue import installed
+
+    known = installed().with_types(own_types(options))
+    try:
+        dialect = DIALECT.convert(options.like)
+    except ParameterError as error:
+        raise EpicycleError(f"--like {error}") from None
+    return known if dialect is None else known.like(dialect)
+
+
 @command(
     "list the actors, or describe one",
     option("name", metavar="NAME", nargs="?", help="an actor type"),
+    LIKE,
     TYPES,
     JSON,
     imports=("show",),
 )
 def actors(options: argparse.Namespace) -> int:
     """List the actors that a model may use, or describe one: its ports and parameters."""
-    from ..catalogue import installed
-
-    known = installed().with_types(own_types(options))
+    known = _known_types(options)
     return _print_reference(known.actors, known.aspects, "actor", options.name, options.json)
 
 
@@ -161,6 +181,7 @@ def actors(options: argparse.Namespace) -> int:
         nargs="?",
         help="an aspect type, a packaged model, or a path to a YAML file",
     ),
+    LIKE,
     *CHANGES,
     JSON,
     imports=("show",),
@@ -170,9 +191,9 @@ def aspects(options: argparse.Namespace) -> int:
     in the order in which a token meets them."""
     from epicycle.actors import EpicycleError
 
-    from ..catalogue import installed, is_path, packaged_models
+    from ..catalogue import is_path, packaged_models
 
-    known = installed().with_types(own_types(options))
+    known = _known_types(options)
     name, packaged = options.model, packaged_models()
     if name is None or name in known.aspects or not (name in packaged or is_path(name)):
         if options.set or options.overrides or options.disturb or options.aspect or options.without:
@@ -180,6 +201,8 @@ def aspects(options: argparse.Namespace) -> int:
         return _print_reference(known.aspects, known.actors, "aspect", name, options.json, also=packaged)
     from ..show import aspects_at, weaving
 
+    if options.like is not None:
+        raise EpicycleError("--like is for the list of types: the directors in a model name their dialects themselves")
     model = load(options)
     if options.json:
         tell_json(aspects_at(model), indent=2)
@@ -251,17 +274,18 @@ def _print_reference(
 @command(
     "write a JSON Schema of model files, for editors",
     option("-o", "--out", metavar="FILE", type=Path, help="write to FILE (default: standard output)"),
+    LIKE,
     TYPES,
     imports=("show.report",),
 )
 def schema(options: argparse.Namespace) -> int:
     """Write a JSON Schema of model files, made from the installed actors and aspects. An editor with a YAML language
     server completes and checks a model whose first line is '# yaml-language-server: $schema=FILE'."""
-    from ..catalogue import figure_types, installed, load_all
+    from ..catalogue import figure_types, load_all
     from ..language import json_schema, schema_text
     from ..show.report import study_figure_types
 
-    catalogue, errors = installed().with_types(own_types(options)).loaded()
+    catalogue, errors = _known_types(options).loaded()
     figures, wrong = load_all(figure_types())
     of_studies, wrong_too = load_all(study_figure_types())
     for error in (*errors, *wrong, *wrong_too):

@@ -7,6 +7,7 @@ from functools import partial
 from importlib.metadata import EntryPoint, entry_points
 from typing import TYPE_CHECKING
 
+from ..printing import complain
 from .options import Command
 
 if TYPE_CHECKING:
@@ -21,7 +22,8 @@ def offered_commands() -> Iterator[Command]:
     try:
         for each in entry_points(group=GROUP):
             points.setdefault(each.name, []).append(each)
-    except Exception:  # a list of entry points that cannot be read, as the catalogue says of a package with types
+    except Exception as error:  # of importlib.metadata, when one of the packages has a list that cannot be read
+        complain(f"warning: the commands of installed packages cannot be read: {error}")
         return
     for name, found in sorted(points.items()):
         packages = " and ".join(sorted(f"{_package(each)!r}" for each in found))

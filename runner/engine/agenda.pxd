@@ -6,19 +6,17 @@ from epicycle.actors cimport InputPort, Moment, Wake, Way, is_alone
 
 @cython.final
 cdef class Turn:
-    cdef public object actor, poster
+    cdef public object actor
     cdef public Form form
-    cdef public long nesting, rank
-    cdef public list keeps, later, ports, wakes
+    cdef public long rank
+    cdef public list later, ports, wakes
     cdef public Wake wake
-    cdef public bint fires_for_nothing, is_own, is_wanted, takes_all
+    cdef public bint is_wanted
     cpdef add(self, Wake wake)
     @cython.locals(wake=Wake, due=cython.bint)
     cpdef bint use_wakes(self) except -1
     @cython.locals(port=InputPort, found=Py_ssize_t)
     cpdef Py_ssize_t new(self) except -1
-    @cython.locals(port=InputPort, found=Py_ssize_t)
-    cpdef Py_ssize_t kept(self) except -1
     @cython.locals(port=InputPort)
     cpdef hold(self)
     @cython.locals(port=InputPort)
@@ -35,8 +33,6 @@ cdef class Instant(Moment):
     cdef public Turn turn
     cdef public Wake wake
     cpdef add(self, Turn turn, Wake wake)
-    @cython.locals(found=list, turn=Turn, wake=Wake)
-    cpdef arrange(self)
 
 
 @cython.locals(instant=Instant)

@@ -2,56 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any, Protocol
+from typing import Any
 
 from epicycle.actors import Actor, InputPort, Moment, Wake, Way, is_alone
 
 _NOTHING: list[Any] = []  # shown by a port whose tokens are for a later turn
 
 
-class Poster(Protocol):
-    """Requests turns for the contents of a composite that fires as one."""
-
-    poster: Poster | None  # of the composite around it
-    nesting: int
-
-    def note(self, time: int, microstep: int) -> None:
-        """Something inside has requested a turn."""
-
-
 class Turn:
     """The place of an actor in the firing order, for its wake-ups or for the tokens of some inputs.
 
     ``ports`` are these inputs, ``later`` those whose tokens are taken in a later turn of the same actor; unconnected
-    ports are left out.  ``keeps`` are its inputs that keep tokens, if any.  ``wakes`` are the wake-ups of the present
-    tag.
-
-    ``poster`` posts it, in a composite that is posted as a whole; ``nesting`` is the number of those around it.  With
-    ``all_at_once``, the actor takes all tokens that wait at its inputs in any of its turns, and also fires in a turn
-    for tokens that it has already taken.
+    ports are left out.  ``wakes`` are the wake-ups of the present tag.
     """
 
-    __slots__ = (
-        "actor", "fires_for_nothing", "form", "is_own", "is_wanted", "keeps", "later", "nesting", "ports", "poster",
-        "rank", "takes_all", "wake", "wakes",
-    )  # fmt: skip
+    __slots__ = ("actor", "form", "is_wanted", "later", "ports", "rank", "wake", "wakes")
 
-    def __init__(self, actor: Actor, rank: int, ranks: Mapping[str, int], all_at_once: bool | None = None) -> None:
+    def __init__(self, actor: Actor, rank: int, ports: list[InputPort[Any]], later: list[InputPort[Any]]) -> None:
         self.actor = actor
         self.form: Form | None = None
         self.rank = rank
-        connected = [port for port in actor.inputs.values() if port.width]
-        self.takes_all = all_at_once is not None
-        self.fires_for_nothing = bool(all_at_once)
-        self.is_own = ranks.get(actor.path) == rank
-        self.ports: list[InputPort[Any]] = [p for p in connected if self.takes_all or ranks[p.path] == rank]
-        later = [p for p in connected if not self.takes_all and ranks[p.path] > rank]
+        self.ports = ports
         self.later: list[InputPort[Any]] = later or _NOTHING
-        keeps = [port for port in self.ports if port.terms.keep]
-        self.keeps: list[InputPort[Any]] | None = keeps or None
-        self.poster: Poster | None = None
-        self.nesting = 0
         self.is_wanted = False  # whether the actor has this turn at the present tag
         self.wake: Wake | None = None  # the first one of the present tag
         self.wakes: list[Wake] | None = None  # the others
@@ -84,15 +56,6 @@ class Turn:
             found += len(port.arrived)
         return found
 
-    def kept(self) -> int:
-        """How many tokens wait at ports that keep them."""
-        found = 0
-        for port in self.keeps or _NOTHING:
-            found += len(port.arrived)
-            if port.kept is not None:
-                found += port.kept.count
-        return found
-
     def hold(self) -> None:
         """The actor fires: it does not yet see tokens for a later turn."""
         for port in self.later:
@@ -101,11 +64,8 @@ class Turn:
     def clear(self) -> None:
         """The actor has fired: unread tokens are dropped."""
         for port in self.ports:
-            if port.arrived or port.kept is not None:
-                if port.terms.keep:
-                    port.put_in_line()
-                else:
-                    port.clear()
+            if port.arrived:
+                port.clear()
         for port in self.later:
             port.shown = port.arrived
 
@@ -143,20 +103,6 @@ class Instant(Moment):
         else:
             self.turns.append(turn)
             self.wakes.append(wake)
-
-    def arrange(self) -> None:
-        """Leave out what was cancelled, and put the contents of a composite behind the turn that posts all of it."""
-        if self.turn is None:
-            return
-        found = [(self.turn, self.wake), *zip(self.turns or (), self.wakes or (), strict=True)]
-        self.turn = self.wake = self.turns = self.wakes = None
-        for turn, wake in sorted(found, key=_nesting):
-            if wake is None or not wake.cancelled:
-                self.add(turn, wake)
-
-
-def _nesting(entry: tuple[Turn, Wake | None]) -> int:
-    return entry[0].nesting
 
 
 def new_instant(time: int, microstep: int, past: Instant | None = None) -> Instant:

@@ -6,13 +6,12 @@ from epicycle.runner.engine.agenda cimport Delivery, Form, Instant, Turn, new_in
 
 
 cdef class Director:
-    cdef public object _all_at_once, _environment, seed, streams, crowd, ranks, watch, _stop_after, _reason
-    cdef public list _queue, _recent, _turns
-    cdef public dict posters
+    cdef public object _environment, seed, streams, crowd, ranks, watch, _stop_after, _reason
+    cdef public list _queue, _recent, turns
     cdef public Ranks _ready
     cdef public Times _times
     cdef public long long firings, steps, _on_their_way, _most_times, _most_microsteps, _most_steps, _time
-    cdef public long _rank
+    cdef public long rank
     cdef public Instant present, _last, _next, _past
     cdef public bint _has_simpy, _is_interrupted
     @cython.locals(last=Instant, time=cython.longlong)
@@ -41,17 +40,16 @@ cdef class Director:
     cpdef _await_present(self)
     @cython.locals(instant=Instant, past=Instant)
     cpdef Instant _await(self, long long time, long microstep)
-    @cython.locals(turn=Turn, delivery=Delivery, turns=list, ready=Ranks, place=cython.Py_ssize_t)
-    cpdef _handle(self, Instant instant)
-    @cython.locals(is_to_fire=cython.bint, other=Turn)
-    cpdef bint _gather(self, Turn turn) except -1
-    cpdef bint _has_reason(self, Turn turn) except -1
+    cpdef line_up(self, Turn turn)
+    @cython.locals(turn=Turn)
+    cpdef Turn next_turn(self)
+    cpdef bint has_reason(self, Turn turn) except -1
+    @cython.locals(turn=Turn, delivery=Delivery, place=cython.Py_ssize_t)
+    cpdef handle(self, Instant instant)
     cpdef _wake_up(self, Turn turn, Wake wake)
     cpdef _begin(self, Instant instant)
     cpdef bint use_wakes(self, Turn turn) except -1
     cpdef fire(self, Turn turn)
-    @cython.locals(waiting=Py_ssize_t, left=Py_ssize_t)
-    cpdef _fire_on(self, Turn turn)
 
 
 cdef class Entry(Way):

@@ -8,10 +8,6 @@ fires once per tag; the exception is one with an output that does not depend on 
 which may have to send before that input has arrived: its tokens are taken in a separate firing, at the rank of the
 input.
 
-Where ties are posted (``postings``), actors of equal depth and priority fire in the order in which they were to have a
-turn first: by requesting a wake-up, or by the arrival of a token.  Then an actor takes all tokens that wait for it, in
-whichever of its turns it fires, and its consecutive turns are one firing.
-
 A token sent over a connection without delay arrives at the same tag; with delay d > 0 at (time + d, 1); with delay 0
 at the next microstep.  A wake-up for the present time comes at the next microstep, one for the future at
 microstep 1.  The first tag of a run is (start, 1).
@@ -21,7 +17,12 @@ them: the earlier of the two goes first.  At one instant, all events of SimPy co
 is received at the first microstep that the director has not yet handled.
 
 Departures from Ptolemy II: a firing sees all tokens of its tag at once, where Ptolemy fires again for each further
-token; and tokens that an actor does not read do not stay in the port, unless it keeps them (``InputPort.keep``).
+token; and tokens that an actor does not read do not stay in the port.
+
+Another director is a subclass, which a dialect names (``catalogue.Dialect.director``).  It may decide in which turn an
+actor takes which tokens (``inputs_at``), which turn is next (``line_up``, ``next_turn``), whether it leads to a firing
+(``has_reason``), what happens at the begin of a tag (``handle``), and what the borders of composites do
+(``composites``).
 """
 
 from __future__ import annotations
@@ -33,7 +34,6 @@ from epicycle.actors import (
     Environment,
     InputPort,
     Moment,
-    Posts,
     Process,
     Ranks,
     Streams,
@@ -46,14 +46,14 @@ from epicycle.actors import (
 
 from ..text import NORMAL, Limits, describe
 from . import errors
-from .agenda import Delivery, Instant, Poster, Turn, new_instant
+from .agenda import Delivery, Instant, Turn, new_instant
 from .errors import ActorError, Crowd, CrowdError, LoopError
 
 if TYPE_CHECKING:
     from epicycle.actors import Actor
     from epicycle.aspects import Job
 
-    from ..graph import Postings
+    from ..graph import ModelGraph
 
 REPORTED = 256  # tokens that come together at one port are counted in groups of this size
 
@@ -62,14 +62,17 @@ class Director:
     """Fires the actors of one run."""
 
     __slots__ = (
-        "_all_at_once", "_environment", "_has_simpy", "_is_interrupted", "_last", "_most_microsteps", "_most_steps",
-        "_most_times", "_next", "_on_their_way", "_past", "_queue", "_rank", "_ready", "_reason", "_recent",
-        "_stop_after", "_time", "_times", "_turns", "crowd", "firings", "posters", "present", "ranks", "seed", "steps",
-        "streams", "watch",
+        "_environment", "_has_simpy", "_is_interrupted", "_last", "_most_microsteps", "_most_steps",
+        "_most_times", "_next", "_on_their_way", "_past", "_queue", "_ready", "_reason", "_recent",
+        "_stop_after", "_time", "_times", "crowd", "firings", "present", "rank", "ranks", "seed", "steps",
+        "streams", "turns", "watch",
     )  # fmt: skip
 
+    # The subclass of ``Directors`` that makes the borders of composites; None is the usual one.
+    composites: Any = None
+
     def __init__(
-        self, order: dict[str, int], seed: int, limits: Limits = NORMAL, postings: Postings | None = None
+        self, order: dict[str, int], seed: int, limits: Limits = NORMAL, graph: ModelGraph | None = None
     ) -> None:
         self._environment = Environment()
         self._queue = self._environment.queue
@@ -87,17 +90,13 @@ class Director:
         self._last = new_instant(0, 0)  # the latest tag that was handled, or is being handled
         self._past: Instant | None = None  # the one before it, which may serve again
         self.ranks = order  # of actors and of their inputs
-        self._turns: list[Turn | None] = [None] * (max(order.values(), default=0) + 1)  # by rank
+        self.turns: list[Turn | None] = [None] * (max(order.values(), default=0) + 1)  # by rank
         # The work: at the present tag the ranks of turns (a heap), then the next microstep, then later times.
         # One entry per actor and tag, whatever the number of its tokens.
         self._ready = Ranks()
-        self._all_at_once = {} if postings is None else postings.actors  # which take all waiting tokens
-        self.posters: dict[str, Poster] = {}  # of composites that are posted as a whole
-        if postings is not None:
-            self._ready.posts = Posts(postings.places)
         self._next: Instant | None = None
         self._times = Times()
-        self._rank = -1  # the rank of the turn handled now
+        self.rank = -1  # the rank of the turn handled now
         self._stop_after: Tag | None = None
         self._reason = "no events left"
         self._recent: list[str] | None = None  # actors that fire while time seems to stand still
@@ -151,7 +150,7 @@ class Director:
         return self._wake_at(turn, self._to_come(now, time))
 
     def call(self, actor: Actor, tag: Tag, rank: int) -> Wake:
-        """Fire ``actor`` at a future tag and rank (``next_turn``)."""
+        """Fire ``actor`` at a future tag and rank (``next_tag``)."""
         turn, now = self.turn(actor, rank), self.now()
         if tag.time == now.time and tag.microstep == now.microstep:
             return self._call_now(turn, now)
@@ -165,42 +164,35 @@ class Director:
             return now
         instant = self._to_come(now, time)
         instant.add(turn, None)
-        if turn.poster is not None:
-            turn.poster.note(instant.time, instant.microstep)
         return instant
 
     def _call_now(self, turn: Turn, now: Instant) -> Wake:
         wake = new_wake(now.time, now.microstep)
         turn.add(wake)
         self.want(turn)
-        if turn.poster is not None:
-            turn.poster.note(now.time, now.microstep)
         return wake
 
     def _wake_at(self, turn: Turn, instant: Instant) -> Wake:
         wake = new_wake(instant.time, instant.microstep)
         instant.add(turn, wake)
-        if turn.poster is not None:
-            turn.poster.note(instant.time, instant.microstep)
         return wake
 
     def turn(self, actor: Actor, rank: int) -> Turn:
         """The turn of a rank, for ``actor``: an actor of the model, or its stand-in."""
-        turn = self._turns[rank]
+        turn = self.turns[rank]
         if turn is None:
-            turn = self._turns[rank] = self.new_turn(actor, rank)
+            turn = self.turns[rank] = self.new_turn(actor, rank)
         return turn
 
     def new_turn(self, actor: Actor, rank: int) -> Turn:
         """A turn of an actor, or of its stand-in, at a rank."""
-        turn = Turn(actor, rank, self.ranks, self._all_at_once.get(actor.path))
-        around = actor.path
-        while self.posters and around and turn.poster is None:
-            around = around.rpartition(".")[0]
-            turn.poster = self.posters.get(around)
-        if turn.poster is not None:
-            turn.nesting = turn.poster.nesting + 1
-        return turn
+        ports = [port for port in self.inputs_at(actor, rank) if port.width]
+        connected = [port for port in actor.inputs.values() if port.width and port not in ports]
+        return Turn(actor, rank, ports, [port for port in connected if self.ranks[port.path] > rank])
+
+    def inputs_at(self, actor: Actor, rank: int) -> list[InputPort[Any]]:
+        """The inputs whose tokens an actor takes in its turn at a rank."""
+        return [port for port in actor.inputs.values() if self.ranks[port.path] == rank]
 
     def entry(self, port: InputPort[Any], channel: int, stand_in: Actor | None = None) -> Way:
         """The way into a port at the present tag, which lets the port's actor, or its stand-in, fire."""
@@ -233,21 +225,11 @@ class Director:
             self._stop_after = self.tag
             self._reason = reason
 
-    def next_turn(self, rank: int) -> Tag:
+    def next_tag(self, rank: int) -> Tag:
         """The first tag at which a turn of this rank is still to come."""
         now = self.tag
-        is_over = self.present is not None and self._rank >= rank
+        is_over = self.present is not None and self.rank >= rank
         return Tag(now.time, now.microstep + 1) if is_over else now
-
-    def is_between(self, first: int, last: int) -> bool:
-        """Whether none of the turns of these ranks is being taken."""
-        return self.present is None or not first <= self._rank <= last
-
-    def is_to_come(self, first: int, last: int) -> bool:
-        """Whether a turn of these ranks is still to come at the present tag, and none of them is being taken."""
-        if self.present is None or first <= self._rank <= last:
-            return False
-        return any(turn is not None and turn.is_wanted for turn in self._turns[first : last + 1])
 
     def set_aside(self, job: Job) -> None:
         """A firing is deferred: its tokens and wake-ups do not belong to its actor's next firing."""
@@ -259,16 +241,34 @@ class Director:
 
     def _who(self) -> tuple[str, ...]:
         """The actor that fires now."""
-        turn = None if self._rank < 0 else self._turns[self._rank]
+        turn = None if self.rank < 0 else self.turns[self.rank]
         return () if turn is None else (turn.actor.path,)
 
     def want(self, turn: Turn) -> None:
         """Give an actor a turn at the present tag."""
         if not turn.is_wanted:
-            turn.is_wanted = True
-            self._ready.push(turn.rank)
+            self.line_up(turn)
             if self.present is None:
                 self._await_present()
+
+    def line_up(self, turn: Turn) -> None:
+        """Add a turn to those of the present tag, from which ``next_turn`` takes."""
+        turn.is_wanted = True
+        self._ready.push(turn.rank)
+
+    def next_turn(self) -> Turn | None:
+        """The next turn at the present tag, which is no longer lined up; None if there is none."""
+        if not self._ready.size:
+            return None
+        turn = self.turns[self._ready.pop()]
+        assert turn is not None
+        turn.is_wanted = False
+        self.rank = turn.rank
+        return turn
+
+    def has_reason(self, turn: Turn) -> bool:
+        """Whether an actor is to fire in its turn: its wake-ups may all have been cancelled."""
+        return turn.wake is None or self.use_wakes(turn)
 
     def _to_come(self, now: Instant, time: int) -> Instant:
         """The work after the present tag: at the next microstep, or at the first one of a later time."""
@@ -299,33 +299,26 @@ class Director:
 
     # -- time -----------------------------------------------------------------------------------------------------
 
-    def _handle(self, instant: Instant) -> None:
-        turns, ready = self._turns, self._ready
-        if ready.posts is not None:
-            ready.posts.settle()
-            instant.arrange()
+    def handle(self, instant: Instant) -> None:
+        """Handle a tag, which is the next one."""
         if instant.turn is not None:
             self._wake_up(instant.turn, instant.wake)
         if instant.turns is not None and instant.wakes is not None:
             for place in range(len(instant.turns)):
                 self._wake_up(instant.turns[place], instant.wakes[place])
         if instant.pending is not None:
-            self._rank = -1
+            self.rank = -1
             self._begin(instant)
             for delivery in instant.pending:
                 delivery.arrive()
             self._on_their_way -= len(instant.pending)
         turn = None
         try:
-            while ready.size:
-                turn = turns[ready.pop()]
-                assert turn is not None
-                turn.is_wanted = False
-                self._rank = turn.rank
-                if turn.takes_all:
-                    if not self._gather(turn):
-                        continue
-                elif turn.wake is not None and not self.use_wakes(turn):
+            while True:
+                turn = self.next_turn()
+                if turn is None:
+                    break
+                if not self.has_reason(turn):
                     continue
                 if self.present is not instant:
                     self._begin(instant)
@@ -338,34 +331,11 @@ class Director:
         # Its next microstep comes next, even if nobody fired at this one: a process may have requested it.
         self.present = None if self._next is None else instant
 
-    def _gather(self, turn: Turn) -> bool:
-        """Give an actor that takes all waiting tokens its next turns, too.
-
-        False if it has no reason to fire.
-        """
-        is_to_fire = self._has_reason(turn)
-        posts = self._ready.posts
-        while posts is not None and posts.first() >= 0:
-            other = self._turns[posts.first()]
-            assert other is not None
-            if other.actor is not turn.actor:
-                break
-            self._ready.pop()
-            other.is_wanted = False
-            is_to_fire = self._has_reason(other) or is_to_fire
-        return is_to_fire
-
-    def _has_reason(self, turn: Turn) -> bool:
-        if turn.wake is not None:
-            return self.use_wakes(turn)
-        return turn.is_own or turn.fires_for_nothing or turn.new() > 0
-
     def _wake_up(self, turn: Turn, wake: Wake | None) -> None:
         if wake is not None:
             turn.add(wake)
         if not turn.is_wanted:
-            turn.is_wanted = True
-            self._ready.push(turn.rank)
+            self.line_up(turn)
 
     def _begin(self, instant: Instant) -> None:
         """Something happens at a tag, for the first time."""
@@ -390,26 +360,10 @@ class Director:
             self._recent.append(turn.actor.path)
         if turn.later:
             turn.hold()
-        if turn.form is not None:
-            turn.form.fire()
-        elif turn.keeps is None:
+        if turn.form is None:
             turn.actor.fire()
         else:
-            self._fire_on(turn)
-
-    def _fire_on(self, turn: Turn) -> None:
-        """Let an actor fire as long as it takes tokens from ports that keep them, and leaves others there."""
-        waiting = turn.kept()
-        turn.actor.fire()
-        left = turn.kept()
-        while 0 < left < waiting:
-            turn.clear()
-            if turn.later:
-                turn.hold()
-            self.firings += 1
-            waiting = left
-            turn.actor.fire()
-            left = turn.kept()
+            turn.form.fire()
 
     def fail(self, turn: Turn, error: BaseException) -> NoReturn:
         """Report the error of an actor in its turn; one of an aspect on a token's way, say, has been reported."""
@@ -443,10 +397,7 @@ class Entry(Way):
             self.port.arrived.append(token)
         else:
             self.port.receive(token, self.channel)
-        if not turn.is_wanted:  # as in want, without the call: this happens for every token that arrives
-            turn.is_wanted = True
-            self.director._ready.push(turn.rank)
-            if self.director.present is None:
-                self.director._await_present()
+        if not turn.is_wanted:
+            self.director.want(turn)
         elif not len(self.port.arrived) % REPORTED:
             self.director.crowd.add(self.director.tag, self.port.path, REPORTED)

@@ -2,22 +2,31 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING, cast
 
 from ..graph import Clock, ModelGraph, is_within
 from .director import Director
-from .local_time import Border, LocalDirector, Passage
+from .local_time import LocalDirector, Passage
 from .refinement import Conductor, Refinement
 
 if TYPE_CHECKING:
-    from epicycle.actors import Actor, StateMachine
+    from epicycle.actors import Actor, Context, StateMachine
 
     from .execution import Execution
 
 
+def director_of(graph: ModelGraph) -> type[Director]:
+    """The class of the director of a run: that of a dialect in the model, if one has its own."""
+    found = (each.director() for each in dict.fromkeys(graph.dialects.values()))
+    return next((kind for kind in found if kind is not None), Director)
+
+
 class Directors:
     """The directors of a run ``of`` each composite that has one, with the passages at its ports.
+
+    A director may come with a subclass (``Director.composites``), which makes other passages and conductors.
 
     ``executions`` are those of the actors whose firings are deferred or whose errors are caught; their maker adds them.
     """
@@ -30,7 +39,6 @@ class Directors:
         self.of: dict[str, Director | LocalDirector | Refinement] = {}
         self.conductors: dict[str, Conductor] = {}
         self.passages: dict[str, Passage] = {}
-        self.borders: dict[str, Border] = {}
         self.refinements: dict[str, Refinement] = {}
         for composite, clock in graph.clocks.items():
             self._add_director(composite, clock)
@@ -43,46 +51,37 @@ class Directors:
         """The options of a composite's own director."""
         outside = self.base(self.graph.director_of(composite)) if composite else self.director
         for paths in self.graph.borders(composite):
-            self.passages.update({path: Passage(path, outside) for path in paths})
-        if self.graph.refires(composite):
-            self._add_border(composite, outside)
-        is_refired = composite in self.graph.modal or self.graph.refinement_of(composite) == composite != ""
-        if is_refired and self.graph.rules[composite].are_ptolemys:
-            self._let_refire(composite)
+            self.passages.update({path: self.passage(path, outside) for path in paths})
+        self.prepare(composite, outside)
         self.of[composite] = self._made_director(composite, clock)
         if composite in self.graph.modal:
             machine = cast("StateMachine", self.actors[self.graph.modal[composite].machine])
-            conductor = Conductor(composite, machine, self.director, self.of[composite])
-            self.conductors[composite] = conductor
-            conductor.is_refired = self.graph.rules[composite].are_ptolemys
-            if machine.is_preemptive or conductor.is_refired:
+            conductor = self.conductors[composite] = self.conductor(composite, machine)
+            if conductor.hears_inputs:
                 for path in self.graph.borders(composite)[0]:
                     self.passages[path].beside = conductor
 
-    def _add_border(self, composite: str, outside: Director | Refinement) -> None:
-        """Let a composite fire again as long as tokens wait at its inputs."""
-        border = self.borders[composite] = Border(composite, self.graph.end_of(composite), self.director, outside)
-        for paths, passages in zip(
-            self.graph.borders(composite), (border.inputs_before, border.outputs_behind), strict=True
-        ):
-            passages += (self.passages[path] for path in paths)
-            for passage in passages:
-                passage.border = border
-        around = composite
-        while around and border.poster is None:
-            around = around.rpartition(".")[0]
-            border.poster = self.director.posters.get(around)
-        border.nesting = 0 if border.poster is None else border.poster.nesting + 1
-        if composite not in self.graph.modal:  # whose parts are posted one by one
-            self.director.posters[composite] = border
+    def passage(self, path: str, outside: Director | Refinement) -> Passage:
+        """The passage at a port of a composite with a director."""
+        return Passage(path, outside)
 
-    def _let_refire(self, composite: str) -> None:
-        """Let a composite with modes, or a refinement, take one token of each channel per firing, as in Ptolemy."""
-        inputs, outputs = self.graph.borders(composite)
-        for path in (*inputs, *outputs):
-            self.passages[path].is_refired = True
-        for path in outputs if composite in self.graph.modal else ():
-            self.passages[path].holds_one = True
+    def prepare(self, composite: str, outside: Director | Refinement) -> None:
+        """Called when a composite has its passages, and not yet its director."""
+
+    def conductor(self, composite: str, machine: StateMachine) -> Conductor:
+        """The conductor of a composite with modes."""
+        return Conductor(composite, machine, self.director, self.of[composite])
+
+    def refinement(self, path: str, outside: Context, conductor: Conductor) -> Refinement:
+        """The director of a refinement."""
+        return Refinement(path, outside, self.director, conductor)
+
+    def resumption(self, composite: str) -> Callable[[], None] | None:
+        """What to call when an actor under this director fires after an aspect outside has deferred that."""
+        return None
+
+    def start(self, before: str, path: str) -> None:
+        """Called at the start between the initialization of two actors."""
 
     def _made_director(self, composite: str, clock: Clock) -> Director | LocalDirector | Refinement:
         if not composite or self.graph.refinement_of(composite) != composite:
@@ -90,7 +89,7 @@ class Directors:
             return base if clock.is_global else LocalDirector(base, clock)
         modal, _, mode = composite.rpartition(".")
         conductor = self.conductors[modal]
-        inside = Refinement(composite, self.of[modal], self.director, conductor)
+        inside = self.refinement(composite, self.of[modal], conductor)
         self.refinements[composite] = conductor.refinements[mode] = inside
         conductor.insides[mode] = partial(self._begin_anew, composite)
         for path in self.graph.borders(composite)[0]:
@@ -120,11 +119,3 @@ class Directors:
                 else:
                     actor.halt()
                 actor.restart()
-
-    def post(self, before: str, path: str) -> None:
-        """At the start, between the initialization of two actors: post the composites that are complete."""
-        around = before if self.borders else ""
-        while around:
-            around = around.rpartition(".")[0]
-            if around in self.borders and not is_within(path, around):
-                self.borders[around].post()

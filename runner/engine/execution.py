@@ -19,7 +19,7 @@ from ..text import describe
 from .agenda import Turn
 from .director import Director
 from .errors import ActorError
-from .local_time import Border, LocalDirector
+from .local_time import LocalDirector
 from .refinement import Refinement
 
 
@@ -35,7 +35,7 @@ class Execution:
         self.way: Callable[[Job], None] = self.execute
         self.refresh: list[Callable[[], None]] = []
         self.forget: Callable[[], None] = _nothing
-        self.border: Border | None = None  # of its composite, if the firing is deferred from outside
+        self.resumed: Callable[[], None] | None = None  # called before a firing that was deferred from outside
         self.refinement: Refinement | None = None  # its refinement, if errors in it lead to a transition
         self.seed = director.seed
         self.streams = director.streams
@@ -46,11 +46,10 @@ class Execution:
         # An actor has a turn for each rank at which it takes tokens, and one for its wake-ups.
         self._turns: dict[int, _StandIn] = {}
         for port in actor.inputs.values():
-            self._stand_in(director.ranks[port.path]).inputs[port.name] = port
+            self._stand_in(director.ranks[port.path])
         self._own = self._stand_in(director.ranks[actor.path])
-        if self.turn_at(self._own.rank).takes_all:
-            for turn in self._turns.values():
-                turn.inputs.update(actor.inputs)
+        for rank, turn in self._turns.items():
+            turn.inputs.update({port.name: port for port in director.inputs_at(actor, rank)})
         self._open: int | None = None  # the rank of its turn, while the actor itself is idle
         self._asked: list[Wake] = []  # wake-ups that are to come
         self._ready: dict[Wake, Job] = {}  # jobs to execute, and by when
@@ -132,7 +131,7 @@ class Execution:
         if self._open == job.rank:
             self._carry_out(job)
             return
-        tag = self._director.next_turn(job.rank)
+        tag = self._director.next_tag(job.rank)
         self._ready[self._director.call(self._turns[job.rank], tag, job.rank)] = job
 
     def _carry_out(self, job: Job) -> None:
@@ -143,8 +142,8 @@ class Execution:
         if self._gates:
             self._held.append(job)
             return
-        if self.border is not None and job.released != self._director.last:
-            self.border.resume()
+        if self.resumed is not None and job.released != self._director.last:
+            self.resumed()
         self._director.put_back(job)
         for wake in job.wakes:
             wake.due = not wake.cancelled

@@ -130,8 +130,6 @@ cdef class DelayForm(Native):
     cdef public long long delay
 
     cdef bint take(self) except -1:
-        if self.actor.steps:
-            return False
         self.input, self.output = self.input_port("input"), self.sender("output")
         self.line = self.actor._held._line
         self.delay = nanoseconds_of(self.actor.delay)
@@ -207,9 +205,7 @@ cdef class PoissonForm(Ticking):
 
     cdef bint take(self) except -1:
         self.drawing = drawing_of(Exponential(mean=self.actor.mean_interval), self.actor.random)
-        if self.actor.one_at_a_time and self.actor.stop_time is not None:
-            return False
-        return self.actor.generator is None and not self.actor.trigger.width and Ticking.take(self)
+        return not self.actor.trigger.width and Ticking.take(self)
 
     cpdef fire(self):
         cdef long long following
@@ -237,8 +233,6 @@ cdef class ServerForm(Native):
 
     cdef bint take(self) except -1:
         actor = self.actor
-        if actor.one_at_a_time:
-            return False
         self.input, self.output = self.input_port("input"), self.sender("output")
         self.size, self.rejected = self.sender("size"), self.sender("rejected")
         self.line, self.waiting = actor._served._line, actor._waiting
@@ -292,7 +286,7 @@ cdef class ServerForm(Native):
             return self.drawing.next()
         token = None if self.time is None else self.time._received
         if type(token) is not float or not <double>token >= 0.0:
-            return self.actor._draw()
+            return self.actor.draw_time()
         self.time.settle(token)
         return token
 
@@ -307,7 +301,7 @@ cdef class RandomForm(Native):
     cdef bint take(self) except -1:
         self.trigger, self.output, self.stream = self.input_port("trigger"), self.sender("output"), self.actor.random
         self.drawing = drawing_of(self.actor.distribution, self.stream)
-        return self.output is not None and self.trigger.width == 1 and self.actor.generator is None
+        return self.output is not None and self.trigger.width == 1
 
     cpdef fire(self):
         for _ in range(count_of(self.trigger)):
@@ -409,8 +403,6 @@ def attach(director, actors, besides):
             continue
         inputs = list(actor.inputs.values())
         varying = {each.name for each in inputs if type(each) is not InputPort and each.width}
-        if any(each.keep for each in inputs):
-            continue
         if actor.context is not director or not varying.issubset(getattr(kind, "varying", ())):
             continue
         form = kind()

@@ -73,12 +73,12 @@ def handle_events(
                 environment.happen()
             elif instant is not None:
                 director._next = None
-                director._handle(instant)
+                director.handle(instant)
             else:
                 director._time = upcoming
                 if director._has_simpy:
                     environment._now = upcoming
-                director._handle(times.pop())
+                director.handle(times.pop())
         except BaseException as error:
             director.present = None
             if isinstance(error, (ActorError, LoopError, KeyboardInterrupt)):

@@ -45,7 +45,6 @@ class Refinement:
         self._stood = 0  # outer time since when it has stood still
         self._agenda: list[Entry] = []
         self._numbers = count()
-        self._is_beginning = False
 
     @property
     def time(self) -> int:
@@ -83,13 +82,13 @@ class Refinement:
         most = self.director.crowd.most
         if len(self._agenda) >= most:
             raise CrowdError(self.director.tag, most, f"pending tokens, wake-ups and events in {self.path}", ())
-        heapq.heappush(self._agenda, (time, next(self._numbers), what, how, self._not_before(time)))
+        heapq.heappush(self._agenda, (time, next(self._numbers), what, how, self.not_before(time)))
         if self.is_active:
             self.conductor.plan()
 
-    def _not_before(self, time: int) -> tuple[int, int]:
-        """Work for the present time is for its next microstep; but a composite that fires again begins at once."""
-        if time > self.time or self._is_beginning:
+    def not_before(self, time: int) -> tuple[int, int]:
+        """The outer time and microstep before which work for a local time is not done: for the present, the next."""
+        if time > self.time:
             return 0, 0
         present = self.director.now()
         return present.time, present.microstep + (self.director.present is not None)
@@ -153,9 +152,7 @@ class Refinement:
 
     def begin_inside(self, inside: Callable[[], None]) -> None:
         """Start its contents."""
-        self._is_beginning = True
         inside()
-        self._is_beginning = False
 
 
 class _Environment(Environment):
@@ -197,7 +194,6 @@ class Conductor(Actor):
         self._active: Refinement | None = None
         self._left: Tag | None = None  # the tag at which a preemptive transition, or an error, cut a firing short
         self._wake: Wake | None = None
-        self.is_refired = False  # whether it fires again at a tag as long as tokens wait at the inputs of its composite
         self.failure: ActorError | None = None
         machine.refinements = self
 
@@ -206,11 +202,14 @@ class Conductor(Actor):
         """Whether the active refinement no longer takes part in the present tag."""
         return self._left is not None and self._left == self._director.tag
 
+    @property
+    def hears_inputs(self) -> bool:
+        """Whether it fires when something comes in, not only when its refinement has work to do."""
+        return self.machine.is_preemptive
+
     def fire(self) -> None:
         if self._wake is not None and (self._wake.due or self._wake.cancelled):
             self._wake = None
-        if self.is_refired:
-            self._left = None
         if self.machine.is_preemptive and self.machine.preempt():
             self._left = self._director.tag
         elif self._active is not None and self._active.release():
@@ -248,8 +247,7 @@ class Conductor(Actor):
         if self._wake is not None:
             self._wake.cancel()
             self._wake = None
-        is_over = self.is_refired and self.machine.modes[mode].final  # in Ptolemy, it no longer fires
-        self._active = None if is_over else self.refinements.get(mode)
+        self._active = self.active_in(mode)
         if self._active is None:
             return
         if history:
@@ -258,6 +256,10 @@ class Conductor(Actor):
             self._active.begin()
             self._active.begin_inside(self.insides[mode])
         self.plan()
+
+    def active_in(self, mode: str) -> Refinement | None:
+        """The refinement that is active in a mode that is entered, if there is one."""
+        return self.refinements.get(mode)
 
     def fail(self, error: ActorError) -> None:
         """Something in the active refinement has failed: the machine decides what follows."""

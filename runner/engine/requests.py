@@ -23,7 +23,6 @@ class Requests:
         self._ways: dict[str, list[JoinPoint]] = {}
         self._jobs: dict[tuple[str, int], Job] = {}  # the firings that wait for an answer, by actor and number
         self._number: dict[str, int] = {}  # how many firings of an actor there were
-        self._waits: set[str] = set()  # places whose requests wait for the composite's turn
 
     def add_way(self, point: JoinPoint, place: str) -> Callable[[Any], None]:
         """A further way through a place, to everything behind a port or to one channel: where its tokens enter."""
@@ -35,20 +34,15 @@ class Requests:
             number = self._number[place] = self._number.get(place, -1) + 1
             self._jobs[place, number] = job
             seconds = time_needed(self.model.times[place], job, point.random) or 0.0
-            if place not in self._waits:
-                point.act("requested", seconds)
             self.entries[place](FiringRequest(None, "", place, point.now, self.name, number, seconds))
 
         def ask(token: Any) -> None:
-            if place not in self._waits:
-                point.act("requested", token)
             self.entries[place](Request(token, point.source, place, point.now, self.name, way))
 
         return ask_for_firing if place in self.model.times else ask
 
     def told(self, place: str, onward: Way) -> Way:
-        """``onward`` for requests from a place that wait for the composite's turn: they are made when they enter."""
-        self._waits.add(place)
+        """The way of requests from a place onward; each is an act when it goes there."""
 
         def come_in(request: Any) -> None:
             is_firing = isinstance(request, FiringRequest)

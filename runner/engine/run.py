@@ -20,6 +20,7 @@ from ..text import describe, raised_at
 from .acts import Acts
 from .copies import Copies
 from .director import Director
+from .directors import director_of
 from .errors import ActorError
 from .forms import attach
 from .listeners import Measuring, Recording
@@ -27,7 +28,7 @@ from .loop import handle_events
 from .measured import Measured, add_computed
 from .monitoring import Listening, Monitoring
 from .pace import Pace
-from .trace import Tracer, TracingDirector, TracingLog
+from .trace import Tracer, Tracing, TracingLog, tracing
 from .way import Deliver
 from .ways import Ways
 
@@ -66,11 +67,10 @@ class Run:
         self._awaited: Mapping[str, float] = {}  # robustness of monitors at which it is to pause
         order, limits = model.order(), model.graph.limits
         self.log = EventLog(keeps, log_to) if tracer is None else TracingLog(keeps, tracer)
-        self.director = (
-            Director(order, seed, limits, model.postings())
-            if tracer is None
-            else TracingDirector(order, seed, tracer, limits, model.postings())
-        )
+        kind = director_of(model.graph)
+        self.director: Director = (kind if tracer is None else tracing(kind))(order, seed, limits, model.graph)
+        if isinstance(self.director, Tracing) and tracer is not None:
+            self.director.begin_trace(tracer)
         self.log.crowd = self.director.crowd.add
         self.signals = {name: Signal(name) for name in model.recorded}
         self._units = {metric.name: metric.unit for metric in model.metrics}
@@ -204,11 +204,11 @@ class Run:
             actor.enter(self._ways.context_of(path))
         before = ""
         for path, actor in self.actors.items():
-            self._ways.directors.post(before, path)
+            self._ways.directors.start(before, path)
             self._call(actor, "initialize")
             self._initialized.append(actor)
             before = path
-        self._ways.directors.post(before, "")
+        self._ways.directors.start(before, "")
         self._ways.begin()
         # Ports are open only while actors fire: nothing is sent in initialize and wrapup.
         self._ways.open()

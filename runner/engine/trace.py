@@ -7,14 +7,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from epicycle.actors import Actor, InputPort, Tag, Wake, Way, When
 from epicycle.aspects import Job
 
-from ..graph import Postings
 from ..results import EventLog, Names, Record, Writer
-from ..text import Limits
 from .agenda import Delivery, Turn
 from .director import Director
 from .execution import is_stand_in
@@ -131,13 +129,17 @@ class _TracingWriter(Writer):
         self._tracer.add(Record(Tag(when.time, when.microstep), *self.names, value))
 
 
-class TracingDirector(Director):
-    """A director that remembers causes."""
+if TYPE_CHECKING:
+    _Base = Director
+else:
+    _Base = object  # any director comes behind it, see ``tracing``
 
-    def __init__(
-        self, order: dict[str, int], seed: int, tracer: Tracer, limits: Limits, postings: Postings | None = None
-    ) -> None:
-        super().__init__(order, seed, limits, postings)
+
+class Tracing(_Base):
+    """What makes a director remember causes."""
+
+    def begin_trace(self, tracer: Tracer) -> None:
+        """Report to a tracer from now on."""
         self._tracer = tracer
         self._arrivals: dict[str, list[Arrival]] = {}
         self._asked: dict[Wake, Tag | None] = {}
@@ -211,3 +213,8 @@ class TracingDirector(Director):
             super().fire(turn)
         finally:
             self._tracer.end()
+
+
+def tracing(kind: type[Director]) -> Any:
+    """The class of a director, with ``Tracing``."""
+    return type(f"Tracing{kind.__name__}", (Tracing, kind), {})

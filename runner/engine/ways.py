@@ -93,7 +93,8 @@ class Ways:
                 listeners.setdefault(woven.model.response, []).append(partial(self._answer, woven))
         for path in dict.fromkeys(path for woven in aspects for path in woven.looks_at):
             listeners.setdefault(path, []).append(partial(self._latest.__setitem__, path))
-        self.directors = directors = Directors(graph, actors, director)
+        kind: type[Directors] = type(director).composites or Directors
+        self.directors = directors = kind(graph, actors, director)
         changed = {path.rpartition(".")[0] for woven in aspects for path in woven.parameters}
         self._executions = directors.executions
         for path, actor in actors.items():
@@ -107,7 +108,7 @@ class Ways:
                 execution.refinement = directors.refinements[graph.refinement_of(path)]
             around = graph.director_of(path)
             if any(graph.director_of(woven.name) != around for woven in self._woven_at.get(path, ())):
-                execution.border = directors.borders.get(around)
+                execution.resumed = directors.resumption(around)
             execution.way = self._scheduled(path, execution.execute)
             execution.forget = partial(self._forget, path)
 
@@ -176,13 +177,10 @@ class Ways:
             for place, path in requests.model.requests.items():
                 if path not in ways:
                     ways[path] = all_of(self._branches(path, ()))
-                passage = self.directors.passages.get(path)
-                onward = ways[path]
-                if passage is not None and passage.border is not None:
-                    onward = passage.await_turn(requests.told(place, onward))
-                elif passage is not None:
-                    onward = passage.lane(place, onward)
-                requests.entries[place] = self._woven(path, path, onward).go
+                passage, told = self.directors.passages.get(path), partial(requests.told, place)
+                onward, waits = (ways[path], False) if passage is None else passage.admit(place, ways[path], told)
+                entry = self._woven(path, path, onward)
+                requests.entries[place] = (entry if waits else told(entry)).go
 
     def _heard(self, path: str) -> list[Way]:
         """The listeners to what leaves a port."""

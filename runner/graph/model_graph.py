@@ -14,10 +14,10 @@ from typing import Any
 from epicycle.actors import Actor, InputPort, OutputPort
 from epicycle.aspects import Request
 
+from ..catalogue import Dialect
 from ..text import NORMAL, Limits, Position
 from .acts import connection_place
 from .clock import Clock
-from .rules import Rules
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,8 +87,8 @@ class ModelGraph:
         self.composites: dict[str, str] = {}  # the class of each composite, outer ones first
         # The composites with their own director, which are actors in the graph around them; "" is the model.
         self.clocks: dict[str, Clock] = {"": Clock() if inside is None else inside.clocks[director]}
-        # The rules of each of these directors.
-        self.rules: dict[str, Rules] = {"": Rules() if inside is None else inside.rules[director]}
+        # The dialect of each of these directors.
+        self.dialects: dict[str, type[Dialect]] = {"": Dialect if inside is None else inside.dialects[director]}
         self.members: dict[str, list[str]] = {"": []}  # what each director fires, in the order of declaration
         self.modal: dict[str, Modal] = {}  # composites with modes, by their path
         self.priorities: dict[str, int] = {}
@@ -132,7 +132,7 @@ class ModelGraph:
         self._check_open()
         self.ports |= part.ports
         self.members[director] += part.members.pop("")
-        del part.clocks[""], part.rules[""]
+        del part.clocks[""], part.dialects[""]
         parts = part._parts
         part._parts = {path: each for path, each in parts.items() if path not in self._parts}
         for known, new in zip(self._by_path(), part._by_path(), strict=True):
@@ -145,8 +145,6 @@ class ModelGraph:
 
     def add_actor(self, actor: Actor, position: Position | None) -> None:
         self._check_open()
-        if self.rules_at(actor.path).are_ptolemys:
-            actor.follow_ptolemy()
         actor.is_part = True
         self.actors[actor.path] = actor
         self._enrol(actor.path)
@@ -176,30 +174,29 @@ class ModelGraph:
         path: str,
         start: int | None = None,
         drift: float = 1.0,
-        ties: str | None = None,
-        like: str | None = None,
+        like: type[Dialect] | None = None,
     ) -> None:
-        """Give a composite its own director, with this clock (``start`` in ns) and these rules if given."""
+        """Give a composite its own director, with this clock (``start`` in ns), and a dialect (default: as outside)."""
         self._check_open()
         outer = self.director_of(path)
         self.members[outer].append(path)
         self.members[path] = []
         self.clocks[path] = self.clocks[outer].inside(start, drift)
-        self.rules[path] = self.rules[outer].inside(ties, like)
+        self.dialects[path] = like or self.dialects[outer]
 
-    def rules_at(self, path: str) -> Rules:
-        """The rules of the director of an actor or composite."""
-        return self.rules[self.director_of(path)]
+    def dialect_at(self, path: str) -> type[Dialect]:
+        """The dialect of the director of an actor or composite."""
+        return self.dialects[self.director_of(path)]
 
-    def refires(self, director: str) -> bool:
-        """Whether a composite fires again at a tag as long as tokens wait at its inputs, as in Ptolemy."""
-        if not director or director not in self.rules or self.refinement_of(director) == director:
+    def is_strict(self, composite: str) -> bool:
+        """Whether this is a composite with a director, not a refinement, which counts as one actor in all respects."""
+        if not composite or composite not in self.dialects or self.refinement_of(composite) == composite:
             return False
-        return self.rules[director].are_ptolemys
+        return self.dialects[composite].is_strict
 
-    def end_of(self, director: str) -> str:
-        """Where a composite that fires again has its turn to do so; one with modes begins at its own path."""
-        return f"{director}.(end)" if director in self.modal else director
+    def end_of(self, composite: str) -> str:
+        """What has the rank behind everything in a strict composite."""
+        return f"{composite}.(end)"
 
     def add_refinement(self, path: str) -> None:
         """Give a composite its own director, whose time advances in only one mode; clocks in it count that time."""
@@ -259,7 +256,7 @@ class ModelGraph:
         """The properties of parts, actors first."""
         return (
             self.actors, self.composites, self.positions, self.priorities, self.tags, self.clocks, self.members,
-            self._borders, self._parts, self.modal, self.rules,
+            self._borders, self._parts, self.modal, self.dialects,
         )  # fmt: skip
 
     def remove(self, path: str) -> None:
@@ -370,14 +367,14 @@ class ModelGraph:
     def channel_of(self, hops: tuple[Hop, ...], hop: Hop) -> object:
         """What distinguishes the channels of a port: the wire, or the connection at the port if that is one channel.
 
-        As in Ptolemy, what leaves a composite with modes is one channel, whichever refinement has sent it.
+        What leaves a strict composite with modes is one channel, whichever refinement has sent it.
         """
         if hop.shared is not None:
             return hop.shared
         for place in range(len(hops), 0, -1) if self.modal else ():
             far = hops[place - 1].destination
             owner = self.owner(far)
-            if owner in self.modal and self.direction(far) == "output" and self.rules[owner].are_ptolemys:
+            if owner in self.modal and self.direction(far) == "output" and self.dialects[owner].is_strict:
                 return hops[place:]
         return hops
 

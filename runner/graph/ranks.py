@@ -13,14 +13,23 @@ from dataclasses import dataclass
 from itertools import chain
 from typing import TypeAlias
 
-from epicycle.actors import Place
-
 from .digraph import in_order
 from .model_graph import Hop, ModelGraph
 
 # The dependencies within a tag, of one director: the successors of each port.  There is a connection without delay
 # between them (``Hop``), or they are in one actor and the second depends on the first within the tag.
 Region: TypeAlias = dict[str, dict[str, Hop | None]]
+
+
+@dataclass(frozen=True)
+class Step:
+    """A turn under a director: of an actor, for its wake-ups or for some of its inputs; of a port; or of a composite.
+
+    Actors and composites have a ``level``, their depth and priority: at equal ones, nothing else decides who is first.
+    """
+
+    paths: list[str]
+    level: tuple[int, int] | None = None
 
 
 def firing_order(graph: ModelGraph) -> dict[str, int]:
@@ -31,60 +40,35 @@ def firing_order(graph: ModelGraph) -> dict[str, int]:
     (``depths``), at equal depth by priority, then in the order of declaration.  Raises
     ``graphlib.CycleError`` if there is a loop without delay.
     """
-    return {path: rank for rank, (paths, _) in enumerate(_unfolded(graph)) for path in paths}
+    order, found = steps(graph), dict[str, int]()
 
-
-@dataclass(frozen=True)
-class Postings:
-    """Where ties are resolved as posted: the place of each rank, and the actors that take all waiting tokens.
-
-    For these, whether they also fire when the tokens for their firing have already been taken.
-    """
-
-    places: tuple[Place, ...]
-    actors: dict[str, bool]
-
-
-def postings(graph: ModelGraph) -> Postings | None:
-    """The ``Postings``, if ties are posted anywhere."""
-    if not any(rules.are_posted for rules in graph.rules.values()):
-        return None
-    rules = {path: graph.rules_at(path) for path in graph.actors}
-    actors = {path: each.are_ptolemys for path, each in rules.items() if each.are_posted}
-    return Postings(tuple(place for _, place in _unfolded(graph)), actors)
-
-
-def _unfolded(graph: ModelGraph) -> list[tuple[list[str], Place]]:
-    """What fires in the order of ranks: the paths of each rank, and its place among what is posted."""
-    regions = dependencies(graph)
-    numbers = {director: number for number, director in enumerate(graph.clocks)}
-    order: list[tuple[list[str], Place]] = []
-
-    def unfold(director: str, around: Place) -> None:
-        inputs, outputs = graph.borders(director)
-        group = 0
-
-        def add(paths: list[str], *, beside: bool = False) -> None:
-            nonlocal group
-            group += not beside
-            if paths[0] in graph.clocks and paths[0] != director:
-                unfold(paths[0], (*around, (group, numbers[paths[0]])))
+    def unfold(director: str, rank: int) -> int:
+        for step in order[director]:
+            if step.paths[0] in order and step.paths[0] != director:
+                rank = unfold(step.paths[0], rank)
             else:
-                order.append((paths, (*around, (group, 0))))
+                found.update(dict.fromkeys(step.paths, rank))
+                rank += 1
+        return rank
 
-        for port in inputs:
-            add([port])
-        if director in graph.modal:  # its conductor is first, and its machine last
-            add([director])
-        for paths, is_tied in _turns(graph, director, depths(graph, director, regions[director])):
-            add(paths, beside=is_tied and graph.rules[director].are_posted)
-        for port in outputs:
-            add([port])
-        if graph.refires(director):
-            add([graph.end_of(director)])
+    unfold("", 0)
+    return found
 
-    unfold("", ())
-    return order
+
+def steps(graph: ModelGraph) -> dict[str, list[Step]]:
+    """What each director lets happen, in order; what is in a composite with its own happens at its step."""
+    found = {}
+    for director, region in dependencies(graph).items():
+        inputs, outputs = graph.borders(director)
+        found[director] = [
+            *(Step([port]) for port in inputs),
+            # Of a composite with modes, the conductor is first, and the machine last.
+            *([Step([director])] if director in graph.modal else ()),
+            *_turns(graph, director, depths(graph, director, region)),
+            *(Step([port]) for port in outputs),
+            *([Step([graph.end_of(director)])] if graph.is_strict(director) else ()),
+        ]
+    return found
 
 
 def dependencies(graph: ModelGraph) -> dict[str, Region]:
@@ -111,7 +95,7 @@ def dependencies(graph: ModelGraph) -> dict[str, Region]:
                 region.setdefault(port, {})
             if member in graph.clocks:
                 for port in inputs:
-                    if graph.rules[member].are_ptolemys or _acts(graph, member, regions[member], port):
+                    if graph.dialects[member].is_strict or _acts(graph, member, regions[member], port):
                         region[port].update(dict.fromkeys(outputs))
                 continue
             for output in graph.actors[member].outputs.values():
@@ -175,13 +159,12 @@ def depths(graph: ModelGraph, director: str, region: Region) -> dict[str, int]:
     return result
 
 
-def _turns(graph: ModelGraph, director: str, depth: dict[str, int]) -> Iterator[tuple[list[str], bool]]:
+def _turns(graph: ModelGraph, director: str, depth: dict[str, int]) -> Iterator[Step]:
     """The firings within a tag in their order: each a composite, or an actor and those of its inputs that go with it.
 
-    If an actor takes the tokens of some inputs later than it answers wake-ups, these inputs are a separate turn.  Each
-    turn states whether it is tied with the one before.
+    If an actor takes the tokens of some inputs later than it answers wake-ups, these inputs are a separate turn.
     """
-    turns: list[tuple[int, int, list[str]]] = []
+    turns: list[tuple[tuple[int, int], list[str]]] = []
     modal = graph.modal.get(director)
     for member in graph.members[director]:
         if modal is not None and member == modal.machine:
@@ -190,11 +173,9 @@ def _turns(graph: ModelGraph, director: str, depth: dict[str, int]) -> Iterator[
         found: dict[int, list[str]] = {depth[member]: [member]}
         for port in inputs:
             found.setdefault(depth[port], []).append(port)
-        turns += [(deep, graph.priorities.get(member, 0), paths) for deep, paths in found.items()]
+        turns += [((deep, graph.priorities.get(member, 0)), paths) for deep, paths in found.items()]
     # The sort is stable: the order of declaration decides ties.
-    before: tuple[int, int] | None = None
-    for deep, priority, paths in sorted(turns, key=lambda turn: turn[:2]):
-        yield paths, (deep, priority) == before
-        before = deep, priority
+    for level, paths in sorted(turns, key=lambda turn: turn[0]):
+        yield Step(paths, level)
     if modal is not None:
-        yield [modal.machine, *ports_of(graph, modal.machine)[0]], False
+        yield Step([modal.machine, *ports_of(graph, modal.machine)[0]])

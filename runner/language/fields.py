@@ -307,7 +307,5 @@ def about(parameter: Parameter[Any]) -> str:
         facts.append(f"in {parameter.unit}")
     if not parameter.required:
         facts.append(f"default {shown(as_written(parameter.default))}")
-    if parameter.differs:
-        facts.append(f"like ptolemy {shown(as_written(parameter.ptolemy))}")
     doc = parameter.doc[:1].upper() + parameter.doc[1:]
     return f"{doc} ({', '.join(facts)})" if doc else ", ".join(facts).capitalize()

@@ -7,7 +7,7 @@ from typing import Any
 
 from epicycle.actors import Parameter
 
-from ..graph import LIKE, PTOLEMY, TIES
+from ..catalogue import LIKE, dialects
 from ..text import MAX_SEED, POISON, Entry, Mapping, Node, NodeReader, Poison, Position, Problems, Scalar, Text
 from .acts import ActText
 from .fields import (
@@ -27,7 +27,6 @@ from .fields import (
     nanoseconds,
     node_as,
     ref,
-    schema_of,
     sound,
 )
 from .metrics import METRICS, MetricText
@@ -41,18 +40,15 @@ from .ports import PORTS, ParameterText, PortText
 # -- composite classes --------------------------------------------------------------------------------------------
 
 
-def _rules(**defaults: str) -> dict[str, Key]:
-    """The rules of a director."""
-    said = {"ties": TIES, "like": LIKE}
-    return {
-        key: Key(node_as(schema_of(each)), f"{each.doc[:1].upper()}{each.doc[1:]} (default: {defaults[key]}).")
-        for key, each in said.items()
-    }
+def _like(default: str) -> dict[str, Key]:
+    """The dialect of a director."""
+    doc = f"{LIKE.doc[:1].upper()}{LIKE.doc[1:]} (default: {default})."
+    return {"like": Key(node_as({"type": "string"}), doc)}
 
 
 MODEL_DIRECTOR = Construct(
     "The rules of the model's director, and of the directors inside that do not override them.",
-    _rules(ties="declared", like="epicycle"),
+    _like("epicycle"),
 )
 DIRECTOR = Construct(
     "A separate director, with a local clock.",
@@ -63,7 +59,7 @@ DIRECTOR = Construct(
         "drift": Key(
             node_as(computed("number", unit="1")), "The rate of local time; 1 is as fast as the time outside."
         ),
-        **_rules(ties="as outside", like="as outside"),
+        **_like("as outside"),
     },
 )
 DOC = Key(TEXT, "What it shows or does.")
@@ -238,8 +234,10 @@ class ModelText:
 
 def _model_director(reader: NodeReader, node: Node, what: str) -> dict[str, Entry] | Poison:
     """What a file declares about the model's director."""
-    if isinstance(node, Scalar) and node.value == PTOLEMY:
-        return reader.problems.add(f"{what} is not a mapping", node.position, f"write 'director: {{like: {PTOLEMY}}}'")
+    if isinstance(node, Scalar) and node.value in dialects():
+        return reader.problems.add(
+            f"{what} is not a mapping", node.position, f"write 'director: {{like: {node.value}}}'"
+        )
     if isinstance(node, Mapping):
         for key in [key for key in ("start", "drift") if key in node.entries]:
             message = f"{what} has no {key!r}: the time of a run begins at 0 and has no drift"

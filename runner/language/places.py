@@ -115,7 +115,7 @@ class ConnectionText:
     )
     shared: bool = keyed(
         FLAG,
-        "Make it one channel at each port, like a relation in Ptolemy; otherwise each pair is one.",
+        "Make it one channel at each port, whoever sends and receives; otherwise each pair is one.",
         called="'shared' of a connection",
         default=False,
     )

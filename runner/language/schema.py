@@ -210,6 +210,6 @@ def _type(name: str, cls: type, kind: str) -> Schema:
             **dict.fromkeys(_beside(kind), True),  # whose rules are where the type is
             **{key: {**schema_of(parameter), "description": about(parameter)} for key, parameter in declared.items()},
         },
-        "required": [key for key, parameter in declared.items() if parameter.required and not parameter.differs],
+        "required": [key for key, parameter in declared.items() if parameter.required],
         "additionalProperties": False,
     }

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import replace
 from itertools import groupby
 from operator import attrgetter
-from typing import Any
 
 from rich.console import Group, RenderableType
 from rich.padding import Padding
@@ -232,14 +230,6 @@ def facts(reference: TypeReference) -> list[str]:
 
 def _port_row(port: PortReference) -> list[str]:
     notes = ", ".join(_notes(port))
-    if port.ptolemy:
-        options: dict[str, Any] = dict(port.ptolemy)
-        there = [options.pop("type")] if "type" in options else []
-        if options:
-            there += _notes(replace(port, **options)) or [
-                "required" if port.direction == "input" else "depends on all inputs"
-            ]
-        notes += ("; " if notes else "") + f"like Ptolemy {', '.join(there)}"
     return [port.name, port.type, notes, port.doc]
 
 
@@ -249,7 +239,6 @@ def _notes(port: PortReference) -> list[str]:
     notes = {
         "optional": is_input and not port.required,
         "does not trigger": is_input and not port.triggers,
-        "keeps what is not taken out": is_input and port.keep,
         # Such a port may be part of a loop.
         f"depends at once on {' and '.join(inputs or ()) or 'no input'}": not is_input and inputs is not None,
         "any number of connections": port.multi,
@@ -266,6 +255,4 @@ def _parameter_row(parameter: ParameterReference) -> list[str]:
     else:
         kind += bounds_text(parameter.min, parameter.above, parameter.max, "{:g}".format)
     default = "required" if parameter.required else shown(parameter.default)
-    if parameter.differs:
-        default += f"; like Ptolemy {shown(parameter.ptolemy)}"
     return [parameter.name, kind, parameter.unit, default, parameter.doc]

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -15,9 +17,10 @@ from typing import Any
 import pytest
 
 from epicycle.runner.build import load_model
-from epicycle.runner.catalogue import CatalogueError, Types, built_in, describe, figure_types, installed
+from epicycle.runner.catalogue import CatalogueError, Types, built_in, describe, dialects, figure_types, installed
 from epicycle.runner.catalogue.reference import TOPICS, doc_of
 from epicycle.runner.catalogue.types import _offered
+from epicycle.runner.engine import Simulation
 from epicycle.runner.language import read_study
 from epicycle.runner.show.report import check_figures
 from epicycle.runner.study import Plan
@@ -196,6 +199,62 @@ def test_name_of_two_packages_must_be_qualified(site: Path) -> None:
     assert "Lidar" not in names
 
 
+DIALECTS = """
+from epicycle.runner.catalogue import Dialect
+from epicycle.runner.engine import Director
+class Odd(Dialect):
+    name = "odd"
+    @classmethod
+    def director(cls): return cls.made
+    made = type("OddDirector", (Director,), {})
+class Even(Odd):
+    name = "even"
+    made = type("EvenDirector", (Director,), {})
+"""
+
+
+def error_of_dialect(name: str, more: str = "") -> str:
+    """What is said about a model with such a dialect."""
+    Path("m.yaml").write_text(f"model: m\ndirector: {{like: {name}}}\n{more}", encoding="utf-8")
+    with pytest.raises(ModelError) as caught:
+        load_model("./m.yaml")
+    return str(caught.value)
+
+
+def test_a_dialect_that_cannot_be_loaded(site: Path) -> None:
+    install(site, "acme_a", "1 / 0", dialects="odd = acme_a:Odd\neven = acme_a:Even")
+    assert error_of_dialect("odd") == (
+        "m.yaml:2:18: error: m: director.like: dialect 'odd' of the package 'acme-a' cannot be loaded: "
+        "ZeroDivisionError: division by zero; its entry point in the group epicycle.dialects is odd = acme_a:Odd; "
+        "fix or uninstall 'acme-a'\n"
+        "    2 | director: {like: odd}\n"
+        "      |                  ^^^"
+    )
+    assert error_of_dialect("evn").splitlines()[0] == (
+        "m.yaml:2:18: error: m: director.like: 'evn' is not one of "
+        f"{', '.join(sorted(dialects()))}, did you mean 'even'?"
+    )
+
+
+def test_a_dialect_with_another_name(site: Path) -> None:
+    install(site, "acme_a", DIALECTS, dialects="strange = acme_a:Odd")
+    assert "the class is called odd, and its entry point must have the same name" in error_of_dialect("strange")
+
+
+def test_a_model_has_one_director(site: Path) -> None:
+    install(site, "acme_a", DIALECTS, dialects="odd = acme_a:Odd\neven = acme_a:Even")
+    parts = "composites: {C: {director: {like: even}}, D: {director: {}}}\nactors: {c: {type: C}, d: {type: D}}\n"
+    assert error_of_dialect("odd", parts) == (
+        "m.yaml:4:10: error: c is like even, but other parts of the model are like odd\n"
+        "    4 | actors: {c: {type: C}, d: {type: D}}\n"
+        "      |          ^\n"
+        "   help: a run has one director, and each of these has its own"
+    )
+    Path("m.yaml").write_text(f"model: m\ndirector: {{like: odd}}\n{parts.replace('even', 'odd')}", encoding="utf-8")
+    director = Simulation(load_model("./m.yaml")).director
+    assert type(director).__name__ == "OddDirector"
+
+
 def test_own_name_means_the_own_type(site: Path) -> None:
     install(site, "acme_a", GOOD.replace("Lidar", "Clock"), actors="Clock = acme_a:Clock")
     types = installed().actors
@@ -239,7 +298,7 @@ def epicycle(site: Path, *arguments: str) -> str:
 
 def check_installed(site: Path) -> None:
     """The package shows up in the reference, in the schema and in a run."""
-    assert "acme_sensing  Weather: a thermometer, and ice on it" in epicycle(site, "actors")
+    assert "acme_sensing  Weather: a thermometer, and ice on it; a dialect and a command" in epicycle(site, "actors")
     (icing,) = [each for each in json.loads(epicycle(site, "aspects", "--json")) if each["name"] == "Icing"]
     assert (icing["stands_at"], icing["events"], icing["parameters"][0]["default"]) == (["output"], ["frozen"], 273.15)
     schema = json.loads(epicycle(site, "schema"))
@@ -259,6 +318,15 @@ def check_installed(site: Path) -> None:
     epicycle(site, "report", "icy")
     assert "Coldest of all. </" in (site / "icy" / "report.html").read_text(encoding="utf-8").replace("<span", "</")
     assert (site / "icy" / "figures" / "runs.svg").is_file()
+    assert "    coldest   say how cold it gets in a model\n" in epicycle(site, "--help")
+    assert epicycle(site, "coldest", "weather.yaml") == "273.15 K\n"
+    assert re.search("^  Const +Sends 7, unless it is told otherwise", epicycle(site, "actors", "--like", "acme"), re.M)
+    model = "model: acme\ndirector: {like: NAME}\nactors: {one: {type: Const}, two: {type: Const, value: 2}}\n"
+    for name, sent in (("epicycle", [["one", "1"], ["two", "2"]]), ("acme", [["two", "2"], ["one", "7"]])):
+        (site / "acme.yaml").write_text(model.replace("NAME", name), encoding="utf-8")
+        epicycle(site, "run", "acme.yaml", "--log", f"{name}.csv")
+        with (site / f"{name}.csv").open(newline="", encoding="utf-8") as file:
+            assert [[row["actor"], row["value"]] for row in csv.DictReader(file)] == sent
 
 
 def test_third_party_package_shows_up(tmp_path: Path) -> None:

@@ -5,8 +5,7 @@
 left out on both sides; so are the actors that only check values (``Test``, ``NonStrictTest``), for the comparison takes
 their place.
 
-``like_ptolemy/`` holds models once more that depart from Ptolemy's where they stand in ``models/``, or are not quite
-Ptolemy's there: with ``director: {like: ptolemy}`` they are.  All others match with it as they do without it.
+``tests/ptolemy/conformance`` runs the same cases with ``director: {like: ptolemy}``.
 """
 
 from __future__ import annotations
@@ -15,7 +14,6 @@ import csv
 import json
 import re
 from pathlib import Path
-from shutil import copytree
 from typing import Any
 
 import pytest
@@ -77,21 +75,8 @@ def recorded(case: str) -> Sends:
         ]
 
 
-def load(case: str, folder: str = "models") -> Model:
-    return load_model(HERE / folder / f"{case}.yaml", types=TYPES)
-
-
-def load_like_ptolemy(case: str, folder: Path) -> Model:
-    """The same model, and nothing else, with Ptolemy's rules and defaults."""
-    if (HERE / "like_ptolemy" / f"{case}.yaml").is_file():
-        return load(case, "like_ptolemy")
-    file = folder / f"{case}.yaml"
-    file.write_text(
-        (HERE / "models" / file.name).read_text(encoding="utf-8") + "director: {like: ptolemy}\n", encoding="utf-8"
-    )
-    if (HERE / "models" / case).is_dir():  # what it reads
-        copytree(HERE / "models" / case, folder / case)
-    return load_model(file, types=TYPES)
+def load(case: str) -> Model:
+    return load_model(HERE / "models" / f"{case}.yaml", types=TYPES)
 
 
 def sends(model: Model) -> Sends:
@@ -138,8 +123,6 @@ QUANTITY_MANAGER = "CompositeQM"
 REFIRING = "RefiringActorInDE"
 OTHER_MICROSTEPS = ("ScheduleEmbeddedActors",)
 """The cases in which times and order are Ptolemy's, and microsteps are not; docs/ptolemy.md tells why."""
-RESUMED = 7.7, 2, "composite_actor.ramp2.output"
-"""Like Ptolemy, this send alone is at another microstep: at 1, as all others of actors whose firing was put off."""
 REFUSED = "DEFixedPointLimitation"
 CASES = [
     "BusConfigureParamsDE", "CancelFireAt", "DEScheduleTest", "DEinDEwithStartTimes", "DepthTest4", "DiscreteClock10",
@@ -154,18 +137,19 @@ def test_sends_as_ptolemy(case: str, monkeypatch: pytest.MonkeyPatch) -> None:
     compare(load(case), case, monkeypatch, 2 if case in OTHER_MICROSTEPS else 1)
 
 
-@pytest.mark.parametrize("case", CASES)
-def test_sends_like_ptolemy(case: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    compare(load_like_ptolemy(case, tmp_path), case, monkeypatch, 1)
-
-
-def compare(model: Model, case: str, monkeypatch: pytest.MonkeyPatch, first: int) -> None:
+def compare(
+    model: Model,
+    case: str,
+    monkeypatch: pytest.MonkeyPatch,
+    first: int,
+    send_resumed: tuple[float, int, str] | None = None,
+) -> None:
     """See that a model sends what Ptolemy sent, from which field of each send on beside the time and the value."""
     monkeypatch.setattr(TestActorPortDepth, "depths", depths(model.graph, "", dependencies(model.graph)[""]))
     found, expected = sends(model), recorded(case)
     same = slice(first, 4)
-    if first == 1 and case in OTHER_MICROSTEPS:
-        expected = [(*send[:1], 1, *send[2:]) if send[:3] == RESUMED else send for send in expected]
+    if send_resumed is not None:
+        expected = [(*send[:1], 1, *send[2:]) if send[:3] == send_resumed else send for send in expected]
     assert [send[same] for send in found] == [send[same] for send in expected]
     for (time, _, port, _, value), (recorded_time, _, _, _, text) in zip(found, expected, strict=True):
         assert abs(time - recorded_time) <= RESOLUTION, (port, recorded_time)
@@ -198,30 +182,6 @@ def test_an_aspect_that_is_a_model() -> None:
         return time, microstep + late, port, channel, value
 
     assert sorted(map(ptolemys, found), key=repr) == sorted(expected, key=repr)
-    assert sorted(map(ptolemys, requests(model))) == sorted(inside)
-
-
-def test_an_aspect_that_is_a_model_like_ptolemy() -> None:
-    """Requests wait for the turn of the aspect: all is as there, what comes in by its request ports, too."""
-    model = load(QUANTITY_MANAGER, "like_ptolemy")
-    expected, inside = came_in(model, recorded(QUANTITY_MANAGER))
-    assert [(*send[:4], requested(send[4])) for send in sends(model)] == expected
-    assert sorted(requests(model)) == sorted(inside)
-
-
-def test_aspects_that_are_models_like_ptolemy() -> None:
-    """All is as there but for the microstep at which the first firing is asked for.
-
-    There, what is asked of an aspect for firings goes by the microstep that its director had last: it had none before.
-    """
-    model = load(REFIRING, "like_ptolemy")
-    expected, inside = came_in(model, recorded(REFIRING))
-
-    def ptolemys(send: tuple[float, int, str, int, Any]) -> tuple[float, int, str, int, Any]:
-        time, microstep, port, channel, value = send
-        return time, microstep - (time == 1 and port.startswith("execution.")), port, channel, value
-
-    assert [ptolemys((*send[:4], requested(send[4]))) for send in sends(model)] == expected
     assert sorted(map(ptolemys, requests(model))) == sorted(inside)
 
 

@@ -10,7 +10,7 @@ import json
 import os
 import sys
 import tempfile
-from collections.abc import Generator
+from collections.abc import Generator, Sequence
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -60,22 +60,15 @@ class Moody(Actor):
 
 
 class Keeper(Actor):
-    """Sends the first tokens of both inputs together; like Ptolemy, it keeps what waits for another one."""
+    """Sends the first tokens of both inputs together; what waits for another one is lost."""
 
-    input: InputPort[Any] = InputPort(multi=True, ptolemy={"keep": True})
-    trigger: InputPort[Any] = InputPort(ptolemy={"keep": True})
+    input: InputPort[Any] = InputPort(multi=True)
+    trigger: InputPort[Any] = InputPort()
     output: OutputPort[Any] = OutputPort(float)
 
     def fire(self) -> None:
-        if not self.trigger.keep:
-            for token, _ in zip(self.input.tokens, self.trigger.tokens, strict=False):
-                self.output.send(token)
-        elif self.trigger.waiting():
-            for channel in range(self.input.width):
-                if self.input.waiting(channel):
-                    self.output.send(self.input.get(channel))
-                    self.trigger.get()
-                    return
+        for token, _ in zip(self.input.tokens, self.trigger.tokens, strict=False):
+            self.output.send(token)
 
 
 class Patient(Process):
@@ -220,15 +213,14 @@ ASPECTS: list[dict[str, Any]] = [
     {"type": "Duplicate", "probability": 0.3},
     {"type": "Probe"},
 ]
-RULES: list[dict[str, Any]] = [{"ties": "posted"}, {"like": "ptolemy"}, {"like": "ptolemy", "ties": "declared"}]
 AT_ACTORS: list[dict[str, Any]] = [
     {"type": "ExecutionTime", "time": "50 ms"},
     {"type": "CrashRestart", "mtbf": 1.5, "repair": 0.3},
 ]
 
 
-def network(numbers: Numbers) -> dict[str, Any]:
-    """A model, as in a JSON file; it need not be valid."""
+def network(numbers: Numbers, rules: Sequence[dict[str, Any]] = ()) -> dict[str, Any]:
+    """A model, as in a JSON file; it need not be valid.  Its directors may have some of these rules."""
     actors: dict[str, Any] = {}
     sources: list[str] = []
     connections: list[dict[str, Any]] = []
@@ -267,8 +259,8 @@ def network(numbers: Numbers) -> dict[str, Any]:
             part["director"] = {"drift": 1.5}
         elif numbers.random() < 0.3:
             del part["director"]
-        if "director" in part and numbers.random() < 0.3:
-            part["director"].update(numbers.choice(RULES))
+        if rules and "director" in part and numbers.random() < 0.3:
+            part["director"].update(numbers.choice(rules))
         model = {"composites": {"Part": part}, "actors": {"part": {"type": "Part"}}}
         prefix = "part."
         if numbers.random() < 0.3:  # two of them in another one, each of which may have what the other one sends
@@ -280,12 +272,12 @@ def network(numbers: Numbers) -> dict[str, Any]:
                 {"from": "twin.out", "to": "part.into", "delay": numbers.choice(TIMES)},
             ]
             if numbers.random() < 0.7:
-                around["director"] = numbers.choice([{}, {"drift": 0.5}, *RULES])
+                around["director"] = numbers.choice([{}, {"drift": 0.5}, *rules])
             model = {"composites": {"Part": part, "Around": around}, "actors": {"around": {"type": "Around"}}}
             prefix = "around.part."
         ends = [f"{prefix}{port}" for port in ends]
-    if numbers.random() < 0.4:
-        model["director"] = numbers.choice(RULES)
+    if rules and numbers.random() < 0.7:
+        model["director"] = numbers.choice(rules)
     model["run"] = {"stop": numbers.choice([3, 6.05]), "seed": numbers.randint(0, 5), "record": ends[:2]}
     metrics: dict[str, Any] = {}
     for place in range(3):

@@ -146,7 +146,7 @@ def test_help_shows_what_a_class_takes(core: str) -> None:
     ).stdout
     declared = "A declared parameter: on an instance it reads as its value, on the class as itself."
     assert told.splitlines() == [
-        "type shape multi required triggers keep ptolemy doc A port where tokens arrive: of any type if none is given.",
-        f"type default unit min above max choices renamed shape optional ptolemy doc {declared}",
+        "type shape multi required triggers doc A port where tokens arrive: of any type if none is given.",
+        f"type default unit min above max choices renamed shape optional doc {declared}",
         "(a, b=1)",
     ]

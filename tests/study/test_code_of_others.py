@@ -46,7 +46,7 @@ class NAME(Actor):
     output: OutputPort[float] = OutputPort(float)
 
     def fire(self) -> None:
-        self.input.get()
+        self.input.value
         self.output.send(STEP)
 """
 

@@ -1,12 +1,18 @@
-"""Weather: a thermometer, and ice on it."""
+"""Weather: a thermometer, and ice on it; a dialect and a command."""
 
 from __future__ import annotations
 
+import argparse
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, ClassVar
 
+from epicycle import actors
 from epicycle.actors import Actor, InputPort, OutputPort, Parameter
 from epicycle.aspects import JoinPoint, MeasurementAspect
+from epicycle.runner.catalogue import Dialect
+from epicycle.runner.commands import DONE, command, option, tell
+from epicycle.runner.engine import Director, Turn
 from epicycle.runner.show import Figure
 from epicycle.runner.show.report import StudyFigure
 
@@ -65,3 +71,55 @@ class Ladder(StudyFigure):
         for path in paths:
             canvas.savefig(path)
         return f"{len(data.rows)} runs."
+
+
+class Const(actors.Const):
+    """Sends 7, unless it is told otherwise."""
+
+    value = Parameter(object, 7, doc="the value to send")
+
+
+class LastFirst(Director):
+    """Lets the actor fire first that asked last; for models in which none waits for another one at a tag."""
+
+    def __init__(self, *given: Any) -> None:
+        super().__init__(*given)
+        self.line: list[Turn] = []
+
+    def line_up(self, turn: Turn) -> None:
+        turn.is_wanted = True
+        self.line.append(turn)
+
+    def next_turn(self) -> Turn | None:
+        if not self.line:
+            return None
+        turn = self.line.pop()
+        turn.is_wanted, self.rank = False, turn.rank
+        return turn
+
+
+class Acme(Dialect):
+    """How things are done at Acme."""
+
+    name = "acme"
+
+    @classmethod
+    def types(cls) -> Iterable[type]:
+        return (Const,)
+
+    @classmethod
+    def director(cls) -> Any:
+        return LastFirst
+
+
+@command(
+    "say how cold it gets in a model",
+    option("model", metavar="MODEL", help="a path to a YAML file"),
+    imports=("build",),
+)
+def coldest(options: argparse.Namespace) -> int:
+    """Run a model, and tell its metric 'coldest'."""
+    from epicycle import run
+
+    tell(f"{run(options.model).metrics['coldest']:g} K")
+    return DONE

@@ -34,11 +34,11 @@ def test_what_ports_declare() -> None:
 def test_a_port_may_differ_from_its_declaration() -> None:
     hub, other = Hub("hub"), Hub("other")
     assert hub.one.terms is other.one.terms is Hub.one.terms
-    hub.one.keep = False  # as declared
+    hub.one.triggers = True  # as declared
     assert hub.one.terms is Hub.one.terms
-    hub.one.keep, hub.out.depends_on = True, ()
+    hub.one.triggers, hub.out.depends_on = False, ()
     twin = hub.one.twin(other)
-    assert (hub.one.keep, twin.keep, other.one.keep, Hub.one.keep) == (True, True, False, False)
+    assert (hub.one.triggers, twin.triggers, other.one.triggers, Hub.one.triggers) == (False, False, True, True)
     assert (hub.out.depends_on, other.out.depends_on) == ((), ("one",))
     assert (hub.one.name, hub.one.type, hub.one.required, twin.path, twin.actor) == (
         "one", float, True, "hub.one", other,

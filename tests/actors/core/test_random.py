@@ -101,7 +101,7 @@ def assert_counts(values: np.ndarray, law: Any) -> None:
 
 def test_every_law_is_tested() -> None:
     tested = {*CONTINUOUS, *(name for name, *_ in DISCRETE)}
-    others = {"below", "bytes", "state", "shuffle", "permutation"}  # in tests of their own
+    others = {"below", "bytes", "state", "shuffle", "permutation", "weighted"}  # in tests of their own
     vectors = {"multinomial", "dirichlet", "multivariate_normal"}
     assert {name for name in vars(RandomStream) if not name.startswith("_")} == tested | others | vectors
 

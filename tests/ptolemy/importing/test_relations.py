@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
+from epicycle.ptolemy.importing import MomlError
 from tests.ptolemy.importing.moml_parts import (
-    COMPOSITE,
-    PARAMETER,
     composite,
     entity,
+    imported,
     model,
     port,
     prop,
@@ -152,14 +152,9 @@ def test_wires_that_lead_nowhere_are_left_out(tmp_path: Path) -> None:
     assert "connections" not in written(tmp_path, text)
 
 
-def test_what_is_taken_out_again(tmp_path: Path) -> None:
-    actors = EVENTS + entity("Recorder", "Recorder")
-    changes = '<deleteEntity name="c"/><unlink port="Recorder.input" relation="r1"/><deleteRelation name="r1"/>'
-    text = written(
-        tmp_path, model(actors, wires("a.output Recorder.input", "b.output Recorder.input", "c.output"), changes)
-    )
-    assert connections(text) == ["a.output -> Recorder.input"]
-    assert "  c:" not in text
-
-
-__all__ = ["COMPOSITE", "PARAMETER"]
+@pytest.mark.parametrize("change", ["deleteEntity", "deleteRelation", "unlink", "rename"])
+def test_what_is_taken_out_again_is_not_supported(tmp_path: Path, change: str) -> None:
+    text = model(EVENTS, f'<{change} name="c"/>')
+    with pytest.raises(MomlError) as caught:
+        imported(tmp_path, text)
+    assert str(caught.value) == f"m.xml cannot be imported:\n   - line 16: <{change}> is not supported"

@@ -39,6 +39,7 @@ FED = {
 }  # fmt: skip
 PORTS_FED = {
     "control": "true", "enable": "true", "selector": "true", "select": "true", "array": "{1, 2}",
+    "readKeyArray": "{1, 2}",
     "standardDeviation": "1.0", "upperBound": "2.0", "max": "2.0", "mode": "1.5", "p": "0.5", "trueProbability": "0.5",
 }  # fmt: skip
 SAID = {

@@ -7,22 +7,14 @@ from typing import Any, ClassVar
 
 import pytest
 
-from epicycle.actors import (
-    Actor,
-    Configurable,
-    InputPort,
-    OutputPort,
-    Parameter,
-    ParameterError,
-    PortError,
-    Tag,
-    TimeDelay,
-)
-from epicycle.aspects import Bus
+from epicycle import actors
+from epicycle.actors import Actor, InputPort, OutputPort, Parameter, Tag
+from epicycle.ptolemy.changing import Singly, Waiting
+from epicycle.ptolemy.timing import TimeDelay
 from epicycle.runner.build import Model
 from epicycle.runner.engine import Simulation
 from epicycle.runner.text import ModelError
-from tests.engine.engine_parts import Probe, Repeat, Ticker, load, seen, sends, simulate
+from tests.engine.engine_parts import Probe, Repeat, load, seen, sends, simulate
 
 
 class Hold(Actor):
@@ -35,23 +27,15 @@ class Hold(Actor):
         pass
 
 
-class One(Actor):
-    """Takes one token in each firing, or tells what came."""
+class One(Singly):
+    """Takes one token in each firing."""
 
-    input: InputPort[Any] = InputPort(Any, ptolemy={"keep": True, "required": False})
+    input: InputPort[Any] = InputPort(Any)
     output: OutputPort[Any] = OutputPort(Any)
-    told = Parameter(str, "here", ptolemy="there")
-    needed: Parameter[Any] = Parameter(int, ptolemy=3)
-    fallible = Parameter(int, 1, min=0, ptolemy=2)
-    checks: ClassVar[list[int]] = []
 
-    def check(self) -> None:
-        self.checks.append(self.fallible)
-        if self.fallible == self.needed:
-            raise ParameterError("fallible is needed")
-
-    def fire(self) -> None:
-        self.output.send(self.input.get() if self.input.keep else self.input.tokens)
+    def fire_once(self) -> None:
+        for token in self.input.tokens:
+            self.output.send(token)
 
 
 TYPES = [Hold, One, Repeat]
@@ -142,9 +126,7 @@ def test_a_composite_is_posted_for_what_comes_first_in_it(kind: str) -> None:
     ours = [f"early{inner}.first", f"late{inner}.first"]
     text = NEXT.replace("TYPE", kind)
     for head, order in (
-        ("director: {ties: posted}\n", [*ours, "alone"]),
         (LIKE, [ours[0], "alone", ours[1]]),
-        ("director: {like: ptolemy, ties: declared}\n", [ours[0], "alone", ours[1]]),
         ("", [ours[0], "alone", ours[1]]),
     ):
         _, results = simulate(head + text, types=[*TYPES, Wakes])
@@ -179,7 +161,7 @@ def test_outputs_of_a_composite_depend_on_all_inputs(head: str, director: str, i
         load(text, types=TYPES)
     (problem,) = caught.value.problems
     assert problem.message == "a loop without delay: c -> g -> c"
-    assert "c has a director like Ptolemy's: all its outputs depend on all its inputs" in problem.help
+    assert "c has a director like ptolemy: all its outputs depend on all its inputs" in problem.help
 
 
 def test_a_delay_keeps_microsteps() -> None:
@@ -190,9 +172,6 @@ connections: [{from: t.output, to: twice.input, delay: 0}, twice.output -> delay
     assert seen(simulate(text, types=TYPES)[0]) == [(1.0, 1, (0, 0))]
     # Both tokens come at (0 s, 2), and leave one after the other.
     assert seen(simulate(LIKE + text, types=TYPES)[0]) == [(1.0, 2, (0,)), (1.0, 3, (0,))]
-    assert seen(simulate(LIKE + text.replace("TimeDelay", "TimeDelay, steps: false"), types=TYPES)[0]) == [
-        (1.0, 1, (0, 0))
-    ]
     assert seen(simulate(LIKE + text.replace("TimeDelay", "TimeDelay, delay: 0"), types=TYPES)[0]) == [
         (0.0, 3, (0,)),
         (0.0, 4, (0,)),
@@ -202,18 +181,23 @@ connections: [{from: t.output, to: twice.input, delay: 0}, twice.output -> delay
 def test_tokens_of_a_delay_that_leave_at_one_time() -> None:
     """A new one is the last of them, unless its microstep is below that of the last of all: then it is the first."""
     model = Model("m", like="ptolemy", stop=4)
-    delay = model.add(TimeDelay("delay"))
+    delay: Any = model.add(TimeDelay("delay"))
     source = model.add(Wakes("source", at=[0]))
     model.connect(source.output, delay.input)
     simulation = Simulation(model)
     simulation.advance(until=0.5)
-    held: Any = simulation[delay].__dict__["_held"]
+    held: Any = simulation[delay]
+
+    def put(token: str, seconds: float) -> None:
+        held.inputs["delay"].start_with(seconds)
+        held._put(token)
+
     for seconds, token in ((2.0, "a"), (1.0, "b"), (2.0, "c"), (3.0, "d"), (1.0, "e")):
-        held.put(token, seconds)
+        put(token, seconds)
     assert [token for _, token in held._line] == ["b", "e", "a", "c", "d"]
     last, token = held._line[-1]
     held._line[-1] = Tag(last.time, 9), token
-    held.put("f", 2.0)
+    put("f", 2.0)
     assert [token for _, token in held._line] == ["b", "e", "f", "a", "c", "d"]
 
 
@@ -260,66 +244,45 @@ def test_requests_wait_for_the_turn_of_an_aspect_that_is_a_model() -> None:
     assert asked == [(0.0, 2), (1.0, 2)]
 
 
-def test_defaults_are_inherited_inwards() -> None:
+def test_types_are_those_of_the_director_around() -> None:
     text = """
 director: {like: ptolemy}
 composites:
-  Inner:
-    actors: {one: {type: One}, two: {type: One, told: me, needed: 1}}
+  Inner: {actors: {it: {type: Clock, period: 1}}}
   Opaque: {director: {drift: 2}, actors: {inner: {type: Inner}}}
-  Other: {director: {like: epicycle}, actors: {one: {type: One, needed: 5}, t: {type: Ticker}},
-          connections: [t.output -> one.input]}
-actors: {one: {type: One}, opaque: {type: Opaque}, other: {type: Other}}
+  Other: {director: {like: epicycle}, actors: {inner: {type: Inner}}, outputs: [out], connections: []}
+actors: {it: {type: Clock, period: 1}, opaque: {type: Opaque}, other: {type: Other}, here: {type: Recorder}}
+aspects: {bus: {type: Bus, factor: 0, at: here.input}}
+connections: [it.output -> here.input]
 """
-    model = load(text, types=TYPES)
-    told = {path: (one.told, one.needed, one.input.keep) for path, one in model.graph.actors.items() if path[-1] != "t"}
-    assert told == {  # type: ignore[comparison-overlap]
-        "one": ("there", 3, True),
-        "opaque.inner.one": ("there", 3, True),
-        "opaque.inner.two": ("me", 1, True),
-        "other.one": ("here", 5, False),
-    }
-    with pytest.raises(ModelError) as caught:
-        load("actors: {one: {type: One}}", types=TYPES)
-    assert [problem.message for problem in caught.value.problems] == ["one: One needs a value for 'needed'"]
+    model = load(text)
+    kinds = {path: type(actor).__module__ for path, actor in model.graph.actors.items() if "it" in path}
+    ours, theirs = "epicycle.ptolemy.timing", "epicycle.actors.sources"
+    assert kinds == {"it": ours, "opaque.inner.it": ours, "other.inner.it": theirs}
+    assert type(model.aspects[0].aspect).__module__ == ours
 
 
-def test_python_says_the_same() -> None:
+def test_own_types_win() -> None:
+    class Queue(Hold):
+        pass
+
+    model = load("director: {like: ptolemy}\nactors: {q: {type: Queue}}\n", types=[Queue])
+    assert type(model.graph.actors["q"]) is Queue
+
+
+def test_python_names_the_classes_that_it_means() -> None:
     model = Model("m", like="ptolemy", stop=3)
-    one = model.add(One("one", needed=4))
-    delay = model.add(TimeDelay("delay", steps=False))
-    assert (one.told, one.needed, one.fallible, one.input.keep, delay.steps) == ("there", 4, 2, True, False)
-    assert One.checks[-2:] == [1, 2]  # once more, with Ptolemy's
-    ticker = model.add(Ticker("t"))
-    model.connect(ticker.output, one.input)
-    model.connect(ticker.output, delay.input)
-    bus = Bus(factor=0)
-    model.weave("bus", bus, at=one.input)
-    assert bus.steps
-    inside = model.composite("inside", director=True, like="epicycle")
-    assert inside.add(TimeDelay("delay")).steps is False
-    plain = model.composite("plain")
-    assert plain.add(TimeDelay("delay")).steps is True
-    posted = model.composite("posted", director=True, ties="declared")
-    rules = model.graph.rules
-    assert (rules[""].ties, rules["inside"].ties, rules["posted"].ties) == ("posted", "declared", "declared")
-    assert rules[posted.path].like == "ptolemy"
-    for composite in (inside, plain):
-        composite.add(Ticker("t"))
-        composite.connect("t.output -> delay.input")
-    results = Simulation(model, keep_log=True).run()
-    assert [row[1:2] for row in sends(results, "one")] == [(2,)] * 4
+    assert type(model.add(actors.TimeDelay("delay"))) is actors.TimeDelay
+    model.composite("inside", director=True, like="epicycle")
+    model.composite("plain", director=True)
+    named = {path: dialect.name for path, dialect in model.graph.dialects.items()}
+    assert named == {"": "ptolemy", "inside": "epicycle", "plain": "ptolemy"}
 
 
 MISTAKES: list[tuple[Any, str]] = [
     (
         lambda: Model("m", like="Ptolemy"),
         "m: director.like: 'Ptolemy' is not one of epicycle, ptolemy, did you mean 'ptolemy'?",
-    ),
-    (lambda: Model("m", ties="first"), "m: director.ties: 'first' is not one of declared, posted"),
-    (
-        lambda: Model("m").composite("c", director=True, ties=3),  # type: ignore[arg-type]
-        "c: director.ties: 3 is not one of declared, posted",
     ),
     (lambda: Model("m").composite("c", like="ptolemy"), "c: 'like' belongs to a director, and c has none of its own"),
 ]
@@ -332,24 +295,20 @@ def test_mistakes_in_python(call: Any, message: str) -> None:
     assert [problem.message for problem in caught.value.problems] == [message]
 
 
-def test_ports_that_keep_tokens_without_a_model() -> None:
-    port: InputPort[Any] = InputPort(keep=True, multi=True).bind(Probe("p"))
+def test_tokens_that_wait_without_a_model() -> None:
+    port: InputPort[Any] = InputPort(multi=True).bind(Probe("p"))
     port.width = 2
+    waiting = Waiting([port])
     for token, channel in ((1, 0), (2, 1), (3, 0), (4, 0)):
         port.receive(token, channel)
-    assert (port.waiting(0), port.waiting(1), port.tokens) == (3, 1, (1, 2, 3, 4))
-    assert (port.get(0), port.get(0), port.tokens) == (1, 3, (2, 4))
-    assert (port.get(1), port.present) == (2, True)
-    with pytest.raises(PortError) as caught:
-        port.get(1)
-    assert str(caught.value) == "p. has no token on channel 1; check 'waiting' before calling 'get'"
-    # What an execution aspect takes out is what has come since the actor fired; what was left stays before it.
-    port.put_in_line()
+    assert (waiting.come(), port.tokens) == (4, ())
+    assert [waiting.firsts(port) for _ in range(3)] == [([1, 2], [0, 1]), ([3], [0]), ([4], [0])]
+    # What an execution aspect puts back comes behind what was left.
     port.receive(5, 1)
-    taken = port.take()
-    assert (taken, port.tokens) == (([5], [1]), (4,))
-    port.give(taken)
-    assert (port.tokens, port.by_channel()) == ((4, 5), [[4], [5]])
+    waiting.come()
+    port.receive(6, 1)
+    port.give(port.take())
+    assert (waiting.come(), waiting.firsts(port), waiting.firsts(port)) == (2, ([5], [1]), ([6], [1]))
 
 
 def test_what_waits_in_a_port_costs_nothing() -> None:
@@ -382,25 +341,15 @@ def test_kept_tokens_and_aspects_of_execution() -> None:
     assert got == [(1.5, 1, 0), (1.5, 1, 0), (3.0, 1, 1), (3.0, 1, 1), (4.5, 1, 2), (4.5, 1, 2)]
 
 
-def test_a_crash_costs_the_tokens_that_are_kept() -> None:
-    text = "actors: {t: {type: Ticker}, one: {type: Never}}\nconnections: [t.output -> one.input]\n"
-    aspect = "aspects: {crash: {type: CrashRestart, mtbf: 100 ms, repair: 100 ms, at: one, until: 1500 ms}}"
-    for more, left in (("", 6), (aspect, 4)):
-        simulation, _ = simulate(text + more, until=5, types=[*TYPES, Never])
-        never = simulation["one"]
-        assert isinstance(never, Never)
-        assert never.input.waiting() == left
-
-
-class Never(Actor):
-    """Takes nothing out."""
-
-    input: InputPort[Any] = InputPort(Any, keep=True)
-
-    def fire(self) -> None:
-        pass
-
-
-def test_what_has_no_other_default_remembers_nothing() -> None:
-    assert "_configured" not in vars(Probe("p"))
-    assert "_configured" not in vars(Configurable())
+def test_a_crash_costs_the_tokens_that_wait() -> None:
+    text = (
+        LIKE
+        + """
+actors: {t: {type: Ticker, period: 0.25}, never: {type: SingleEvent, time: 9}, it: {type: Comparator, comparison: '=='}}
+connections: [t.output -> it.left, never.output -> it.right]
+"""
+    )
+    aspect = "aspects: {crash: {type: CrashRestart, mtbf: 100 ms, repair: 100 ms, at: it, until: 1500 ms}}"
+    for more, left in (("", 21), (aspect, 14)):
+        it: Any = simulate(text + more, until=5)[0]["it"]
+        assert it._waiting.come() == left

@@ -7,7 +7,7 @@ from typing import Any
 from hypothesis import given
 from hypothesis import strategies as st
 
-from epicycle.actors import Place, Posts
+from epicycle.ptolemy.posts import Place, Posts
 
 
 class Queue:

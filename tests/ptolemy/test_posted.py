@@ -1,4 +1,4 @@
-"""Ties in the order of posting, and other behaviour of a director like Ptolemy's."""
+"""PostedDirector: ties in the order of posting."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import Any, ClassVar
 import pytest
 
 from epicycle.actors import Actor, InputPort, OutputPort, Parameter, Pending
+from epicycle.ptolemy.changing import Together
 from epicycle.runner.engine import Firing, Simulation, Tracer
 from tests.engine.engine_parts import Repeat, load, sends, simulate
 
@@ -51,24 +52,19 @@ class Delay(Actor):
             self.held.put(token, 1.0)
 
 
-class Pair(Actor):
+class Pair(Together):
     """Takes the first token of each channel out, and sends them as a list, when all have one."""
 
-    input: InputPort[Any] = InputPort(Any, multi=True, ptolemy={"keep": True})
+    input: InputPort[Any] = InputPort(Any, multi=True)
     output: OutputPort[Any] = OutputPort(Any)
-    told = Parameter(str, "here", ptolemy="there")
-    needed: Parameter[Any] = Parameter(int, ptolemy=3)
 
-    def fire(self) -> None:
-        channels = range(self.input.width)
-        if self.input.keep and all(self.input.waiting(channel) for channel in channels):
-            self.output.send([self.input.get(channel) for channel in channels])
-        elif not self.input.keep:
-            self.output.send(self.input.by_channel())
+    def fire_once(self) -> None:
+        if self.input.present:
+            self.output.send(list(self.input.tokens))
 
 
 TYPES = [Asker, Delay, Pair, Repeat]
-HEAD = "director: {ties: posted}\n"
+HEAD = "director: {like: ptolemy}\n"
 
 
 def order(text: str, time: float, until: float | None = None) -> list[str]:
@@ -89,8 +85,6 @@ actors:
 def test_who_has_asked_first_fires_first() -> None:
     assert order(ASKERS, 5) == ["a", "b", "c", "d"]
     assert order(HEAD + ASKERS, 5) == ["b", "a", "c", "d"]
-    assert order("director: {like: ptolemy}" + ASKERS, 5) == ["b", "a", "c", "d"]
-    assert order("director: {like: ptolemy, ties: declared}" + ASKERS, 5) == ["a", "b", "c", "d"]
 
 
 def test_what_was_called_off_was_not_posted() -> None:
@@ -147,17 +141,24 @@ actors:
 """
 
 
-@pytest.mark.parametrize(("director", "inside"), [("", [0, 1]), ("ties: declared", [0, 1]), ("ties: posted", [1, 0])])
-def test_a_composite_is_posted_with_what_is_in_it_first(director: str, inside: list[int]) -> None:
-    """Then all that is in it goes on, in the order that its own director says."""
-    text = COMPOSITES.replace("DIRECTOR", director)
-    own = ["first", "second"]
-    declared = ["first", "second"] if director != "ties: posted" else [own[each] for each in inside]
+ONE = ["one.first", "one.second"]
+IN_ORDER, POSTED = ["two.first", "two.second"], ["two.second", "two.first"]
+
+
+@pytest.mark.parametrize(
+    ("head", "director", "expected"),
+    [
+        ("", "", [*ONE, "alone", *IN_ORDER]),
+        ("", "like: ptolemy", [*ONE, "alone", *POSTED]),
+        (HEAD, "", ["alone", *ONE, *POSTED]),
+        # Posted with the first request in it; all that is in it follows, in the order of its own director.
+        (HEAD, "like: epicycle", [*IN_ORDER, "alone", *ONE]),
+    ],
+)
+def test_each_composite_has_the_order_of_its_own_director(head: str, director: str, expected: list[str]) -> None:
+    text = head + COMPOSITES.replace("DIRECTOR", director)
     got = [port.rpartition(".")[0] for when, _, port, _ in sends(simulate(text, types=TYPES)[1]) if when == 5]
-    assert got == ["one.first", "one.second", "alone", *(f"two.{each}" for each in declared)]
-    inside_two = [own[each] for each in inside] if director else ["second", "first"]  # as around it
-    got = [port.rpartition(".")[0] for when, _, port, _ in sends(simulate(HEAD + text, types=TYPES)[1]) if when == 5]
-    assert got == [*(f"two.{each}" for each in inside_two), "alone", "one.first", "one.second"]
+    assert got == expected
 
 
 def test_a_firing_takes_what_already_waits() -> None:
@@ -177,31 +178,24 @@ connections: [a.output -> delay.input]
     # At 1.5 s the wake-up of the delay was asked for after that of the source, and both are of depth 0.
     assert found("") == [(0.5, (0, 1)), (1.5, (1, 0)), (1.5, (0, 1)), (2.5, (1, 0))]
     assert found(HEAD) == [(0.5, (0, 1)), (1.5, (1, 1)), (2.5, (1, 0))]
-    assert found("director: {like: ptolemy}") == [(0.5, (0, 1)), (1.5, (1, 1)), (2.5, (1, 0))]
     # With another actor between the two turns, Ptolemy's director fires for what is not there any more.
     text += "  - a.output -> p.input\n"
     text = text.replace("connections: [a.output -> delay.input]\n", "  p: {type: Scale}\nconnections:\n")
     text += "  - a.output -> delay.input\n"
-    assert found(HEAD) == [(0.5, (0, 1)), (1.5, (1, 1)), (2.5, (1, 0))]
-    assert found("director: {like: ptolemy}") == [(0.5, (0, 1)), (1.5, (1, 1)), (1.5, (0, 0)), (2.5, (1, 0))]
+    assert found(HEAD) == [(0.5, (0, 1)), (1.5, (1, 1)), (1.5, (0, 0)), (2.5, (1, 0))]
 
 
-def test_tokens_that_are_kept() -> None:
+def test_tokens_that_wait() -> None:
     text = """
 actors:
   a: {type: Asker, asks: [[0, 1, 2]]}
   b: {type: Asker, asks: [[0, 3]]}
   twice: {type: Repeat}
-  pair: {type: Pair, needed: 1}
+  pair: {type: Pair}
 connections: [a.output -> pair.input, b.output -> twice.input, twice.output -> pair.input]
 """
-    got = [(when, token) for when, _, _, token in sends(simulate(text, types=TYPES)[1], "pair")]
-    assert got == [(1, [[1.0], []]), (2, [[2.0], []]), (3, [[], [3.0, 3.0]])]
-    simulation, results = simulate("director: {like: ptolemy}" + text, types=TYPES)
+    _, results = simulate(text, types=TYPES)
     assert [(when, token) for when, _, _, token in sends(results, "pair")] == [(3, [1.0, 3.0]), (3, [2.0, 3.0])]
-    pair = simulation["pair"]
-    assert isinstance(pair, Pair)
-    assert (pair.told, pair.needed, pair.input.waiting(0), pair.input.waiting(1)) == ("there", 1, 0, 0)
 
 
 def test_snapshots_keep_posts_and_tokens() -> None:
