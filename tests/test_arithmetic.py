@@ -7,6 +7,7 @@ import pytest
 from tests.arithmetic import found, offences
 
 
+@pytest.mark.slow
 def test_the_same_bits_everywhere() -> None:
     assert list(found()) == []
 

@@ -107,6 +107,7 @@ def test_who_has_one_duty_keeps_it() -> None:
     assert roles == [{"chaining"}, {"relaying"}, {"informing"}]
 
 
+@pytest.mark.slow
 def test_the_whole_tour() -> None:
     """The base hears the main robot all the time, with changing roles, and not if all inform."""
     results = Simulation(load_model("changing_roles"), seed=2).run()

@@ -15,6 +15,7 @@ from epicycle.runner import bars
 NOTEBOOK = Path(__file__).parents[1] / "docs" / "tutorial" / "14_notebook.ipynb"
 
 
+@pytest.mark.slow
 def test_the_notebook_of_the_tutorials_runs(tmp_path: Path) -> None:
     nbclient, nbformat = pytest.importorskip("nbclient"), pytest.importorskip("nbformat")
     notebook = nbformat.read(NOTEBOOK, as_version=4)

@@ -12,6 +12,8 @@ from scipy import integrate
 from epicycle.runner import Simulation, load_model
 from epicycle.runner.engine import Results
 
+pytestmark = pytest.mark.slow
+
 
 def results_of(text: str, folder: Path) -> Results:
     path = folder / "m.yaml"

@@ -60,6 +60,7 @@ run: {stop: 9, record: sum.output}
     assert len(run(model)["sum.output"]) > 3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(packaged_models()))
 def test_a_model_runs_again_as_if_it_were_new(name: str) -> None:
     model = load_model(name)

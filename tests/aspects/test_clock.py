@@ -166,6 +166,7 @@ run: {{stop: 1000 s}}
     assert [r.value for r in same.log.records if r.actor == "pair[7].a"][-1] == by_actor["pair[7].a"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("aspect", [ClockDrift(), ClockOffset()])
 def test_strength_zero_changes_no_bit(aspect: ClockAspect) -> None:
     for name in packaged_models():

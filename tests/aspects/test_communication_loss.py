@@ -16,6 +16,7 @@ from tests.aspects.bench import Bench
 from tests.aspects.laws import COUNT, SURE, lost_of, runs
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("p", "r", "loss_bad", "loss_good"), [(1 / 12, 0.25, 1, 0), (0.02, 0.1, 0.8, 0.05), (1, 1, 1, 0)]
 )

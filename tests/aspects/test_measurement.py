@@ -49,6 +49,7 @@ def test_outliers() -> None:
     assert stats.kstest(errors[errors != 0], stats.norm(0, 50).cdf).pvalue > 1 - SURE
 
 
+@pytest.mark.slow
 def test_drift() -> None:
     steady = Bench(Drift(rate=2.0)).play([1.0] * 1001)
     assert steady.tokens == pytest.approx(1 + 2e-3 * np.arange(1001))

@@ -16,6 +16,7 @@ from tests.aspects.bench import Bench
 from tests.aspects.laws import COUNT, SURE, lost_of, runs
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("probability", "burst"), [(0.25, 4.0), (0.5, 10.0), (0.1, 1.0)])
 def test_failures_in_runs(probability: float, burst: float) -> None:
     lost = lost_of(Bench(MeasurementFailure(probability=probability, burst=burst)).play(range(COUNT)), COUNT)

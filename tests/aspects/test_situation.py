@@ -35,6 +35,7 @@ def lost(aspect: Any, world: dict[str, Any], count: int = COUNT) -> int:
 # -- distance ---------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("correlation", [None, 20.0])
 @pytest.mark.parametrize(
     ("distance", "exponent", "shadowing"), [(10, 3, 4), (7, 3, 4), (16, 3, 4), (12, 2, 8), (10.01, 3, 0), (9.99, 3, 0)]

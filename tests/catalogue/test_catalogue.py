@@ -329,6 +329,7 @@ def check_installed(site: Path) -> None:
             assert [[row["actor"], row["value"]] for row in csv.DictReader(file)] == sent
 
 
+@pytest.mark.slow
 def test_third_party_package_shows_up(tmp_path: Path) -> None:
     project = tomllib.loads((THIRD_PARTY / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     groups = {

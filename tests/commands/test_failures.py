@@ -274,6 +274,7 @@ m.yaml:8:37: error: figure last: 'clock.out' is not recorded, did you mean 'cloc
 LABELS = ["$\\left", "$\\frac{a}{", "$x^" + "{" * 300, "a $b$ c", "\x1b[31m \u202e", "_hidden", "100 %", "\\n"]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("label", LABELS)
 def test_labels_are_text_and_no_formulas(label: str, monkeypatch: pytest.MonkeyPatch) -> None:
     import json
@@ -285,6 +286,7 @@ def test_labels_are_text_and_no_formulas(label: str, monkeypatch: pytest.MonkeyP
     assert Path("out/f.png").stat().st_size > 10_000
 
 
+@pytest.mark.slow
 def test_a_backend_that_there_is_not() -> None:
     clock = "model: m\nactors: {clock: {type: Clock, period: 1}}\nrun: {stop: 3, record: [clock.output]}\n"
     Path("m.yaml").write_text(

@@ -69,6 +69,7 @@ def on_a_terminal(arguments: list[str], folder: Path, is_over: Callable[[str], b
     return lines, code, time.monotonic() - typed
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not hasattr(os, "login_tty"), reason="no terminals here")
 @pytest.mark.parametrize(
     ("model", "progress", "word"),

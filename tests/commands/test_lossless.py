@@ -80,6 +80,7 @@ def test_a_model_that_may_end_is_not_warned_of(
     assert capsys.readouterr().err == ""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ending", ["jsonl", "csv", "parquet"])
 def test_an_interrupt_ends_a_run_without_an_end(ending: str, folder: Path) -> None:
     """What was recorded and logged before is complete."""
@@ -120,6 +121,7 @@ def test_nothing_is_said_where_until_is_given(folder: Path, capsys: pytest.Captu
 # -- the log ----------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ending", ["jsonl", "csv", "parquet"])
 def test_a_log_takes_no_more_memory_the_longer_it_gets(
     ending: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch

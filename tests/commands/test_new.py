@@ -27,6 +27,7 @@ def test_a_model_runs_at_once(capsys: pytest.CaptureFixture[str]) -> None:
     assert printed.err == ""
 
 
+@pytest.mark.slow
 def test_a_package_runs_at_once_and_its_tests_pass() -> None:
     assert main(["new", "acme", "--package"]) == 0
     types = ["--types", "acme/src/acme/__init__.py"]

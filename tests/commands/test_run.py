@@ -45,6 +45,7 @@ def read_log(path: Path) -> list[dict[str, Any]]:
     return [json.loads(line) for line in path.read_text(encoding="utf-8").splitlines()]
 
 
+@pytest.mark.slow
 def test_digest_is_the_same_for_every_hash_seed_and_folder(tmp_path: Path) -> None:
     arguments = (*SHORT, "--set", "disturbance=0.5")
     digests = {run_json(*arguments)["digest"]}

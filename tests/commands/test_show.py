@@ -120,6 +120,7 @@ def test_parameters_without_a_comma_are_told(text: str, capsys: pytest.CaptureFi
     )
 
 
+@pytest.mark.slow
 def test_the_same_in_several_processes(capsys: pytest.CaptureFixture[str]) -> None:
     words = ("compare", "mm1", "--vary", "load=0.5", "--vary", "load=0.6", "--replications", "3", "--until", "500")
     for more in ((), ("--json",)):

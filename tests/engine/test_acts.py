@@ -67,6 +67,7 @@ def test_counts_are_of_what_happens() -> None:
     assert results.aspects == {"lossy": {"dropped": 0}, "slow": {"delayed": 0}}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("disturbance", sorted(path.stem for path in Path("models/disturbances").glob("*.yaml")))
 def test_noting_acts_changes_nothing_and_leaving_out_none_neither(disturbance: str) -> None:
     for model in ("collision_avoidance", "mm1"):

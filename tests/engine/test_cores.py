@@ -38,6 +38,7 @@ def at() -> Iterator[dict[str, Worker]]:
         yield found
 
 
+@pytest.mark.slow
 @settings(max_examples=60, suppress_health_check=list(HealthCheck))
 @given(numbers=st.randoms(use_true_random=False), way=st.sampled_from(WAYS))
 def test_networks(at: dict[str, Worker], numbers: Any, way: str) -> None:

@@ -53,6 +53,7 @@ def test_duplicates_one_upon_the_other() -> None:
     assert told == f"too much at (0 s, 3): {most}; {RAISE_IT}"
 
 
+@pytest.mark.slow
 def test_duplicates_that_come_apart_in_time() -> None:
     """Then no tag holds much, and no time is far away."""
     stack = "".join(

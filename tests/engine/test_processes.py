@@ -412,6 +412,7 @@ def test_a_process_is_halted_in_the_step_in_which_what_it_waits_for_happens(beha
     assert [token for *_, token in sends(results)] == ["a"]
 
 
+@pytest.mark.slow
 def test_a_process_that_nobody_else_knows_goes_on_waiting_for_a_token(behave: Callable[..., Results]) -> None:
     def behaviour(actor: Script) -> Generator[Any, Any, None]:
         actor.environment.process(hear(actor))

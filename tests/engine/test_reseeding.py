@@ -74,6 +74,7 @@ def test_every_stream_there_is_becomes_another() -> None:
     assert assert_all_are_reseeded(load(FEATURES), 4.0) >= 9
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", packaged_models())
 def test_every_stream_of_packaged_models_becomes_another(name: str) -> None:
     model = load_model(name)

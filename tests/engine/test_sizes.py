@@ -20,6 +20,7 @@ def model() -> Model:
     return growth.model(growth.PIPELINE, actors=ACTORS, stop=3)
 
 
+@pytest.mark.slow
 def test_an_actor_of_a_pipeline_takes_at_most_2200_bytes_in_a_run(model: Model) -> None:
     Simulation(model).run()  # what all runs share is there
     gc.collect()

@@ -109,6 +109,7 @@ def assert_goes_on(model: Model, number: int, seed: int = 0, keep_log: bool = Tr
 # -- every model, every aspect ----------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", packaged_models())
 def test_snapshots_of_packaged_models(name: str) -> None:
     short = ["observers=1", "disturbance=0.5"] if name == "collision_avoidance" else []
@@ -144,6 +145,7 @@ def test_snapshots_with_aspects(aspect: Aspect) -> None:
     assert_goes_on(model, 6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(3))
 def test_snapshots_of_all_there_is(seed: int) -> None:
     model = load(FEATURES, set=[f"period={100 + seed} ms"])
@@ -192,6 +194,7 @@ def test_simulations_take_turns(name: str) -> None:
     assert alone[0] == alone[2] != alone[1]
 
 
+@pytest.mark.slow
 def test_simulations_in_threads() -> None:
     model = load(FEATURES)
     alone = [told(Simulation(model, seed=seed, keep_log=True)) for seed in range(4)]

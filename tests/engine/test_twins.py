@@ -109,6 +109,7 @@ connections:
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(12))
 @pytest.mark.parametrize("director", ["doc: transparent", "director: {}", "director: {start: 3, drift: 1.25}"])
 def test_twins_send_the_same(seed: int, director: str) -> None:

@@ -12,10 +12,11 @@ import pytest
 ROOT = Path(__file__).parents[2]
 
 
-@pytest.mark.parametrize(("seed", "mutants"), [(1, 50), pytest.param(2, 2_000, marks=pytest.mark.slow)])
-def test_mutants_of_good_models(seed: int, mutants: int) -> None:
+@pytest.mark.slow
+def test_mutants_of_good_models() -> None:
+    mutants = 2_000
     # In a process of its own, which watches what it opens, and whose memory is limited.
-    command = [sys.executable, "-m", "tests.fuzz.fuzz", "--mutants", str(mutants), "--seed", str(seed), "--jobs", "1"]
+    command = [sys.executable, "-m", "tests.fuzz.fuzz", "--mutants", str(mutants), "--seed", "2", "--jobs", "1"]
     done = subprocess.run(command, cwd=ROOT, check=False, capture_output=True, text=True, timeout=600)
     assert done.returncode == 0, done.stdout + done.stderr
     counted = re.search(

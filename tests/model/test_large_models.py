@@ -11,6 +11,7 @@ from epicycle.runner.build import load_model
 from epicycle.runner.text import PathIndex, matches
 
 
+@pytest.mark.slow
 def test_two_thousand_actors_in_ten_thousand_lines(tmp_path: Path) -> None:
     text = validation.flat(2_000)
     assert text.count("\n") > 10_000

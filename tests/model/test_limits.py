@@ -70,6 +70,7 @@ def test_a_quantity_too_large_for_a_float(tmp_path: Path) -> None:
     assert refused(tmp_path, text) == "m.yaml:2:27: error: far: 1e+308 km is too large for a number in SI units"
 
 
+@pytest.mark.slow
 def test_classes_that_nothing_uses(tmp_path: Path) -> None:
     base = "  B: {actors: {s: {type: Clock, period: 1, count: 1000}}}\n"
     many = "".join(f"  C{n}: {{actors: {{s: {{type: B, count: 9}}}}}}\n" for n in range(300))
@@ -96,6 +97,7 @@ def test_expressions_of_unused_classes_count_together(tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("what", ["record", "at", "overrides"])
 def test_many_patterns_over_many_paths(tmp_path: Path, what: str) -> None:
     names = {"record": "output", "at": "input", "overrides": "factor"}
@@ -118,6 +120,7 @@ def test_one_pattern_again_and_again(tmp_path: Path) -> None:
     assert refused(tmp_path, f"{array(5_000)}run: {{stop: 1, record: [{again}]}}\n") == "nothing"
 
 
+@pytest.mark.slow
 def test_patterns_that_select_everything(tmp_path: Path) -> None:
     metrics = "".join(f'  m{n}: {{of: "**.output", take: count}}\n' for n in range(100))
     assert refused(tmp_path, f"{array(5_000)}run: {{stop: 1}}\nmetrics:\n{metrics}") == (
@@ -130,6 +133,7 @@ def test_patterns_that_select_everything(tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.slow
 def test_a_pattern_means_the_same_compiled_or_not() -> None:
     draw = np.random.default_rng(1)
     segments, names = ["*", "**", "a", "b", "a[*]", "a[1]", "b[2]", "*[*]"], ["a", "b", "a[1]", "a[0]", "b[2]", "c"]

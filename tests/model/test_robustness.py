@@ -87,6 +87,7 @@ BOMBS = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", BOMBS)
 def test_bombs_do_no_harm(name: str, tmp_path: Path) -> None:
     started = time.process_time()
@@ -94,6 +95,7 @@ def test_bombs_do_no_harm(name: str, tmp_path: Path) -> None:
     assert time.process_time() - started < 5
 
 
+@pytest.mark.slow
 def test_what_is_said_about_bombs(tmp_path: Path) -> None:
     assert "m.yaml:2:115: error: nested deeper than 100 levels" in said(BOMBS["nesting"], tmp_path)
     assert "a.a.a.a" in said(BOMBS["too deep"], tmp_path)

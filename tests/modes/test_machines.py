@@ -39,6 +39,7 @@ def sent(
 # -- against the reference ----------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_random_machines_are_the_same_in_a_file_in_python_and_in_the_reference() -> None:
     found = {seed: disagreement(seed) for seed in range(50)}
     assert {seed: each for seed, each in found.items() if each is not None} == {}

@@ -13,6 +13,7 @@ from tests.actors.feeding import Events, feed
 from tests.modes.test_machines import sent
 
 
+@pytest.mark.slow
 def test_transitions_with_probabilities_share_what_is_drawn() -> None:
     """One draw a reaction, in which each that is enabled otherwise has a share of its own."""
     machine: dict[str, Any] = {

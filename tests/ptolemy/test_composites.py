@@ -311,6 +311,7 @@ def test_tokens_that_wait_without_a_model() -> None:
     assert (waiting.come(), waiting.firsts(port), waiting.firsts(port)) == (2, ([5], [1]), ([6], [1]))
 
 
+@pytest.mark.slow
 def test_what_waits_in_a_port_costs_nothing() -> None:
     """Taking a token out takes as long, however many wait: by a walk through all of them this would be minutes."""
     text = """

@@ -192,6 +192,7 @@ def test_a_snapshot_goes_on_as_the_run_would_have() -> None:
     assert simulation.run().digest == whole
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("first", range(0, 100, 50))
 def test_random_machines_are_those_of_the_reference(first: int) -> None:
     for seed in range(first, first + 50):

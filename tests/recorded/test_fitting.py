@@ -37,6 +37,7 @@ def best(found: list[LossModel]) -> LossModel:
 # -- losses -----------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @SEEDS
 @pytest.mark.parametrize(
     "truth",
@@ -62,6 +63,7 @@ def test_a_hidden_channel_is_found_again(truth: dict[str, float], seed: int) -> 
     assert found.gain.p < 1e-6
 
 
+@pytest.mark.slow
 @SEEDS
 def test_bursts_are_found_again_and_no_more_is_made_of_them(seed: int) -> None:
     found = best(loss_models(losses_of(GilbertElliott(p=1 / 12, r=0.25), seed)))
@@ -140,6 +142,7 @@ def test_little_to_fit(lost: list[bool]) -> None:
 # -- delays -----------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @SEEDS
 @pytest.mark.parametrize(
     ("name", "shift", "mean", "shape"),

@@ -285,6 +285,7 @@ def test_order_and_digest() -> None:
     assert len({simulate(MODEL, seed=seed)[1].digest for seed in range(8)}) > 3
 
 
+@pytest.mark.slow
 def test_the_digest_does_not_depend_on_the_hash_seed() -> None:
     script = (
         "from tests.results.test_log import MODEL, simulate\n"

@@ -90,6 +90,7 @@ def test_a_damped_oscillator_without_noise() -> None:
     assert found.calibration.matches[0].rms < 1e-4
 
 
+@pytest.mark.slow
 def test_a_damped_oscillator_with_noise_is_resumed_and_saved(capsys: pytest.CaptureFixture[str]) -> None:
     gaps = noise(1, len(TIMES), 0.01)
     measured(TIMES, [place(time) + gap for time, gap in zip(TIMES, gaps, strict=True)])

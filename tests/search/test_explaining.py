@@ -218,6 +218,7 @@ def twice(tmp_path: Path) -> Path:
     return file
 
 
+@pytest.mark.slow
 def test_all_times_are_those_of_the_run_of_the_set(twice: Path) -> None:
     made, moved, elsewhere = load_model(twice), 0, 0
     for seed in range(12):
@@ -284,6 +285,7 @@ def breaks(file: Path, found: epicycle.Explained) -> bool:
     return again.monitors[found.explanation.monitor].holds is False
 
 
+@pytest.mark.slow
 def test_a_limit_of_runs(late: Path, tmp_path: Path) -> None:
     told: list[tuple[int, int]] = []
 
@@ -344,6 +346,7 @@ def test_what_is_noted_is_short(late: Path, tmp_path: Path) -> None:
     assert sum(map(len, lines)) < 60 * 150
 
 
+@pytest.mark.slow
 def test_the_acts_of_one_aspect(late: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "out"
     words = ["explain", str(late), "--seed", "1", "--monitor", "enough", "--only", "slow", "--out", str(out)]
@@ -371,6 +374,7 @@ def test_the_acts_of_one_aspect(late: Path, tmp_path: Path, capsys: pytest.Captu
 # -- the paper --------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_chosen_set_in_the_paper() -> None:
     """What is told of a run of the paper's scenario, checked by brute force."""
     check_paper(134)

@@ -96,6 +96,7 @@ def test_a_broken_run_and_what_is_said_of_it(capsys: pytest.CaptureFixture[str])
     ]
 
 
+@pytest.mark.slow
 def test_nothing_found_is_not_called_safe(capsys: pytest.CaptureFixture[str]) -> None:
     assert falsify("--vary", "n=1..3", "--vary", "policy=[fifo, lifo]", "--runs", 25, "--seed", 7, "--out", "out") == 0
     assert capsys.readouterr().out.splitlines() == [
@@ -114,6 +115,7 @@ def test_nothing_found_is_not_called_safe(capsys: pytest.CaptureFixture[str]) ->
     ]
 
 
+@pytest.mark.slow
 def test_it_follows_robustness_where_the_library_is() -> None:
     pytest.importorskip("cma")
     found = epicycle.falsify("far.yaml", "away", vary=BOX, set={"n": 0, "policy": "lifo"}, out="out", jobs=1)
@@ -128,6 +130,7 @@ def test_it_follows_robustness_where_the_library_is() -> None:
     assert found.explain == []  # no aspect acts in it
 
 
+@pytest.mark.slow
 def test_without_the_library_it_goes_on_at_random_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(falsifying, "is_guided", lambda: False)
     found = epicycle.falsify("far.yaml", "away", vary=BOX, set=ALONE, out="out", runs=70, jobs=1)
@@ -369,6 +372,7 @@ def size(folder: Path) -> int:
     return sum(path.stat().st_size for path in (*folder.glob("journals/*"), *folder.glob("parts/*")) if path.exists())
 
 
+@pytest.mark.slow
 def test_an_interrupt_keeps_what_is_there() -> None:
     Path("walk.yaml").write_text(MODEL, encoding="utf-8")
     said = ["falsify", "walk.yaml", "--monitor", "always walk.output < 1000", "--types", THIS, "--set", "pause=0.2"]

@@ -92,6 +92,7 @@ def _exactly(found: epicycle.Falsified) -> list[dict[str, object]]:
     return facts
 
 
+@pytest.mark.slow
 def test_it_ends_when_all_sets_are_tried(capsys: pytest.CaptureFixture[str]) -> None:
     count = len(lost(2))
     assert falsify("--monitor", "usable", "--acts", 2, "--seed", 2) == 0
@@ -111,6 +112,7 @@ def test_what_needs_no_fault(capsys: pytest.CaptureFixture[str]) -> None:
     )
 
 
+@pytest.mark.slow
 def test_a_longer_search_continues(capsys: pytest.CaptureFixture[str]) -> None:
     assert falsify("--monitor", "usable", "--acts", 2, "--seed", 2, "--runs", 5) == 0
     assert falsify("--monitor", "usable", "--acts", 2, "--seed", 2) == 0

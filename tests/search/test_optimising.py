@@ -64,18 +64,21 @@ def test_the_minimum_of_a_bowl(bowl: str) -> None:
     )
 
 
+@pytest.mark.slow
 def test_whole_numbers_lists_and_expressions(bowl: str) -> None:
     found = optimum(bowl, minimise="cost + n / 10", vary={"x": "-5..5", "n": "0..10", "y": [-0.5, 0.5]}, set=())
     assert found.best is not None
     assert found.best == {"x": pytest.approx(1.5, abs=0.2), "n": 4, "y": -0.5}
 
 
+@pytest.mark.slow
 def test_the_greatest_lies_at_an_end(bowl: str) -> None:
     found = optimum(bowl, minimise="", maximise="cost", vary={"x": "-5..5"}, points=100)
     assert found.best == {"x": pytest.approx(-5.0, abs=0.1)}
     assert "x is at the end of its range: the best may lie beyond." in found.sentence
 
 
+@pytest.mark.slow
 def test_conditions_hold_in_all_runs(bowl: str) -> None:
     found = optimum(bowl, subject_to="x + y <= 0", points=400)
     assert found.best is not None
@@ -90,6 +93,7 @@ def test_conditions_hold_in_all_runs(bowl: str) -> None:
     )
 
 
+@pytest.mark.slow
 def test_of_noisy_runs_the_best_is_told_with_new_seeds(bowl: str) -> None:
     found = optimum(bowl, set={"n": 4, "noise": 3.0}, replications=4)
     assert found.value is not None
@@ -110,6 +114,7 @@ def test_the_runs_hang_on_the_seed_alone(bowl: str) -> None:
     assert one.facts() == {**two.facts(), "folder": "one"}
 
 
+@pytest.mark.slow
 def test_a_search_continues(bowl: str) -> None:
     first = optimum(bowl, points=80, out="grown")
     keys = set(first.results.table()["run"].to_pylist())
@@ -135,6 +140,7 @@ def test_a_killed_search_continues_to_the_same_answer(bowl: str) -> None:
     assert one == {**two, "folder": "killed"}
 
 
+@pytest.mark.slow
 def test_the_conditions_of_a_study_count_alike(bowl: str) -> None:
     Path("s.yaml").write_text(
         "study: s\nmodel: ./bowl.yaml\nvary: {y: [0.5, -1.5], n: [4, 5]}\nmetrics: {double: 2 * cost}\nseed: 3\n"

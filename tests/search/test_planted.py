@@ -79,6 +79,7 @@ def check(name: str, seed: int, folder: Path, capsys: pytest.CaptureFixture[str]
     assert acts == plant.fault(results)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", PLANTS)
 def test_a_planted_fault_is_found_and_explained(name: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     check(name, 3_000, tmp_path, capsys)

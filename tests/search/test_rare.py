@@ -76,6 +76,7 @@ def assert_mean(found: RareEvent, probability: float) -> None:
     assert abs(found.probability / probability - 1.0) < 3.0 * found.error
 
 
+@pytest.mark.slow
 def test_a_queue_overflows_before_it_is_empty() -> None:
     model, probability = chain(5, 6)  # 0.00026
     found = rare(model, "full", runs=50, repetitions=6, seed=1)
@@ -89,6 +90,7 @@ def test_a_queue_overflows_before_it_is_empty() -> None:
     assert few[0].shares != few[2].shares
 
 
+@pytest.mark.slow
 def test_the_mean_is_right_whatever_is_known_of_the_state() -> None:
     """A walk of so many steps: those that reach a level early differ from those that reach it late."""
     model = load(WALK.format(stop=19, most=12))
@@ -136,6 +138,7 @@ def test_what_every_run_breaks() -> None:
     assert (found.probability, found.interval, found.error) == (1.0, (1.0, 1.0), 0.0)
 
 
+@pytest.mark.slow
 def test_an_estimate_that_was_killed_goes_on(tmp_path: Path) -> None:
     model, _ = chain(3, 5)
     options: dict[str, Any] = {"runs": 20, "repetitions": 6, "seed": 1}

@@ -32,10 +32,9 @@ class Pose:
     ready: bool
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(packaged_models()))
-@pytest.mark.parametrize(
-    ("ending", "start"), [("svg", b"<?xml"), pytest.param("png", b"\x89PNG", marks=pytest.mark.slow)]
-)
+@pytest.mark.parametrize(("ending", "start"), [("svg", b"<?xml"), ("png", b"\x89PNG")])
 def test_figures_of_packaged_models_are_the_same_whatever_a_user_has_set(
     name: str, ending: str, start: bytes, tmp_path: Path
 ) -> None:

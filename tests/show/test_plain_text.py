@@ -100,6 +100,7 @@ STUDY = {
 }
 
 
+@pytest.mark.slow
 def test_a_report_on_texts_that_are_long_or_look_like_formulas(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

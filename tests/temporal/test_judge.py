@@ -49,6 +49,7 @@ def compare(seed: str, *, lines: bool) -> None:
         assert found.robustness == wanted, about
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("lines", [False, True], ids=["steps", "lines"])
 def test_a_judge_agrees_with_the_definition(lines: bool) -> None:
     for number in range(2_000):

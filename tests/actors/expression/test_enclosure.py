@@ -76,6 +76,7 @@ def some_expression(draw: np.random.Generator, depth: int) -> str:
     return first + "".join(some_expression(draw, depth - 1) + other for other in others)
 
 
+@pytest.mark.slow
 def test_every_value_lies_within_the_bounds() -> None:
     draw, bounded = np.random.default_rng(13), 0
     for _ in range(1000):

@@ -92,6 +92,7 @@ def by_the_evaluator(formula: Formula, tokens: dict[str, Any]) -> str:
         return f"{formula.source!r}: {error}{f', with {given}' if given else ''}"
 
 
+@pytest.mark.slow
 @settings(max_examples=500)
 @given(numbers=st.randoms(use_true_random=False))
 def test_the_evaluator_gives_the_same(numbers: Any) -> None:

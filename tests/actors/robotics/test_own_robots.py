@@ -165,6 +165,7 @@ def test_the_car_is_safe(folder: Path) -> None:
 # --- a sensor -------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("estimator", ["UnscentedEstimator", "ExtendedEstimator", "ParticleEstimator"])
 def test_a_bearing_only_sensor_in_every_filter(estimator: str, folder: Path) -> None:
     """Four robots that see directions know where the obstacle is; late and lost messages included."""
@@ -196,6 +197,7 @@ def test_an_angle_has_no_beginning(folder: Path) -> None:
 # --- an objective ---------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_an_observer_that_keeps_the_obstacle_in_sight(folder: Path) -> None:
     pytest.importorskip("casadi")
     pillars = [[16.0, 4.0, 1.0]]
@@ -224,6 +226,7 @@ def test_an_observer_that_keeps_the_obstacle_in_sight(folder: Path) -> None:
 # --- a filter -------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_inform_uses_the_samples_of_a_particle_filter(folder: Path) -> None:
     model = load_model(team_with(folder, "OwnParticles"), types=types("particles"))
     asked: list[Any] = []
@@ -247,6 +250,7 @@ def test_inform_uses_the_samples_of_a_particle_filter(folder: Path) -> None:
 # --- a solver -------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("objective", [ReachGoal(), StayNear(to={"target": 1.0}), Inform()])
 def test_scipy_finds_the_plan_of_the_barrier_method(objective: Any, folder: Path) -> None:
     (slsqp,) = types("slsqp")

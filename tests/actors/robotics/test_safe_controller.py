@@ -33,6 +33,7 @@ def driven(position: np.ndarray, velocity: np.ndarray, control: np.ndarray, away
     return np.array(found)
 
 
+@pytest.mark.slow
 def test_no_target_comes_nearer_than_a_retreat_promises() -> None:
     """Against targets that start on their bound and go anywhere at their largest speed, straight at the robot too."""
     random, nearest = np.random.default_rng(1), math.inf

@@ -6,6 +6,7 @@ from itertools import groupby
 from typing import Any
 
 import numpy as np
+import pytest
 
 from epicycle.actors import Tag
 from epicycle.runner import Simulation, load_model
@@ -54,6 +55,7 @@ def draws(records: list[Record]) -> dict[tuple[Tag, str], np.ndarray]:
     return found
 
 
+@pytest.mark.slow
 def test_losses_come_in_bursts_and_no_sensor_draws_another_value() -> None:
     rows: dict[str, list[list[bool]]] = {BERNOULLI: [], BURSTS: []}
     for seed in SEEDS:

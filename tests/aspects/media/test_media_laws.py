@@ -18,6 +18,8 @@ from epicycle.actors import EpicycleError
 from epicycle.aspects import Bus, FieldError, Medium, RadioMedium
 from tests.aspects.bench import SECOND, Bench
 
+pytestmark = pytest.mark.slow
+
 SURE = 0.999
 
 

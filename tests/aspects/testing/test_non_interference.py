@@ -119,6 +119,7 @@ def dealt(aspects: list[Aspect]) -> Any:
     return pytest.mark.parametrize(("aspect", "models"), cases)
 
 
+@pytest.mark.slow
 @dealt(AT_ZERO)
 def test_strength_zero_leaves_every_model_as_it_is(aspect: Aspect, models: list[str], record_property: Any) -> None:
     pairs = over_models(aspect, assert_silent_at_zero, models)
@@ -126,6 +127,7 @@ def test_strength_zero_leaves_every_model_as_it_is(aspect: Aspect, models: list[
     record_property("pairs of aspect and model: silent at zero", pairs)
 
 
+@pytest.mark.slow
 @dealt(AT_WORK)
 def test_removal_moves_no_stream_of_others(aspect: Aspect, models: list[str], record_property: Any) -> None:
     loss = Woven("loss", PacketLoss(probability=0.1), "**")
@@ -141,12 +143,14 @@ def test_observers_only_observe(aspect: Aspect, record_property: Any) -> None:
     record_property("pairs of aspect and model: observes only", pairs)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("aspect", AT_WORK, ids=repr)
 def test_a_hundred_ports_have_streams_of_their_own(aspect: Aspect) -> None:
     woven = at_grid(aspect, "first[*]")
     assert_streams_are_its_own(woven.aspect, grid(100, 2), woven.at)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("aspect", AT_WORK, ids=repr)
 def test_order_of_unrelated_aspects_is_free(aspect: Aspect) -> None:
     trial = grid(2, 8)

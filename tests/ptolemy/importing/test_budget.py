@@ -126,6 +126,7 @@ def refusal(tmp_path: Path, text: str) -> str:
     return str(caught.value)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "make",
     [pytest.param(make, id=name) for name, make in TOO_MUCH.items()],
@@ -134,11 +135,13 @@ def test_too_much_for_one_import(tmp_path: Path, make: Callable[[], str]) -> Non
     assert refusal(tmp_path, make()) == SPENT
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("make", "reason"), [pytest.param(*each, id=name) for name, each in TOO_LARGE.items()])
 def test_values_that_are_too_large(tmp_path: Path, make: Callable[[], str], reason: str) -> None:
     assert refusal(tmp_path, make()) == refused(reason)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("make", [pytest.param(make, id=name) for name, make in LARGE.items()])
 def test_large_files_take_time_in_proportion(tmp_path: Path, make: Callable[[], str]) -> None:
     began = time.process_time()

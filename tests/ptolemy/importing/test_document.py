@@ -69,6 +69,7 @@ def test_what_is_no_model(tmp_path: Path, text: str, message: str) -> None:
     assert refusal(tmp_path, text) == message
 
 
+@pytest.mark.slow
 def test_what_is_too_large(tmp_path: Path) -> None:
     assert refusal(tmp_path, b" " * 20_000_001) == "m.xml is larger than the maximum of 20,000,000 bytes"
     many = '<entity name="m">' + "<a/>" * 300_000 + "</entity>"

@@ -49,6 +49,7 @@ def boxes(draw_from: st.DrawFn, path: str = "", level: int = 0) -> Box:
     return box
 
 
+@pytest.mark.slow
 @given(boxes())
 @settings(max_examples=40, deadline=None, derandomize=True, suppress_health_check=list(HealthCheck))
 def test_every_drawing_is_right(root: Box) -> None:

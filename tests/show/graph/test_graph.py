@@ -284,6 +284,7 @@ def epicycle(*arguments: str, cwd: Path, **environment: str) -> subprocess.Compl
     )
 
 
+@pytest.mark.slow
 def test_same_model_same_bytes(tmp_path: Path) -> None:
     model = small(tmp_path)
     done = epicycle("small.yaml", "-o", "there.svg", cwd=tmp_path, PYTHONHASHSEED="7")

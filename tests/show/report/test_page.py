@@ -87,6 +87,7 @@ def opened(page: Path, browser: Any) -> Iterator[Open]:
         assert [url for url in asked if not url.startswith("data:")] == [page.as_uri()]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("scheme", ["light", "dark"])
 @pytest.mark.parametrize("width", [390, 1280, 3840])
 def test_a_page_loads_by_itself_at_any_width(width: int, scheme: str, opened: Open) -> None:
@@ -133,6 +134,7 @@ WHERE = """figure => {
 }"""
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("figure", range(4))
 @pytest.mark.parametrize("width", [390, 1280])
 def test_a_tip_comes_up_where_the_pointer_is(figure: int, width: int, opened: Open) -> None:

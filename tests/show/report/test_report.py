@@ -175,6 +175,7 @@ def test_claims_and_guideline(queue: Path) -> None:
     ]
 
 
+@pytest.mark.slow
 def test_same_table_same_report_that_needs_nothing_else(queue: Path, tmp_path: Path) -> None:
     for name in ("first", "second"):
         assert main(["report", str(queue), "--out", str(tmp_path / name)]) == 0
@@ -266,6 +267,7 @@ def wheels(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder / "out"
 
 
+@pytest.mark.slow
 def test_repeated_runs_give_the_signals_of_single_ones(wheels: Path) -> None:
     data = Data(open_study(wheels))
     figures = figures_of_study(data.plan, Problems())
@@ -293,6 +295,7 @@ def test_repeated_runs_give_the_signals_of_single_ones(wheels: Path) -> None:
     )
 
 
+@pytest.mark.slow
 def test_report_repeats_runs(wheels: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["report", str(wheels), "--jobs", "2"]) == 0
     found = page(wheels)
@@ -392,6 +395,7 @@ def test_panels_and_lines_keep_apart_what_differs(queue: Path) -> None:
     assert [panel.title for panel in by_panel.panels] == ["mean service: 2 s", "mean service: 0.5 s"]
 
 
+@pytest.mark.slow
 def test_names_of_levels_stand_along_the_axis_however_many_there_are(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:

@@ -199,6 +199,7 @@ def test_mcap_has_a_message_for_each_token_firing_and_act(wifi: Recording, tmp_p
     assert "left out" not in file.about
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", packaged_models())
 def test_messages_are_as_their_schemas_say(name: str, tmp_path: Path) -> None:
     model = load_model(name)

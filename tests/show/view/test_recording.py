@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pytest
 
 from epicycle.runner import load_model
 from epicycle.runner.build import Model, figures_of
@@ -106,6 +107,7 @@ def test_acts_at_outputs_are_about_the_send_that_follows_if_one_does(tmp_path: P
     assert all("send" not in each and about[each["failed"]] == NOTHING for each in lost)
 
 
+@pytest.mark.slow
 def test_a_long_run_is_thinned_to_stretches_that_are_whole() -> None:
     model = load_model("mm1")
     whole, thinned = recorded(model, 8_000.0), recorded(model, 8_000.0, most=8 * STRETCH)

@@ -57,6 +57,7 @@ def by_name(found: list[Index]) -> dict[tuple[str, str], Index]:
     return {(each.factor, each.index): each for each in found}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", range(5))
 def test_sobol_indices_of_ishigamis_function(seed: int) -> None:
     found = by_name(sensitivity(samples(designed(f"sobol: {{size: 2048, seed: {seed}"), ishigami), "y"))
@@ -163,6 +164,7 @@ metrics: {place: place}
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("form", "index", "runs"), [("sobol", "total", 64), ("morris", "mu_star", None)])
 def test_a_study_gives_indices_and_its_report_shows_them(
     form: str, index: str, runs: int | None, tmp_path: Path

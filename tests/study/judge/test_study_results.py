@@ -94,6 +94,7 @@ def test_fewer_replications_take_no_row_from_the_table(
     assert "Seeds 20 to 24:" in page
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("paired", ["true", "false"])
 def test_runs_of_another_seed_are_told_and_not_mixed_in(
     paired: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]

@@ -66,6 +66,7 @@ def test_parquet_says_what_the_columns_are(folder: Path) -> None:
     assert open_study(folder / "out").table().schema.field("speed").metadata == {b"unit": b"km/h"}
 
 
+@pytest.mark.slow
 def test_report_shows_the_units(folder: Path) -> None:
     run_study(plan_of(folder / "walks.yaml"), folder / "out", jobs=1)
     assert main(["report", str(folder / "out")]) == 0

@@ -214,6 +214,7 @@ def edits(value: Any) -> Iterator[Any]:
                 yield [*value[:index], other, *value[index + 1 :]]
 
 
+@pytest.mark.slow
 def test_every_edit_of_a_manifest_gives_a_message(copied: Path) -> None:
     """Of any field to any type: by hand, and by somebody who corrects the checksum."""
     out = Path("out")

@@ -49,6 +49,7 @@ def without_progress(text: str) -> str:
     return re.sub(r"^\d\d:\d\d:\d\d walks: .*\n", "", text, flags=re.M)
 
 
+@pytest.mark.slow
 def test_table_is_that_of_local_processes(cluster: Cluster, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Runs that are ok, raise, hang, and end their process, batch by batch until the interval is narrow enough."""
     text = STUDY.replace("[0 m/s, 100 cm/s]", "[0 m/s]") + "until: {metric: place, half_width: 2.2, batch: 5}\n"
@@ -195,6 +196,7 @@ print(json.dumps([runner.make(task) | {"wall_time": 0} for task in iter(backlog.
 """
 
 
+@pytest.mark.slow
 def test_all_files_travel(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Includes, data, disturbances, own types and what these import; from links, and in options, too."""
     home, link, root = tmp_path / "home", tmp_path / "link", tmp_path / "elsewhere"
@@ -240,6 +242,7 @@ def error_of(folder: Path, capsys: pytest.CaptureFixture[str], *arguments: objec
     return f"{code}: {said[max(said.find('error:'), 0) :]}"
 
 
+@pytest.mark.slow
 def test_what_cannot_be(
     cluster: Cluster, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

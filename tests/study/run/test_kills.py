@@ -103,6 +103,7 @@ def kill_and_resume(
     assert len(rows(out)) == 2 * replications
 
 
+@pytest.mark.slow
 def test_nothing_is_lost(tmp_path: Path) -> None:
     kill_and_resume(tmp_path, "--jobs", 2, kills=2, replications=15, seed=2)
 

@@ -59,6 +59,7 @@ def test_special_values_are_those_of_math(name: str) -> None:
     assert not wrong
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", TRUTH)
 def test_compiled_code_gives_the_same_bits_and_no_exception(name: str) -> None:
     function = getattr(elementary, name)
@@ -75,6 +76,7 @@ def test_compiled_code_gives_the_same_bits_and_no_exception(name: str) -> None:
         assert same(interpreted, value), one
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", TRUTH)
 def test_within_an_ulp_of_the_truth(name: str) -> None:
     at = points(name, 10_000, seed=3)

@@ -71,6 +71,7 @@ def test_the_probability_of_a_gate(dimensions: int) -> None:
         assert association.gate_probability(gate, dimensions) == pytest.approx(chi2.cdf(gate, dimensions), abs=1e-13)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", [ukf.RELATIVE_POSITION, ukf.RANGE])
 def test_association_probabilities(random: np.random.Generator, kind: int) -> None:
     """The sum over all joint events, in 400 scenes of each kind."""

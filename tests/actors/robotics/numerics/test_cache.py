@@ -64,6 +64,7 @@ def result(package: Path) -> tuple[str, str]:
     return done.stdout.strip(), done.stderr.replace(f"{package}/", "")
 
 
+@pytest.mark.slow
 def test_a_kernel_is_compiled_anew_when_what_it_calls_has_changed(package: Path) -> None:
     assert len(list(package.glob("__pycache__/*/*/*.nbc"))) == 2
     assert result(package) == ("3.0", "")
@@ -74,14 +75,13 @@ def test_a_kernel_is_compiled_anew_when_what_it_calls_has_changed(package: Path)
 
 
 # One of each kind; the others are slow, for each takes two processes that compile.
-QUICK = {("cut", "twice_and", "nbi"), ("empty", "lambda", "nbc"), ("flipped", "twice_and", "nbc")}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("damage", "of", "ending"),
     [
-        pytest.param(*case, marks=() if case in QUICK else pytest.mark.slow)
-        for case in product(("cut", "empty", "flipped"), ("twice_and", "lambda"), ("nbi", "nbc"))
+        *product(("cut", "empty", "flipped"), ("twice_and", "lambda"), ("nbi", "nbc")),
     ],
 )
 def test_damaged_code_is_compiled_again_with_a_word(mended: Path, damage: str, of: str, ending: str) -> None:
@@ -100,6 +100,7 @@ def test_damaged_code_is_compiled_again_with_a_word(mended: Path, damage: str, o
     assert result(mended) == ("3.0", "")
 
 
+@pytest.mark.slow
 def test_code_that_cannot_be_kept_is_used(package: Path) -> None:
     path = next(package.glob("__pycache__/*/*/*twice_and*.nbi"))
     path.unlink()

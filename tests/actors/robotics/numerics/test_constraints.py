@@ -27,6 +27,7 @@ def kept_and_all(*fields: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.n
     return every[:, 0], every[:, 1], kept[:, 0], kept[:, 1]
 
 
+@pytest.mark.slow
 def test_a_tube_binds_where_it_has_a_radius(random: np.random.Generator) -> None:
     radius = np.linspace(0.6, 4.2, 10)
     radius[[4, 8]] = np.inf
@@ -35,6 +36,7 @@ def test_a_tube_binds_where_it_has_a_radius(random: np.random.Generator) -> None
     assert (row.tolist(), step.tolist()) == ([0] * 6, [2, 3, 5, 6, 7, 9])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("step", [2, 3, 9])
 @pytest.mark.parametrize("limit", ["speed", "acceleration"])
 @pytest.mark.parametrize("tube", [False, True])
@@ -65,6 +67,7 @@ def test_what_is_left_out_is_just_out_of_reach(random: np.random.Generator, step
     assert kept == [[step], []]
 
 
+@pytest.mark.slow
 def test_what_is_left_out_no_plan_can_break(random: np.random.Generator) -> None:
     dropped = 0
     for _ in range(200):

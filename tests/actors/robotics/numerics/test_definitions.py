@@ -107,6 +107,7 @@ def keeps(controls: np.ndarray, room: np.ndarray, *fields: Any) -> bool:
     return keeps_limits(posed)
 
 
+@pytest.mark.slow
 def test_who_keeps_the_limits(random: np.random.Generator) -> None:
     """The speed at step 1 is decided already."""
     kept = []
@@ -155,6 +156,7 @@ def test_a_peer_that_is_not_heard_is_given_more_room(lost: int) -> None:
     assert distances[0] == pytest.approx(2.0 + 3.0 * definitions.sigma_5(radius, 0.4, lost))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kappa", [0.0, 1.0])
 def test_mutual_information(random: np.random.Generator, kappa: float) -> None:
     for _ in range(50):
@@ -235,6 +237,7 @@ def test_constraints_with_their_margins(random: np.random.Generator) -> None:
     assert found[:, 2:] == pytest.approx(expected, abs=1e-12)
 
 
+@pytest.mark.slow
 def test_constraints_in_space(random: np.random.Generator) -> None:
     """Own plan, obstacle and peer, and the lowest and the highest height."""
     cloud = spread(random, 3)

@@ -27,6 +27,7 @@ def riccati(
     return newton_step(stages, period, free, zero), stages[:, step : step + len(zero)].copy()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("d", [2, 3])
 @pytest.mark.parametrize(("steps", "free"), [(3, 3), (10, 10), (40, 40), (10, 9), (10, 4), (10, 1), (40, 7)])
 def test_newton_step_is_that_of_the_dense_system(random: np.random.Generator, steps: int, free: int, d: int) -> None:
@@ -63,6 +64,7 @@ def test_newton_step_is_that_of_the_dense_system(random: np.random.Generator, st
         assert descent == pytest.approx(gradient @ expected)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("d", [2, 3])
 def test_a_block_that_is_no_bowl_counts_as_the_nearest_one(random: np.random.Generator, d: int) -> None:
     """The step is that of the blocks with their eigenvalues of less than 1e-9 raised to it."""

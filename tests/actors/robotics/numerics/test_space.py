@@ -103,6 +103,7 @@ def flight(random: np.random.Generator, informs: bool) -> "horizon.HorizonProble
     return problem.to_reach(own + random.normal(scale=4.0, size=3))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("informs", [False, True])
 def test_against_ipopt_in_space(random: np.random.Generator, informs: bool) -> None:
     """The rule of test_solver.py."""

@@ -64,6 +64,7 @@ def test_an_obstacle_on_top_of_the_robot_lies_along_x() -> None:
     assert hyy == pytest.approx(-1e9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("d", [2, 3])
 @pytest.mark.parametrize("kappa", [0.0, 1.0])
 def test_derivatives_of_mutual_information(random: np.random.Generator, kappa: float, d: int) -> None:
@@ -85,6 +86,7 @@ def test_derivatives_of_mutual_information(random: np.random.Generator, kappa: f
         assert negative(tuple(own.tolist()))[0] == pytest.approx(-expected, abs=1e-8)
 
 
+@pytest.mark.slow
 def test_information_on_top_of_a_sigma_point_is_finite() -> None:
     points, weights = np.array([[1.0, 2.0], [3.0, 2.0], [0.0, 5.0]]), np.array([0.5, 0.25, 0.25])
     found = negative_information((1.0, 2.0), points, weights, np.zeros((3, 3)), 2.0)
