@@ -1,6 +1,6 @@
 from epicycle.actors.core.moment cimport Moment, Wake, new_wake
-from epicycle.actors.core.order cimport Line, Ranks, Times
+from epicycle.actors.core.order cimport TimedQueue, ReadyQueue, Calendar
 from epicycle.actors.core.port_parameter cimport ParameterPort
-from epicycle.actors.core.ports cimport Emitter, InputPort, OutputPort, Way
+from epicycle.actors.core.ports cimport Emitter, InputPort, OutputPort, Receiver
 from epicycle.actors.core.primitives cimport is_alone
 from epicycle.actors.core.tag cimport nanoseconds_of, seconds_of, to_nanoseconds, to_seconds

@@ -32,7 +32,7 @@ LIBRARIES = {
         "epicycle.runner.engine.agenda",
         "epicycle.runner.engine.director",
         "epicycle.runner.engine.loop",
-        "epicycle.runner.engine.way",
+        "epicycle.runner.engine.receivers",
     ),
     "record": (
         "epicycle.runner.results.record",

@@ -43,7 +43,7 @@ __all__ = [
     "LossAspect", "MeasurementAspect", "MeasurementFailure", "Medium", "Noise", "ObservationAspect", "Occlusion",
     "OutOfRange", "Outage", "Outlier", "PacketLoss", "PortAspect", "PortsParameter", "Probe", "Processor", "Quantise",
     "RadioMedium", "RandomLoss", "RangeLoss", "Reading", "Reorder", "Replace", "Request", "Saturate", "Selection",
-    "SelectionParameter", "Server", "SituationError", "SkipFiring", "StuckAt", "Task", "Throttle", "Trace",
-    "TraceError", "TraceFile", "TraceReplay", "Transform", "Unit", "aspect_stream", "class_decorations", "decorations",
+    "SelectionParameter", "Server", "SituationError", "SkipFiring", "StuckAt", "Target", "Task", "Throttle", "Trace",
+    "TraceError", "TraceFile", "TraceReplay", "Transform", "aspect_stream", "class_decorations", "decorations",
     "time_needed",
 ]  # fmt: skip

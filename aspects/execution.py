@@ -26,8 +26,8 @@ from .core import (
     FiringTimeParameter,
     Job,
     Server,
+    Target,
     Task,
-    Unit,
     drawn,
     time_needed,
 )
@@ -321,16 +321,16 @@ class CrashRestart(ExecutionAspect):
     state = Parameter(str, LOST, choices=(LOST, KEPT), doc="what happens to the actors' state")
     tokens = Parameter(str, LOST, choices=(LOST, KEPT), doc="what happens to tokens that come while it is down")
 
-    def begin(self, unit: Unit) -> None:
-        unit.memory["life"] = life = _Life()
-        unit.shared.setdefault("units", []).append(life)
-        now = unit.tag.time
+    def begin(self, target: Target) -> None:
+        target.memory["life"] = life = _Life()
+        target.shared.setdefault("units", []).append(life)
+        now = target.tag.time
         for time in sorted(to_nanoseconds(float(each)) for each in self.times):
             if time > now:
-                unit.later(to_seconds(time - now), self._crash, unit)
+                target.later(to_seconds(time - now), self._crash, target)
             else:
-                self._crash(unit)
-        self._await_failure(unit)
+                self._crash(target)
+        self._await_failure(target)
 
     def schedule(self, job: Job, point: ActorPoint) -> None:
         point.forward(job)  # while it is down, no jobs come here
@@ -340,34 +340,34 @@ class CrashRestart(ExecutionAspect):
         down = sum(life.down_until(end) for life in lives)
         return {"availability": 1.0 - down / (end * len(lives)) if end and lives else None}
 
-    def _await_failure(self, unit: Unit) -> None:
-        is_over = self.until is not None and self.every is None and unit.now >= self.until
+    def _await_failure(self, target: Target) -> None:
+        is_over = self.until is not None and self.every is None and target.now >= self.until
         if self.mtbf is not None and not is_over:
-            life: _Life = unit.memory["life"]
-            unit.later(unit.random.exponential(self.mtbf), self._fail, (unit, life.crashes))
+            life: _Life = target.memory["life"]
+            target.later(target.random.exponential(self.mtbf), self._fail, (target, life.crashes))
 
-    def _fail(self, what: tuple[Unit, int]) -> None:
+    def _fail(self, what: tuple[Target, int]) -> None:
         """A random failure, unless a crash at a given time came before it."""
-        unit, crashes = what
-        life: _Life = unit.memory["life"]
+        target, crashes = what
+        life: _Life = target.memory["life"]
         if life.crashes == crashes:
-            self._crash(unit)
+            self._crash(target)
             if life.crashes == crashes:
-                self._await_failure(unit)
+                self._await_failure(target)
 
-    def _crash(self, unit: Unit) -> None:
+    def _crash(self, target: Target) -> None:
         """Let it crash, if it can crash now."""
-        life: _Life = unit.memory["life"]
-        is_active = self.is_due(unit.tag.time) and (self.when is None or bool(unit.value_of(self.when)))
+        life: _Life = target.memory["life"]
+        is_active = self.is_due(target.tag.time) and (self.when is None or bool(target.value_of(self.when)))
         if life.since is not None or not is_active:
             return
         life.crashes += 1
-        life.since = unit.tag.time
-        unit.act("crashed", None)
+        life.since = target.tag.time
+        target.act("crashed", None)
         if self.state == LOST:
-            unit.kill()
-        unit.suspend(self._keeps)
-        unit.later(drawn(self.repair, unit.random), self._restart, unit)
+            target.kill()
+        target.suspend(self._keeps)
+        target.later(drawn(self.repair, target.random), self._restart, target)
 
     def _keeps(self, job: Job, point: ActorPoint) -> bool:
         """Whether a job that falls due while it is down waits for the repair; wake-ups always do."""
@@ -376,20 +376,20 @@ class CrashRestart(ExecutionAspect):
             job.arrivals.clear()
         return job.is_wanted
 
-    def _restart(self, unit: Unit) -> None:
-        life: _Life = unit.memory["life"]
-        down = life.down_until(unit.tag.time)
-        unit.act("restarted", to_seconds(down - life.down))
+    def _restart(self, target: Target) -> None:
+        life: _Life = target.memory["life"]
+        down = life.down_until(target.tag.time)
+        target.act("restarted", to_seconds(down - life.down))
         life.down, life.since = down, None
         if self.state == LOST:
-            unit.restart()
-        unit.resume()
-        self._await_failure(unit)
+            target.restart()
+        target.resume()
+        self._await_failure(target)
 
 
 @dataclass
 class _Life:
-    """The history of one unit; times in ns."""
+    """The history of one target; times in ns."""
 
     crashes: int = 0
     down: int = 0  # before the crash not yet repaired

@@ -24,7 +24,7 @@ from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
-from . import Aspect, ExecutionAspect, JoinPoint, JoinPointAspect, PortAspect, Unit
+from . import Aspect, ExecutionAspect, JoinPoint, JoinPointAspect, PortAspect, Target
 
 __all__ = [
     "Event", "RunModel", "Woven", "assert_observes_only", "assert_order_of_unrelated_aspects_is_free",
@@ -214,8 +214,8 @@ class _Visits:
                 f"nothing has passed {self._original!r} at {at}, so the test shows nothing: let the model run longer"
             )
 
-    def _begin(self, original: ExecutionAspect, unit: Unit) -> None:
-        original.begin(self._muted(unit, () if self._acts else ("suspend", "resume", "kill", "restart")))
+    def _begin(self, original: ExecutionAspect, target: Target) -> None:
+        original.begin(self._muted(target, () if self._acts else ("suspend", "resume", "kill", "restart")))
 
     def _pass(self, original: Aspect, method: str, passing: Any, point: JoinPoint) -> None:
         """Let the aspect handle a token or a firing."""

@@ -7,8 +7,18 @@ from collections import deque
 from collections.abc import Callable
 from typing import Any, TypeVar
 
-from epicycle.actors import Actor, Context, InputPort, Moment, StateMachine, Tag, Wake, Way
-from epicycle.runner.engine import Call, Conductor, Delivery, Director, Directors, Instant, Passage, Refinement, Turn
+from epicycle.actors import Actor, Context, InputPort, Moment, Receiver, StateMachine, Tag, Wake
+from epicycle.runner.engine import (
+    Activation,
+    BoundaryPort,
+    Call,
+    Delivery,
+    Director,
+    Directors,
+    Instant,
+    ModeDirector,
+    Refinement,
+)
 from epicycle.runner.graph import ModelGraph, is_within
 from epicycle.runner.text import Limits
 
@@ -23,40 +33,42 @@ class PostedComposites(Directors):
     director: PostedDirector
 
     def __init__(self, graph: ModelGraph, actors: dict[str, Actor], director: PostedDirector) -> None:
-        self.borders: dict[str, Border] = {}  # of strict composites
+        self.borders: dict[str, CompositeBoundary] = {}  # of strict composites
         super().__init__(graph, actors, director)
 
     def _is_ours(self, composite: str) -> bool:
         return is_posted(self.graph.dialects[composite], type(self.director))
 
-    def passage(self, path: str, outside: Director | Refinement) -> Passage:
-        kind = PostedPassage if self._is_ours(self.graph.owner(path)) else Passage
+    def boundary_port(self, path: str, outside: Director | Refinement) -> BoundaryPort:
+        kind = PostedPassage if self._is_ours(self.graph.owner(path)) else BoundaryPort
         return kind(path, outside)
 
     def prepare(self, composite: str, outside: Director | Refinement) -> None:
         if not composite or not self._is_ours(composite):
             return
-        passages: list[list[Any]] = [[self.passages[path] for path in paths] for paths in self.graph.borders(composite)]
+        boundary_ports: list[list[Any]] = [
+            [self.boundary_ports[path] for path in paths] for paths in self.graph.borders(composite)
+        ]
         if self.graph.is_strict(composite):
-            border = Border(composite, self.graph.end_of(composite), self.director, outside, *passages)
-            for passage in (*passages[0], *passages[1]):
-                passage.border = border
+            border = CompositeBoundary(composite, self.graph.end_of(composite), self.director, outside, *boundary_ports)
+            for boundary_port in (*boundary_ports[0], *boundary_ports[1]):
+                boundary_port.border = border
             self.borders[composite] = border
             if composite not in self.graph.modal:  # whose parts are posted one by one
                 self.director.posted[composite] = border
         if composite in self.graph.modal or self.graph.refinement_of(composite) == composite:
-            for passage in (*passages[0], *passages[1]):
-                passage.is_refired = True
-            for passage in passages[1] if composite in self.graph.modal else ():
-                passage.holds_one = True
+            for boundary_port in (*boundary_ports[0], *boundary_ports[1]):
+                boundary_port.is_refired = True
+            for boundary_port in boundary_ports[1] if composite in self.graph.modal else ():
+                boundary_port.holds_one = True
 
-    def conductor(self, composite: str, machine: StateMachine) -> Conductor:
-        kind = PostedConductor if self._is_ours(composite) else Conductor
+    def mode_director(self, composite: str, machine: StateMachine) -> ModeDirector:
+        kind = PostedConductor if self._is_ours(composite) else ModeDirector
         return kind(composite, machine, self.director, self.of[composite])
 
-    def refinement(self, path: str, outside: Context, conductor: Conductor) -> Refinement:
+    def refinement(self, path: str, outside: Context, mode_director: ModeDirector) -> Refinement:
         kind = PostedRefinement if self._is_ours(path) else Refinement
-        return kind(path, outside, self.director, conductor)
+        return kind(path, outside, self.director, mode_director)
 
     def resumption(self, composite: str) -> Callable[[], None] | None:
         border = self.borders.get(composite)
@@ -71,7 +83,7 @@ class PostedComposites(Directors):
                 self.borders[around].post()
 
 
-class PostedPassage(Passage):
+class PostedPassage(BoundaryPort):
     """A port of such a composite: with a ``border``, it lets one token through per firing of the composite.
 
     If it ``is_refired`` with the surroundings of the composite, one per firing of those.  One that ``holds_one`` keeps
@@ -80,10 +92,10 @@ class PostedPassage(Passage):
 
     def __init__(self, path: str, director: Director | Refinement) -> None:
         super().__init__(path, director)
-        self.border: Border | None = None
+        self.border: CompositeBoundary | None = None
         self.is_refired = False
         self.holds_one = False
-        self.requests: deque[Delivery] = deque()  # to an aspect that is a model, waiting for its turn
+        self.requests: deque[Delivery] = deque()  # to an aspect that is a model, waiting for its activation
 
     def clear(self) -> None:
         self.requests.clear()
@@ -108,7 +120,7 @@ class PostedPassage(Passage):
         if self.is_waited_for and (self.border is None or self in self.border.behind):
             self.wake_in(0)
 
-    def admit(self, place: str, onward: Way, told: Callable[[Way], Way]) -> tuple[Way, bool]:
+    def admit(self, place: str, onward: Receiver, told: Callable[[Receiver], Receiver]) -> tuple[Receiver, bool]:
         border = self.border
         if border is None:
             return super().admit(place, onward, told)
@@ -124,8 +136,8 @@ class PostedPassage(Passage):
         return Call(arrive), True
 
 
-class Border(Actor):
-    """The turn that ends a firing of such a composite, and posts it for what comes next.
+class CompositeBoundary(Actor):
+    """The activation that ends a firing of such a composite, and posts it for what comes next.
 
     In each of its firings, one token of each channel passes its ports.  The output of an actor whose firing was
     deferred from outside leaves at the next microstep, unless the composite fires at this tag for new input.
@@ -159,9 +171,9 @@ class Border(Actor):
         return self._director.is_to_come(self._first, self._last)
 
     @property
-    def turn(self) -> Turn:
-        """The turn that ends a firing of the composite."""
-        return self._director.turn(self, self._director.ranks[self.path])
+    def activation(self) -> Activation:
+        """The activation that ends a firing of the composite."""
+        return self._director.activation(self, self._director.ranks[self.path])
 
     def note(self, time: int, microstep: int) -> None:
         heapq.heappush(self._inside, (time, microstep))
@@ -169,38 +181,38 @@ class Border(Actor):
             self.post()
 
     def post(self) -> None:
-        """Request a turn for what comes first inside."""
+        """Request an activation for what comes first inside."""
         now = self._director.last
         while self._inside and self._inside[0] <= now:
             heapq.heappop(self._inside)
         self._posted = {tag for tag in self._posted if tag > now}
         if self._inside and self._inside[0] not in self._posted:
             self._posted.add(self._inside[0])
-            self._director.want_at(self.turn, self._inside[0][0])
+            self._director.schedule_at(self.activation, self._inside[0][0])
 
     def resume(self) -> None:
         """An actor inside now fires after its firing was deferred from outside."""
         self._resumed = self.tag
 
-    def lets_pass(self, passage: PostedPassage) -> bool:
+    def lets_pass(self, boundary_port: PostedPassage) -> bool:
         """Whether waiting tokens may pass a port now."""
         now = self.tag
-        if passage in self.before:
+        if boundary_port in self.before:
             self._came_in = now
             self._outside.trigger(self)
             return True
         return self._resumed != now or self._came_in == now
 
     def fire(self) -> None:
-        if any(passage.is_waited_for for passage in self.before):
-            for passage in (*self.before, *self.behind):
-                if passage.is_waited_for:
-                    self._outside.trigger(passage)
+        if any(boundary_port.is_waited_for for boundary_port in self.before):
+            for boundary_port in (*self.before, *self.behind):
+                if boundary_port.is_waited_for:
+                    self._outside.trigger(boundary_port)
         else:
             self.post()
 
 
-class PostedConductor(Conductor):
+class PostedConductor(ModeDirector):
     """Conducts a machine that fires again at a tag as long as tokens wait at the inputs of its composite."""
 
     @property
@@ -235,7 +247,8 @@ class PostedDirector(Director):
 
     A wake-up is posted when it is requested, a token when it is put into a port.  Actors of equal depth and priority
     fire in the order in which they were posted first.  An actor takes all tokens that wait for it, in whichever of its
-    turns it fires; its consecutive turns are one firing, and a later one comes even if its tokens have been taken.
+    activations it fires; its consecutive activations are one firing, and a later one comes even if its tokens have
+    been taken.
     """
 
     composites = PostedComposites
@@ -244,32 +257,32 @@ class PostedDirector(Director):
         super().__init__(order, seed, limits, graph)
         found, self._takes_all = layout(graph, PostedDirector)
         self._posts = Posts(found)
-        self.posted: dict[str, Border] = {}  # of the composites that are posted as a whole
+        self.posted: dict[str, CompositeBoundary] = {}  # of the composites that are posted as a whole
 
     # -- the order ------------------------------------------------------------------------------------------------
 
-    def line_up(self, turn: Turn) -> None:
-        turn.is_wanted = True
-        self._posts.push(turn.rank)
+    def enqueue(self, activation: Activation) -> None:
+        activation.is_scheduled = True
+        self._posts.push(activation.rank)
 
-    def next_turn(self) -> Turn | None:
+    def next_activation(self) -> Activation | None:
         if self._posts.first() < 0:
             return None
-        turn = self._pop()
-        self.rank = turn.rank
-        return turn
+        activation = self._pop()
+        self.rank = activation.rank
+        return activation
 
-    def _pop(self) -> Turn:
-        turn = self.turns[self._posts.pop()]
-        assert turn is not None
-        turn.is_wanted = False
-        return turn
+    def _pop(self) -> Activation:
+        activation = self.activations[self._posts.pop()]
+        assert activation is not None
+        activation.is_scheduled = False
+        return activation
 
-    def has_reason(self, turn: Turn) -> bool:
-        found = super().has_reason(turn)
-        while turn.actor.path in self._takes_all and (rank := self._posts.first()) >= 0:
-            other = self.turns[rank]
-            if other is None or other.actor is not turn.actor:
+    def has_reason(self, activation: Activation) -> bool:
+        found = super().has_reason(activation)
+        while activation.actor.path in self._takes_all and (rank := self._posts.first()) >= 0:
+            other = self.activations[rank]
+            if other is None or other.actor is not activation.actor:
                 break
             found = super().has_reason(self._pop()) or found
         return found
@@ -285,37 +298,37 @@ class PostedDirector(Director):
         super().handle(instant)
 
     def _arrange(self, instant: Instant) -> None:
-        """Leave out what was cancelled, and put the contents of a composite behind the turn that posts all of it."""
-        if instant.turn is None:
+        """Leave out what was cancelled, and put a composite's contents behind the activation that posts all of it."""
+        if instant.activation is None:
             return
-        found = [(instant.turn, instant.wake), *zip(instant.turns or (), instant.wakes or (), strict=True)]
-        instant.turn = instant.wake = instant.turns = instant.wakes = None
-        for turn, wake in sorted(found, key=lambda entry: self._nesting(entry[0].actor)):
+        found = [(instant.activation, instant.wake), *zip(instant.activations or (), instant.wakes or (), strict=True)]
+        instant.activation = instant.wake = instant.activations = instant.wakes = None
+        for activation, wake in sorted(found, key=lambda entry: self._nesting(entry[0].actor)):
             if wake is None or not wake.cancelled:
-                instant.add(turn, wake)
+                instant.add(activation, wake)
 
     # -- composites that are posted as a whole --------------------------------------------------------------------
 
-    def wake_turn(self, turn: Turn, time: int) -> Wake:
-        return self._note(turn, super().wake_turn(turn, time))
+    def wake_activation(self, activation: Activation, time: int) -> Wake:
+        return self._note(activation, super().wake_activation(activation, time))
 
     def call(self, actor: Actor, tag: Tag, rank: int) -> Wake:
-        return self._note(self.turn(actor, rank), super().call(actor, tag, rank))
+        return self._note(self.activation(actor, rank), super().call(actor, tag, rank))
 
-    def want_at(self, turn: Turn, time: int) -> Moment:
+    def schedule_at(self, activation: Activation, time: int) -> Moment:
         is_now = self.present is None and time <= self.now().time
-        moment = super().want_at(turn, time)
-        return moment if is_now else self._note(turn, moment)
+        moment = super().schedule_at(activation, time)
+        return moment if is_now else self._note(activation, moment)
 
-    def _note(self, turn: Turn, moment: M) -> M:
-        """Let the composite that an actor is in know of its turn."""
-        if (border := self._around(turn.actor)) is not None:
+    def _note(self, activation: Activation, moment: M) -> M:
+        """Let the composite that an actor is in know of its activation."""
+        if (border := self._around(activation.actor)) is not None:
             border.note(moment.time, moment.microstep)
         return moment
 
-    def _around(self, actor: Actor) -> Border | None:
+    def _around(self, actor: Actor) -> CompositeBoundary | None:
         """What posts the innermost composite around an actor that is posted as a whole."""
-        path = actor.composite if isinstance(actor, Border) else actor.path
+        path = actor.composite if isinstance(actor, CompositeBoundary) else actor.path
         while path and self.posted:
             path = path.rpartition(".")[0]
             if path in self.posted:
@@ -330,11 +343,13 @@ class PostedDirector(Director):
     # -- for borders --------------------------------------------------------------------------------------------------
 
     def is_between(self, first: int, last: int) -> bool:
-        """Whether none of the turns of these ranks is being taken."""
+        """Whether none of the activations of these ranks is being taken."""
         return self.present is None or not first <= self.rank <= last
 
     def is_to_come(self, first: int, last: int) -> bool:
-        """Whether a turn of these ranks is still to come at the present tag, and none of them is being taken."""
+        """Whether an activation of these ranks is still to come at the present tag, and none of them is being taken."""
         if self.present is None or not self.is_between(first, last):
             return False
-        return any(turn is not None and turn.is_wanted for turn in self.turns[first : last + 1])
+        return any(
+            activation is not None and activation.is_scheduled for activation in self.activations[first : last + 1]
+        )

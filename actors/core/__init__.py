@@ -21,8 +21,8 @@ from .messages import (
     visible_character,
     visible_lines,
 )
-from .moment import Moment, Wake, When, new_wake
-from .order import NEVER, Line, Ranks, Times
+from .moment import Moment, Wake, new_wake
+from .order import NEVER, Calendar, ReadyQueue, TimedQueue
 from .parameter import (
     REQUIRED,
     Configurable,
@@ -37,7 +37,7 @@ from .parameter import (
 from .parameter_kinds import MappingParameter, array_parameter, texts_parameter
 from .port_parameter import PortParameter
 from .port_types import accepts, shaped, token_type, type_name
-from .ports import NO_TOKENS, Emitter, InputPort, OutputPort, PortError, Way
+from .ports import NO_TOKENS, Emitter, InputPort, OutputPort, PortError, Receiver
 from .primitives import is_alone
 from .process import Process
 from .quantity import MAX_DEPTH, Quantity, counted_in_si, is_too_deep, plain
@@ -46,14 +46,15 @@ from .tag import NANOSECONDS_PER_SECOND, Tag, new_tag, to_nanoseconds, to_second
 from .units import UnitError, convert, in_si, parse_unit
 
 __all__ = [
-    "ABSENT", "MAX_DEPTH", "NANOSECONDS_PER_SECOND", "NEVER", "NO_TOKENS", "REQUIRED", "Actor", "Configurable",
-    "Context", "Emitter", "Environment", "EpicycleError", "Fault", "FaultError", "InputPort", "Latest", "Line",
+    "ABSENT", "MAX_DEPTH", "NANOSECONDS_PER_SECOND", "NEVER", "NO_TOKENS", "REQUIRED", "Actor", "Calendar",
+    "Configurable", "Context", "Emitter", "Environment", "EpicycleError", "Fault", "FaultError", "InputPort", "Latest",
     "MappingParameter", "Moment", "OutputPort", "Parameter", "ParameterError", "Pending", "PortError", "PortParameter",
-    "Process", "Quantity", "Ranks", "Span", "Stream", "Streams", "Tag", "Times", "UnitError", "Wake", "Way", "When",
-    "abridged", "accepts", "array_parameter", "bounds_text", "brief", "convert", "counted", "counted_in_si", "cut",
-    "declared_parameters", "declared_ports", "did_you_mean", "digits", "elementary", "has_own_ports", "in_si",
-    "irregular", "is_alone", "is_too_deep", "nearest", "new_tag", "new_wake", "normal_quantile", "normal_share",
-    "open_regular", "parse_unit", "part_finders", "paths", "plain", "present", "random_stream", "read_regular",
-    "read_table", "readable", "rounds", "shaped", "shortened", "texts_parameter", "to_nanoseconds", "to_seconds",
-    "token_type", "type_name", "unknown_parameter", "variants", "visible", "visible_character", "visible_lines",
+    "Process", "Quantity", "ReadyQueue", "Receiver", "Span", "Stream", "Streams", "Tag", "TimedQueue", "UnitError",
+    "Wake", "abridged", "accepts", "array_parameter", "bounds_text", "brief", "convert", "counted",
+    "counted_in_si", "cut", "declared_parameters", "declared_ports", "did_you_mean", "digits", "elementary",
+    "has_own_ports", "in_si", "irregular", "is_alone", "is_too_deep", "nearest", "new_tag", "new_wake",
+    "normal_quantile", "normal_share", "open_regular", "parse_unit", "part_finders", "paths", "plain", "present",
+    "random_stream", "read_regular", "read_table", "readable", "rounds", "shaped", "shortened", "texts_parameter",
+    "to_nanoseconds", "to_seconds", "token_type", "type_name", "unknown_parameter", "variants", "visible",
+    "visible_character", "visible_lines",
 ]  # fmt: skip

@@ -10,7 +10,7 @@ from itertools import zip_longest
 from typing import Any, Generic, TypeVar
 
 from .actor import Actor
-from .order import Line
+from .order import TimedQueue
 from .ports import InputPort
 
 T = TypeVar("T")
@@ -62,7 +62,7 @@ class Pending(Generic[T]):
 
     def __init__(self, actor: Actor) -> None:
         self._actor = actor
-        self._line = Line()
+        self._line = TimedQueue()
 
     def __len__(self) -> int:
         return len(self._line)

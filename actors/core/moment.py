@@ -2,18 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Protocol
-
 from .tag import Tag, new_tag
-
-
-class When(Protocol):
-    """A tag, or an object that represents one."""
-
-    @property
-    def time(self) -> int: ...
-    @property
-    def microstep(self) -> int: ...
 
 
 class Moment:
@@ -39,7 +28,7 @@ class Wake:
 
     __slots__ = ("cancelled", "due", "microstep", "time")
 
-    def __init__(self, when: When) -> None:
+    def __init__(self, when: Tag | Moment) -> None:
         self.move(when)
         self.due = False
         self.cancelled = False
@@ -49,7 +38,7 @@ class Wake:
         """When it is due."""
         return new_tag(self.time, self.microstep)
 
-    def move(self, when: When) -> None:
+    def move(self, when: Tag | Moment) -> None:
         """Engine: set another tag."""
         self.time = when.time
         self.microstep = when.microstep

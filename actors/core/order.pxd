@@ -5,7 +5,7 @@ from epicycle.actors.core.moment cimport Moment, Wake
 
 
 @cython.final
-cdef class Ranks:
+cdef class ReadyQueue:
     cdef long long* items
     cdef readonly Py_ssize_t size
     cdef Py_ssize_t room
@@ -19,8 +19,8 @@ cdef struct Slot:
 
 
 @cython.final
-cdef class Times:
-    cdef Ranks heap
+cdef class Calendar:
+    cdef ReadyQueue heap
     cdef list instants
     cdef Py_ssize_t* free  # places in the list
     cdef Slot* table
@@ -42,7 +42,7 @@ cdef struct Item:
 
 
 @cython.final
-cdef class Line:
+cdef class TimedQueue:
     cdef list wakes, values
     cdef Item* heap
     cdef Py_ssize_t* free

@@ -9,12 +9,12 @@ from heapq import heappop, heappush
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from .moment import Wake, When
+    from .moment import Moment, Wake
 
 NEVER = 2**63 - 1  # ns
 
 
-class Ranks:
+class ReadyQueue:
     """Whole numbers, the smallest first."""
 
     __slots__ = ("content",)
@@ -36,13 +36,13 @@ class Ranks:
         return heappop(self.content)
 
 
-class Times:
+class Calendar:
     """The work due at the first microstep of future times."""
 
     __slots__ = ("_heap", "content")
 
     def __init__(self) -> None:
-        self.content: dict[int, When] = {}
+        self.content: dict[int, Moment] = {}
         self._heap: list[int] = []
 
     @property
@@ -58,7 +58,7 @@ class Times:
         """The work due at a time, if any."""
         return self.content.get(time)
 
-    def add(self, instant: When) -> None:
+    def add(self, instant: Moment) -> None:
         """Add a new time."""
         heappush(self._heap, instant.time)
         self.content[instant.time] = instant
@@ -68,7 +68,7 @@ class Times:
         return self.content.pop(heappop(self._heap))
 
 
-class Line:
+class TimedQueue:
     """Values that wait for wake-ups, in the order of these, and in the order of entry for the same tag."""
 
     __slots__ = ("content", "number")

@@ -9,7 +9,7 @@ NEVER = 2**63 - 1
 cdef long long LAST = 2**63 - 1
 
 
-cdef class Ranks:
+cdef class ReadyQueue:
     __slots__ = ("content",)
 
     def __dealloc__(self):
@@ -63,12 +63,12 @@ cdef class Ranks:
         return least
 
 
-cdef class Times:
+cdef class Calendar:
     __slots__ = ("content",)
 
     def __cinit__(self):
         self.mask = -1
-        self.heap = Ranks()
+        self.heap = ReadyQueue()
         self.instants = []
 
     def __dealloc__(self):
@@ -174,7 +174,7 @@ cdef class Times:
         return found
 
 
-cdef class Line:
+cdef class TimedQueue:
     __slots__ = ("content", "number")
 
     def __cinit__(self):

@@ -4,11 +4,11 @@ cimport cython
 from epicycle.actors.core.primitives cimport empty
 
 
-cdef class Way:
-    cpdef go(self, token)
+cdef class Receiver:
+    cpdef put(self, token)
 
 
-cdef class Emitter(Way):
+cdef class Emitter(Receiver):
     cpdef send(self, token, channel=*)
 
 

@@ -31,17 +31,17 @@ class PortError(EpicycleError):
     """A port was used in a way that its declaration or the model does not allow."""
 
 
-class Way:
+class Receiver:
     """The next place of a token."""
 
     __slots__ = ()
 
-    def go(self, token: Any) -> None:
+    def put(self, token: Any) -> None:
         """Pass a token on."""
         raise NotImplementedError
 
 
-class Emitter(Way):
+class Emitter(Receiver):
     """What ``send`` does in a running model."""
 
     __slots__ = ()

@@ -37,7 +37,7 @@ class Refinements(Protocol):
     def begin(self, mode: str) -> None:
         """Start, or restart, in a mode."""
 
-    def go(self, mode: str, *, history: bool) -> None:
+    def change(self, mode: str, *, history: bool) -> None:
         """Leave the refinement of the present mode and enter that of another: where it was left, or from its start."""
 
     def raise_failure(self) -> None:
@@ -276,7 +276,7 @@ class StateMachine(ModalActor):
 
     def moves(self, rule: Rule) -> None:
         if self.refinements is not None:
-            self.refinements.go(rule.target, history=rule.history)
+            self.refinements.change(rule.target, history=rule.history)
 
     def enters(self, mode: str) -> None:
         self._act(self.modes[mode].entry)

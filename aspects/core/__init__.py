@@ -17,7 +17,7 @@ from .kinds import (
     PortAspect,
     RandomLoss,
     Request,
-    Unit,
+    Target,
     is_bad,
 )
 from .parameters import (
@@ -38,10 +38,10 @@ from .server import NEWEST, OLDEST, Server, Task, WaitingLine
 
 __all__ = [
     "NEWEST", "OLDEST", "STAMP", "TOKEN", "ActorPoint", "Aspect", "AspectContext", "ByActorParameter",
-    "CommunicationAspect", "CompositeAspect", "CompositeExecutionAspect", "Decoration", "Duration",
-    "DurationParameter", "ExecutionAspect", "FieldError", "FiringRequest", "FiringTime", "FiringTimeParameter",
-    "GroupsParameter", "Job", "JoinPoint", "JoinPointAspect", "LawParameter", "LossAspect", "MeasurementAspect",
-    "ObservationAspect", "PortAspect", "PortsParameter", "RandomLoss", "Reading", "Request", "Selection",
-    "SelectionParameter", "Server", "Task", "Unit", "WaitingLine", "altered", "aspect_stream", "class_decorations",
-    "decorations", "drawn", "field_of", "is_bad", "law", "numbers_in", "stamped_as", "time_needed",
+    "CommunicationAspect", "CompositeAspect", "CompositeExecutionAspect", "Decoration", "Duration", "DurationParameter",
+    "ExecutionAspect", "FieldError", "FiringRequest", "FiringTime", "FiringTimeParameter", "GroupsParameter", "Job",
+    "JoinPoint", "JoinPointAspect", "LawParameter", "LossAspect", "MeasurementAspect", "ObservationAspect",
+    "PortAspect", "PortsParameter", "RandomLoss", "Reading", "Request", "Selection", "SelectionParameter", "Server",
+    "Target", "Task", "WaitingLine", "altered", "aspect_stream", "class_decorations", "decorations", "drawn",
+    "field_of", "is_bad", "law", "numbers_in", "stamped_as", "time_needed",
 ]  # fmt: skip

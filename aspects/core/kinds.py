@@ -8,7 +8,7 @@ at which it fires, and its tokens are sent then.  If a job is never forwarded, t
 Tokens that come, and wake-ups that fall due, while a job waits, are separate jobs.  An aspect keeps the jobs of one
 actor in order.  If several aspects are attached to one actor, the first declared is the first to get a job.
 
-An aspect aimed at a composite attaches to all the actors in it, with one ``point.unit`` for all of them: whatever
+An aspect aimed at a composite attaches to all the actors in it, with one ``point.target`` for all of them: whatever
 concerns the composite as a whole, such as a crash, has its stream, memory and events there.  Actors that are processes
 (``run``) are fired by their waits and reads; if they wait for an event of SimPy (a resource, a timeout), no firing
 resumes them, so no aspect can delay that.
@@ -166,9 +166,9 @@ class Keeper(Protocol):
 
 
 class ActorPoint(JoinPoint):
-    """An actor to which an aspect is attached; ``unit`` is its target, this actor or a composite around it."""
+    """An actor to which an aspect is attached; ``target`` is its target, this actor or a composite around it."""
 
-    unit: Unit
+    target: Target
     keeper: Keeper
 
     @staticmethod
@@ -180,7 +180,7 @@ class ActorPoint(JoinPoint):
 _WHOLE = " as a whole"  # a part of the name of a random stream: with another one, results would change
 
 
-class Unit(ActorPoint):
+class Target(ActorPoint):
     """The target of an execution aspect as a whole: the ``points`` of its actors."""
 
     def __init__(self, path: str, first: ActorPoint) -> None:
@@ -220,7 +220,7 @@ class ExecutionAspect(JoinPointAspect[Job, ActorPoint]):
 
     is_processor: ClassVar[bool] = False
 
-    def begin(self, unit: Unit) -> None:
+    def begin(self, target: Target) -> None:
         """Called once before the first tag for each target, for actions that it starts itself."""
 
     @abstractmethod

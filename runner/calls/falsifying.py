@@ -14,7 +14,7 @@ from typing import Any
 from epicycle.actors import EpicycleError, abridged, counted
 
 from ..bars import bar
-from ..engine import Acts, Simulation
+from ..engine import Interventions, Simulation
 from ..graph import ActName
 from ..language import EXACTLY, Setting, split_number
 from ..provenance import version_of
@@ -65,7 +65,7 @@ class Falsified(Tabled):
         name = run.broken[0]
         if asked.monitor is not None and name not in {each.name for each in model.monitors}:
             model.monitor(name, asked.monitor)
-        results = Simulation(model, seed=run.seed, acts=Acts(model.exactly)).run()
+        results = Simulation(model, seed=run.seed, acts=Interventions(model.exactly)).run()
         if results.digest != run.digest:
             raise EpicycleError(
                 f"run {run.number} (seed {run.seed}) does not repeat: its digest is {results.digest[:16]}..., but was "

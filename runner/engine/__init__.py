@@ -15,27 +15,27 @@ from ..results import (
     plain,
     write_log,
 )
-from .acts import Acts
-from .agenda import Delivery, Instant, Turn
+from .acts import Interventions
+from .agenda import Activation, Delivery, Instant
 from .copies import CopyError
 from .director import Director, Entry
 from .directors import Directors
 from .errors import ActorError, LoopError
-from .local_time import LocalDirector, Passage
+from .local_time import BoundaryPort, LocalDirector
 from .log_filter import LogFilter
 from .pace import SLOWEST, Pace
-from .refinement import Conductor, Refinement
+from .receivers import Call
+from .refinement import ModeDirector, Refinement
 from .simulation import Simulation, Snapshot, SnapshotError
 from .trace import Arrival, Firing, Tracer
-from .way import Call
 
 __all__ = [
     "SLOWEST",
+    "Activation",
     "ActorError",
-    "Acts",
     "Arrival",
+    "BoundaryPort",
     "Call",
-    "Conductor",
     "CopyError",
     "Delivery",
     "Director",
@@ -44,13 +44,14 @@ __all__ = [
     "EventLog",
     "Firing",
     "Instant",
+    "Interventions",
     "LocalDirector",
     "LogError",
     "LogFile",
     "LogFilter",
     "LoopError",
+    "ModeDirector",
     "Pace",
-    "Passage",
     "Record",
     "Refinement",
     "Results",
@@ -60,7 +61,6 @@ __all__ = [
     "Snapshot",
     "SnapshotError",
     "Tracer",
-    "Turn",
     "canonical",
     "cell",
     "check_log_path",

@@ -13,15 +13,15 @@ from collections.abc import Callable, Container
 from dataclasses import replace
 from typing import Any
 
-from epicycle.actors import Streams, Tag, Way
+from epicycle.actors import Receiver, Streams, Tag
 from epicycle.aspects import AspectContext
 
 from ..graph import Act, ActName
 from ..results import canonical
-from .way import Guarded
+from .receivers import AspectCall
 
 
-class Acts:
+class Interventions:
     """The acts of a run: those that happen, if ``exactly`` names some, and those that have been ``noted``."""
 
     def __init__(self, exactly: Container[ActName] | None = None) -> None:
@@ -46,18 +46,18 @@ class Acts:
         self._noted[name] = replace(before, events=(*before.events, *events))
 
 
-class Named(Way):
+class NamedCall(Receiver):
     """An aspect at a place, whose acts have names."""
 
-    __slots__ = ("acts", "guarded", "key")
+    __slots__ = ("acts", "aspect_call", "key")
 
-    def __init__(self, guarded: Guarded, acts: Acts, place: str) -> None:
-        self.guarded = guarded
+    def __init__(self, aspect_call: AspectCall, acts: Interventions, place: str) -> None:
+        self.aspect_call = aspect_call
         self.acts = acts
-        self.key = guarded.point.aspect, place
+        self.key = aspect_call.point.aspect, place
 
-    def go(self, token: Any) -> None:
-        name, point = self.acts.next(*self.key), self.guarded.point
+    def put(self, token: Any) -> None:
+        name, point = self.acts.next(*self.key), self.aspect_call.point
         point.random  # noqa: B018 (or a copy would have a stream of its own)
         if self.acts.exactly is None or name in self.acts.exactly:
             passing = _Passing(token, point._forward)
@@ -78,10 +78,12 @@ class Named(Way):
         counts: dict[str, int],
     ) -> None:
         """Let the aspect act; what it keeps of this token, it keeps with a join point that is this token's."""
-        guarded = self.guarded
-        seen = copy.copy(guarded.point)
+        aspect_call = self.aspect_call
+        seen = copy.copy(aspect_call.point)
         seen._context, seen._forward, seen.enter, seen.counts = context, forward, enter, counts
-        Guarded(guarded.act, guarded.doing, seen, guarded.holds, guarded.pass_by, guarded.tell).go(token)
+        AspectCall(
+            aspect_call.act, aspect_call.doing, seen, aspect_call.holds, aspect_call.pass_by, aspect_call.tell
+        ).put(token)
 
 
 class _Passing:
@@ -139,7 +141,7 @@ class _Context:
 class _Noting(_Context):
     """Notes what is done to a token under its name."""
 
-    def __init__(self, context: AspectContext, acts: Acts, name: ActName, source: str, token: Any) -> None:
+    def __init__(self, context: AspectContext, acts: Interventions, name: ActName, source: str, token: Any) -> None:
         super().__init__(context)
         self._acts = acts
         self._name = name

@@ -1,17 +1,17 @@
 # Types for C; agenda.py has the documentation.
 
 cimport cython
-from epicycle.actors cimport InputPort, Moment, Wake, Way, is_alone
+from epicycle.actors cimport InputPort, Moment, Wake, Receiver, is_alone
 
 
 @cython.final
-cdef class Turn:
+cdef class Activation:
     cdef public object actor
     cdef public Form form
     cdef public long rank
     cdef public list later, ports, wakes
     cdef public Wake wake
-    cdef public bint is_wanted
+    cdef public bint is_scheduled
     cpdef add(self, Wake wake)
     @cython.locals(wake=Wake, due=cython.bint)
     cpdef bint use_wakes(self) except -1
@@ -29,10 +29,10 @@ cdef class Form:
 
 @cython.final
 cdef class Instant(Moment):
-    cdef public list pending, turns, wakes
-    cdef public Turn turn
+    cdef public list pending, activations, wakes
+    cdef public Activation activation
     cdef public Wake wake
-    cpdef add(self, Turn turn, Wake wake)
+    cpdef add(self, Activation activation, Wake wake)
 
 
 @cython.locals(instant=Instant)
@@ -41,6 +41,6 @@ cpdef Instant new_instant(long long time, long microstep, Instant past=*)
 
 @cython.final
 cdef class Delivery:
-    cdef public Way way
+    cdef public Receiver way
     cdef public object token
     cpdef arrive(self)

@@ -1,22 +1,22 @@
-"""The agenda: the turns of actors at a tag, and the work of future tags."""
+"""The agenda: the activations of actors at a tag, and the work of future tags."""
 
 from __future__ import annotations
 
 from typing import Any
 
-from epicycle.actors import Actor, InputPort, Moment, Wake, Way, is_alone
+from epicycle.actors import Actor, InputPort, Moment, Receiver, Wake, is_alone
 
-_NOTHING: list[Any] = []  # shown by a port whose tokens are for a later turn
+_NOTHING: list[Any] = []  # shown by a port whose tokens are for a later activation
 
 
-class Turn:
+class Activation:
     """The place of an actor in the firing order, for its wake-ups or for the tokens of some inputs.
 
-    ``ports`` are these inputs, ``later`` those whose tokens are taken in a later turn of the same actor; unconnected
-    ports are left out.  ``wakes`` are the wake-ups of the present tag.
+    ``ports`` are these inputs, ``later`` those whose tokens are taken in a later activation of the same actor;
+    unconnected ports are left out.  ``wakes`` are the wake-ups of the present tag.
     """
 
-    __slots__ = ("actor", "form", "is_wanted", "later", "ports", "rank", "wake", "wakes")
+    __slots__ = ("actor", "form", "is_scheduled", "later", "ports", "rank", "wake", "wakes")
 
     def __init__(self, actor: Actor, rank: int, ports: list[InputPort[Any]], later: list[InputPort[Any]]) -> None:
         self.actor = actor
@@ -24,12 +24,12 @@ class Turn:
         self.rank = rank
         self.ports = ports
         self.later: list[InputPort[Any]] = later or _NOTHING
-        self.is_wanted = False  # whether the actor has this turn at the present tag
+        self.is_scheduled = False  # whether the actor has this activation at the present tag
         self.wake: Wake | None = None  # the first one of the present tag
         self.wakes: list[Wake] | None = None  # the others
 
     def add(self, wake: Wake) -> None:
-        """Add a reason for this turn."""
+        """Add a reason for this activation."""
         if self.wake is None:
             self.wake = wake
         elif self.wakes is None:
@@ -57,7 +57,7 @@ class Turn:
         return found
 
     def hold(self) -> None:
-        """The actor fires: it does not yet see tokens for a later turn."""
+        """The actor fires: it does not yet see tokens for a later activation."""
         for port in self.later:
             port.shown = _NOTHING
 
@@ -83,25 +83,25 @@ class Form:
 class Instant(Moment):
     """The work of one tag: tokens to deliver, then wake-ups.
 
-    The first wake-up is ``wake``, for the actor of ``turn``; most instants have no other.
+    The first wake-up is ``wake``, for the actor of ``activation``; most instants have no other.
     """
 
-    __slots__ = ("pending", "turn", "turns", "wake", "wakes")
+    __slots__ = ("activation", "activations", "pending", "wake", "wakes")
 
     pending: list[Delivery] | None
-    turn: Turn | None
+    activation: Activation | None
     wake: Wake | None
-    turns: list[Turn] | None
-    wakes: list[Wake | None] | None  # of each of these turns
+    activations: list[Activation] | None
+    wakes: list[Wake | None] | None  # of each of these activations
 
-    def add(self, turn: Turn, wake: Wake | None) -> None:
-        """Give an actor a turn, for a wake-up if there is one."""
-        if self.turn is None:
-            self.turn, self.wake = turn, wake
-        elif self.turns is None or self.wakes is None:
-            self.turns, self.wakes = [turn], [wake]
+    def add(self, activation: Activation, wake: Wake | None) -> None:
+        """Give an actor an activation, for a wake-up if there is one."""
+        if self.activation is None:
+            self.activation, self.wake = activation, wake
+        elif self.activations is None or self.wakes is None:
+            self.activations, self.wakes = [activation], [wake]
         else:
-            self.turns.append(turn)
+            self.activations.append(activation)
             self.wakes.append(wake)
 
 
@@ -109,7 +109,7 @@ def new_instant(time: int, microstep: int, past: Instant | None = None) -> Insta
     """An instant without work yet; a past one is reused if nobody has kept it."""
     instant = past if past is not None and is_alone(past) else Instant.__new__(Instant)
     instant.time, instant.microstep = time, microstep
-    instant._tag = instant.pending = instant.turn = instant.wake = instant.turns = instant.wakes = None
+    instant._tag = instant.pending = instant.activation = instant.wake = instant.activations = instant.wakes = None
     return instant
 
 
@@ -118,10 +118,10 @@ class Delivery:
 
     __slots__ = ("token", "way")
 
-    def __init__(self, way: Way, token: Any) -> None:
+    def __init__(self, way: Receiver, token: Any) -> None:
         self.way = way
         self.token = token
 
     def arrive(self) -> None:
         """Send it onward."""
-        self.way.go(self.token)
+        self.way.put(self.token)

@@ -12,8 +12,8 @@ from ..results import EventLog, Signal
 from .director import Director
 from .errors import ActorError, CrowdError, LoopError
 from .local_time import LocalDirector
+from .receivers import Call, Deliver
 from .refinement import Refinement
-from .way import Call, Deliver
 
 
 class EngineContext:

@@ -19,10 +19,10 @@ is received at the first microstep that the director has not yet handled.
 Departures from Ptolemy II: a firing sees all tokens of its tag at once, where Ptolemy fires again for each further
 token; and tokens that an actor does not read do not stay in the port.
 
-Another director is a subclass, which a dialect names (``catalogue.Dialect.director``).  It may decide in which turn an
-actor takes which tokens (``inputs_at``), which turn is next (``line_up``, ``next_turn``), whether it leads to a firing
-(``has_reason``), what happens at the begin of a tag (``handle``), and what the borders of composites do
-(``composites``).
+Another director is a subclass, which a dialect names (``catalogue.Dialect.director``).  It may decide in which
+activation an actor takes which tokens (``inputs_at``), which activation is next (``enqueue``, ``next_activation``),
+whether it leads to a firing (``has_reason``), what happens at the begin of a tag (``handle``), and what the borders of
+composites do (``composites``).
 """
 
 from __future__ import annotations
@@ -31,22 +31,22 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NoReturn
 
 from epicycle.actors import (
+    Calendar,
     Environment,
     InputPort,
     Moment,
     Process,
-    Ranks,
+    ReadyQueue,
+    Receiver,
     Streams,
     Tag,
-    Times,
     Wake,
-    Way,
     new_wake,
 )
 
 from ..text import NORMAL, Limits, describe
 from . import errors
-from .agenda import Delivery, Instant, Turn, new_instant
+from .agenda import Activation, Delivery, Instant, new_instant
 from .errors import ActorError, Crowd, CrowdError, LoopError
 
 if TYPE_CHECKING:
@@ -64,8 +64,8 @@ class Director:
     __slots__ = (
         "_environment", "_has_simpy", "_is_interrupted", "_last", "_most_microsteps", "_most_steps",
         "_most_times", "_next", "_on_their_way", "_past", "_queue", "_ready", "_reason", "_recent",
-        "_stop_after", "_time", "_times", "crowd", "firings", "present", "rank", "ranks", "seed", "steps",
-        "streams", "turns", "watch",
+        "_stop_after", "_time", "_times", "activations", "crowd", "firings", "present", "rank",
+        "ranks", "seed", "steps", "streams", "watch",
     )  # fmt: skip
 
     # The subclass of ``Directors`` that makes the borders of composites; None is the usual one.
@@ -90,13 +90,13 @@ class Director:
         self._last = new_instant(0, 0)  # the latest tag that was handled, or is being handled
         self._past: Instant | None = None  # the one before it, which may serve again
         self.ranks = order  # of actors and of their inputs
-        self.turns: list[Turn | None] = [None] * (max(order.values(), default=0) + 1)  # by rank
-        # The work: at the present tag the ranks of turns (a heap), then the next microstep, then later times.
+        self.activations: list[Activation | None] = [None] * (max(order.values(), default=0) + 1)  # by rank
+        # The work: at the present tag the ranks of activations (a heap), then the next microstep, then later times.
         # One entry per actor and tag, whatever the number of its tokens.
-        self._ready = Ranks()
+        self._ready = ReadyQueue()
         self._next: Instant | None = None
-        self._times = Times()
-        self.rank = -1  # the rank of the turn handled now
+        self._times = Calendar()
+        self.rank = -1  # the rank of the activation handled now
         self._stop_after: Tag | None = None
         self._reason = "no events left"
         self._recent: list[str] | None = None  # actors that fire while time seems to stand still
@@ -140,69 +140,69 @@ class Director:
 
     def wake(self, actor: Actor, time: int) -> Wake:
         """Fire ``actor`` at ``time``; the present or past is the next microstep."""
-        return self.wake_turn(self.turn(actor, self.ranks[actor.path]), time)
+        return self.wake_activation(self.activation(actor, self.ranks[actor.path]), time)
 
-    def wake_turn(self, turn: Turn, time: int) -> Wake:
-        """Give an actor a turn at ``time``."""
+    def wake_activation(self, activation: Activation, time: int) -> Wake:
+        """Give an actor an activation at ``time``."""
         now = self.now()
         if self.present is None and time <= now.time:
-            return self._call_now(turn, now)
-        return self._wake_at(turn, self._to_come(now, time))
+            return self._call_now(activation, now)
+        return self._wake_at(activation, self._to_come(now, time))
 
     def call(self, actor: Actor, tag: Tag, rank: int) -> Wake:
         """Fire ``actor`` at a future tag and rank (``next_tag``)."""
-        turn, now = self.turn(actor, rank), self.now()
+        activation, now = self.activation(actor, rank), self.now()
         if tag.time == now.time and tag.microstep == now.microstep:
-            return self._call_now(turn, now)
-        return self._wake_at(turn, self._to_come(now, tag.time))
+            return self._call_now(activation, now)
+        return self._wake_at(activation, self._to_come(now, tag.time))
 
-    def want_at(self, turn: Turn, time: int) -> Moment:
-        """Give an actor a turn at ``time`` that cannot be cancelled; returns its tag."""
+    def schedule_at(self, activation: Activation, time: int) -> Moment:
+        """Give an actor an activation at ``time`` that cannot be cancelled; returns its tag."""
         now = self.now()
         if self.present is None and time <= now.time:
-            self.want(turn)
+            self.schedule(activation)
             return now
         instant = self._to_come(now, time)
-        instant.add(turn, None)
+        instant.add(activation, None)
         return instant
 
-    def _call_now(self, turn: Turn, now: Instant) -> Wake:
+    def _call_now(self, activation: Activation, now: Instant) -> Wake:
         wake = new_wake(now.time, now.microstep)
-        turn.add(wake)
-        self.want(turn)
+        activation.add(wake)
+        self.schedule(activation)
         return wake
 
-    def _wake_at(self, turn: Turn, instant: Instant) -> Wake:
+    def _wake_at(self, activation: Activation, instant: Instant) -> Wake:
         wake = new_wake(instant.time, instant.microstep)
-        instant.add(turn, wake)
+        instant.add(activation, wake)
         return wake
 
-    def turn(self, actor: Actor, rank: int) -> Turn:
-        """The turn of a rank, for ``actor``: an actor of the model, or its stand-in."""
-        turn = self.turns[rank]
-        if turn is None:
-            turn = self.turns[rank] = self.new_turn(actor, rank)
-        return turn
+    def activation(self, actor: Actor, rank: int) -> Activation:
+        """The activation of a rank, for ``actor``: an actor of the model, or its stand-in."""
+        activation = self.activations[rank]
+        if activation is None:
+            activation = self.activations[rank] = self.new_activation(actor, rank)
+        return activation
 
-    def new_turn(self, actor: Actor, rank: int) -> Turn:
-        """A turn of an actor, or of its stand-in, at a rank."""
+    def new_activation(self, actor: Actor, rank: int) -> Activation:
+        """An activation of an actor, or of its stand-in, at a rank."""
         ports = [port for port in self.inputs_at(actor, rank) if port.width]
         connected = [port for port in actor.inputs.values() if port.width and port not in ports]
-        return Turn(actor, rank, ports, [port for port in connected if self.ranks[port.path] > rank])
+        return Activation(actor, rank, ports, [port for port in connected if self.ranks[port.path] > rank])
 
     def inputs_at(self, actor: Actor, rank: int) -> list[InputPort[Any]]:
-        """The inputs whose tokens an actor takes in its turn at a rank."""
+        """The inputs whose tokens an actor takes in its activation at a rank."""
         return [port for port in actor.inputs.values() if self.ranks[port.path] == rank]
 
-    def entry(self, port: InputPort[Any], channel: int, stand_in: Actor | None = None) -> Way:
+    def entry(self, port: InputPort[Any], channel: int, stand_in: Actor | None = None) -> Receiver:
         """The way into a port at the present tag, which lets the port's actor, or its stand-in, fire."""
-        return Entry(self, self.turn(stand_in or port.actor, self.ranks[port.path]), port, channel)
+        return Entry(self, self.activation(stand_in or port.actor, self.ranks[port.path]), port, channel)
 
     def trigger(self, actor: Actor) -> None:
         """Fire ``actor`` at the present tag."""
-        self.want(self.turn(actor, self.ranks[actor.path]))
+        self.schedule(self.activation(actor, self.ranks[actor.path]))
 
-    def later(self, delay: int, way: Way, token: Any) -> None:
+    def later(self, delay: int, way: Receiver, token: Any) -> None:
         """Send a token onward after ``delay`` ns; 0 is the next microstep."""
         now = self.now()
         instant = self._to_come(now, now.time + delay)
@@ -215,7 +215,7 @@ class Director:
         if self._on_their_way > self._most_times:
             raise CrowdError(now.tag, self._most_times, "tokens on their way, over all times", self._who())
 
-    def hold(self, way: Way, token: Any) -> Delivery:
+    def hold(self, way: Receiver, token: Any) -> Delivery:
         """A function that sends a token onward, later."""
         return Delivery(way, token)
 
@@ -226,7 +226,7 @@ class Director:
             self._reason = reason
 
     def next_tag(self, rank: int) -> Tag:
-        """The first tag at which a turn of this rank is still to come."""
+        """The first tag at which an activation of this rank is still to come."""
         now = self.tag
         is_over = self.present is not None and self.rank >= rank
         return Tag(now.time, now.microstep + 1) if is_over else now
@@ -241,34 +241,34 @@ class Director:
 
     def _who(self) -> tuple[str, ...]:
         """The actor that fires now."""
-        turn = None if self.rank < 0 else self.turns[self.rank]
-        return () if turn is None else (turn.actor.path,)
+        activation = None if self.rank < 0 else self.activations[self.rank]
+        return () if activation is None else (activation.actor.path,)
 
-    def want(self, turn: Turn) -> None:
-        """Give an actor a turn at the present tag."""
-        if not turn.is_wanted:
-            self.line_up(turn)
+    def schedule(self, activation: Activation) -> None:
+        """Give an actor an activation at the present tag."""
+        if not activation.is_scheduled:
+            self.enqueue(activation)
             if self.present is None:
                 self._await_present()
 
-    def line_up(self, turn: Turn) -> None:
-        """Add a turn to those of the present tag, from which ``next_turn`` takes."""
-        turn.is_wanted = True
-        self._ready.push(turn.rank)
+    def enqueue(self, activation: Activation) -> None:
+        """Add an activation to those of the present tag, from which ``next_activation`` takes."""
+        activation.is_scheduled = True
+        self._ready.push(activation.rank)
 
-    def next_turn(self) -> Turn | None:
-        """The next turn at the present tag, which is no longer lined up; None if there is none."""
+    def next_activation(self) -> Activation | None:
+        """The next activation at the present tag, which is no longer lined up; None if there is none."""
         if not self._ready.size:
             return None
-        turn = self.turns[self._ready.pop()]
-        assert turn is not None
-        turn.is_wanted = False
-        self.rank = turn.rank
-        return turn
+        activation = self.activations[self._ready.pop()]
+        assert activation is not None
+        activation.is_scheduled = False
+        self.rank = activation.rank
+        return activation
 
-    def has_reason(self, turn: Turn) -> bool:
-        """Whether an actor is to fire in its turn: its wake-ups may all have been cancelled."""
-        return turn.wake is None or self.use_wakes(turn)
+    def has_reason(self, activation: Activation) -> bool:
+        """Whether an actor is to fire in its activation: its wake-ups may all have been cancelled."""
+        return activation.wake is None or self.use_wakes(activation)
 
     def _to_come(self, now: Instant, time: int) -> Instant:
         """The work after the present tag: at the next microstep, or at the first one of a later time."""
@@ -301,41 +301,41 @@ class Director:
 
     def handle(self, instant: Instant) -> None:
         """Handle a tag, which is the next one."""
-        if instant.turn is not None:
-            self._wake_up(instant.turn, instant.wake)
-        if instant.turns is not None and instant.wakes is not None:
-            for place in range(len(instant.turns)):
-                self._wake_up(instant.turns[place], instant.wakes[place])
+        if instant.activation is not None:
+            self._wake_up(instant.activation, instant.wake)
+        if instant.activations is not None and instant.wakes is not None:
+            for place in range(len(instant.activations)):
+                self._wake_up(instant.activations[place], instant.wakes[place])
         if instant.pending is not None:
             self.rank = -1
             self._begin(instant)
             for delivery in instant.pending:
                 delivery.arrive()
             self._on_their_way -= len(instant.pending)
-        turn = None
+        activation = None
         try:
             while True:
-                turn = self.next_turn()
-                if turn is None:
+                activation = self.next_activation()
+                if activation is None:
                     break
-                if not self.has_reason(turn):
+                if not self.has_reason(activation):
                     continue
                 if self.present is not instant:
                     self._begin(instant)
-                self.fire(turn)
-                turn.clear()
+                self.fire(activation)
+                activation.clear()
         except BaseException as error:  # anything that an actor raises, even sys.exit(), is its failure
-            assert turn is not None
-            turn.clear()
-            self.fail(turn, error)
+            assert activation is not None
+            activation.clear()
+            self.fail(activation, error)
         # Its next microstep comes next, even if nobody fired at this one: a process may have requested it.
         self.present = None if self._next is None else instant
 
-    def _wake_up(self, turn: Turn, wake: Wake | None) -> None:
+    def _wake_up(self, activation: Activation, wake: Wake | None) -> None:
         if wake is not None:
-            turn.add(wake)
-        if not turn.is_wanted:
-            self.line_up(turn)
+            activation.add(wake)
+        if not activation.is_scheduled:
+            self.enqueue(activation)
 
     def _begin(self, instant: Instant) -> None:
         """Something happens at a tag, for the first time."""
@@ -347,57 +347,57 @@ class Director:
         else:
             self._recent = None
 
-    def use_wakes(self, turn: Turn) -> bool:
-        """Make the wake-ups of a turn due; false if the actor has no reason left to fire."""
-        return turn.use_wakes()
+    def use_wakes(self, activation: Activation) -> bool:
+        """Make the wake-ups of an activation due; false if the actor has no reason left to fire."""
+        return activation.use_wakes()
 
-    def fire(self, turn: Turn) -> None:
-        """Let an actor fire, in its turn."""
+    def fire(self, activation: Activation) -> None:
+        """Let an actor fire, in its activation."""
         if self._is_interrupted:
             raise KeyboardInterrupt
         self.firings += 1
         if self._recent is not None:
-            self._recent.append(turn.actor.path)
-        if turn.later:
-            turn.hold()
-        if turn.form is None:
-            turn.actor.fire()
+            self._recent.append(activation.actor.path)
+        if activation.later:
+            activation.hold()
+        if activation.form is None:
+            activation.actor.fire()
         else:
-            turn.form.fire()
+            activation.form.fire()
 
-    def fail(self, turn: Turn, error: BaseException) -> NoReturn:
-        """Report the error of an actor in its turn; one of an aspect on a token's way, say, has been reported."""
+    def fail(self, activation: Activation, error: BaseException) -> NoReturn:
+        """Report the error of an actor in its activation; one of an aspect on a token's way, say, has been reported."""
         if isinstance(error, (ActorError, LoopError, KeyboardInterrupt)):
             raise error
-        doing = "run()" if isinstance(turn.actor, Process) else "fire()"
-        raise ActorError(turn.actor.path, self.last, doing, describe(error)) from error
+        doing = "run()" if isinstance(activation.actor, Process) else "fire()"
+        raise ActorError(activation.actor.path, self.last, doing, describe(error)) from error
 
     def interrupt(self) -> None:
         """Raise ``KeyboardInterrupt`` instead of the next firing, or of the next instant."""
         self._is_interrupted = True
 
 
-class Entry(Way):
+class Entry(Receiver):
     """The end of a token's way: a port of an actor, on one channel."""
 
-    __slots__ = ("channel", "director", "is_plain", "port", "turn")
+    __slots__ = ("activation", "channel", "director", "is_plain", "port")
 
-    def __init__(self, director: Director, turn: Turn, port: InputPort[Any], channel: int) -> None:
+    def __init__(self, director: Director, activation: Activation, port: InputPort[Any], channel: int) -> None:
         self.director = director
-        self.turn = turn
+        self.activation = activation
         self.port = port
         self.channel = channel
         self.is_plain = type(port) is InputPort and port.width == 1
         port.open()
 
-    def go(self, token: Any) -> None:
+    def put(self, token: Any) -> None:
         """Put a token in."""
-        turn = self.turn
+        activation = self.activation
         if self.is_plain:
             self.port.arrived.append(token)
         else:
             self.port.receive(token, self.channel)
-        if not turn.is_wanted:
-            self.director.want(turn)
+        if not activation.is_scheduled:
+            self.director.schedule(activation)
         elif not len(self.port.arrived) % REPORTED:
             self.director.crowd.add(self.director.tag, self.port.path, REPORTED)

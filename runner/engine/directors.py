@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, cast
 
 from ..graph import Clock, ModelGraph, is_within
 from .director import Director
-from .local_time import LocalDirector, Passage
-from .refinement import Conductor, Refinement
+from .local_time import BoundaryPort, LocalDirector
+from .refinement import ModeDirector, Refinement
 
 if TYPE_CHECKING:
     from epicycle.actors import Actor, Context, StateMachine
@@ -24,9 +24,9 @@ def director_of(graph: ModelGraph) -> type[Director]:
 
 
 class Directors:
-    """The directors of a run ``of`` each composite that has one, with the passages at its ports.
+    """The directors of a run ``of`` each composite that has one, with its boundary ports.
 
-    A director may come with a subclass (``Director.composites``), which makes other passages and conductors.
+    A director may come with a subclass (``Director.composites``), which makes other boundary ports and mode directors.
 
     ``executions`` are those of the actors whose firings are deferred or whose errors are caught; their maker adds them.
     """
@@ -37,8 +37,8 @@ class Directors:
         self.director = director
         self.executions: dict[str, Execution] = {}
         self.of: dict[str, Director | LocalDirector | Refinement] = {}
-        self.conductors: dict[str, Conductor] = {}
-        self.passages: dict[str, Passage] = {}
+        self.mode_directors: dict[str, ModeDirector] = {}
+        self.boundary_ports: dict[str, BoundaryPort] = {}
         self.refinements: dict[str, Refinement] = {}
         for composite, clock in graph.clocks.items():
             self._add_director(composite, clock)
@@ -51,30 +51,30 @@ class Directors:
         """The options of a composite's own director."""
         outside = self.base(self.graph.director_of(composite)) if composite else self.director
         for paths in self.graph.borders(composite):
-            self.passages.update({path: self.passage(path, outside) for path in paths})
+            self.boundary_ports.update({path: self.boundary_port(path, outside) for path in paths})
         self.prepare(composite, outside)
         self.of[composite] = self._made_director(composite, clock)
         if composite in self.graph.modal:
             machine = cast("StateMachine", self.actors[self.graph.modal[composite].machine])
-            conductor = self.conductors[composite] = self.conductor(composite, machine)
-            if conductor.hears_inputs:
+            mode_director = self.mode_directors[composite] = self.mode_director(composite, machine)
+            if mode_director.hears_inputs:
                 for path in self.graph.borders(composite)[0]:
-                    self.passages[path].beside = conductor
+                    self.boundary_ports[path].beside = mode_director
 
-    def passage(self, path: str, outside: Director | Refinement) -> Passage:
-        """The passage at a port of a composite with a director."""
-        return Passage(path, outside)
+    def boundary_port(self, path: str, outside: Director | Refinement) -> BoundaryPort:
+        """What a port of a composite with a director becomes in a run."""
+        return BoundaryPort(path, outside)
 
     def prepare(self, composite: str, outside: Director | Refinement) -> None:
-        """Called when a composite has its passages, and not yet its director."""
+        """Called when a composite has its boundary ports, and not yet its director."""
 
-    def conductor(self, composite: str, machine: StateMachine) -> Conductor:
-        """The conductor of a composite with modes."""
-        return Conductor(composite, machine, self.director, self.of[composite])
+    def mode_director(self, composite: str, machine: StateMachine) -> ModeDirector:
+        """The mode director of a composite with modes."""
+        return ModeDirector(composite, machine, self.director, self.of[composite])
 
-    def refinement(self, path: str, outside: Context, conductor: Conductor) -> Refinement:
+    def refinement(self, path: str, outside: Context, mode_director: ModeDirector) -> Refinement:
         """The director of a refinement."""
-        return Refinement(path, outside, self.director, conductor)
+        return Refinement(path, outside, self.director, mode_director)
 
     def resumption(self, composite: str) -> Callable[[], None] | None:
         """What to call when an actor under this director fires after an aspect outside has deferred that."""
@@ -88,12 +88,12 @@ class Directors:
             base = self.base(composite)
             return base if clock.is_global else LocalDirector(base, clock)
         modal, _, mode = composite.rpartition(".")
-        conductor = self.conductors[modal]
-        inside = self.refinement(composite, self.of[modal], conductor)
-        self.refinements[composite] = conductor.refinements[mode] = inside
-        conductor.insides[mode] = partial(self._begin_anew, composite)
+        mode_director = self.mode_directors[modal]
+        inside = self.refinement(composite, self.of[modal], mode_director)
+        self.refinements[composite] = mode_director.refinements[mode] = inside
+        mode_director.insides[mode] = partial(self._begin_anew, composite)
         for path in self.graph.borders(composite)[0]:
-            self.passages[path].gate = inside
+            self.boundary_ports[path].gate = inside
         return inside
 
     def base(self, composite: str) -> Director | Refinement:
@@ -104,13 +104,13 @@ class Directors:
     def catches(self, path: str) -> bool:
         """Whether an actor is in a refinement for whose errors there are transitions."""
         refinement = self.refinements.get(self.graph.refinement_of(path))
-        return refinement is not None and refinement.conductor.machine.catches
+        return refinement is not None and refinement.mode_director.machine.catches
 
     def _begin_anew(self, refinement: str) -> None:
         """Restart the contents of a refinement."""
-        for path, passage in self.passages.items():
+        for path, boundary_port in self.boundary_ports.items():
             if is_within(path, refinement):
-                passage.clear()
+                boundary_port.clear()
         for path, actor in self.actors.items():
             if is_within(path, refinement):
                 execution = self.executions.get(path)

@@ -1,9 +1,9 @@
 """Execution: how an actor with aspects fires.
 
-The director does not fire such an actor: in its turns a stand-in fires, which turns the tokens and wake-ups of the
-firing into a ``Job`` and passes it to the aspects.  When they let it pass, the actor fires for it, in a turn at its own
-rank, so that what it sends is received within the tag. A job that passes at once is a firing like any other. All other
-actors fire as in a model without such aspects.
+The director does not fire such an actor: in its activations a stand-in fires, which turns the tokens and wake-ups of
+the firing into a ``Job`` and passes it to the aspects.  When they let it pass, the actor fires for it, in an activation
+at its own rank, so that what it sends is received within the tag. A job that passes at once is a firing like any
+other. All other actors fire as in a model without such aspects.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from epicycle.actors import Actor, InputPort, Tag, Wake
 from epicycle.aspects import ActorPoint, Job
 
 from ..text import describe
-from .agenda import Turn
+from .agenda import Activation
 from .director import Director
 from .errors import ActorError
 from .local_time import LocalDirector
@@ -43,14 +43,14 @@ class Execution:
         self.stop = local.stop
         self._director = director
         self._local = local
-        # An actor has a turn for each rank at which it takes tokens, and one for its wake-ups.
+        # An actor has an activation for each rank at which it takes tokens, and one for its wake-ups.
         self._turns: dict[int, _StandIn] = {}
         for port in actor.inputs.values():
             self._stand_in(director.ranks[port.path])
         self._own = self._stand_in(director.ranks[actor.path])
-        for rank, turn in self._turns.items():
-            turn.inputs.update({port.name: port for port in director.inputs_at(actor, rank)})
-        self._open: int | None = None  # the rank of its turn, while the actor itself is idle
+        for rank, activation in self._turns.items():
+            activation.inputs.update({port.name: port for port in director.inputs_at(actor, rank)})
+        self._open: int | None = None  # the rank of its activation, while the actor itself is idle
         self._asked: list[Wake] = []  # wake-ups that are to come
         self._ready: dict[Wake, Job] = {}  # jobs to execute, and by when
         self._life = 0  # how often it has been killed
@@ -64,9 +64,9 @@ class Execution:
             self._turns[rank] = _StandIn(self, rank)
         return self._turns[rank]
 
-    def turn_at(self, rank: int) -> Turn:
-        """A turn as the actor itself would have it."""
-        return self._director.new_turn(self.actor, rank)
+    def turn_at(self, rank: int) -> Activation:
+        """An activation as the actor itself would have it."""
+        return self._director.new_activation(self.actor, rank)
 
     # -- as the actor's context -----------------------------------------------------------------------------------
 
@@ -81,23 +81,23 @@ class Execution:
         return self._local.time
 
     def wake(self, actor: Actor, time: int) -> Wake:
-        """Give the actor a turn at ``time``."""
+        """Give the actor an activation at ``time``."""
         wake = self._local.wake(self._own, time)
         self._asked.append(wake)
         return wake
 
-    # -- its turns ------------------------------------------------------------------------------------------------
+    # -- its activations ----------------------------------------------------------------------------------------------
 
-    def turn_of(self, port: InputPort[Any]) -> Actor:
+    def activation_of(self, port: InputPort[Any]) -> Actor:
         """The stand-in that fires for a token at a port."""
         return self._turns[self._director.ranks[port.path]]
 
-    def take(self, turn: _StandIn) -> None:
-        """Use a turn: execute what is ready, and pass what has fallen due to the aspects."""
-        self._director.firings -= 1  # the actor counts its own firings, and a turn is not one
-        job = self._fallen_due(turn)
-        ready = [wake for wake, each in self._ready.items() if wake.due and each.rank == turn.rank]
-        self._open = turn.rank
+    def take(self, activation: _StandIn) -> None:
+        """Use an activation: execute what is ready, and pass what has fallen due to the aspects."""
+        self._director.firings -= 1  # the actor counts its own firings, and an activation is not one
+        job = self._fallen_due(activation)
+        ready = [wake for wake, each in self._ready.items() if wake.due and each.rank == activation.rank]
+        self._open = activation.rank
         try:
             for wake in ready:
                 self._carry_out(self._ready.pop(wake))
@@ -106,15 +106,15 @@ class Execution:
         finally:
             self._open = None
 
-    def _fallen_due(self, turn: _StandIn) -> Job:
+    def _fallen_due(self, activation: _StandIn) -> Job:
         """Take the tokens out of the ports and the wake-ups back, as if they had not yet come."""
-        due = [wake for wake in self._asked if wake.due] if turn is self._own else []
+        due = [wake for wake in self._asked if wake.due] if activation is self._own else []
         if self._asked:
             self._asked = [wake for wake in self._asked if not (wake.due or wake.cancelled)]
         for wake in due:
             wake.due = False
-        taken = {port: port.take() for port in turn.inputs.values() if port.has_new}
-        job = Job(self.actor, turn.rank, self._director.last, taken, tuple(due), life=self._life)
+        taken = {port: port.take() for port in activation.inputs.values() if port.has_new}
+        job = Job(self.actor, activation.rank, self._director.last, taken, tuple(due), life=self._life)
         self._director.set_aside(job)
         return job
 
@@ -127,7 +127,7 @@ class Execution:
             self._waiting.append(job)
 
     def execute(self, job: Job) -> None:
-        """Let the actor fire for a job: at once if it is its turn, or else in its next possible turn."""
+        """Let the actor fire for a job: at once if it is its activation, or else in its next possible one."""
         if self._open == job.rank:
             self._carry_out(job)
             return
@@ -151,7 +151,7 @@ class Execution:
             port.give(taken)
         for refresh in self.refresh:
             refresh()
-        turn, self._open = self._open, None
+        activation, self._open = self._open, None
         start = perf_counter()
         own = self._turns[job.rank].of_actor
         try:
@@ -160,14 +160,14 @@ class Execution:
             except BaseException as error:
                 self._director.fail(own, error)
             finally:
-                own.clear()  # the director clears only the turn of the stand-in
+                own.clear()  # the director clears only the activation of the stand-in
         except ActorError as error:
             if self.refinement is None:
                 raise
-            self.refinement.conductor.fail(error)
+            self.refinement.mode_director.fail(error)
         if job.watch is not None:
             job.watch(perf_counter() - start)
-        self._open = turn
+        self._open = activation
 
     # -- acts of aspects on the actor as a whole ------------------------------------------------------------------
 
@@ -208,17 +208,17 @@ class Execution:
 
 
 class _StandIn(Actor):
-    """Fires in place of an actor, in its turns at one rank, for the tokens taken there."""
+    """Fires in place of an actor, in its activations at one rank, for the tokens taken there."""
 
     def __init__(self, execution: Execution, rank: int) -> None:
         super().__init__(execution.actor.path)
         self.rank = rank
         self._execution = execution
-        self._of_actor: Turn | None = None
+        self._of_actor: Activation | None = None
 
     @property
-    def of_actor(self) -> Turn:
-        """The turn as the actor itself would have it."""
+    def of_actor(self) -> Activation:
+        """The activation as the actor itself would have it."""
         if self._of_actor is None:
             self._of_actor = self._execution.turn_at(self.rank)
         return self._of_actor

@@ -11,12 +11,12 @@ import os
 
 from cpython.float cimport PyFloat_FromDouble
 
-from epicycle.actors cimport InputPort, Line, ParameterPort, Wake, nanoseconds_of, seconds_of
+from epicycle.actors cimport InputPort, TimedQueue, ParameterPort, Wake, nanoseconds_of, seconds_of
 from epicycle.actors.core.laws cimport standard_exponential, standard_gamma, standard_normal
 from epicycle.actors.core.primitives cimport Words
-from epicycle.runner.engine.agenda cimport Form, Instant, Turn
+from epicycle.runner.engine.agenda cimport Form, Instant, Activation
 from epicycle.runner.engine.director cimport Director
-from epicycle.runner.engine.way cimport Sender
+from epicycle.runner.engine.receivers cimport Sender
 
 from epicycle.actors import (
     Clock, Constant, Expression, Exponential, Gamma, Normal, PoissonClock, Random, Scale, Server, TimeDelay, Uniform,
@@ -73,7 +73,7 @@ cdef class Native(Form):
 
     cdef public object actor
     cdef public Director director
-    cdef public Turn turn
+    cdef public Activation activation
 
     cdef bint take(self) except -1:
         """Get hold of what the actor holds; whether it can have a form."""
@@ -90,15 +90,15 @@ cdef class Native(Form):
         return self.director.present.time
 
     cdef Wake wake_at(self, long long time):
-        return self.director.wake_turn(self.turn, time)
+        return self.director.wake_activation(self.activation, time)
 
-    cdef int keep(self, Line line, long long time, value) except -1:
+    cdef int keep(self, TimedQueue line, long long time, value) except -1:
         """Let a value wait for its time; who fires it cannot call off, and so needs no wake-up that says so."""
-        cdef Instant instant = self.director.want_at(self.turn, time)
+        cdef Instant instant = self.director.schedule_at(self.activation, time)
         line.put(instant.time, instant.microstep, None, value)
         return 0
 
-    cdef bint is_due(self, Line line):
+    cdef bint is_due(self, TimedQueue line):
         cdef Instant now = self.director.present
         return line.is_before(now.time, now.microstep)
 
@@ -123,10 +123,10 @@ cdef inline bint all_floats(list tokens):
 
 
 cdef class DelayForm(Native):
-    __slots__ = ("actor", "delay", "director", "input", "line", "output", "turn")
+    __slots__ = ("actor", "delay", "director", "input", "line", "output", "activation")
     cdef public InputPort input
     cdef public Sender output
-    cdef public Line line
+    cdef public TimedQueue line
     cdef public long long delay
 
     cdef bint take(self) except -1:
@@ -139,7 +139,7 @@ cdef class DelayForm(Native):
         cdef Py_ssize_t place
         cdef list tokens
         while self.is_due(self.line):
-            self.output.go(self.line.pop())
+            self.output.put(self.line.pop())
         tokens = tokens_of(self.input)
         for place in range(len(tokens)):
             self.keep(self.line, self.now() + self.delay, tokens[place])
@@ -162,12 +162,12 @@ cdef class Ticking(Native):
         return self.output is not None
 
     cdef int send(self, tick) except -1:
-        self.output.go(tick if self.values is None else self.values[<long long>tick % len(self.values)])
+        self.output.put(tick if self.values is None else self.values[<long long>tick % len(self.values)])
         return 0
 
 
 cdef class ClockForm(Ticking):
-    __slots__ = ("actor", "director", "offsets", "output", "period", "stop", "turn", "values")
+    __slots__ = ("actor", "director", "offsets", "output", "period", "stop", "activation", "values")
     cdef public list offsets
     cdef public long long period
 
@@ -200,7 +200,7 @@ cdef class ClockForm(Ticking):
 
 
 cdef class PoissonForm(Ticking):
-    __slots__ = ("actor", "director", "drawing", "output", "stop", "turn", "values")
+    __slots__ = ("actor", "director", "drawing", "output", "stop", "activation", "values")
     cdef public Drawing drawing
 
     cdef bint take(self) except -1:
@@ -214,18 +214,18 @@ cdef class PoissonForm(Ticking):
         self.actor._tick = tick + 1
         following = self.now() + nanoseconds_of(self.drawing.next())
         if following <= self.stop:  # nobody calls it off, so that it needs no wake-up
-            self.director.want_at(self.turn, following)
+            self.director.schedule_at(self.activation, following)
 
 
 cdef class ServerForm(Native):
     __slots__ = (
         "actor", "capacity", "director", "drawing", "input", "line", "output", "rejected", "servers", "size", "time",
-        "turn", "waiting",
+        "activation", "waiting",
     )
     varying = ("service_time",)
     cdef public InputPort input
     cdef public Sender output, size, rejected
-    cdef public Line line
+    cdef public TimedQueue line
     cdef public Drawing drawing  # None if Python draws, or times come by themselves
     cdef public object waiting
     cdef public ParameterPort time  # where they come
@@ -255,8 +255,8 @@ cdef class ServerForm(Native):
             token, rest = self.line.pop()
             size -= 1
             self.actor._size = size
-            self.output.go(token)
-            self.size.go(size)
+            self.output.put(token)
+            self.size.put(size)
             if self.waiting:
                 token, time = self.waiting.popleft()
                 self.serve(token, time + <double>rest)
@@ -264,7 +264,7 @@ cdef class ServerForm(Native):
         for place in range(len(tokens)):
             token = tokens[place]
             if size >= self.capacity:
-                self.rejected.go(token)
+                self.rejected.put(token)
                 continue
             time = self.draw()
             if self.line.size < self.servers:
@@ -273,7 +273,7 @@ cdef class ServerForm(Native):
                 self.waiting.append((token, time))
             size += 1
             self.actor._size = size
-            self.size.go(size)
+            self.size.put(size)
 
     cdef int serve(self, token, double time) except -1:
         cdef long long nanoseconds = nanoseconds_of(time)
@@ -292,7 +292,7 @@ cdef class ServerForm(Native):
 
 
 cdef class RandomForm(Native):
-    __slots__ = ("actor", "director", "drawing", "output", "stream", "trigger", "turn")
+    __slots__ = ("actor", "director", "drawing", "output", "stream", "trigger", "activation")
     cdef public InputPort trigger
     cdef public Sender output
     cdef public Drawing drawing
@@ -306,13 +306,13 @@ cdef class RandomForm(Native):
     cpdef fire(self):
         for _ in range(count_of(self.trigger)):
             if self.drawing is None:
-                self.output.go(self.actor.distribution.draw(self.stream))
+                self.output.put(self.actor.distribution.draw(self.stream))
             else:
-                self.output.go(PyFloat_FromDouble(self.drawing.next()))
+                self.output.put(PyFloat_FromDouble(self.drawing.next()))
 
 
 cdef class ScaleForm(Native):
-    __slots__ = ("actor", "director", "input", "number", "offset_number", "output", "turn")
+    __slots__ = ("actor", "director", "input", "number", "offset_number", "output", "activation")
     cdef public InputPort input
     cdef public Sender output
     cdef public double number, offset_number
@@ -329,11 +329,11 @@ cdef class ScaleForm(Native):
             self.actor.fire()
             return
         for place in range(len(tokens)):
-            self.output.go(PyFloat_FromDouble(self.number * <double>tokens[place] + self.offset_number))
+            self.output.put(PyFloat_FromDouble(self.number * <double>tokens[place] + self.offset_number))
 
 
 cdef class ExpressionForm(Native):
-    __slots__ = ("actor", "director", "function", "holds", "inputs", "latest", "names", "output", "ports", "turn", "wants_number")
+    __slots__ = ("actor", "director", "function", "holds", "inputs", "latest", "names", "output", "ports", "activation", "wants_number")
     cdef public list ports, inputs, names  # ports, what they are called, and the names of the expression
     cdef public Sender output
     cdef public dict latest
@@ -376,7 +376,7 @@ cdef class ExpressionForm(Native):
         else:
             if type(value) is not float or not self.wants_number:
                 value = self.actor._checked(value)
-        self.output.go(value)
+        self.output.put(value)
 
 
 FORMS = {
@@ -407,13 +407,13 @@ def attach(director, actors, besides):
             continue
         form = kind()
         form.actor, form.director = actor, director
-        form.turn = director.turn(actor, director.ranks[path])
+        form.activation = director.activation(actor, director.ranks[path])
         try:
             if not form.take():
                 continue
         except Exception:  # as soon as it fires, the actor says what is wrong
             continue
         for rank in {director.ranks[path], *(director.ranks[each.path] for each in inputs if each.width)}:
-            (<Turn>director.turn(actor, rank)).form = form
+            (<Activation>director.activation(actor, rank)).form = form
         count += 1
     return count

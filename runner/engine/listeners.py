@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from epicycle.actors import Way
+from epicycle.actors import Receiver
 
 if TYPE_CHECKING:
     from ..results import Samples
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from .measurement import Measurement
 
 
-class Recording(Way):
+class Recording(Receiver):
     """Appends tokens to a signal."""
 
     __slots__ = ("director", "samples")
@@ -21,12 +21,12 @@ class Recording(Way):
         self.samples = samples
         self.director = director
 
-    def go(self, token: Any) -> None:
+    def put(self, token: Any) -> None:
         now = self.director.now()
         self.samples.add(now.time, now.microstep, token)
 
 
-class Measuring(Way):
+class Measuring(Receiver):
     """Passes the tokens of a port to a metric."""
 
     __slots__ = ("director", "measurement", "port")
@@ -36,5 +36,5 @@ class Measuring(Way):
         self.port = port
         self.director = director
 
-    def go(self, token: Any) -> None:
+    def put(self, token: Any) -> None:
         self.measurement.add(self.port, self.director.now().time, token)

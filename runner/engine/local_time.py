@@ -12,13 +12,13 @@ from typing import Any
 
 from simpy.events import Event, EventPriority
 
-from epicycle.actors import NEVER, Actor, Environment, Tag, Wake, Way
+from epicycle.actors import NEVER, Actor, Environment, Receiver, Tag, Wake
 
 from ..graph import Clock
 from .agenda import Delivery
 from .director import Director
+from .receivers import Call
 from .refinement import Refinement
-from .way import Call
 
 
 class LocalDirector:
@@ -51,7 +51,7 @@ class LocalDirector:
         """End the whole run, not only this composite."""
         self._director.stop(reason)
 
-    def later(self, delay: int, way: Way, token: Any) -> None:
+    def later(self, delay: int, way: Receiver, token: Any) -> None:
         """Send a token onward after ``delay`` ns of local time."""
         self._director.later(self._clock.span(self._director.time, delay), way, token)
 
@@ -76,7 +76,7 @@ class LocalEnvironment(Environment):
         self._environment.put(event, priority, delay)
 
 
-class Passage(Actor):
+class BoundaryPort(Actor):
     """A port of a composite with its own director: at each tag it lets one token of each channel through.
 
     The rest waits for the next microstep.  A *lane* is the way of one channel, from the sender's side onward.
@@ -85,7 +85,7 @@ class Passage(Actor):
     def __init__(self, path: str, director: Director | Refinement) -> None:
         super().__init__(path)
         self.enter(director)
-        self.gate: Refinement | None = None  # the passage behind it, which may be closed: then tokens are lost
+        self.gate: Refinement | None = None  # the boundary port behind it, which may be closed: then tokens are lost
         self.beside: Actor | None = None  # fires when something has come through
         self._director = director
         self._lanes: dict[object, Lane] = {}
@@ -95,7 +95,7 @@ class Passage(Actor):
         for lane in self._lanes.values():
             lane.waiting.clear()
 
-    def lane(self, channel: object, onward: Way) -> Way:
+    def lane(self, channel: object, onward: Receiver) -> Receiver:
         """The way of a token of a channel that has come this far; ``onward`` is its way after passing."""
         lane = self._lanes.setdefault(channel, Lane())
 
@@ -113,7 +113,7 @@ class Passage(Actor):
         self.let_through()
 
     def let_through(self) -> None:
-        """Let one token of each channel through, if none has passed at this tag; ask for another turn for the rest."""
+        """Let one token of each channel through, if none has passed at this tag; ask for another one for the rest."""
         now = self.tag
         for lane in self._lanes.values():
             if lane.waiting and lane.passed != now:
@@ -122,8 +122,8 @@ class Passage(Actor):
         if self.is_waited_for:
             self.wake_in(0)
 
-    def admit(self, place: str, onward: Way, told: Callable[[Way], Way]) -> tuple[Way, bool]:
-        """The way of requests from a place to an aspect that is this composite, and whether they wait for its turn.
+    def admit(self, place: str, onward: Receiver, told: Callable[[Receiver], Receiver]) -> tuple[Receiver, bool]:
+        """The way of requests from a place to an aspect that is this composite, and whether they wait for it to fire.
 
         If so, they are ``told`` to be made when they go onward, not before.
         """
@@ -136,7 +136,7 @@ class Passage(Actor):
 
 
 class Lane:
-    """One channel of a passage: the tokens that wait, and the tag at which one has passed."""
+    """One channel of a boundary port: the tokens that wait, and the tag at which one has passed."""
 
     __slots__ = ("passed", "waiting")
 

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
-from epicycle.actors import EpicycleError, Moment, Way, to_seconds
+from epicycle.actors import EpicycleError, Moment, Receiver, to_seconds
 from epicycle.actors.expression import operand, value_at
 from epicycle.aspects import Reading
 
@@ -276,7 +276,7 @@ class Monitoring:
         return Verdict(False, margin, shown.time, shown.values, broken_by=() if is_any else tuple(in_order))
 
 
-class Listening(Way):
+class Listening(Receiver):
     """Hands the tokens of a port to a part of a monitor."""
 
     __slots__ = ("director", "monitoring", "port")
@@ -286,5 +286,5 @@ class Listening(Way):
         self.port = port
         self.director = director
 
-    def go(self, token: Any) -> None:
+    def put(self, token: Any) -> None:
         self.monitoring.add(self.port, self.director.now(), token)

@@ -1,8 +1,8 @@
 """Refinements: composites that are active in one mode of a machine; in all others, their time stands still.
 
-Requests inside a refinement wait in its own agenda, in its local time.  The conductor of the machine's composite fires
-before everything in it: it lets the machine take a preemptive transition, or else lets the active refinement do what is
-due.  The machine fires last, and a mode that it enters begins at the next microstep.
+Requests inside a refinement wait in its own agenda, in its local time.  The mode director of the machine's composite
+fires before everything in it: it lets the machine take a preemptive transition, or else lets the active refinement do
+what is due.  The machine fires last, and a mode that it enters begins at the next microstep.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Any
 
 from simpy.events import Event, EventPriority
 
-from epicycle.actors import Actor, Context, Environment, Tag, Wake, Way, new_wake
+from epicycle.actors import Actor, Context, Environment, Receiver, Tag, Wake, new_wake
 
-from .agenda import Delivery, Turn
+from .agenda import Activation, Delivery
 from .director import Director
 from .errors import ActorError, CrowdError
 
@@ -26,19 +26,19 @@ if TYPE_CHECKING:
     from epicycle.actors import StateMachine
 
 # When, a number that keeps the order, what and how, and the earliest outer time and microstep.
-Entry = tuple[int, int, "Wake | Delivery | Event", "Turn | EventPriority | None", tuple[int, int]]
+Entry = tuple[int, int, "Wake | Delivery | Event", "Activation | EventPriority | None", tuple[int, int]]
 
 
 class Refinement:
     """The director as seen inside a refinement; ``outer`` is the director around its machine."""
 
-    def __init__(self, path: str, outer: Context, director: Director, conductor: Conductor) -> None:
+    def __init__(self, path: str, outer: Context, director: Director, mode_director: ModeDirector) -> None:
         self.path = path
         self.seed = director.seed
         self.streams = director.streams
         self.director = director
         self.environment = _Environment(self, outer.environment)
-        self.conductor = conductor
+        self.mode_director = mode_director
         self.is_active = False
         self._outer = outer
         self._lag = 0  # how far its time lags behind (ns)
@@ -59,18 +59,18 @@ class Refinement:
     @property
     def is_open(self) -> bool:
         """Whether it takes part in the present tag."""
-        return self.is_active and not self.conductor.has_left
+        return self.is_active and not self.mode_director.has_left
 
     def wake(self, actor: Actor, time: int) -> Wake:
         """Fire ``actor`` at a local time; the present or past is the next microstep."""
         now, present = self.time, self.director.now()
         step = present.microstep + (self.director.present is not None)
         wake = new_wake(time, 1) if time > now else new_wake(now, step)
-        turn = self.director.turn(actor, self.director.ranks[actor.path])
-        self._put(max(time, now), wake, turn)
+        activation = self.director.activation(actor, self.director.ranks[actor.path])
+        self._put(max(time, now), wake, activation)
         return wake
 
-    def later(self, delay: int, way: Way, token: Any) -> None:
+    def later(self, delay: int, way: Receiver, token: Any) -> None:
         """Let a token go on after ``delay`` ns of local time."""
         self._put(self.time + delay, self.director.hold(way, token), None)
 
@@ -78,13 +78,13 @@ class Refinement:
         """Schedule a SimPy event at a local time."""
         self._put(time, event, priority)
 
-    def _put(self, time: int, what: Wake | Delivery | Event, how: Turn | EventPriority | None) -> None:
+    def _put(self, time: int, what: Wake | Delivery | Event, how: Activation | EventPriority | None) -> None:
         most = self.director.crowd.most
         if len(self._agenda) >= most:
             raise CrowdError(self.director.tag, most, f"pending tokens, wake-ups and events in {self.path}", ())
         heapq.heappush(self._agenda, (time, next(self._numbers), what, how, self.not_before(time)))
         if self.is_active:
-            self.conductor.plan()
+            self.mode_director.plan()
 
     def not_before(self, time: int) -> tuple[int, int]:
         """The outer time and microstep before which work for a local time is not done: for the present, the next."""
@@ -93,7 +93,7 @@ class Refinement:
         present = self.director.now()
         return present.time, present.microstep + (self.director.present is not None)
 
-    def hold(self, way: Way, token: Any) -> Delivery:
+    def hold(self, way: Receiver, token: Any) -> Delivery:
         """A function that sends a token onward, later."""
         return self.director.hold(way, token)
 
@@ -105,7 +105,7 @@ class Refinement:
         """End the run."""
         self.director.stop(reason)
 
-    # -- for its conductor ----------------------------------------------------------------------------------------
+    # -- for its mode director ----------------------------------------------------------------------------------------
 
     @property
     def next_time(self) -> int | None:
@@ -126,9 +126,9 @@ class Refinement:
             elif what.cancelled:
                 continue
             else:
-                assert isinstance(how, Turn)
+                assert isinstance(how, Activation)
                 how.add(what)
-                self.director.want(how)
+                self.director.schedule(how)
             is_any = True
         return is_any
 
@@ -180,7 +180,7 @@ class _Environment(Environment):
         self._outer.put(event, priority, 0)
 
 
-class Conductor(Actor):
+class ModeDirector(Actor):
     """Fires first in a composite with modes: it holds the refinements, of which at most one is active."""
 
     def __init__(self, path: str, machine: StateMachine, director: Director, outer: Context) -> None:
@@ -189,7 +189,7 @@ class Conductor(Actor):
         self.machine = machine
         self.refinements: dict[str, Refinement] = {}
         self.insides: dict[str, Callable[[], None]] = {}  # restarts the contents of a refinement
-        self.passages: Mapping[str, Any] = {}
+        self.boundary_ports: Mapping[str, Any] = {}
         self._director = director
         self._active: Refinement | None = None
         self._left: Tag | None = None  # the tag at which a preemptive transition, or an error, cut a firing short
@@ -240,7 +240,7 @@ class Conductor(Actor):
         self._left = self.failure = None
         self._active = self.refinements.get(mode)
 
-    def go(self, mode: str, *, history: bool) -> None:
+    def change(self, mode: str, *, history: bool) -> None:
         """Leave the present mode's refinement, and enter the other's, where it was left or from the beginning."""
         if self._active is not None:
             self._active.suspend()

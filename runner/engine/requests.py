@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from epicycle.actors import EpicycleError, Way, to_nanoseconds, to_seconds
+from epicycle.actors import EpicycleError, Receiver, to_nanoseconds, to_seconds
 from epicycle.aspects import FiringRequest, Job, JoinPoint, Request, time_needed
 
 from ..graph import WovenAspect
-from .way import Call, Deliver
+from .receivers import Call, Deliver
 
 
 class Requests:
@@ -41,14 +41,14 @@ class Requests:
 
         return ask_for_firing if place in self.model.times else ask
 
-    def told(self, place: str, onward: Way) -> Way:
+    def told(self, place: str, onward: Receiver) -> Receiver:
         """The way of requests from a place onward; each is an act when it goes there."""
 
         def come_in(request: Any) -> None:
             is_firing = isinstance(request, FiringRequest)
             point = self._ways[place][0 if is_firing else request.way]
             point.act("requested", request.execution_time if is_firing else request.token)
-            onward.go(request)
+            onward.put(request)
 
         return Call(come_in)
 

@@ -9,7 +9,7 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from epicycle.actors import Actor, EpicycleError, Way, did_you_mean, to_seconds
+from epicycle.actors import Actor, EpicycleError, Receiver, did_you_mean, to_seconds
 
 from ..build import Model
 from ..collection import seldom_collecting, without_collection
@@ -17,7 +17,7 @@ from ..graph import WovenAspect
 from ..interrupt import between_steps
 from ..results import STOP_TIME, EventLog, Record, Results, Signal, Verdict
 from ..text import describe, raised_at
-from .acts import Acts
+from .acts import Interventions
 from .copies import Copies
 from .director import Director
 from .directors import director_of
@@ -28,9 +28,9 @@ from .loop import handle_events
 from .measured import Measured, add_computed
 from .monitoring import Listening, Monitoring
 from .pace import Pace
+from .receivers import Deliver
 from .trace import Tracer, Tracing, TracingLog, tracing
-from .way import Deliver
-from .ways import Ways
+from .wiring import Wiring
 
 Keeps = Callable[[str, str, str, str], bool]
 
@@ -48,7 +48,7 @@ class Run:
         keeps: Keeps | None = None,
         log_to: Callable[[Record], None] | None = None,
         tracer: Tracer | None = None,
-        acts: Acts | None = None,
+        acts: Interventions | None = None,
     ) -> None:
         self.model = model
         self.seed = seed
@@ -57,7 +57,7 @@ class Run:
         self.stopped = ""  # why the run is over, once it is
         self._tracer = tracer
         if acts is None and model.exactly is not None:
-            acts = Acts(model.exactly)
+            acts = Interventions(model.exactly)
         self.acts = acts  # of aspects, where they have names
         self._stop: int | None = None  # the time (ns) up to which it has been allowed to run
         self._spent = 0.0  # s of the wall clock
@@ -83,7 +83,7 @@ class Run:
                 self.actors = {path: copies.of(actor) for path, actor in model.graph.actors.items()}
                 self.aspects = [replace(woven, aspect=copies.of(woven.aspect)) for woven in model.aspects]
                 listeners = self._listeners()
-                self._ways = Ways(
+                self._ways = Wiring(
                     model.graph, self.actors, self.aspects, self.director, self.log, listeners, self.signals, self.acts
                 )
         except ActorError as error:  # from a clock whose error cannot be computed
@@ -91,9 +91,9 @@ class Run:
 
     # -- listeners ------------------------------------------------------------------------------------------------
 
-    def _listeners(self) -> dict[str, list[Deliver | Way]]:
+    def _listeners(self) -> dict[str, list[Deliver | Receiver]]:
         """Recorders, metrics and the stop rule, by the path of the port that they listen to."""
-        found: dict[str, list[Deliver | Way]] = {}
+        found: dict[str, list[Deliver | Receiver]] = {}
         for name, signal in self.signals.items():
             found.setdefault(name, []).append(Recording(signal.samples, self.director))
         for metric in self.model.metrics:
@@ -151,7 +151,7 @@ class Run:
 
     # -- running --------------------------------------------------------------------------------------------------
 
-    def go(
+    def advance(
         self,
         stop: int | None,
         *,
@@ -185,7 +185,7 @@ class Run:
         before, self._awaited = self.director.watch, robustness
         self.director.watch = self._is_awaited
         try:
-            self.go(stop)
+            self.advance(stop)
             if robustness and not self._awaited:
                 self.stopped = ""  # it is not over
             for name in self._awaited:

@@ -14,7 +14,7 @@ from ..collection import without_collection
 from ..graph import WovenAspect
 from ..results import STOP_TIME, EventLog, Record, Results, Signal, Verdict
 from ..tables import Table, Tabled
-from .acts import Acts
+from .acts import Interventions
 from .copies import Copies
 from .director import Director
 from .log_filter import LogFilter
@@ -50,13 +50,13 @@ class Snapshot:
         """A run that continues from here; raises ``SnapshotError``."""
         if self.run is not None:
             return _copy(self.run)
-        acts = Acts(self._exactly) if self._named else None
+        acts = Interventions(self._exactly) if self._named else None
         run = Run(self.model, self.seed, self._keeps, acts=acts)
         for is_begun, steps, seed in self._reseeds:
             if is_begun:
-                run.go(None, most=steps - run.director.steps)
+                run.advance(None, most=steps - run.director.steps)
             run.reseed(seed)
-        run.go(None, most=self._steps - run.director.steps)
+        run.advance(None, most=self._steps - run.director.steps)
         if (run.director.last, run.log.digest) != (self.tag, self._digest):
             raise SnapshotError(
                 f"{self.model.name} has processes, so its run was repeated from the start to go back to {self.tag}, "
@@ -94,7 +94,7 @@ class Simulation(Tabled):
         keep_log: bool | LogFilter = False,
         log_to: Callable[[Record], None] | None = None,
         tracer: Tracer | None = None,
-        acts: Acts | None = None,
+        acts: Interventions | None = None,
     ) -> None:
         model.check()
         if keep_log is True:
@@ -136,7 +136,7 @@ class Simulation(Tabled):
         """
         self._refuse_over()
         stop = self.model.stop_time if until is None else to_nanoseconds(until)
-        self._run.go(stop, progress=progress, pace=pace)
+        self._run.advance(stop, progress=progress, pace=pace)
         return self._run.finish()
 
     def advance(self, until: float) -> bool:
@@ -144,7 +144,7 @@ class Simulation(Tabled):
         self._refuse_over()
         stop, last = to_nanoseconds(until), self.model.stop_time
         is_last = last is not None and stop >= last
-        return self._run.go(last if is_last else stop) == STOP_TIME and not is_last
+        return self._run.advance(last if is_last else stop) == STOP_TIME and not is_last
 
     def reach(self, robustness: Mapping[str, float], *, until: float | None = None) -> bool:
         """Go on until the ``robustness`` of one of these monitors is at most the number given; whether one is.
@@ -161,7 +161,7 @@ class Simulation(Tabled):
     def step(self) -> bool:
         """Handle the next tag, or SimPy events before it; returns whether there was anything until the stop time."""
         self._refuse_over()
-        return not self._run.go(self.model.stop_time, most=1)
+        return not self._run.advance(self.model.stop_time, most=1)
 
     def finish(self) -> Results:
         """End the run where it is, and return the results."""

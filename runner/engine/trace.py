@@ -9,14 +9,14 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from epicycle.actors import Actor, InputPort, Tag, Wake, Way, When
+from epicycle.actors import Actor, InputPort, Moment, Receiver, Tag, Wake
 from epicycle.aspects import Job
 
 from ..results import EventLog, Names, Record, Writer
-from .agenda import Delivery, Turn
+from .agenda import Activation, Delivery
 from .director import Director
 from .execution import is_stand_in
-from .way import Call
+from .receivers import Call
 
 
 @dataclass(frozen=True, slots=True)
@@ -124,7 +124,7 @@ class _TracingWriter(Writer):
         super().__init__(log, names, keep)
         self._tracer = tracer
 
-    def write(self, when: When, value: Any) -> None:
+    def write(self, when: Tag | Moment, value: Any) -> None:
         super().write(when, value)
         self._tracer.add(Record(Tag(when.time, when.microstep), *self.names, value))
 
@@ -152,37 +152,37 @@ class Tracing(_Base):
             self._asked[wake] = self.tag if self.last.microstep else None
         return wake
 
-    def entry(self, port: InputPort[Any], channel: int, stand_in: Actor | None = None) -> Way:
+    def entry(self, port: InputPort[Any], channel: int, stand_in: Actor | None = None) -> Receiver:
         enter = super().entry(port, channel, stand_in)
         if port.actor.path not in self._tracer.actors:
             return enter
 
         def enter_and_tell(token: Any) -> None:
-            enter.go(token)
+            enter.put(token)
             arrival = Arrival(port.name, channel, token, *self._tracer.origin)
             self._arrivals.setdefault(port.actor.path, []).append(arrival)
 
         return Call(enter_and_tell)
 
-    def hold(self, way: Way, token: Any) -> Delivery:
+    def hold(self, way: Receiver, token: Any) -> Delivery:
         origin = self._tracer.origin
 
         def release(token: Any) -> None:
             self._tracer.origin, self._tracer.releasing = origin, True
             try:
-                way.go(token)
+                way.put(token)
             finally:
                 self._tracer.releasing = False
 
         return super().hold(Call(release), token)
 
-    def use_wakes(self, turn: Turn) -> bool:
+    def use_wakes(self, activation: Activation) -> bool:
         asked = [
             (wake, self._asked.pop(wake))
-            for wake in (turn.wake, *(turn.wakes or ()))
+            for wake in (activation.wake, *(activation.wakes or ()))
             if wake is not None and wake in self._asked
         ]
-        is_to_fire = super().use_wakes(turn)
+        is_to_fire = super().use_wakes(activation)
         self._due = [tag for wake, tag in asked if wake.due and is_to_fire]
         return is_to_fire
 
@@ -196,21 +196,21 @@ class Tracing(_Base):
         arrivals, self._due = self._aside.pop(job)
         self._arrivals[job.actor.path] = [*arrivals, *self._arrivals.get(job.actor.path, [])]
 
-    def fire(self, turn: Turn) -> None:
-        actor = turn.actor
+    def fire(self, activation: Activation) -> None:
+        actor = activation.actor
         if actor.path not in self._tracer.actors or is_stand_in(actor):
             self._tracer.end()  # by a process that was resumed before
-            super().fire(turn)
+            super().fire(activation)
             self._due = []
             return
         waiting = self._arrivals.pop(actor.path, [])
-        later = {port.name for port in turn.later}
+        later = {port.name for port in activation.later}
         self._arrivals[actor.path] = [arrival for arrival in waiting if arrival.port in later]
         arrivals = [arrival for arrival in waiting if arrival.port not in later]
         due, self._due = self._due, []
         self._tracer.begin(Firing(self.last, actor.path, arrivals, due))
         try:
-            super().fire(turn)
+            super().fire(activation)
         finally:
             self._tracer.end()
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from epicycle.actors import EpicycleError, Tag, When, new_tag, to_seconds
+from epicycle.actors import EpicycleError, Moment, Tag, new_tag, to_seconds
 
 from ..shown import short
 from ..tables import pandas_module
@@ -77,7 +77,7 @@ class Writer:
         self._number = b""  # of these names; none before the first record
         self._keep = keep
 
-    def write(self, when: When, value: Any) -> None:
+    def write(self, when: Tag | Moment, value: Any) -> None:
         """Append a record; raises an exception if the value cannot be logged."""
         hashed = self.log.hash
         self._number = hashed.add(self._number, b"" if self._number else _encoded(self.names), when, value)
@@ -92,7 +92,7 @@ def _encoded(names: Names) -> bytes:
     return b"".join(map(canonical, (event, actor, port, aspect, channel)))
 
 
-def _tag(when: When) -> Tag:
+def _tag(when: Tag | Moment) -> Tag:
     return when if type(when) is Tag else new_tag(when.time, when.microstep)
 
 
@@ -133,7 +133,7 @@ class EventLog:
         """A new writer."""
         return Writer(self, names, keep)
 
-    def report(self, when: When, port: str) -> None:
+    def report(self, when: Tag | Moment, port: str) -> None:
         """Report very many records at one tag, the last of them sent by a port just now."""
         number, self.hash.at_tag = self.hash.at_tag, 0
         if self.crowd is not None:

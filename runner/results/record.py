@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from epicycle.actors import When
+from epicycle.actors import Moment, Tag
 
 from .encoding import encoders, field_values
 
@@ -38,10 +38,10 @@ class RecordHash:
         self._buffer = bytearray()  # still to be hashed
         self._names = 0  # different names so far
         self._tag = b""  # of the last record
-        self._when: When | None = None  # an object that represents it
+        self._when: Tag | Moment | None = None  # an object that represents it
         self._known: dict[int, tuple[Any, bytes]] = {}  # tokens that cannot change, with their bytes, by id
 
-    def add(self, number: bytes, names: bytes, when: When, value: Any) -> bytes:
+    def add(self, number: bytes, names: bytes, when: Tag | Moment, value: Any) -> bytes:
         """Append a record; ``number`` is that of its names, empty if they are new.  Returns their number.
 
         Raises an exception, and appends nothing, if the value cannot be encoded.

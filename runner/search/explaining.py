@@ -12,7 +12,7 @@ from typing import Any
 from epicycle.actors import EpicycleError, did_you_mean, to_seconds
 
 from ..build import Model
-from ..engine import Acts, Simulation
+from ..engine import Interventions, Simulation
 from ..graph import Act, ActName, ModelGraph
 from ..results import Results, Verdict, canonical, plain
 from .minimal import minimal
@@ -117,7 +117,7 @@ class _Runs:
     def results(self, exactly: Collection[ActName] | None, *, keep_log: bool = False) -> Results:
         """What comes of the run with these acts; with None, with all."""
         self.number += 1
-        acts = Acts(None if exactly is None else self.others.union(exactly))
+        acts = Interventions(None if exactly is None else self.others.union(exactly))
         return Simulation(self.model, seed=self.seed, acts=acts, keep_log=keep_log).run(until=self.until)
 
     def _outcome(self, names: frozenset[ActName]) -> list[Any]:

@@ -12,7 +12,7 @@ from epicycle.actors import EpicycleError
 
 from ..build import Model, load_model
 from ..catalogue import types_of_file
-from ..engine import Acts, Simulation
+from ..engine import Interventions, Simulation
 from ..language import Level, Setting, study_of_text
 from ..study import OK, Search, Trials, available_cores, open_trials
 from ..text import Problems
@@ -190,7 +190,7 @@ class _Searching:
             raise EpicycleError(
                 "acts are searched in one run, in which nothing varies\n   help: leave out --vary or --acts"
             )
-        acts = Simulation(model, seed=asked.seed, acts=Acts(model.exactly)).run().acts
+        acts = Simulation(model, seed=asked.seed, acts=Interventions(model.exactly)).run().acts
         if not acts:
             raise EpicycleError(
                 f"no aspect does anything in the run of {model.name} with seed {asked.seed}\n   help: add --disturb"

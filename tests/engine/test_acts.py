@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from epicycle.runner.build import load_model
-from epicycle.runner.engine import Acts, Simulation
+from epicycle.runner.engine import Interventions, Simulation
 from epicycle.runner.graph import ActName
 from epicycle.runner.results import Results
 from epicycle.runner.text import ModelError
@@ -25,7 +25,7 @@ aspects:
 
 
 def run(text: str, exactly: frozenset[ActName] | None = None, seed: int = 1) -> tuple[list[object], Results]:
-    simulation = Simulation(load(text), seed=seed, acts=Acts(exactly))
+    simulation = Simulation(load(text), seed=seed, acts=Interventions(exactly))
     results = simulation.run()
     return [(time, *tokens) for time, _, tokens in seen(simulation)], results
 
@@ -76,10 +76,10 @@ def test_noting_acts_changes_nothing_and_leaving_out_none_neither(disturbance: s
         except ModelError:  # it is for other models
             continue
         plain = Simulation(made, seed=3).run(until=2.0)
-        noted = Simulation(made, seed=3, acts=Acts()).run(until=2.0)
+        noted = Simulation(made, seed=3, acts=Interventions()).run(until=2.0)
         assert noted.digest == plain.digest
         exactly = frozenset(act.name for act in noted.acts)
-        assert Simulation(made, seed=3, acts=Acts(exactly)).run(until=2.0).digest == plain.digest
+        assert Simulation(made, seed=3, acts=Interventions(exactly)).run(until=2.0).digest == plain.digest
 
 
 @pytest.mark.parametrize(
@@ -106,7 +106,7 @@ def test_without_its_acts_an_aspect_does_nothing(aspect: str) -> None:
 
 
 def test_snapshots_know_the_names() -> None:
-    simulation = Simulation(load(TEXT), seed=1, acts=Acts())
+    simulation = Simulation(load(TEXT), seed=1, acts=Interventions())
     simulation.advance(2.5)
     snapshot = simulation.snapshot()
     acts = simulation.run().acts

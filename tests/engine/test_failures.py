@@ -15,7 +15,7 @@ import pytest
 
 from epicycle.actors import Actor, Clock, InputPort, OutputPort, Parameter, Process, Scale
 from epicycle.aspects import ClockAspect, ExecutionAspect, Job, JoinPoint, PortAspect
-from epicycle.aspects.execution import ActorPoint, Unit
+from epicycle.aspects.execution import ActorPoint, Target
 from epicycle.runner import Model
 from epicycle.runner.engine import ActorError, Simulation
 from tests.engine.engine_parts import load
@@ -236,7 +236,7 @@ class Faulty(ExecutionAspect):
         if self.where == here:
             raise RuntimeError(f"no {here}")
 
-    def begin(self, unit: Unit) -> None:
+    def begin(self, target: Target) -> None:
         self._fail("begin")
 
     def is_due(self, time: int) -> bool:

@@ -15,7 +15,7 @@ from tests.engine.cores import ROOT
 SOURCES = (
     ("arithmetic.py", "Scale", "273a2352ccb6f7a0"),
     ("core/authoring.py", "Latest", "b022c8dea367d216"),
-    ("core/authoring.py", "Pending", "faf6cabccebf5d58"),
+    ("core/authoring.py", "Pending", "1ede8ce90b73329c"),
     ("core/authoring.py", "rounds", "bcf677d00b681776"),
     ("core/elementary/logarithm.py", "log", "25dc7d4323f94b34"),
     ("core/laws.py", "exponential", "dd3e701d840f2744"),

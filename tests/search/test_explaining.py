@@ -13,7 +13,7 @@ import epicycle
 from epicycle.actors import EpicycleError
 from epicycle.runner.build import load_model
 from epicycle.runner.cli import main
-from epicycle.runner.engine import Acts, Simulation
+from epicycle.runner.engine import Interventions, Simulation
 from epicycle.runner.graph import ActName
 from epicycle.runner.search import explaining
 
@@ -60,7 +60,7 @@ def losses(found: epicycle.Explained) -> list[int]:
 @pytest.mark.parametrize("seed", range(12))
 def test_two_losses_in_a_row_suffice(model: Path, seed: int) -> None:
     made = load_model(model)
-    results = Simulation(made, seed=seed, acts=Acts()).run()
+    results = Simulation(made, seed=seed, acts=Interventions()).run()
     if results.monitors["alive"].holds is not False:
         with pytest.raises(
             EpicycleError, match="monitor alive holds in this run of relay: there is nothing to explain"
@@ -73,7 +73,7 @@ def test_two_losses_in_a_row_suffice(model: Path, seed: int) -> None:
     assert names[1].token == names[0].token + 1
     # By brute force: with these it is broken, without one of them it is not.
     for exactly in ([*names], names[:1], names[1:], []):
-        verdict = Simulation(made, seed=seed, acts=Acts(frozenset(exactly))).run().monitors["alive"]
+        verdict = Simulation(made, seed=seed, acts=Interventions(frozenset(exactly))).run().monitors["alive"]
         assert verdict.holds is (exactly != names)
     assert all(effect.without == effect.alone == float("inf") for effect in found.explanation.effects)
 
@@ -223,10 +223,10 @@ def test_all_times_are_those_of_the_run_of_the_set(twice: Path) -> None:
     made, moved, elsewhere = load_model(twice), 0, 0
     for seed in range(12):
         found = epicycle.explain(twice, "alive", seed=seed).explanation
-        results = Simulation(made, seed=seed, acts=Acts(frozenset(found.names))).run()
+        results = Simulation(made, seed=seed, acts=Interventions(frozenset(found.names))).run()
         assert [effect.act for effect in found.effects] == results.acts
         assert found.verdict_of_set == results.monitors["alive"]
-        whole = {act.name: act for act in Simulation(made, seed=seed, acts=Acts()).run().acts}
+        whole = {act.name: act for act in Simulation(made, seed=seed, acts=Interventions()).run().acts}
         assert [effect.whole for effect in found.effects] == [whole[name] for name in found.names]
         moved += any(effect.has_moved for effect in found.effects)
         elsewhere += found.verdict.time != found.verdict_of_set.time
@@ -385,7 +385,7 @@ def check_paper(seed: int) -> int:
     made.monitor("near", "always clearance.distance >= 3.7 m")
 
     def holds(names: list[ActName]) -> Any:
-        return Simulation(made, seed=seed, acts=Acts(frozenset(names))).run().monitors["near"].holds
+        return Simulation(made, seed=seed, acts=Interventions(frozenset(names))).run().monitors["near"].holds
 
     found = epicycle.explain(made, "near", seed=seed)
     names = found.explanation.names
@@ -405,7 +405,11 @@ def test_ten_seeds_of_the_paper_with_the_least_margin() -> None:
     nearest = []
     for seed in range(400):
         with_acts = Simulation(made, seed=seed).run().metrics["min_obstacle_distance"]
-        if with_acts < 3.7 <= Simulation(made, seed=seed, acts=Acts(())).run().metrics["min_obstacle_distance"]:
+        if (
+            with_acts
+            < 3.7
+            <= Simulation(made, seed=seed, acts=Interventions(())).run().metrics["min_obstacle_distance"]
+        ):
             nearest.append((with_acts, seed))
     assert min(nearest)[0] > 2.0
     sizes = [check_paper(seed) for _, seed in sorted(nearest)[:10]]

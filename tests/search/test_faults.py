@@ -52,9 +52,9 @@ def falsify(*arguments: object) -> int:
 def lost(seed: int) -> list[int]:
     """The numbers of the plans that are lost in a run."""
     from epicycle.runner import Simulation, load_model
-    from epicycle.runner.engine import Acts
+    from epicycle.runner.engine import Interventions
 
-    results = Simulation(load_model("stale.yaml"), seed=seed, acts=Acts()).run()
+    results = Simulation(load_model("stale.yaml"), seed=seed, acts=Interventions()).run()
     return [act.name.token for act in results.acts]
 
 

@@ -11,7 +11,7 @@ import pytest
 
 import epicycle
 from epicycle.runner.cli import main
-from epicycle.runner.engine import Acts, Simulation
+from epicycle.runner.engine import Interventions, Simulation
 from epicycle.runner.graph import ActName
 from epicycle.runner.results import Results
 
@@ -75,7 +75,7 @@ def check(name: str, seed: int, folder: Path, capsys: pytest.CaptureFixture[str]
     explained = json.loads(capsys.readouterr().out.splitlines()[-1])
     acts = [ActName(*each["act"]["name"]) for each in explained["effects"]]
     values = dict(each.partition("=")[::2] for each in found.command if "=" in each)
-    results = Simulation(epicycle.load(file, set=values), seed=found.broken.seed, acts=Acts()).run()
+    results = Simulation(epicycle.load(file, set=values), seed=found.broken.seed, acts=Interventions()).run()
     assert acts == plant.fault(results)
 
 
@@ -98,5 +98,5 @@ def test_planted_faults_are_found_whatever_the_seed(
 def test_without_acts_the_planted_models_are_right(name: str) -> None:
     """The faults do not show by themselves: something has to happen."""
     model = epicycle.load(PLANTED / f"{name}.yaml")
-    results = Simulation(model, acts=Acts(frozenset())).run()
+    results = Simulation(model, acts=Interventions(frozenset())).run()
     assert results.monitors[PLANTS[name].monitor].holds

@@ -12,7 +12,7 @@ from epicycle.actors import Actor, InputPort, OutputPort, Parameter
 from epicycle.aspects import JoinPoint, MeasurementAspect
 from epicycle.runner.catalogue import Dialect
 from epicycle.runner.commands import DONE, command, option, tell
-from epicycle.runner.engine import Director, Turn
+from epicycle.runner.engine import Activation, Director
 from epicycle.runner.show import Figure
 from epicycle.runner.show.report import StudyFigure
 
@@ -84,18 +84,18 @@ class LastFirst(Director):
 
     def __init__(self, *given: Any) -> None:
         super().__init__(*given)
-        self.line: list[Turn] = []
+        self.line: list[Activation] = []
 
-    def line_up(self, turn: Turn) -> None:
-        turn.is_wanted = True
-        self.line.append(turn)
+    def enqueue(self, activation: Activation) -> None:
+        activation.is_scheduled = True
+        self.line.append(activation)
 
-    def next_turn(self) -> Turn | None:
+    def next_activation(self) -> Activation | None:
         if not self.line:
             return None
-        turn = self.line.pop()
-        turn.is_wanted, self.rank = False, turn.rank
-        return turn
+        activation = self.line.pop()
+        activation.is_scheduled, self.rank = False, activation.rank
+        return activation
 
 
 class Acme(Dialect):

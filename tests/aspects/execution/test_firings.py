@@ -220,7 +220,7 @@ class Named(ExecutionAspect):
     """Notes whose firings it puts off."""
 
     def schedule(self, job: Job, point: ActorPoint) -> None:
-        point.act("seen", (point.owner, point.unit.owner))
+        point.act("seen", (point.owner, point.target.owner))
         point.forward(job)
 
 

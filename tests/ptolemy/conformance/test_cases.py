@@ -49,7 +49,7 @@ def test_sends_like_ptolemy(case: str, tmp_path: Path, monkeypatch: pytest.Monke
 
 
 def test_an_aspect_that_is_a_model_like_ptolemy() -> None:
-    """Requests wait for the turn of the aspect: all is as there, what comes in by its request ports, too."""
+    """Requests wait for the activation of the aspect: all is as there, what comes in by its request ports, too."""
     model = load_like_ptolemy(QUANTITY_MANAGER)
     expected, inside = came_in(model, recorded(QUANTITY_MANAGER))
     assert [(*send[:4], requested(send[4])) for send in sends(model)] == expected

@@ -6,7 +6,7 @@ from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING, Any, Protocol
 
-from epicycle.actors import Emitter, PortError, Way, counted
+from epicycle.actors import Emitter, PortError, Receiver, counted
 
 from .errors import ActorError, LoopError
 
@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 Deliver = Callable[[Any], None]
 
 
-class Call(Way):
+class Call(Receiver):
     """Passes each token to a function: of an aspect, a recorder, a metric."""
 
     __slots__ = ("function",)
@@ -28,24 +28,24 @@ class Call(Way):
     def __init__(self, function: Deliver) -> None:
         self.function = function
 
-    def go(self, token: Any) -> None:
+    def put(self, token: Any) -> None:
         self.function(token)
 
 
-class Fork(Way):
+class Fork(Receiver):
     """Sends each token along several ways."""
 
     __slots__ = ("ways",)
 
-    def __init__(self, ways: list[Way]) -> None:
+    def __init__(self, ways: list[Receiver]) -> None:
         self.ways = ways
 
-    def go(self, token: Any) -> None:
+    def put(self, token: Any) -> None:
         for way in self.ways:
-            way.go(token)
+            way.put(token)
 
 
-class Guarded(Way):
+class AspectCall(Receiver):
     """Passes each token, or job, to an aspect at a join point; an error in it is reported with what it was doing."""
 
     __slots__ = ("act", "doing", "holds", "pass_by", "point", "tell")
@@ -66,7 +66,7 @@ class Guarded(Way):
         self.pass_by = pass_by
         self.tell = tell
 
-    def go(self, token: Any) -> None:
+    def put(self, token: Any) -> None:
         doing = self.doing
         try:
             if self.holds is not None:
@@ -86,21 +86,21 @@ class Guarded(Way):
 class Waits(Protocol):
     """A director, or one with its own time."""
 
-    def later(self, delay: int, way: Way, token: Any) -> None:
+    def later(self, delay: int, way: Receiver, token: Any) -> None:
         """Send a token onward after ``delay`` ns."""
 
 
-class Delayed(Way):
+class Delayed(Receiver):
     """Sends each token onward after a delay."""
 
     __slots__ = ("delay", "director", "onward")
 
-    def __init__(self, director: Waits, delay: int, onward: Way) -> None:
+    def __init__(self, director: Waits, delay: int, onward: Receiver) -> None:
         self.director = director
         self.delay = delay
         self.onward = onward
 
-    def go(self, token: Any) -> None:
+    def put(self, token: Any) -> None:
         self.director.later(self.delay, self.onward, token)
 
 
@@ -124,7 +124,7 @@ class Sender(Emitter):
         port: OutputPort[Any],
         director: Director,
         writer: Writer,
-        onward: Way,
+        onward: Receiver,
         channels: Channels,
     ) -> None:
         self.port = port
@@ -134,17 +134,17 @@ class Sender(Emitter):
         self.channels = channels
         self.single: dict[int, Sender] | None = None  # made when the first token takes them: few ever do
 
-    def go(self, token: Any) -> None:
+    def put(self, token: Any) -> None:
         present = self.director.present
         self.writer.write(self.director.tag if present is None else present, token)
-        self.onward.go(token)
+        self.onward.put(token)
 
     def send(self, token: Any, channel: int | None = None) -> None:
         """Send a token to all channels, or to one."""
         if channel is None:
-            self.go(token)
+            self.put(token)
         else:
-            self.to(channel).go(token)
+            self.to(channel).put(token)
 
     def to(self, channel: int) -> Sender:
         """The sender to one channel."""
@@ -160,7 +160,7 @@ class Sender(Emitter):
         return sender
 
 
-class Screened(Emitter):
+class WovenSender(Emitter):
     """A sender behind aspects: what they drop has not been sent.
 
     The channel of a send travels past them in the way behind, for they may forward it later.
@@ -168,20 +168,20 @@ class Screened(Emitter):
 
     __slots__ = ("entries", "sender", "woven")
 
-    def __init__(self, sender: Sender, woven: Callable[[Way], Way]) -> None:
+    def __init__(self, sender: Sender, woven: Callable[[Receiver], Receiver]) -> None:
         self.sender = sender
         self.woven = woven
-        self.entries: dict[int | None, Way] = {}
+        self.entries: dict[int | None, Receiver] = {}
 
     def send(self, token: Any, channel: int | None = None) -> None:
         """Send a token to all channels, or to one."""
         entry = self.entries.get(channel)
         if entry is None:
-            onward: Way = self.sender if channel is None else Call(partial(self.sender.send, channel=channel))
+            onward: Receiver = self.sender if channel is None else Call(partial(self.sender.send, channel=channel))
             entry = self.entries[channel] = self.woven(onward)
-        entry.go(token)
+        entry.put(token)
 
 
-def all_of(ways: list[Way]) -> Way:
+def all_of(ways: list[Receiver]) -> Receiver:
     """A single way along all of them."""
     return ways[0] if len(ways) == 1 else Fork(ways)

@@ -1,4 +1,4 @@
-"""Ways: the ways of tokens, from every output port to the ports behind it."""
+"""The wiring of a run: the ways of tokens, from every output port to the ports behind it."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from epicycle.actors import (
     Emitter,
     EpicycleError,
     OutputPort,
-    Way,
+    Receiver,
     declared_parameters,
 )
 from epicycle.aspects import (
@@ -24,14 +24,14 @@ from epicycle.aspects import (
     JoinPointAspect,
     Medium,
     PortAspect,
-    Unit,
+    Target,
     aspect_stream,
 )
 
 from ..graph import Clock, Hop, ModelGraph, WovenAspect, connection_place
 from ..results import EventLog, Signal
 from ..text import describe
-from .acts import Acts, Named
+from .acts import Interventions, NamedCall
 from .aspect_context import EngineContext
 from .director import Director
 from .directors import Directors
@@ -39,15 +39,15 @@ from .errors import ActorError, LoopError
 from .execution import Execution
 from .local_time import LocalDirector
 from .parameters import VaryingParameter
+from .receivers import AspectCall, Call, Delayed, Deliver, Sender, WovenSender, all_of
 from .refinement import Refinement
 from .requests import Requests
-from .way import Call, Delayed, Deliver, Guarded, Screened, Sender, all_of
 
 T = TypeVar("T")
 P = TypeVar("P", bound=JoinPoint)
 
 
-class Ways:
+class Wiring:
     """The effect of ``send`` at each port of a run: through delays, borders and join points to the receivers.
 
     ``actors`` and ``aspects`` are those of the run; the ``graph`` is not changed.  ``listeners`` get every token that
@@ -62,9 +62,9 @@ class Ways:
         aspects: list[WovenAspect],
         director: Director,
         log: EventLog,
-        listeners: dict[str, list[Deliver | Way]],
+        listeners: dict[str, list[Deliver | Receiver]],
         signals: dict[str, Signal],
-        acts: Acts | None = None,
+        acts: Interventions | None = None,
     ) -> None:
         self.graph = graph
         self.acts = acts
@@ -73,8 +73,8 @@ class Ways:
         self.log = log
         self.points: dict[str, list[JoinPoint]] = {woven.name: [] for woven in aspects}
         self._wrong_clocks = [(woven, aspect) for woven in aspects if isinstance(aspect := woven.aspect, ClockAspect)]
-        self._to_begin: list[tuple[WovenAspect, ExecutionAspect, Unit]] = []
-        self._units: dict[tuple[str, str], Unit] = {}
+        self._to_begin: list[tuple[WovenAspect, ExecutionAspect, Target]] = []
+        self._targets: dict[tuple[str, str], Target] = {}
         self._listeners = listeners
         self._signals = signals
         self._points_at: dict[tuple[str, str], JoinPoint] = {}
@@ -122,10 +122,10 @@ class Ways:
             owner, _, name = path.rpartition(".")
             actor = self.actors[owner]
             varying = VaryingParameter(actor, declared_parameters(type(actor))[name])
-            entry: Way = Call(varying.set)
+            entry: Receiver = Call(varying.set)
             for woven in reversed(there):
                 entry = self._through(woven, path, path, entry)
-            self._executions[owner].refresh.append(partial(entry.go, varying.nominal))
+            self._executions[owner].refresh.append(partial(entry.put, varying.nominal))
 
     def context_of(self, path: str) -> Context:
         """The context of an actor: its view of the run."""
@@ -172,20 +172,22 @@ class Ways:
 
     def _open_requests(self) -> None:
         """Find the ways from the request ports of aspects that are models to the actors inside."""
-        ways: dict[str, Way] = {}
+        ways: dict[str, Receiver] = {}
         for requests in self._requests.values():
             for place, path in requests.model.requests.items():
                 if path not in ways:
                     ways[path] = all_of(self._branches(path, ()))
-                passage, told = self.directors.passages.get(path), partial(requests.told, place)
-                onward, waits = (ways[path], False) if passage is None else passage.admit(place, ways[path], told)
+                boundary_port, told = self.directors.boundary_ports.get(path), partial(requests.told, place)
+                onward, waits = (
+                    (ways[path], False) if boundary_port is None else boundary_port.admit(place, ways[path], told)
+                )
                 entry = self._woven(path, path, onward)
-                requests.entries[place] = (entry if waits else told(entry)).go
+                requests.entries[place] = (entry if waits else told(entry)).put
 
-    def _heard(self, path: str) -> list[Way]:
+    def _heard(self, path: str) -> list[Receiver]:
         """The listeners to what leaves a port."""
         listeners = self._listeners.get(path, [])
-        return [listener if isinstance(listener, Way) else Call(listener) for listener in listeners]
+        return [listener if isinstance(listener, Receiver) else Call(listener) for listener in listeners]
 
     def _emitter(self, port: OutputPort[Any]) -> Emitter:
         """The effect of ``port.send``."""
@@ -194,9 +196,9 @@ class Ways:
         # An aspect at an output comes before the send itself: what it drops has not been sent.
         if port.path not in self._woven_at:
             return everywhere
-        return Screened(everywhere, partial(self._woven, port.path, port.path))
+        return WovenSender(everywhere, partial(self._woven, port.path, port.path))
 
-    def _sender(self, port: OutputPort[Any], channel: int | None, ways: list[Way]) -> Sender:
+    def _sender(self, port: OutputPort[Any], channel: int | None, ways: list[Receiver]) -> Sender:
         writer = self.log.writer("send", port.actor.path, port.name, channel, "")
         return Sender(port, self.director, writer, all_of([*self._heard(port.path), *ways]), self)
 
@@ -206,7 +208,7 @@ class Ways:
         ways = [self._way(wires[0])] if len(wires) == 1 else self._branches(port.path, (), wires)
         return self._sender(port, channel, ways)
 
-    def _branches(self, path: str, hops: tuple[Hop, ...], wires: list[tuple[Hop, ...]] | None = None) -> list[Way]:
+    def _branches(self, path: str, hops: tuple[Hop, ...], wires: list[tuple[Hop, ...]] | None = None) -> list[Receiver]:
         """The ways onward from a port, one for each connection that leaves it, or that some wires take."""
         ways = []
         for hop in self.graph.outgoing(path):
@@ -220,24 +222,24 @@ class Ways:
             ways.append(self._over(hop, onward, taken))
         return ways
 
-    def _way(self, hops: tuple[Hop, ...]) -> Way:
+    def _way(self, hops: tuple[Hop, ...]) -> Receiver:
         """The way along one wire alone, for tokens that are sent to one channel."""
         onward = self._put(hops)
         for hop in reversed(hops):
             onward = self._over(hop, all_of([*self._heard(hop.destination), onward]), hops)
         return onward
 
-    def _over(self, hop: Hop, onward: Way, channel: tuple[Hop, ...]) -> Way:
-        """One connection: its delay, and the aspects and the passage at its far end."""
+    def _over(self, hop: Hop, onward: Receiver, channel: tuple[Hop, ...]) -> Receiver:
+        """One connection: its delay, and the aspects and the boundary port at its far end."""
         far = hop.destination
-        passage, lane = self.directors.passages.get(far), self.graph.channel_of(channel, hop)
+        boundary_port, lane = self.directors.boundary_ports.get(far), self.graph.channel_of(channel, hop)
         is_output = self.graph.direction(far) == "output"
         source = far if is_output else hop.source
         # Aspects at a port of a composite are outside of it.
-        if passage is not None and not is_output:
-            onward = self._woven(far, source, passage.lane(lane, onward))
-        elif passage is not None:
-            onward = passage.lane(lane, self._woven(far, source, onward))
+        if boundary_port is not None and not is_output:
+            onward = self._woven(far, source, boundary_port.lane(lane, onward))
+        elif boundary_port is not None:
+            onward = boundary_port.lane(lane, self._woven(far, source, onward))
         else:
             onward = self._woven(far, source, onward)
         for woven in reversed(self._woven_on.get((hop.source, far), [])):
@@ -246,25 +248,25 @@ class Ways:
             return onward
         return Delayed(self.directors.of[self.graph.director_over(hop)], hop.delay, onward)
 
-    def _put(self, hops: tuple[Hop, ...]) -> Way:
+    def _put(self, hops: tuple[Hop, ...]) -> Receiver:
         """The end of a wire, in the port of an actor."""
         owner, _, name = hops[-1].destination.rpartition(".")
         port, execution = self.actors[owner].inputs[name], self._executions.get(owner)
-        stand_in = None if execution is None else execution.turn_of(port)
+        stand_in = None if execution is None else execution.activation_of(port)
         return self.director.entry(port, self.graph.channels.of(hops), stand_in)
 
-    def _woven(self, path: str, source: str, onward: Way) -> Way:
+    def _woven(self, path: str, source: str, onward: Receiver) -> Receiver:
         """``onward`` preceded by the aspects at a port, the first declared outermost."""
         for woven in reversed(self._woven_at.get(path, [])):
             onward = self._through(woven, path, source, onward)
         return onward
 
-    def _through(self, woven: WovenAspect, path: str, source: str, onward: Way, place: str = "") -> Way:
+    def _through(self, woven: WovenAspect, path: str, source: str, onward: Receiver, place: str = "") -> Receiver:
         """``onward`` preceded by one aspect at a port; ``place`` is the connection, if the aspect is at only one."""
         aspect = woven.aspect
         assert isinstance(aspect, PortAspect)
-        point = self._point(JoinPoint, woven, aspect, path, onward.go, place or path, source)
-        return self._guarded(woven, aspect, aspect.pass_token, point, "pass_token()", place or path)
+        point = self._point(JoinPoint, woven, aspect, path, onward.put, place or path, source)
+        return self._aspect_call(woven, aspect, aspect.pass_token, point, "pass_token()", place or path)
 
     def _scheduled(self, path: str, onward: Callable[[Job], None]) -> Callable[[Job], None]:
         """``onward`` preceded by the aspects at an actor, the first declared outermost."""
@@ -273,10 +275,10 @@ class Ways:
             assert isinstance(aspect, ExecutionAspect)
             point = self._point(ActorPoint, woven, aspect, path, onward, path)
             self._join(point, woven, aspect)
-            onward = self._guarded(woven, aspect, aspect.schedule, point, "schedule()", path).go
+            onward = self._aspect_call(woven, aspect, aspect.schedule, point, "schedule()", path).put
         return onward
 
-    def _guarded(
+    def _aspect_call(
         self,
         woven: WovenAspect,
         aspect: JoinPointAspect[T, P],
@@ -284,11 +286,11 @@ class Ways:
         point: P,
         name: str,
         place: str,
-    ) -> Way:
+    ) -> Receiver:
         """The act of an aspect on what comes to a join point; an error in it is reported with its ``name``."""
         holds = None if aspect.is_always_active else partial(self._is_active, woven, aspect, point)
-        guarded = Guarded(act, name, point, holds, aspect.pass_by, partial(self._told, woven, point.port))
-        return guarded if self.acts is None else Named(guarded, self.acts, place)
+        aspect_call = AspectCall(act, name, point, holds, aspect.pass_by, partial(self._told, woven, point.port))
+        return aspect_call if self.acts is None else NamedCall(aspect_call, self.acts, place)
 
     def _is_active(self, woven: WovenAspect, aspect: JoinPointAspect[T, P], point: P) -> bool:
         return aspect.is_due(point.tag.time) and self._holds(woven, aspect, point)
@@ -352,12 +354,12 @@ class Ways:
     def _join(self, point: ActorPoint, woven: WovenAspect, aspect: ExecutionAspect) -> None:
         """Add the join point of an actor to the target of the aspect."""
         aimed = woven.name, woven.actors[point.port]
-        if aimed not in self._units:
-            self._units[aimed] = Unit(aimed[1], point)
-            self.points[woven.name].append(self._units[aimed])
-            self._to_begin.append((woven, aspect, self._units[aimed]))
-        point.keeper, point.unit = self._executions[point.port], self._units[aimed]
-        point.unit.points.append(point)
+        if aimed not in self._targets:
+            self._targets[aimed] = Target(aimed[1], point)
+            self.points[woven.name].append(self._targets[aimed])
+            self._to_begin.append((woven, aspect, self._targets[aimed]))
+        point.keeper, point.target = self._executions[point.port], self._targets[aimed]
+        point.target.points.append(point)
 
     def _forget(self, path: str) -> None:
         """Notify the aspects at an actor that it has lost its state."""
@@ -372,10 +374,10 @@ class Ways:
 
     def begin(self) -> None:
         """Start the aspects that act on their own."""
-        for woven, aspect, unit in self._to_begin:
+        for woven, aspect, target in self._to_begin:
             try:
-                aspect.begin(unit)
+                aspect.begin(target)
             except (ActorError, LoopError):
                 raise
             except Exception as error:
-                raise self._error(woven, f"begin() at {unit.port}", error) from error
+                raise self._error(woven, f"begin() at {target.port}", error) from error

@@ -1,45 +1,45 @@
 # Types for C; way.py has the documentation.
 
 cimport cython
-from epicycle.actors cimport Emitter, Way
+from epicycle.actors cimport Emitter, Receiver
 from epicycle.runner.engine.director cimport Director
 from epicycle.runner.results cimport Writer
 
 
-cdef class Call(Way):
+cdef class Call(Receiver):
     cdef public object function
-    cpdef go(self, token)
+    cpdef put(self, token)
 
 
-cdef class Fork(Way):
+cdef class Fork(Receiver):
     cdef public list ways
-    @cython.locals(way=Way)
-    cpdef go(self, token)
+    @cython.locals(way=Receiver)
+    cpdef put(self, token)
 
 
-cdef class Delayed(Way):
+cdef class Delayed(Receiver):
     cdef public object director, delay
-    cdef public Way onward
-    cpdef go(self, token)
+    cdef public Receiver onward
+    cpdef put(self, token)
 
 
-cdef class Guarded(Way):
+cdef class AspectCall(Receiver):
     cdef public object act, doing, holds, pass_by, point, tell
-    cpdef go(self, token)
+    cpdef put(self, token)
 
 
 cdef class Sender(Emitter):
     cdef public object port, channels
     cdef public Director director
     cdef public Writer writer
-    cdef public Way onward
+    cdef public Receiver onward
     cdef public dict single
-    cpdef go(self, token)
+    cpdef put(self, token)
     cpdef send(self, token, channel=*)
     cpdef Sender to(self, channel)
 
 
-cdef class Screened(Emitter):
+cdef class WovenSender(Emitter):
     cdef public Sender sender
     cdef public object woven
     cdef public dict entries
