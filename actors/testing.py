@@ -13,7 +13,9 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from typing import Any
 
-from .core import Actor, Environment, Streams, Tag, Wake, to_nanoseconds
+from simpy.events import Event, EventPriority
+
+from .core import Actor, Environment, Events, Streams, Tag, Wake, to_nanoseconds
 
 
 class Harness:
@@ -31,7 +33,8 @@ class Harness:
         self.tag = Tag(0, 0)
         self.seed = seed
         self.streams = Streams(seed)
-        self.environment = Environment()
+        self.events = Events()
+        self.environment = Environment(self)
         self.wakes: list[Wake] = []
         self.stopped: str | None = None
         self.sent: dict[str, list[tuple[float, Any]]] = {name: [] for name in actor.outputs}
@@ -52,6 +55,15 @@ class Harness:
     def time(self) -> int:
         """The time of the present tag (ns)."""
         return self.tag.time
+
+    @property
+    def next_event(self) -> int:
+        """The time of SimPy's next event (ns)."""
+        return self.events.first
+
+    def put_event(self, event: Event, priority: EventPriority, delay: int) -> None:
+        """Called by the environment: let an event happen after ``delay`` ns."""
+        self.events.put(self.time + delay, priority, event)
 
     def wake(self, actor: Actor, time: int) -> Wake:
         """Called by ``wake_in`` and ``wake_at`` of the actor."""
@@ -85,7 +97,7 @@ class Harness:
             self.wakes = [wake for wake in self.wakes if not wake.cancelled]
             tags = [wake.tag for wake in self.wakes] + [Tag(time, 1) for time in coming]
             tag = min(tags, default=Tag(end + 1, 0))
-            if self.environment.queue and self.environment.queue[0][0] <= min(tag.time, end):
+            if self.next_event <= min(tag.time, end):
                 self._resume()
             elif tag.time > end:
                 break
@@ -94,12 +106,11 @@ class Harness:
 
     def _resume(self) -> None:
         """Let SimPy's next event happen, which may resume a process."""
-        self.tag = max(self.tag, Tag(self.environment.queue[0][0], 1))
-        self.environment.happen()
+        self.tag = max(self.tag, Tag(self.next_event, 1))
+        self.events.happen()
 
     def _fire(self, tag: Tag, tokens: Iterable[tuple[str, Any]]) -> None:
         self.tag = tag
-        self.environment._now = max(tag.time, self.environment.time)
         for name, token in tokens:
             port = self.actor.inputs[name]
             each_channel = token if port.multi and isinstance(token, list) else [token]

@@ -7,7 +7,7 @@ from collections import deque
 from collections.abc import Callable
 from typing import Any, TypeVar
 
-from epicycle.actors import Actor, Context, InputPort, Moment, Receiver, StateMachine, Tag, Wake
+from epicycle.actors import Actor, InputPort, Moment, Receiver, StateMachine, Tag, Wake
 from epicycle.runner.engine import (
     Activation,
     BoundaryPort,
@@ -17,6 +17,7 @@ from epicycle.runner.engine import (
     Directors,
     Instant,
     ModeDirector,
+    Outer,
     Refinement,
 )
 from epicycle.runner.graph import ModelGraph, is_within
@@ -66,7 +67,7 @@ class PostedComposites(Directors):
         kind = PostedConductor if self._is_ours(composite) else ModeDirector
         return kind(composite, machine, self.director, self.of[composite])
 
-    def refinement(self, path: str, outside: Context, mode_director: ModeDirector) -> Refinement:
+    def refinement(self, path: str, outside: Outer, mode_director: ModeDirector) -> Refinement:
         kind = PostedRefinement if self._is_ours(path) else Refinement
         return kind(path, outside, self.director, mode_director)
 

@@ -3,7 +3,7 @@
 from . import elementary, paths
 from .actor import Actor, Context, declared_ports, has_own_ports
 from .authoring import ABSENT, Latest, Pending, present, rounds
-from .environment import Environment
+from .environment import Environment, Events, Host
 from .errors import EpicycleError, Fault, FaultError, Span
 from .files import irregular, open_regular, read_regular, read_table
 from .laws import normal_quantile, normal_share
@@ -47,11 +47,11 @@ from .units import UnitError, convert, in_si, parse_unit
 
 __all__ = [
     "ABSENT", "MAX_DEPTH", "NANOSECONDS_PER_SECOND", "NEVER", "NO_TOKENS", "REQUIRED", "Actor", "Calendar",
-    "Configurable", "Context", "Emitter", "Environment", "EpicycleError", "Fault", "FaultError", "InputPort", "Latest",
-    "MappingParameter", "Moment", "OutputPort", "Parameter", "ParameterError", "Pending", "PortError", "PortParameter",
-    "Process", "Quantity", "ReadyQueue", "Receiver", "Span", "Stream", "Streams", "Tag", "TimedQueue", "UnitError",
-    "Wake", "abridged", "accepts", "array_parameter", "bounds_text", "brief", "convert", "counted",
-    "counted_in_si", "cut", "declared_parameters", "declared_ports", "did_you_mean", "digits", "elementary",
+    "Configurable", "Context", "Emitter", "Environment", "EpicycleError", "Events", "Fault", "FaultError", "Host",
+    "InputPort", "Latest", "MappingParameter", "Moment", "OutputPort", "Parameter", "ParameterError", "Pending",
+    "PortError", "PortParameter", "Process", "Quantity", "ReadyQueue", "Receiver", "Span", "Stream", "Streams", "Tag",
+    "TimedQueue", "UnitError", "Wake", "abridged", "accepts", "array_parameter", "bounds_text", "brief", "convert",
+    "counted", "counted_in_si", "cut", "declared_parameters", "declared_ports", "did_you_mean", "digits", "elementary",
     "has_own_ports", "in_si", "irregular", "is_alone", "is_too_deep", "nearest", "new_tag", "new_wake",
     "normal_quantile", "normal_share", "open_regular", "parse_unit", "part_finders", "paths", "plain", "present",
     "random_stream", "read_regular", "read_table", "readable", "rounds", "shaped", "shortened", "texts_parameter",

@@ -18,6 +18,7 @@ from simpy.events import Event
 from simpy.events import Process as SimPyProcess
 
 from .actor import Actor
+from .environment import end, settle
 from .moment import Wake
 from .ports import InputPort
 
@@ -53,16 +54,11 @@ class Process(Actor):
         except (GeneratorExit, KeyboardInterrupt):
             raise
         except BaseException as error:
-            self.failure = error  # SimPy raises a copy of it later, which does not show the actor
+            self.failure = error  # which does not show the actor
             raise
 
     def halt(self) -> None:
-        process = self.process
-        if not process.is_alive:
-            return
-        if process.target.callbacks is not None:
-            process.target.callbacks.remove(process._resume)
-        process._generator.close()  # which leaves its `with` blocks: a resource that it held or waited for is released
+        end(self.process)
 
     @property
     def environment(self) -> Any:
@@ -80,7 +76,7 @@ class Process(Actor):
         event = Event(self.environment)
         queue = self._queued[port.name]
         if queue:
-            _settle(event, queue.popleft())
+            settle(event, queue.popleft())
         else:
             event.callbacks = _Listeners(ref(event), self._awaited)
             self._reads.append((port.name, ref(event)))
@@ -94,11 +90,11 @@ class Process(Actor):
         if due:
             self._waits = [entry for entry in self._waits if not entry[0].due]
         for _, event in due:
-            _settle(event, None)
+            settle(event, None)
         # A resumed process may request the next token at once, so repeat until no read can be served.
         while (entry := self._next_read()) is not None:
             name, event = entry
-            _settle(event, self._queued[name].popleft())
+            settle(event, self._queued[name].popleft())
         if self.failure is not None:
             raise self.failure
 
@@ -139,12 +135,3 @@ class _Listeners(list[Any]):
         self.deserted = not self
         if self.deserted and (event := self._event()) is not None:
             self._awaited.discard(event)
-
-
-def _settle(event: Event, value: object) -> None:
-    """Let an event happen now, inside the firing, as SimPy's ``Environment.step`` would for its next event."""
-    event._ok = True
-    event._value = value
-    callbacks, event.callbacks = event.callbacks, None  # type: ignore[assignment]
-    for callback in callbacks or ():
-        callback(event)

@@ -25,7 +25,7 @@ from .local_time import BoundaryPort, LocalDirector
 from .log_filter import LogFilter
 from .pace import SLOWEST, Pace
 from .receivers import Call
-from .refinement import ModeDirector, Refinement
+from .refinement import ModeDirector, Outer, Refinement
 from .simulation import Simulation, Snapshot, SnapshotError
 from .trace import Arrival, Firing, Tracer
 
@@ -51,6 +51,7 @@ __all__ = [
     "LogFilter",
     "LoopError",
     "ModeDirector",
+    "Outer",
     "Pace",
     "Record",
     "Refinement",

@@ -6,14 +6,14 @@ from epicycle.runner.engine.agenda cimport Delivery, Form, Instant, Activation, 
 
 
 cdef class Director:
-    cdef public object _environment, seed, streams, crowd, ranks, watch, _stop_after, _reason
-    cdef public list _queue, _recent, activations
+    cdef public object _environment, events, seed, streams, crowd, ranks, watch, _stop_after, _reason
+    cdef public list _recent, activations
     cdef public ReadyQueue _ready
     cdef public Calendar _times
     cdef public long long firings, steps, _on_their_way, _most_times, _most_microsteps, _most_steps, _time
     cdef public long rank
     cdef public Instant present, _last, _next, _past
-    cdef public bint _has_simpy, _is_interrupted
+    cdef public bint _is_interrupted
     @cython.locals(last=Instant, time=cython.longlong)
     cpdef Instant now(self)
     cpdef wake(self, actor, long long time)

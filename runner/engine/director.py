@@ -12,9 +12,9 @@ A token sent over a connection without delay arrives at the same tag; with delay
 at the next microstep.  A wake-up for the present time comes at the next microstep, one for the future at
 microstep 1.  The first tag of a run is (start, 1).
 
-SimPy has the events of processes and resources, at whole nanoseconds, too.  The director has its own agenda beside
-them: the earlier of the two goes first.  At one instant, all events of SimPy come first, and what processes send then
-is received at the first microstep that the director has not yet handled.
+Actors react, or are SimPy processes; one director orders both.  It also lets the events of processes and resources
+happen (``Environment``), at whole nanoseconds, too.  At one instant, all of these events come first, and what processes
+send then is received at the first microstep that the director has not yet handled.
 
 Departures from Ptolemy II: a firing sees all tokens of its tag at once, where Ptolemy fires again for each further
 token; and tokens that an actor does not read do not stay in the port.
@@ -30,9 +30,12 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, NoReturn
 
+from simpy.events import Event, EventPriority
+
 from epicycle.actors import (
     Calendar,
     Environment,
+    Events,
     InputPort,
     Moment,
     Process,
@@ -62,9 +65,9 @@ class Director:
     """Fires the actors of one run."""
 
     __slots__ = (
-        "_environment", "_has_simpy", "_is_interrupted", "_last", "_most_microsteps", "_most_steps",
+        "_environment", "_is_interrupted", "_last", "_most_microsteps", "_most_steps",
         "_most_times", "_next", "_on_their_way", "_past", "_queue", "_ready", "_reason", "_recent",
-        "_stop_after", "_time", "_times", "activations", "crowd", "firings", "present", "rank",
+        "_stop_after", "_time", "_times", "activations", "crowd", "events", "firings", "present", "rank",
         "ranks", "seed", "steps", "streams", "watch",
     )  # fmt: skip
 
@@ -74,10 +77,9 @@ class Director:
     def __init__(
         self, order: dict[str, int], seed: int, limits: Limits = NORMAL, graph: ModelGraph | None = None
     ) -> None:
-        self._environment = Environment()
-        self._queue = self._environment.queue
-        self._has_simpy = False  # whether anybody uses the environment
-        self._time = 0  # SimPy's time until then
+        self.events = Events()
+        self._environment: Environment | None = None  # made for the first process
+        self._time = 0  # of the latest instant or event
         self.seed = seed
         self.streams = Streams(seed)
         self.crowd = Crowd(limits.tokens)
@@ -123,17 +125,26 @@ class Director:
 
     @property
     def environment(self) -> Environment:
-        """SimPy's part of the run, which is kept up to date once it has been requested."""
-        if not self._has_simpy:
-            self._has_simpy = True
-            self._environment._now = self._time
+        """The environment for processes and resources, whose events this director lets happen."""
+        if self._environment is None:
+            self._environment = Environment(self)
         return self._environment
+
+    @property
+    def next_event(self) -> int:
+        """The time of the next event of SimPy's (ns)."""
+        time: int = self.events.first
+        return time
+
+    def put_event(self, event: Event, priority: EventPriority, delay: int) -> None:
+        """Let an event of SimPy's happen after ``delay`` ns."""
+        self.events.put(self._time + delay, priority, event)
 
     def now(self) -> Instant:
         """The present tag, with its work if it is being handled."""
         if self.present is not None:
             return self.present
-        now, last = self._environment.time if self._has_simpy else self._time, self._last
+        now, last = self._time, self._last
         return new_instant(now, 1) if now > last.time else new_instant(last.time, last.microstep + 1)
 
     # -- requests of actors and aspects ---------------------------------------------------------------------------

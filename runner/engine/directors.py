@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, cast
 from ..graph import Clock, ModelGraph, is_within
 from .director import Director
 from .local_time import BoundaryPort, LocalDirector
-from .refinement import ModeDirector, Refinement
+from .refinement import ModeDirector, Outer, Refinement
 
 if TYPE_CHECKING:
-    from epicycle.actors import Actor, Context, StateMachine
+    from epicycle.actors import Actor, StateMachine
 
     from .execution import Execution
 
@@ -72,7 +72,7 @@ class Directors:
         """The mode director of a composite with modes."""
         return ModeDirector(composite, machine, self.director, self.of[composite])
 
-    def refinement(self, path: str, outside: Context, mode_director: ModeDirector) -> Refinement:
+    def refinement(self, path: str, outside: Outer, mode_director: ModeDirector) -> Refinement:
         """The director of a refinement."""
         return Refinement(path, outside, self.director, mode_director)
 

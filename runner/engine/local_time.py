@@ -25,7 +25,7 @@ class LocalDirector:
     """The director as seen by the actors and aspects inside a composite with its own clock."""
 
     def __init__(self, director: Director | Refinement, clock: Clock) -> None:
-        self.environment = LocalEnvironment(director.environment, clock)
+        self.environment = Environment(self)
         self.seed = director.seed
         self.streams = director.streams
         self._director = director
@@ -47,6 +47,18 @@ class LocalDirector:
         wake.move(self._clock.tag(wake.tag))
         return wake
 
+    @property
+    def next_event(self) -> int:
+        """The local time of the next event of SimPy's (ns)."""
+        time = self._director.next_event
+        return self._clock.local(time) if time < NEVER else NEVER
+
+    def put_event(self, event: Event, priority: EventPriority, delay: int) -> None:
+        """Let an event of SimPy's happen after ``delay`` ns of local time."""
+        if 0 < delay < NEVER:
+            delay = self._clock.span(self._director.time, delay)
+        self._director.put_event(event, priority, delay)
+
     def stop(self, reason: str) -> None:
         """End the whole run, not only this composite."""
         self._director.stop(reason)
@@ -54,26 +66,6 @@ class LocalDirector:
     def later(self, delay: int, way: Receiver, token: Any) -> None:
         """Send a token onward after ``delay`` ns of local time."""
         self._director.later(self._clock.span(self._director.time, delay), way, token)
-
-
-class LocalEnvironment(Environment):
-    """The run's SimPy environment in local time, for the processes inside: its events are the run's."""
-
-    def __init__(self, environment: Environment, clock: Clock) -> None:
-        super().__init__()
-        self._environment = environment
-        self._clock = clock
-
-    @property
-    def time(self) -> int:
-        """The local time (ns)."""
-        return self._clock.local(self._environment.time)
-
-    def put(self, event: Event, priority: EventPriority, delay: int) -> None:
-        """Let an event happen after ``delay`` ns of local time."""
-        if 0 < delay < NEVER:
-            delay = self._clock.span(self._environment.time, delay)
-        self._environment.put(event, priority, delay)
 
 
 class BoundaryPort(Actor):

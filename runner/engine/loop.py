@@ -32,7 +32,8 @@ def handle_events(
 
     Returns why it ended, or an empty text after ``most`` steps, each of which is a tag or a SimPy event.
     """
-    environment, times, queue = director._environment, director._times, director._queue
+    times, events = director._times, director.events
+    queue = events.content
     last_step = NEVER if most is None else director.steps + most
     last_time = NEVER - 1 if stop is None else stop
     here, never = 0, NEVER
@@ -70,14 +71,13 @@ def handle_events(
             if director._is_interrupted:
                 raise KeyboardInterrupt
             if is_of_simpy:
-                environment.happen()
+                director._time = upcoming
+                events.happen()
             elif instant is not None:
                 director._next = None
                 director.handle(instant)
             else:
                 director._time = upcoming
-                if director._has_simpy:
-                    environment._now = upcoming
                 director.handle(times.pop())
         except BaseException as error:
             director.present = None

@@ -10,11 +10,11 @@ from __future__ import annotations
 import heapq
 from collections.abc import Mapping
 from itertools import count
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 from simpy.events import Event, EventPriority
 
-from epicycle.actors import Actor, Context, Environment, Receiver, Tag, Wake, new_wake
+from epicycle.actors import NEVER, Actor, Context, Environment, Host, Receiver, Tag, Wake, new_wake
 
 from .agenda import Activation, Delivery
 from .director import Director
@@ -29,15 +29,19 @@ if TYPE_CHECKING:
 Entry = tuple[int, int, "Wake | Delivery | Event", "Activation | EventPriority | None", tuple[int, int]]
 
 
+class Outer(Context, Host, Protocol):
+    """The director around a machine."""
+
+
 class Refinement:
     """The director as seen inside a refinement; ``outer`` is the director around its machine."""
 
-    def __init__(self, path: str, outer: Context, director: Director, mode_director: ModeDirector) -> None:
+    def __init__(self, path: str, outer: Outer, director: Director, mode_director: ModeDirector) -> None:
         self.path = path
         self.seed = director.seed
         self.streams = director.streams
         self.director = director
-        self.environment = _Environment(self, outer.environment)
+        self.environment = Environment(self)
         self.mode_director = mode_director
         self.is_active = False
         self._outer = outer
@@ -74,9 +78,17 @@ class Refinement:
         """Let a token go on after ``delay`` ns of local time."""
         self._put(self.time + delay, self.director.hold(way, token), None)
 
-    def put_event(self, event: Event, priority: EventPriority, time: int) -> None:
-        """Schedule a SimPy event at a local time."""
-        self._put(time, event, priority)
+    @property
+    def next_event(self) -> int:
+        """The local time of the next event of SimPy's in here (ns)."""
+        return min((time for time, _, what, *_ in self._agenda if isinstance(what, Event)), default=NEVER)
+
+    def put_event(self, event: Event, priority: EventPriority, delay: int) -> None:
+        """Let an event of SimPy's happen after ``delay`` ns of local time."""
+        if delay == 0 and self.is_active:
+            self._outer.put_event(event, priority, 0)
+        else:
+            self._put(self.time + delay, event, priority)
 
     def _put(self, time: int, what: Wake | Delivery | Event, how: Activation | EventPriority | None) -> None:
         most = self.director.crowd.most
@@ -122,7 +134,8 @@ class Refinement:
             if isinstance(what, Delivery):
                 what.arrive()
             elif isinstance(what, Event):
-                self.environment.release(what, how)
+                assert isinstance(how, int)
+                self._outer.put_event(what, how, 0)
             elif what.cancelled:
                 continue
             else:
@@ -153,31 +166,6 @@ class Refinement:
     def begin_inside(self, inside: Callable[[], None]) -> None:
         """Start its contents."""
         inside()
-
-
-class _Environment(Environment):
-    """The run's SimPy environment in the time of a refinement, for the processes inside."""
-
-    def __init__(self, refinement: Refinement, outer: Environment) -> None:
-        super().__init__()
-        self._refinement = refinement
-        self._outer = outer
-
-    @property
-    def time(self) -> int:
-        """The local time (ns)."""
-        return self._refinement.time
-
-    def put(self, event: Event, priority: EventPriority, delay: int) -> None:
-        """Let an event happen after ``delay`` ns of local time."""
-        if delay == 0 and self._refinement.is_active:
-            self.release(event, priority)
-        else:
-            self._refinement.put_event(event, priority, self._refinement.time + delay)
-
-    def release(self, event: Event, priority: Any) -> None:
-        """Let an event happen now."""
-        self._outer.put(event, priority, 0)
 
 
 class ModeDirector(Actor):
