@@ -148,10 +148,7 @@ READINGS: dict[str, tuple[Any, str, Any]] = {
     "starts_known": (
         True,
         "controller.peers_at_start",
-        {
-            MAIN: OBSERVER_STARTS,
-            **{own: [START, *OBSERVER_STARTS[:i], *OBSERVER_STARTS[i + 1 :]] for i, own in enumerate(OBSERVERS)},
-        },
+        [START, *OBSERVER_STARTS],  # of which each robot leaves out its own 'start'
     ),
 }
 

@@ -294,7 +294,9 @@ class Configurable:
     """Base of everything with declared parameters: actors, aspects and their parts."""
 
     # Keys that YAML uses beside parameters; no parameter may have these names.
-    reserved: ClassVar[frozenset[str]] = frozenset({"type", "count", "priority", "tags"})
+    reserved: ClassVar[frozenset[str]] = frozenset({"type", "count", "priority", "tags", "inherit"})
+    # Inherited parameters that would do nothing: 'inherit: all' of a model leaves them out.
+    unused: ClassVar[tuple[str, ...]] = ()
     # Advice for names that might be mistaken for parameters.
     refused: ClassVar[Mapping[str, str]] = {}
     # Attributes that its copies, for a run or a snapshot, share with it.
@@ -387,6 +389,14 @@ def variants(base: type) -> dict[str, type]:
 part_finders: list[Callable[[str], None]] = []
 
 
+def found_variants(base: type, name: object) -> dict[str, type]:
+    """The variants of ``base``, after a search for one of that name."""
+    if isinstance(name, str) and name not in variants(base):
+        for find in part_finders:
+            find(name)
+    return variants(base)
+
+
 def build_variant(base: type, value: object, unit: str = "") -> object:
     """Make one of the variants of ``base`` from a mapping with a ``type`` key; an instance is returned as it is.
 
@@ -395,10 +405,7 @@ def build_variant(base: type, value: object, unit: str = "") -> object:
     if isinstance(value, base):
         return value
     name = value.get("type") if isinstance(value, Mapping) else None
-    if isinstance(name, str) and name not in variants(base):
-        for find in part_finders:
-            find(name)
-    known = variants(base)
+    known = found_variants(base, name)
     valid = ", ".join(sorted(known))
     if not isinstance(value, Mapping):
         raise ParameterError(f"{brief(value)} is not a mapping {{type: ...}} with one of the types {valid}")

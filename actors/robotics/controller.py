@@ -52,9 +52,9 @@ class _Peers:
     replaces the nearest one.
     """
 
-    def __init__(self, places: Array) -> None:
+    def __init__(self, places: list[list[float]]) -> None:
         # Their names are not paths.
-        self._nobody = {f"[{number}]": tuple(place) for number, place in enumerate(places.tolist())}
+        self._nobody = {f"[{number}]": tuple(place) for number, place in enumerate(places)}
         self._rows = {
             name: array_of((0.0, float(len(place)), 0.0, *place, *[0.0] * len(place)))
             for name, place in sorted(self._nobody.items())
@@ -104,9 +104,9 @@ class RobustController(TargetModel, Actor):
     With ``objectives`` and a ``role``, the objective changes during the run.  All else stays: the standing plan, to
     which f3 ties the next one, the peers' plans and the estimate.
 
-    Before the first plan or estimate comes, the robot avoids only the positions in ``peers_at_start``. Plans and
-    estimates that are not finite are ignored; the last good ones are kept.  Without a finite own state the control is
-    zero, and nothing else is sent.
+    Before the first plan or estimate comes, the robot avoids only the positions in ``peers_at_start``, where its own
+    ``start`` may be among them.  Plans and estimates that are not finite are ignored; the last good ones are kept.
+    Without a finite own state the control is zero, and nothing else is sent.
 
     A robot with other ``dynamics`` than the paper's plans with its own states and controls.  Its plan is sent to the
     others as accelerations that bring a double integrator to the same places.
@@ -180,8 +180,9 @@ class RobustController(TargetModel, Actor):
     keep_out = array_parameter(
         (None, 3), (), unit="m", doc="in the plane, what stands in the way: x, y, and the distance to keep from there"
     )
+    start = PlaceParameter(None, doc="where this robot is at time 0, to tell it from the others in 'peers_at_start'")
     peers_at_start = PlaceParameter(
-        (), several=True, doc="positions of other robots at time 0, used until their plans come"
+        (), several=True, doc="positions of robots at time 0, used until their plans come; its own 'start' is left out"
     )
     robot_name = Parameter(
         str, "", doc="name in the plan; if empty, the path of the composite that contains the controller"
@@ -204,6 +205,8 @@ class RobustController(TargetModel, Actor):
             raise ParameterError("keep_out: a robot that flies is above what stands in the way; leave it out")
         if len(self.peers_at_start) and self.peers_at_start.shape[1] != d:
             raise ParameterError(f"peers_at_start: places have {self.peers_at_start.shape[1]} numbers; expected {d}")
+        if self.start is not None and len(self.start) != d:
+            raise ParameterError(f"start: it has {len(self.start)} numbers; expected {d}")
         self.control.change("type", shaped(np.ndarray, (self._motion.controls,)))
 
     def initialize(self) -> None:
@@ -250,7 +253,8 @@ class RobustController(TargetModel, Actor):
         self._applied = self._rest  # U_t
         first = np.zeros(d if self._is_papers else motion.states)
         self._standing = self._nothing = _Standing(-math.inf, first, np.zeros(d), np.zeros((self._steps, size)))
-        self._peers = _Peers(self.peers_at_start)
+        own = None if self.start is None else self.start.tolist()
+        self._peers = _Peers([place for place in self.peers_at_start.tolist() if place != own])
         self._objective: Objective = self.objective
         self._target: Estimate | None = None
         self._tracks: Tracks | None = None

@@ -21,7 +21,7 @@ class IntegratedOU(Configurable):
     speed stays bounded, while under eq. (1) its velocity is a random walk.
     """
 
-    _unused: tuple[str, ...] = "position_noise", "velocity_noise"  # inherited, of the random walk of eq. (1)
+    unused: ClassVar[tuple[str, ...]] = "position_noise", "velocity_noise"  # of the random walk of eq. (1)
 
     target_speed = Parameter(float, 1.5, unit="m/s", min=1e-6, doc="largest speed of the target")
 
@@ -30,7 +30,7 @@ class IntegratedOU(Configurable):
     def check(self) -> None:
         """Refuse inherited parameters that would do nothing."""
         super().check()
-        for name in self._unused:
+        for name in self.unused:
             if getattr(self, name) != declared_parameters(type(self))[name].default:
                 raise ParameterError(
                     f"it has no effect in {type(self).__name__}, whose target roams; leave it out, and set "

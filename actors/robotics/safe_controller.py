@@ -50,7 +50,7 @@ class SafeController(IntegratedOU, RobustController):
     decides.
     """
 
-    _unused = "position_noise", "velocity_noise", "covariance_noise"
+    unused: ClassVar[tuple[str, ...]] = "position_noise", "velocity_noise", "covariance_noise"
     _of_target = PLANE  # the model of its motion is
 
     overrides = OutputPort(int, doc="number of controls so far that a retreat has changed")

@@ -38,7 +38,7 @@ class Aspect(Configurable, ABC):
     figures that it gives at the end of a run, with their units.
     """
 
-    reserved: ClassVar[frozenset[str]] = frozenset({"type", "at", "enabled"})
+    reserved: ClassVar[frozenset[str]] = frozenset({"type", "at", "enabled", "inherit"})
     at_ports: ClassVar[bool] = False
     stands_at: ClassVar[frozenset[str]] = frozenset({"actor"})
     events: ClassVar[tuple[str, ...]] = ()

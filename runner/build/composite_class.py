@@ -9,7 +9,7 @@ from pathlib import Path
 
 from ..catalogue import Catalogue, installed
 from ..graph import WovenAspect
-from ..language import CompositeText, PartText, Settings, beside, inherit, read_library
+from ..language import CompositeText, PartText, Settings, Surroundings, beside, inherit, read_library
 from ..text import Position, Problems, Text, call_site, did_you_mean, entries_of
 from .draft import Draft
 from .settle import Settler
@@ -73,7 +73,7 @@ def load_composite(file: str | Path, name: str, *, types: Iterable[type] = ()) -
     problems = Problems()
     declared = read_library(file, problems)
     catalogue = installed().with_types(types)
-    composites = inherit(declared, catalogue.actors, problems)
+    composites = Surroundings(inherit(declared, catalogue.actors, problems), catalogue, problems).composites
     if name not in composites:
         hint = f"its composites: {', '.join(composites) or 'none'}"
         problems.add(f"{file} has no composite {name!r}{did_you_mean(name, list(composites))}", call_site(), hint)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any, TypeAlias, TypeVar
@@ -75,7 +75,7 @@ def configure(
         elif here is not None:
             found[name] = _value(parameter, *here, f"{label}.{name}", values)
         elif parameter.required:
-            tell_missing(f"{label}: {cls.__name__}", name, parameter.doc, position, problems, local.path)
+            tell_missing(f"{label}: {cls.__name__}", name, (parameter.doc,), position, problems, local.path)
             is_whole = False
     failure = None
     if is_whole and not any(value is POISON for value in found.values()):
@@ -108,7 +108,8 @@ def _value(parameter: Parameter[Any], entry: Entry, local: Locals, label: str, v
     return values.converted(entry.value, local, label, file)
 
 
-def tell_missing(who: str, name: str, doc: str, position: Position, problems: Problems, scope: str) -> Poison:
-    return problems.add(
-        f"{who} needs a value for {name!r}", position, *([f"{name}: {doc}"] if doc else []), scope=scope
-    )
+def tell_missing(
+    who: str, name: str, about: Iterable[str], position: Position, problems: Problems, scope: str
+) -> Poison:
+    hints = [f"{name}: {each}" for each in about if each]
+    return problems.add(f"{who} needs a value for {name!r}", position, *hints, scope=scope)

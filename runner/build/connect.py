@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import product
 
@@ -209,6 +209,15 @@ class Wiring:
                 if not (spare_self and one.rpartition(".")[0] == other.rpartition(".")[0]):
                     links.append(Link(one, other, delay, source.text.position, connection.shared))
         return links
+
+    def check_ports(self, name: str, child: Child, connections: Iterable[ConnectionText | Poison]) -> None:
+        """Check that a child of another type that it may have would have the ports that connections name."""
+        for each in connections:
+            if each:
+                for ends, wanted in ((each.sources, "output"), (each.destinations, "input")):
+                    for text in ends:
+                        if text.actor == name:
+                            self._has_port(name, child, text.port, wanted, text)
 
     def _label(self, text: Endpoint) -> str:
         return f"{self.path}.{text.text}" if self.path else text.text

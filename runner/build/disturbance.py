@@ -20,6 +20,7 @@ from ..language import (
     PointcutText,
     Setting,
     Settings,
+    Surroundings,
     inherit,
     joined,
     load_disturbance,
@@ -149,8 +150,9 @@ def _woven(
             problems.add(f"there is already an aspect {part.name!r}", part.position, "unweave it first")
     problems.raise_if_any()
     settler = Settler(Settings(settings), problems)
-    composites = inherit(disturbance.composites, catalogue.actors, problems)
-    made = Unfolding(Known(composites, catalogue), settler, model.draft.copy())
+    around = Surroundings(inherit(disturbance.composites, catalogue.actors, problems), catalogue, problems)
+    root = around.composite(root)
+    made = Unfolding(Known(around.composites, catalogue), settler, model.draft.copy())
     made.body("", root, settler.parameters("", root, {}, {}, None))
     found = weave_all(made)
     settler.check_unused(made.draft)

@@ -16,6 +16,7 @@ from ..language import (
     ModelText,
     Setting,
     Settings,
+    Surroundings,
     Values,
     add_disturbances,
     change_aspect,
@@ -79,7 +80,9 @@ def load_model(
         disturbances = load_disturbances(map(str, _several(disturb)), problems)
         for disturbance in disturbances:
             declared = joined(declared, disturbance.composites, COMPOSITE_THERE, problems)
-        composites = inherit(declared, catalogue.actors, problems, limits)
+        around = Surroundings(inherit(declared, catalogue.actors, problems, limits), catalogue, problems)
+        composites = around.composites
+        text = around.model(text)
         check_usage(text, declared, composites, catalogue.actors, problems)
         # What is changed from outside; settings of disturbances come first, because the last one wins.
         text, set_by_them = add_disturbances(text, disturbances, problems)
@@ -88,6 +91,7 @@ def load_model(
             text = without(text, change, problems)
         for change in aspects:
             text = change_aspect(text, change, problems)
+        text = around.model(text)  # with what has come from outside
         # What results.
         known = Known(composites, catalogue)
         settler = Settler(Settings(settings, limits), problems)

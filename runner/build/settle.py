@@ -74,7 +74,8 @@ class Settler:
                 node, local = setting[0].value, OUTSIDE
             if node is None:
                 who, at = kind if path else label, position or declared.position
-                names[name] = tell_missing(who, name, declared.doc, at, self.problems, path)
+                about = (declared.doc, declared.undecided)
+                names[name] = tell_missing(who, name, about, at, self.problems, path)
             else:
                 names[name] = self.values.declared(declared, node, local, full)
         return names

@@ -16,7 +16,7 @@ from epicycle.actors import Actor, FaultError, Parameter
 
 from ..catalogue import Catalogue, CatalogueError, Dialect, read_type, token_types
 from ..graph import Modal
-from ..language import CompositeText, Locals, PartText, PortText
+from ..language import CompositeText, Locals, PartText, PortText, Settings, Values
 from ..text import POISON, RAISE_IT, Entry, Poison, Position, did_you_mean
 from .composite_aspect import as_actor
 from .connect import Child, Inside, Wiring, child_of_actors, make
@@ -84,6 +84,7 @@ class Unfolding:
         self._port_types: dict[str, Any] = {}
         self._tokens = cache(partial(token_types, known.catalogue))
         self._like = {Dialect: known}
+        self._tried: set[tuple[str, str]] = set()  # classes, and the parts in them whose other types are checked
 
     def body(self, path: str, composite: CompositeText, names: Names, within: tuple[str, ...] = ()) -> None:
         """Make the actors of a composite, or of the model, and connect them; its aspects are noted."""
@@ -95,6 +96,11 @@ class Unfolding:
                 self.draft.gaps[full] = Gap()
             else:
                 children[name] = child
+        others = [
+            (name, child)
+            for name, part in composite.actors.items()
+            for child in self._others(f"{path}.{name}" if path else name, composite, part, names, within)
+        ]
         for name, part in composite.aspects.items():
             if part.type.text in self.known.composites and (
                 model := self._aspect_model(path, composite, part, names, within)
@@ -104,6 +110,8 @@ class Unfolding:
             path, composite.name, composite.inputs, composite.outputs, composite.actors, children, composite
         )
         wiring = Wiring(inside, self.draft.graph, self.values, self.problems)
+        for name, child in others:
+            wiring.check_ports(name, child, composite.connections)
         for connection in composite.connections:
             make(wiring.resolve(connection, names) if connection else [POISON], self.draft)
         if composite.machine is not None:
@@ -133,6 +141,7 @@ class Unfolding:
         self, path: str, part: PartText, names: Names, within: tuple[str, ...] = (), *, is_refinement: bool = False
     ) -> Child | None:
         """Make the instances of one entry of ``actors``; None if there is no such type."""
+        part = _chosen(part, names)
         kind = self._type(path, part, within)
         if kind is None:
             return None
@@ -159,6 +168,24 @@ class Unfolding:
             return Child(kind.name, paths, is_array, count, list(kind.inputs), list(kind.outputs))
         return child_of_actors(kind, paths, is_array, count, self.draft.graph)
 
+    def _others(
+        self, path: str, composite: CompositeText, part: PartText, names: Names, within: tuple[str, ...]
+    ) -> list[Child]:
+        """What a part would be with the other types that it may have, made once of each class to check them."""
+        if not part.choices or (composite.name, part.name) in self._tried:
+            return []
+        self._tried.add((composite.name, part.name))
+        trial = copy(self)
+        trial.settler = Settler(Settings(), self.problems, Values(self.problems, self.values.budget))
+        trial.values = trial.settler.values
+        trial.draft, trial.aspects, trial.actors = self.draft.inside(self.draft.graph.director_of(path)), [], []
+        chosen = _chosen(part, names)
+        others = [each for each in part.choices.values() if each is not chosen]
+        try:
+            return [child for each in others if (child := trial.instances(path, each, names, within))]
+        finally:
+            self.cost = trial.cost
+
     # -- one entry of ``actors`` ----------------------------------------------------------------------------------
 
     def _type(self, path: str, part: PartText, within: tuple[str, ...]) -> CompositeText | type[Actor] | None:
@@ -170,12 +197,15 @@ class Unfolding:
         except CatalogueError as error:
             self.values.blame(path, error, part.type.position, Locals(path))
             return None
-        if found is POISON:
+        if found is POISON or "${" in wanted:
             return None
         if found is None:
             near = did_you_mean(wanted, [*known.composites, *known.catalogue.actors])
             hints = known.valid_types("actor", wanted)
             self._tell(f"{path}: there is no actor type {wanted!r}{near}", part.type.position, path, *hints)
+        elif part.inherit:
+            message = f"{path}: {wanted} cannot inherit, as it is a type of a dialect"
+            self._tell(message, part.inherit[0].position, path, "write what it takes as 'name: ${name}'")
         elif wanted in within:
             way = " -> ".join([*within[within.index(wanted) :], wanted])
             self._tell(f"{path}: composite {wanted} contains itself: {way}", part.type.position, path)
@@ -221,6 +251,7 @@ class Unfolding:
         while waiting:
             each = waiting.pop()
             found |= {each.type.text, *(tag.text for tag in each.tags)}
+            waiting += each.choices.values()
             if (inner := self.known.composites.get(each.type.text)) and inner.name not in seen:
                 seen.add(inner.name)
                 waiting += inner.actors.values()
@@ -337,3 +368,12 @@ class Unfolding:
             self.cost = trial.cost
         self.draft.gaps[full] = Gap()
         return None
+
+
+def _chosen(part: PartText, names: Mapping[str, object]) -> PartText:
+    """A part with the type that a parameter chooses; with the first one, if its value is not known."""
+    if not part.choices:
+        return part
+    first, *_ = part.choices.values()
+    value = names.get(part.type.text.strip("${ }"))
+    return part.choices.get(value, first) if isinstance(value, str) else first

@@ -28,7 +28,8 @@ def try_classes(known: Known, used: Collection[str], values: Values, limits: Lim
     inner = {
         part.type.text
         for composite in composites.values()
-        for part in (*composite.actors.values(), *composite.aspects.values())
+        for entry in (*composite.actors.values(), *composite.aspects.values())
+        for part in (entry, *entry.choices.values())
     }
     most = left = limits.actors // 2
     untried: list[str] = []

@@ -33,7 +33,7 @@ class Mark:
 class Figure(Configurable):
     """Base of the figures of a run: declare parameters, write ``draw``, and ``marks`` if it shows a space."""
 
-    reserved: ClassVar[frozenset[str]] = frozenset({"type"})
+    reserved: ClassVar[frozenset[str]] = frozenset({"type", "inherit"})
 
     def signal_patterns(self) -> tuple[str, ...]:
         """The signals that the figure reads, as patterns; each must be recorded."""

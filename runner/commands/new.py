@@ -19,7 +19,7 @@ parameters:
 
 actors:
   customers: {type: PoissonClock, mean_interval: "$${service_time / load}"}
-  server: {type: Server, service_time: "$${service_time}"}
+  server: {type: Server, inherit: service_time}
 
 connections:
   - customers.output -> server.input

@@ -46,7 +46,7 @@ def show(options: argparse.Namespace) -> int:
     tell(f"{model.extent}" + ("" if model.stop is None else f", stops at {in_time(model.stop)}"))
     for rows in filter(None, found.values()):
         tell("")
-        head = list(rows[0])
+        head = [key for key in rows[0] if key != "stands for"]  # it takes room
         console().print(columns(head, ([str(row[key]) for key in head] for row in rows), whole=(head[0], "unit")))
     for what in ("records", "reads"):
         if about[what]:
@@ -64,11 +64,18 @@ def _parameters(model: Model) -> Iterator[dict[str, str]]:
         said = model.declared[name]
         kinds = {bool: "true or false", str: "text", int: "number", float: "number", list: "list", tuple: "list"}
         kind = f"one of {', '.join(said.choices)}" if said.choices else kinds.get(type(value), "any value")
-        low, high = said.bounds()
-        kind += bounds_text(low, None, high, lambda bound: f"{bound:g}")
+        low, above, high = said.bounds()
+        kind += bounds_text(low, above, high, lambda bound: f"{bound:g}")
         unit = "" if said.unit == "1" else said.unit
         told = in_words(value) if isinstance(value, (bool, float)) else short(value)
-        yield {"parameter": name, "type": kind, "unit": unit, "value": told, "what it is": said.doc}
+        yield {
+            "parameter": name,
+            "type": kind,
+            "unit": unit,
+            "value": told,
+            "stands for": said.source,
+            "what it is": said.doc,
+        }
 
 
 def _metrics(model: Model) -> Iterator[dict[str, str]]:

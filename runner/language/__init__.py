@@ -50,6 +50,7 @@ from .settings import (
 )
 from .study import MAX_REPLICATIONS, MAX_STUDY_SEED, RESERVED, Study, is_study, read_study, study_of_text
 from .study_metric import ASPECTS, NUMBERS, SIGNALS, StudyMetric, asks_for_none
+from .surroundings import Surroundings
 from .usage import check_usage
 from .values import OUTSIDE, Locals, Values
 
@@ -99,6 +100,7 @@ __all__ = [
     "Settings",
     "Study",
     "StudyMetric",
+    "Surroundings",
     "Values",
     "add_disturbances",
     "as_factor",

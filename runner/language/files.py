@@ -7,7 +7,8 @@ from pathlib import Path
 from epicycle.actors import irregular
 
 from ..catalogue import find, is_path, model_folders, packaged_files, packaged_ones, unreadable
-from ..text import Mapping, Problems, Text, did_you_mean, read
+from ..text import Mapping, Problems, Text, did_you_mean, plain, read
+from .inheritance import extended
 from .models import CompositeText, ModelText, library_of, model_of
 
 MAX_INCLUDES = 200
@@ -42,7 +43,40 @@ def read_model(name: str, problems: Problems) -> tuple[ModelText, dict[str, Comp
         text = model_of(node, problems)
     if path is None or not text:
         return problems.whole(None)
-    return text, _composites(text, path, problems)
+    found = _bases(text, path, problems)
+    for base, _ in found[1:]:
+        text = extended(base, text, problems)
+    return text, _composites(found, problems)
+
+
+def _bases(text: ModelText, path: Path, problems: Problems) -> list[tuple[ModelText, Path]]:
+    """A model and those that it extends, directly and further on, with their files."""
+    found, seen = [(text, path)], {path.resolve()}
+    while (said := text.extends) is not None:
+        if is_path(said.text) and not _is_below(path.parent / said.text, path.parent):
+            hint = "a model extends a packaged one, or a file in or below its folder"
+            problems.add(f"{text.root.name}: {said.text!r} cannot be extended", said.position, hint)
+            break
+        if (base := named_file(said, path.parent, "model", problems, f"{text.root.name}: ")) is None:
+            break
+        if base.resolve() in seen or len(seen) > MAX_INCLUDES:
+            problems.add(f"{text.root.name}: the models extend each other in a circle", said.position)
+            break
+        seen.add(base.resolve())
+        node = read(base, problems, str(path.parent / said.text) if is_path(said.text) else None)
+        whole = None if node is None else model_of(node, problems)
+        if not whole:
+            break
+        text, path = whole, base
+        found.append((text, path))
+    return found
+
+
+def _is_below(path: Path, folder: Path) -> bool:
+    try:
+        return path.resolve().is_relative_to(folder.resolve())
+    except (OSError, RuntimeError, ValueError):  # endless links, too long, or a NUL in it
+        return False
 
 
 def read_library(file: str | Path, problems: Problems) -> dict[str, CompositeText]:
@@ -54,23 +88,25 @@ def read_library(file: str | Path, problems: Problems) -> dict[str, CompositeTex
     if node is not None:
         is_model = isinstance(node, Mapping) and "model" in node.entries
         text = (model_of if is_model else library_of)(node, problems)
-    return _composites(problems.whole(text), path, problems)
+    return _composites([(problems.whole(text), path)], problems)
 
 
-def _composites(text: ModelText, path: Path, problems: Problems) -> dict[str, CompositeText]:
-    # Included files must lie in or below the model's folder: a model cannot read other files.
-    root = path.parent.resolve()
+def _composites(files: list[tuple[ModelText, Path]], problems: Problems) -> dict[str, CompositeText]:
+    """The composite classes of files and of what they include."""
     composites: dict[str, CompositeText] = {}
-    seen: dict[Path, None] = {path.resolve(): None}
-    waiting = [(text, path)]
+    homes: dict[str, Path] = {}
+    seen: dict[Path, None] = {path.resolve(): None for _, path in files}
+    # Included files must lie in or below the model's folder: a model cannot read other files.
+    waiting = [(text, path, path.parent.resolve()) for text, path in files]
     while waiting:
-        current, where = waiting.pop(0)
+        current, where, root = waiting.pop(0)
         for name, composite in current.composites.items():
-            if name in composites:
+            if name in composites and (homes[name] == root or not _is_copy(composite, composites[name])):
                 first = composites[name].position
                 hint = f"the first definition is at {first.file}:{first.line}"
                 problems.add(f"composite {name!r} is defined twice", composite.position, hint)
             composites.setdefault(name, composite)
+            homes.setdefault(name, root)
         for include in current.include:
             try:
                 target = (where.parent / include.text).resolve()
@@ -99,8 +135,13 @@ def _composites(text: ModelText, path: Path, problems: Problems) -> dict[str, Co
             node = read(target, problems, str(where.parent / include.text))
             inner = library_of(node, problems) if node is not None else None
             if inner:
-                waiting.append((inner, target))
+                waiting.append((inner, target, root))
     return composites
+
+
+def _is_copy(one: CompositeText, other: CompositeText) -> bool:
+    """Whether two files say the same: a model and the one that it extends may each have a copy of a class."""
+    return [each and plain(each) for each in one.written] == [each and plain(each) for each in other.written]
 
 
 def _beside(target: Path, where: Path) -> list[Path]:

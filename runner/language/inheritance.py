@@ -1,11 +1,10 @@
-"""``extends``: a composite class that inherits from another one and changes it.
+"""``extends``: a composite class, or a model, that inherits from another one and changes it.
 
 The declarations of a class change those of its base, name by name:
 
 - a parameter or port of the base stays; keys that the class gives again (a default, a bound, a type) replace the old;
-- an actor or aspect with the same ``type``, or none, keeps its values except those given again; another ``type`` drops
-the old values but keeps ``count``, ``priority``, ``at``, ``enabled`` and ``tags``; ``name: null`` removes it, with the
-base's connections and pointcuts to it;
+- an actor or aspect keeps its values except those given again, also with another ``type``, which must have them;
+``name: null`` removes it, with the base's connections and pointcuts to it;
 - connections are added; ``remove: a.out -> b.in`` removes one of the base's.
 """
 
@@ -13,11 +12,12 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from dataclasses import replace
+from typing import Any
 
 from epicycle.actors import UnitError
 
-from ..text import NORMAL, POISON, RAISE_IT, Limits, Poison, Position, Problems, did_you_mean
-from .models import CompositeText
+from ..text import NORMAL, POISON, RAISE_IT, Entry, Limits, Poison, Position, Problems, Text, did_you_mean
+from .models import CompositeText, ModelText
 from .parts import PartText
 from .places import ConnectionText
 from .ports import PortText
@@ -54,6 +54,25 @@ def inherit(
                 found = _Heir(found, text, problems).composite()
             whole[text.name] = found
     return {name: whole[name] for name in composites}
+
+
+def extended(base: ModelText, text: ModelText, problems: Problems) -> ModelText:
+    """A model with what it inherits from another one; metrics, monitors and figures are whole ones, by name."""
+    root = _Heir(base.root, text.root, problems).composite()
+    run = {key: each for key, each in vars(text.run).items() if each not in (None, ())}
+    return replace(
+        text,
+        root=replace(root, written=(*base.root.written, *text.root.written)),
+        run=replace(base.run, **run),
+        metrics=_by_name(base.metrics, text.metrics),
+        monitors=_by_name(base.monitors, text.monitors),
+        exactly=base.exactly if text.exactly is None else text.exactly,
+        figures={**base.figures, **text.figures},
+    )
+
+
+def _by_name(old: tuple[Any, ...], new: tuple[Any, ...]) -> tuple[Any, ...]:
+    return tuple({each.name: each for each in (*old, *new)}.values())
 
 
 def _size(text: CompositeText) -> int:
@@ -105,7 +124,8 @@ class _Heir:
         for name, parameter in text.parameters.items():
             old = base.parameters.get(name)
             given = {key: getattr(parameter, key) for key in parameter.given}
-            found = parameter if old is None else replace(old, position=parameter.position, **given)
+            said = {**given, "given": (*(old.given if old else ()), *parameter.given)}
+            found = parameter if old is None else replace(old, position=parameter.position, **said)
             if POISON in (parameter.value, None if old is None else old.value):
                 found = replace(found, value=POISON)
             else:
@@ -176,7 +196,9 @@ class _Heir:
                 parts[name] = replace(
                     part,
                     type=part.type if part.type.text else before.type,
-                    values={**before.values, **part.values} if same else part.values,
+                    values={**_without(before.values, part.inherit), **part.values},
+                    kept=before.kept if same else frozenset(before.values.keys() - part.values.keys()),
+                    inherit=part.inherit or before.inherit,
                     count=part.count or before.count,
                     priority=part.priority or before.priority,
                     at=part.at or before.at,
@@ -207,6 +229,12 @@ class _Heir:
         cut = {pair for each in removals for pair in _pairs(each)}
         kept = [each for old in self.base.connections for each in (_kept(old, cut, removed) if old else [old])]
         return (*kept, *(each for each in self.text.connections if not (each and each.removes)))
+
+
+def _without(values: Mapping[str, Entry], inherit: Collection[Text]) -> dict[str, Entry]:
+    """Values of the base, but for those that come from around the part now."""
+    named = {each.text for each in inherit}
+    return {name: entry for name, entry in values.items() if name not in named}
 
 
 def _kept(

@@ -11,6 +11,7 @@ from ..catalogue import LIKE, dialects
 from ..text import MAX_SEED, POISON, Entry, Mapping, Node, NodeReader, Poison, Position, Problems, Scalar, Text
 from .acts import ActText
 from .fields import (
+    AT,
     NAMED,
     TEXT,
     TEXTS,
@@ -134,9 +135,9 @@ _CHANGES = {
 HEIR = Construct(COMPOSITE.doc, {**COMPOSITE.keys, **_CHANGES})
 
 
-def composite_schema() -> Schema:
-    """The schema of a composite class, which may extend another."""
-    found = COMPOSITE.schema
+def composite_schema(construct: Construct = COMPOSITE) -> Schema:
+    """The schema of a composite class, or of a model, which may extend another."""
+    found = construct.schema
     for key, changes in _CHANGES.items():
         found["properties"][key] = {"description": changes.doc}
     return {
@@ -149,14 +150,15 @@ def composite_schema() -> Schema:
 
 def _composite(reader: NodeReader, name: str, entry: Entry) -> CompositeText | Poison:
     entries = COMPOSITE.entries(reader, entry.value, f"composite {name!r}")
-    return POISON if entries is POISON else composite(reader, name, entries, entry.key.position)
+    return POISON if entries is POISON else composite(reader, name, entries, entry.key.position, "extends" in entries)
 
 
-def composite(reader: NodeReader, name: str, entries: dict[str, Entry], position: Position) -> CompositeText:
-    """The keys that a model and a composite class share."""
+def composite(
+    reader: NodeReader, name: str, entries: dict[str, Entry], position: Position, derived: bool
+) -> CompositeText:
+    """The keys that a model and a composite class share; in one that is ``derived``, they may be changes."""
     problems = reader.problems
     before = len(problems)
-    derived = "extends" in entries
     read = (HEIR if derived else COMPOSITE).values(reader, entries, repr(name), position)
     declared = read.pop("connections", ())
     connections: tuple[ConnectionText | Poison, ...] = (POISON,) if declared is POISON else declared
@@ -223,6 +225,7 @@ class ModelText:
     """A whole model file, without what it includes."""
 
     root: CompositeText
+    extends: Text | None = None
     include: tuple[Text, ...] = ()
     composites: dict[str, CompositeText] = field(default_factory=dict)
     run: RunText = field(default_factory=RunText)
@@ -263,6 +266,7 @@ MODEL = Construct(
             name="name",
         ),
         "doc": COMPOSITE.keys["doc"],
+        "extends": Key(AT, "The model that this one changes: packaged, or a file in or below this folder."),
         "include": INCLUDE,
         "parameters": PARAMETERS,
         "composites": COMPOSITES,
@@ -295,7 +299,7 @@ def model_of(node: Node, problems: Problems) -> ModelText | Poison:
     said = sound(_OF_FILE.values(reader, entries, "the model", node.position))
     own = {key: entry for key, entry in entries.items() if key in _OF_ROOT}
     director = said.pop("director", None)
-    root = composite(reader, said.pop("name", "model"), own, node.position)
+    root = composite(reader, said.pop("name", "model"), own, node.position, "extends" in entries)
     others = tuple(entry.value for key, entry in entries.items() if key not in (*_OF_ROOT, "composites"))
     return ModelText(replace(root, director=director, written=(*root.written, *others)), **said)
 

@@ -71,4 +71,5 @@ def _refinement(reader: NodeReader, mode: str, entry: Entry) -> PartText | Poiso
     if said is None:
         return reader.problems.add(f"the refinement of {mode!r} has no type", entry.key.position, "add 'type: ...'")
     kind: Text | Poison = AT.read(reader, said.value, f"the refinement of {mode!r}")
-    return POISON if kind is POISON else PartText(mode, entry.key.position, kind, values)
+    taken = reader.texts(values.pop("inherit").value, "inherit") if "inherit" in values else ()
+    return POISON if kind is POISON else PartText(mode, entry.key.position, kind, values, inherit=taken or ())

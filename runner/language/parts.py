@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from epicycle.actors import Actor, Parameter
 from epicycle.aspects import Aspect
 
+from ..catalogue import Figure
 from ..text import (
     NAME,
     NORMAL,
@@ -58,14 +59,26 @@ class PartText:
         "Names by which aspects can select it: 'at: {tag: ...}'.",
         default=(),
     )
+    inherit: tuple[Text, ...] = keyed(
+        TEXTS.described(one_or_more(ref("text"))),
+        "Parameters that take the values of those with the same names around it: 'all', or their names.",
+        default=(),
+    )
     enabled: Computed | None = keyed(
         computed_as(Parameter(bool)), "Whether it is active (default: true).", default=None
     )
     removes: bool = False  # it removes the inherited part with that name
+    kept: frozenset[str] = frozenset()  # what a base of its class gives to a part of another type
+    choices: dict[str, PartText] = field(default_factory=dict)  # what it may be, if a parameter chooses its type
 
 
 BESIDE = Construct.of(PartText)  # the keys besides the parameters of an actor or aspect
-RESERVED = {"actor": Actor.reserved, "aspect": Aspect.reserved, "figure": frozenset({"type"})}
+RESERVED = {
+    "actor": Actor.reserved,
+    "aspect": Aspect.reserved,
+    "figure": Figure.reserved,
+    "study_figure": frozenset({"type"}),
+}
 
 
 def beside(name: str, node: Node) -> Computed:
@@ -74,7 +87,9 @@ def beside(name: str, node: Node) -> Computed:
     return found
 
 
-def part(reader: NodeReader, name: str, entry: Entry, kind: str, *, derived: bool = False) -> PartText | Poison:
+def part(
+    reader: NodeReader, name: str, entry: Entry, kind: str, reserved: frozenset[str], derived: bool
+) -> PartText | Poison:
     """``name: {type: ..., ...}``; in a class that extends another, ``type`` may be missing, or ``name: null``."""
     problems = reader.problems
     if derived and is_empty(entry.value):
@@ -97,11 +112,16 @@ def part(reader: NodeReader, name: str, entry: Entry, kind: str, *, derived: boo
         if said_type is POISON:
             return POISON
         type_name = said_type
-    beside = {key: values.pop(key).value for key in sorted(RESERVED[kind]) if key in values}
+    beside = {key: values.pop(key).value for key in sorted(reserved) if key in values}
     read = {key: BESIDE.keys[key].shape.read(reader, node, key) for key, node in beside.items()}
     return PartText(name, entry.key.position, type_name, values, **sound(read))
 
 
 def parts(kind: str, definition: str = "", *, derived: bool = False) -> Shape:
     """Actors, aspects or figures by name."""
-    return named(ref(definition or kind), lambda reader, name, entry: part(reader, name, entry, kind, derived=derived))
+    reserved = RESERVED.get(definition, RESERVED[kind])
+
+    def read(reader: NodeReader, name: str, entry: Entry) -> PartText | Poison:
+        return part(reader, name, entry, kind, reserved, derived)
+
+    return named(ref(definition or kind), read)

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from keyword import iskeyword, kwlist
+from typing import Any
 
-from epicycle.actors import UnitError, convert, in_si, parse_unit
+from epicycle.actors import Parameter, UnitError, convert, in_si, parse_unit
 from epicycle.actors.expression import CONSTANTS, FUNCTIONS
 
 from ..text import (
@@ -95,13 +96,17 @@ def _unit(reader: NodeReader, node: Node, what: str) -> str | Poison:
     return unit
 
 
-def _choices(reader: NodeReader, node: Node, what: str) -> tuple[str, ...] | Poison:
-    found = reader.texts(node, "choices")
-    if found is POISON:
+def _choices(reader: NodeReader, node: Node, what: str) -> dict[str, Text] | Poison:
+    """``[A, B]``, or ``{a: A, b: B}`` for choices that mean types with other names."""
+    if isinstance(node, Mapping):
+        types = {name: reader.placed(entry.value, f"the type of {name!r}") for name, entry in node.entries.items()}
+        chosen: dict[str, Text] | Poison = POISON if POISON in types.values() else sound(types)
+    else:
+        texts = reader.texts(node, "choices")
+        chosen = POISON if texts is POISON else {text.text: text for text in texts}
+    if chosen is POISON:
         return POISON
-    return tuple(text.text for text in found) or reader.problems.add(
-        f"{what} has an empty list of choices", node.position
-    )
+    return chosen or reader.problems.add(f"{what} has an empty list of choices", node.position)
 
 
 _FREE_NUMBER = number(float)
@@ -142,18 +147,33 @@ class ParameterText:
         called="{key} of {what}",
         default=None,
     )
-    choices: tuple[str, ...] = keyed(
-        Shape(one_or_more(LABEL), _choices), "The texts to choose from.", called="{what}", default=()
+    above: float | str | None = keyed(
+        Shape(QUANTITY_SCHEMA, _bound),
+        "What every value is greater than, in its unit or with one of its own.",
+        called="{key} of {what}",
+        default=None,
+    )
+    choices: dict[str, Text] = keyed(
+        Shape({"anyOf": [one_or_more(LABEL), names_of(ref("text"))]}, _choices),
+        "The texts to choose from; where one chooses the type of an actor, those of types, or {text: type}.",
+        called="{what}",
+        default_factory=dict,
     )
     doc: str = keyed(TEXT, "What it is.", called="{key} of {what}", default="")
     given: tuple[str, ...] = ("value",)  # the keys of the declaration, which change those of an inherited one
+    # Of a part's parameter that it stands for: that parameter, its type and name, and why it gives no default.
+    of: Parameter[Any] | None = None
+    source: str = ""
+    undecided: str = ""
 
-    def bounds(self) -> tuple[float | None, float | None]:
-        """The least and the greatest value, in its unit; raises ``UnitError``."""
-        low, high = (None if each is None else convert(each, self.unit or "1") for each in (self.min, self.max))
+    def bounds(self) -> tuple[float | None, float | None, float | None]:
+        """The least value, what is below all, and the greatest, in its unit; raises ``UnitError``."""
+        low, above, high = (
+            None if each is None else convert(each, self.unit or "1") for each in (self.min, self.above, self.max)
+        )
         if low is not None and high is not None and low > high:
             raise UnitError("min is greater than max")
-        return low, high
+        return low, above, high
 
 
 PARAMETER = Construct.of(ParameterText, type=["object", "array", "string", "number", "boolean", "null"])
@@ -167,18 +187,19 @@ def _parameter(reader: NodeReader, name: str, entry: Entry) -> ParameterText:
         message = f"a parameter cannot be called {name!r}: in expressions, that name means {meaning}"
         reader.problems.add(message, entry.key.position, "give it another name")
     if not isinstance(entry.value, Mapping):
-        return ParameterText(name, entry.key.position, entry.value)
+        says_nothing = is_empty(entry.value) and not (isinstance(entry.value, Scalar) and entry.value.text)
+        return ParameterText(name, entry.key.position, entry.value, given=() if says_nothing else ("value",))
     what = f"parameter {name!r}"
     entries = PARAMETER.entries(reader, entry.value, what) or {}
     said = PARAMETER.values(reader, entries, what, entry.key.position)
     found = ParameterText(name, entry.key.position, **sound(said), given=tuple(entries))
     if POISON in said.values():
         return replace(found, value=POISON)
-    if found.unit or not {type(found.min), type(found.max)} & {str}:  # otherwise it may be inherited
+    if found.unit or not {type(found.min), type(found.above), type(found.max)} & {str}:  # otherwise it may be inherited
         try:
             found.bounds()
         except UnitError as error:
-            at = next(key for key in ("min", "max") if key in entries)
+            at = next(key for key in ("min", "above", "max") if key in entries)
             return replace(found, value=blame(reader.problems, what, error, entries[at].value))
     return found
 

@@ -66,7 +66,7 @@ CONSTRUCTS = {
     "A claim": CLAIM,
     "A guideline": GUIDELINE,
 }
-_OTHER_TYPE = f"^{NAME}(\\.{NAME})?$"  # a composite, or a type of another package
+_OTHER_TYPE = rf"^({NAME}(\.{NAME})?|\$\{{{NAME}\}})$"  # a composite, a type of another package, or one that is chosen
 
 
 def json_schema(
@@ -133,7 +133,7 @@ def json_schema(
             "if": {"required": ["disturbance"]},
             "then": DISTURBANCE.schema,
             "else": {
-                **MODEL.schema,
+                **composite_schema(MODEL),
                 # Without a name, it is a file to be included, which has only composites.
                 "dependentRequired": {key: ["model"] for key in model_only if key != "model"},
             },
@@ -148,7 +148,7 @@ def schema_text(schema: Schema) -> str:
 
 def _beside(kind: str) -> Schema:
     """The keys besides the parameters of an actor, aspect or figure."""
-    return {key: BESIDE.keys[key].schema for key in sorted(RESERVED[kind.removeprefix("study_")] - {"type"})}
+    return {key: BESIDE.keys[key].schema for key in sorted(RESERVED[kind] - {"type"})}
 
 
 def _changed(kind: str) -> Schema:
@@ -203,6 +203,8 @@ def _part(base: type, known: Mapping[str, type]) -> Schema:
 def _type(name: str, cls: type, kind: str) -> Schema:
     """What may and must be given for one type."""
     declared = declared_parameters(cls)
+    required = [key for key, parameter in declared.items() if parameter.required]
+    given: Schema = {"if": {"not": {"required": ["inherit"]}}, "then": {"required": required}} if required else {}
     return {
         "description": doc_of(cls),
         "properties": {
@@ -210,6 +212,6 @@ def _type(name: str, cls: type, kind: str) -> Schema:
             **dict.fromkeys(_beside(kind), True),  # whose rules are where the type is
             **{key: {**schema_of(parameter), "description": about(parameter)} for key, parameter in declared.items()},
         },
-        "required": [key for key, parameter in declared.items() if parameter.required],
+        **given,
         "additionalProperties": False,
     }

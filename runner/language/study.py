@@ -21,6 +21,7 @@ from ..text import (
     Scalar,
     Text,
     did_you_mean,
+    is_empty,
     parse,
     read,
 )
@@ -350,9 +351,9 @@ class _StudyReader(NodeReader):
         return tuple(each for each in found if each is not None)
 
     def metric(self, name: str, entry: Entry) -> StudyMetric | None:
-        """An expression, or ``{value: expression, unit: s, to: min, doc: ...}``."""
+        """An expression, by default the metric with that name, or ``{value: expression, unit: s, to: min, ...}``."""
         if isinstance(entry.value, Scalar):
-            return checked_metric(name, entry.value, self.problems)
+            return checked_metric(name, entry.key if is_empty(entry.value) else entry.value, self.problems)
         value: Node | None = entry.value
         what, said, places = f"metric {name!r}", {}, {}
         if isinstance(entry.value, Mapping):

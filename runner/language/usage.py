@@ -13,6 +13,7 @@ from ..text import POISON, Node, Poison, Problems, Scalar, Sequence, nearest
 from .models import CompositeText, ModelText
 from .parts import PartText
 
+ALL = "all"  # in place of the names of what a part inherits
 _WORD = re.compile(r"[A-Za-z_]\w*")
 _MAX_STRANGE = 50  # comparing names takes time
 
@@ -29,8 +30,8 @@ def check_usage(
     ``declared`` are the classes as written, ``composites`` with what they inherit.  What a class declares may be used
     by its bases, and by the classes that extend it.
     """
-    own = {name: _names(composite.written) for name, composite in declared.items()}
     whole = {name: composite for name, composite in composites.items() if composite}
+    own = {name: used_names(whole.get(name, composite).written) for name, composite in declared.items()}
     used = dict(own)
     for name, composite in whole.items():
         base = composite.extends
@@ -40,12 +41,13 @@ def check_usage(
             base = whole[base.text].extends
     for name, composite in whole.items():
         _add_unused(composite, declared[name].parameters, used[name], whole, actor_types, problems)
-    _add_unused(text.root, text.root.parameters, _names(text.root.written), whole, actor_types, problems)
+    _add_unused(text.root, text.root.parameters, used_names(text.root.written), whole, actor_types, problems)
 
 
 def check_own_usage(composite: CompositeText, problems: Problems) -> None:
-    """Add a problem for every parameter that nothing in the same text uses."""
-    _add_unused(composite, composite.parameters, _names(composite.written), {}, {}, problems)
+    """Add a problem for every parameter that nothing in the same text uses, or takes by name."""
+    if ALL not in (used := used_names(composite.written)):
+        _add_unused(composite, composite.parameters, used, {}, {}, problems)
 
 
 def _add_unused(
@@ -69,7 +71,7 @@ def _add_unused(
             for actor, part in composite.actors.items()
             if name not in part.values and name in _parameters(part, composites, actor_types)
         ]
-        hints = [f"{actor} has a parameter {name!r}: write '{name}: ${{{name}}}' there" for actor in meant[:3]]
+        hints = [f"{actor} has a parameter {name!r}: write 'inherit: {name}' there" for actor in meant[:3]]
         problems.add(
             f"{composite.name}: nothing uses the parameter {name!r}",
             composite.parameters[name].position,
@@ -88,7 +90,7 @@ def _parameters(
         return ()
 
 
-def _names(nodes: Iterable[Node | Poison]) -> frozenset[str | Poison]:
+def used_names(nodes: Iterable[Node | Poison]) -> frozenset[str | Poison]:
     """The names that expressions use, at any depth; what is wrong with an expression is reported elsewhere."""
     found: set[str | Poison] = set()
     waiting = list(nodes)
@@ -102,6 +104,11 @@ def _names(nodes: Iterable[Node | Poison]) -> frozenset[str | Poison]:
                     found |= names_in(node.value)
                 except ExpressionError:
                     found |= set(_WORD.findall(node.value))  # what it would use if it were right
+        elif isinstance(node, Sequence):
+            waiting += node.items
         else:
-            waiting += node.items if isinstance(node, Sequence) else (each.value for each in node.entries.values())
+            waiting += (each.value for each in node.entries.values())
+            if (taken := node.entries.get("inherit")) is not None:
+                items = taken.value.items if isinstance(taken.value, Sequence) else (taken.value,)
+                found |= {each.text for each in items if isinstance(each, Scalar)}
     return frozenset(found)

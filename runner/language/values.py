@@ -124,9 +124,9 @@ class Values:
         about = (in_general(label), "") if local.is_outside else ()  # a setting may be wrong for all of an array
         return self.problems.add(f"{label}: {message}", position, *hints, scope=local.path, about=about)
 
-    def blame(self, label: str, error: Exception, where: Node | Position, local: Locals) -> Poison:
+    def blame(self, label: str, error: Exception, where: Node | Position, local: Locals, *hints: str) -> Poison:
         """Report what is wrong with a node, or with something at a position; or how code of a class failed."""
-        return blame(self.problems, label, error, where, local.path, in_all=local.is_outside)
+        return blame(self.problems, label, error, where, local.path, *hints, in_all=local.is_outside)
 
     def converted(self, node: Node, local: Locals, label: str, convert: Callable[[Any], Any]) -> Any:
         """The value of a node as ``convert`` makes it."""
@@ -149,14 +149,24 @@ class Values:
         if parameter.value is POISON:
             self.of(node, local, label)
             return POISON
-        return self.converted(node, local, label, lambda value: _converted(parameter, value))
+        value = self.of(node, local, label)
+        if value is POISON:
+            return POISON
+        try:
+            found = _converted(parameter, value)
+            if parameter.of is not None and found is not None:
+                parameter.of.convert(found)
+        except Exception as error:  # of a user's class
+            source = (f"declared by {parameter.source}",) if parameter.source else ()
+            return self.blame(label, error, node, local, *source)
+        return found
 
 
 def _converted(parameter: ParameterText, value: Any) -> Any:
     default = parameter.value
     if isinstance(default, (Sequence, MappingNode)):
         kind, word = (list, "list") if isinstance(default, Sequence) else (dict, "mapping")
-        if not isinstance(value, kind):
+        if not isinstance(value, kind) and (parameter.of is None or value is None):  # or else that one knows
             missing = f"a value is missing, expected a {word}"
             raise ParameterError(missing if value is None else f"{value!r} is not a {word}")
         return _each(_reader(parameter, None), value)
@@ -171,9 +181,9 @@ def _converted(parameter: ParameterText, value: Any) -> Any:
 def _reader(parameter: ParameterText, default: object) -> Callable[[Any], Any]:
     """The conversion of a value, or of each one in a list, to what the parameter holds."""
     if parameter.choices:
-        return Parameter(str, choices=parameter.choices).convert
-    low, high = parameter.bounds()
-    bounds: dict[str, Any] = {"min": low, "max": high}
+        return Parameter(str, choices=tuple(parameter.choices)).convert
+    low, above, high = parameter.bounds()
+    bounds: dict[str, Any] = {"min": low, "above": above, "max": high}
     if parameter.unit:
         number, unit = Parameter(float, unit=parameter.unit, **bounds), parameter.unit
         return number.convert if unit == "1" else lambda value: _quantity(number.convert(value), unit)
@@ -181,7 +191,7 @@ def _reader(parameter: ParameterText, default: object) -> Callable[[Any], Any]:
         return Parameter(bool).convert
     if isinstance(default, int):
         return Parameter(int, unit="1", **bounds).convert
-    if isinstance(default, float) or low is not None or high is not None:
+    if isinstance(default, float) or any(bound is not None for bound in bounds.values()):
         return Parameter(float, unit="1", **bounds).convert
     return _as_it_is
 

@@ -2,7 +2,7 @@
 
 from epicycle.actors import did_you_mean, nearest
 
-from .document import Entry, Mapping, Node, Scalar, Sequence, parse, plain, read
+from .document import Entry, Inherited, Mapping, Node, Scalar, Sequence, parse, plain, read
 from .faults import blame, place_in
 from .files import COMMAND_LINE, Noted, data_file, note_package, noting
 from .limits import MAX_SEED, NORMAL, RAISE_IT, Limits
@@ -37,6 +37,7 @@ __all__ = [
     "SURE",
     "Comparisons",
     "Entry",
+    "Inherited",
     "Limits",
     "Mapping",
     "ModelError",

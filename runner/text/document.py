@@ -45,6 +45,13 @@ class Scalar:
 
 
 @dataclass(frozen=True, slots=True)
+class Inherited(Scalar):
+    """The value of a parameter around a part, at the place where the part says that it takes it."""
+
+    giver: str  # that parameter
+
+
+@dataclass(frozen=True, slots=True)
 class Sequence:
     items: tuple["Node", ...]
     position: Position

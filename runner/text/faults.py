@@ -6,7 +6,7 @@ from typing import Any
 
 from epicycle.actors import EpicycleError, Fault, FaultError
 
-from .document import Mapping, Node, Scalar, Sequence
+from .document import Inherited, Mapping, Node, Scalar, Sequence
 from .patterns import in_general
 from .problems import POISON, Poison, Position, Problems
 from .program import describe, raised_at
@@ -36,17 +36,26 @@ def place_in(node: Node, fault: Fault) -> Position:
 
 
 def blame(
-    problems: Problems, label: str, error: Exception, where: Node | Position, scope: str = "", *, in_all: bool = False
+    problems: Problems,
+    label: str,
+    error: Exception,
+    where: Node | Position,
+    scope: str = "",
+    *more: str,
+    in_all: bool = False,
 ) -> Poison:
     """Add what is wrong with a node, or with something at a position, or how the code of a user's class failed.
 
-    ``label`` is its name in messages; ``in_all``: what is wrong for all of an array is reported once.
+    ``label`` is its name in messages, ``more`` further help; ``in_all``: what is wrong for all of an array is reported
+    once.
     """
     at = where if isinstance(where, Position) else where.position
+    if isinstance(where, Inherited):
+        more = (f"given by {where.giver}", *more)
 
     def tell(message: str, place: Position, *hints: str, number: int = 0, **of_user: Any) -> None:
         about = (in_general(label), str(number)) if in_all else ()
-        problems.add(f"{label}: {message}", place, *hints, scope=scope, about=about, **of_user)
+        problems.add(f"{label}: {message}", place, *hints, *more, scope=scope, about=about, **of_user)
 
     if isinstance(error, FaultError):
         for number, fault in enumerate(error.faults):

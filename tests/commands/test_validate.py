@@ -126,6 +126,7 @@ Triangular, Uniform, VonMises, did you mean 'Exponential'?
 m.yaml:21:19: error: g.n: '3 min' is a time, expected a number
    21 |   g: {type: C, n: "${wait}", x: 1 min}
       |                   ^^^^^^^^^
+   help: declared by Station.places
 
 m.yaml:23:66: error: i.distribution: Bernoulli.probability: '50 ms' is a time, expected a number
    23 |   i: {type: Random, distribution: {type: Bernoulli, probability: 50 ms}}

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from epicycle.runner import ModelError, Simulation
 from epicycle.runner.build import Model, load_composite, load_model
 from tests.model.model_parts import TYPES
 
@@ -39,13 +40,9 @@ CASES: dict[str, tuple[str, dict[str, str]]] = {
         "actors: {gain: {times: 5}, hold: {count: 3}, ramp: {type: Ramp, start: 4 m}}",
         {"times: 3": "times: 5", "count: 2": "count: 3", '"${level}"': "4 m", "level: {value: 1, unit: m}, ": ""},
     ),
-    "another type keeps the count": (
-        "actors: {gain: {type: Anything}, hold: {type: Anything}}",
-        {
-            'type: Gain, factor: "${gain}", times: 3': "type: Anything",
-            "type: Hold": "type: Anything",
-            "gain: {value: 2, min: 0, max: 9}, ": "",
-        },
+    "another type keeps values and count": (
+        "actors: {hold: {type: Anything}}",
+        {"type: Hold": "type: Anything"},
     ),
     "without an actor": (
         "actors: {hold: null}",
@@ -157,3 +154,84 @@ def test_a_derived_class_in_python(tmp_path: Path) -> None:
     model = Model("m")
     model.add(load_composite(path, "Thrice", types=TYPES)("t"))
     assert vars(model.graph.actors["t.r"])["start"] == 3.0
+
+
+MODEL = """
+model: base
+doc: A base.
+parameters: {start: 2 m, p: 0.5, far: {value: 1, unit: m}}
+actors:
+  ramp: {type: Ramp, inherit: all}
+  gain: {type: Gain, factor: 3, times: 2}
+  other: {type: Ramp, start: "${far}"}
+connections: [ramp.output -> gain.input]
+aspects: {loss: {type: PacketLoss, probability: "${p}", at: gain.input}}
+run: {stop: 2 s, seed: 3, record: gain.output}
+metrics: {count: {of: gain.output, take: count}, last: {of: ramp.output, take: last}}
+monitors: {low: always gain.output < 100}
+"""
+HEIR = """
+model: heir
+extends: base.yaml
+parameters: {start: 3, factor: 4}
+actors: {other: null, ramp: {type: Pair}, gain: {inherit: factor, times: 5}, end: {type: Sum}}
+composites: {Pair: {parameters: {start: }, outputs: [output], actors: {r: {type: Ramp, inherit: all}},
+  connections: [r.output -> output]}}
+connections: [gain.output -> end.input]
+run: {seed: 4}
+metrics: {count: {of: ramp.output, take: count}}
+"""
+WRITTEN_OUT = """
+model: heir
+doc: A base.
+parameters: {start: 3 m, p: 0.5, factor: 4}
+composites: {Pair: {parameters: {start: }, outputs: [output], actors: {r: {type: Ramp, inherit: all}},
+  connections: [r.output -> output]}}
+actors:
+  ramp: {type: Pair, inherit: all}
+  gain: {type: Gain, inherit: factor, times: 5}
+  end: {type: Sum}
+connections: [ramp.output -> gain.input, gain.output -> end.input]
+aspects: {loss: {type: PacketLoss, probability: "${p}", at: gain.input}}
+run: {stop: 2 s, seed: 4, record: gain.output}
+metrics: {count: {of: ramp.output, take: count}, last: {of: ramp.output, take: last}}
+monitors: {low: always gain.output < 100}
+"""
+
+
+def test_a_model_that_extends_another_is_as_if_it_were_written_out(tmp_path: Path) -> None:
+    for name, text in (("base", MODEL), ("heir", HEIR), ("long", WRITTEN_OUT)):
+        (tmp_path / f"{name}.yaml").write_text(text)
+    short, long = (load_model(tmp_path / f"{name}.yaml", types=TYPES) for name in ("heir", "long"))
+    assert (short.name, short.doc, short.stop) == ("heir", "A base.", 2.0)
+    assert {**long.parameters, "far": 1.0} == short.parameters
+    one, other = (Simulation(each, seed=4).run() for each in (short, long))
+    assert (one.digest, one.metrics) == (other.digest, other.metrics)
+    assert [*one.metrics] == ["count", "last", "low", "low_robustness"]
+    assert repr(short.graph.actors) == repr(long.graph.actors)
+    assert sorted(short.graph.actors) == ["end", "gain", "ramp.r"]
+
+
+def test_a_chain_of_models_that_include_the_same_file(tmp_path: Path) -> None:
+    (tmp_path / "parts.yaml").write_text("composites: {Part: {actors: {r: {type: Ramp}}}}\n")
+    start = "model: {}\ninclude: parts.yaml\n"
+    (tmp_path / "a.yaml").write_text(start.format("a") + "actors: {p: {type: Part}}\nrun: {stop: 1 s}\n")
+    (tmp_path / "b.yaml").write_text(start.format("b") + "extends: a.yaml\nactors: {p: {count: 2}}\n")
+    (tmp_path / "c.yaml").write_text(start.format("c") + "extends: b.yaml\nactors: {q: {type: Part}}\n")
+    assert sorted(load_model(tmp_path / "c.yaml", types=TYPES).graph.actors) == ["p[0].r", "p[1].r", "q.r"]
+
+
+def test_a_packaged_model_may_be_extended(tmp_path: Path) -> None:
+    (tmp_path / "m.yaml").write_text("model: slow\nextends: mm1\nparameters: {load: 0.1}\n")
+    assert load_model(tmp_path / "m.yaml").parameters["load"] == 0.1
+
+
+def test_a_copy_of_a_class_that_the_base_has_too(tmp_path: Path) -> None:
+    (tmp_path / "lib").mkdir()
+    part = "composites: {Part: {actors: {r: {type: Ramp}}}}\n"
+    (tmp_path / "lib" / "a.yaml").write_text(f"model: a\n{part}actors: {{p: {{type: Part}}}}\nrun: {{stop: 1 s}}\n")
+    (tmp_path / "m.yaml").write_text(f"model: m\nextends: lib/a.yaml\n{part}actors: {{q: {{type: Part}}}}\n")
+    assert sorted(load_model(tmp_path / "m.yaml", types=TYPES).graph.actors) == ["p.r", "q.r"]
+    (tmp_path / "m.yaml").write_text("model: m\nextends: lib/a.yaml\ncomposites: {Part: {actors: {s: {type: Ramp}}}}\n")
+    with pytest.raises(ModelError, match="composite 'Part' is defined twice"):
+        load_model(tmp_path / "m.yaml", types=TYPES)

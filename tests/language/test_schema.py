@@ -158,8 +158,8 @@ def breaks_shape(problem: str, file: str) -> bool:
     """Whether a problem, as shown, is one of shape: by its words, and unless it is about a computed value."""
     head, *shown = problem.splitlines()
     at = re.match(rf"{re.escape(file)}:\d+:(\d+): ", head)
-    if at is None or not SHAPE.search(head) or NOT_SHAPE.search(head):
-        return False
+    if at is None or not SHAPE.search(head) or NOT_SHAPE.search(head) or "help: declared by" in problem:
+        return False  # the last are values of parameters that composites declare
     source = shown[0].partition("| ")[2]
     if "is out of bounds" in head and re.search("[a-z%]", source[int(at[1]) - 1 :][: shown[1].count("^")]):
         return False  # the bounds of a text with a unit are beyond a schema

@@ -137,6 +137,15 @@ def test_who_stands_where_at_the_start_may_be_known_before_a_plan_comes() -> Non
     assert peers(0.5, plan("c", 0.5, y=9.0))[0] == [[20.0, -1.0], [20.0, -3.0], [20.0, 9.0]]
 
 
+def test_a_robot_is_none_of_those_who_stand_somewhere_at_the_start() -> None:
+    harness, recorder = make(start=[20.0, -2.0], peers_at_start=[[20.0, 2.0], [20.0, -2.0], [30.0, 0.0]])
+    harness.fire(0.0, trigger=0, state=state())
+    assert recorder.records[-1][0].peer_mean[:, 0].tolist() == [[20.0, 2.0], [30.0, 0.0]]
+    harness, recorder = make(start=[20.0, -2.0], peers_at_start=[[20.0, -2.0]])
+    harness.fire(0.0, trigger=0, state=state())
+    assert recorder.records[-1][0].peer_mean.shape[0] == 0
+
+
 def test_a_plan_from_before_the_start_counts_until_there_is_another() -> None:
     harness, recorder = make()
     harness.fire(0.0, trigger=0, state=state(), peer_plans=[plan("b", -0.2, y=7.0)])

@@ -167,6 +167,7 @@ def test_a_goal_in_the_air_for_a_robot_on_the_ground() -> None:
             {"dimensions": 3, "keep_out": [[1, 2, 3]]},
             "keep_out: a robot that flies is above what stands in the way; leave it out",
         ),
+        (RobustController, {"start": [1, 2, 3]}, "start: it has 3 numbers; expected 2"),
         (RobustController, {"peers_at_start": [[1, 2, 3]]}, "peers_at_start: places have 3 numbers; expected 2"),
         (
             RobustController,

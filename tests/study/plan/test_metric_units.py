@@ -57,7 +57,7 @@ def test_parquet_says_what_the_columns_are(folder: Path) -> None:
         if (metadata := schema.field(name).metadata)
     }
     assert {name: said for name, said in found.items() if said} == {
-        "drift": {"unit": "m/s"},
+        "drift": {"unit": "m/s", "doc": "mean step"},
         "place": {"unit": "m", "doc": "where it ends"},
         "in_km": {"unit": "km", "doc": "where it ends"},
         "highest": {"unit": "cm", "doc": "the farthest point"},
