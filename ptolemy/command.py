@@ -17,7 +17,7 @@ def _run(options: argparse.Namespace) -> int:
     types = own_types(options)
     if options.out is not None and options.out.suffix not in (".yaml", ".yml"):
         raise EpicycleError(f"{options.out} is not a name for a model file: it must end in .yaml")
-    found = import_moml(options.file, lambda path: load_model(path, types=types), types, as_de=options.as_de)
+    found = import_moml(options.file, lambda path: load_model(path, types=types), types)
     for note in found.notes:
         complain(f"note: {note}")
     if options.out is None:
@@ -38,18 +38,7 @@ import_ = Command(  # "import" is a keyword in Python
     "nothing is written. No other file is read.",
     (
         option("file", metavar="MODEL.xml", type=Path, help="the MoML file"),
-        option(
-            "-o",
-            "--out",
-            metavar="MODEL.yaml",
-            type=Path,
-            help="write to this file (default: print the model)",
-        ),
-        option(
-            "--as-de",
-            action="store_true",
-            help="let the actors of a model with an SDF or SR director fire by the rules of DE",
-        ),
+        option("-o", "--out", metavar="MODEL.yaml", type=Path, help="write to this file (default: print the model)"),
         TYPES,
     ),
     ("build",),

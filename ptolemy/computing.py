@@ -5,7 +5,9 @@ from __future__ import annotations
 import math
 import operator
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from functools import partial, reduce
+from itertools import repeat
 from typing import Any
 
 from epicycle import actors
@@ -17,8 +19,16 @@ from .changing import Singly, Together, but, preset
 
 def _of_any_type(kind: type[Actor], *outputs: str) -> type[Actor]:
     """An actor some of whose outputs send tokens of any type."""
-    body = {name: but(getattr(kind, name), type=Any) for name in outputs}
-    return type(kind.__name__, (kind,), {"__doc__": kind.__doc__, "__module__": __name__, **body})
+    return _variant(kind, kind.__doc__, {name: but(getattr(kind, name), type=Any) for name in outputs})
+
+
+def _with_default(kind: type[Actor], name: str, default: object, doc: str) -> type[Actor]:
+    """An actor with another default of a parameter."""
+    return _variant(kind, doc, {name: preset(getattr(kind, name), default)})
+
+
+def _variant(kind: type[Actor], doc: str | None, declared: dict[str, Any]) -> type[Actor]:
+    return type(kind.__name__, (kind,), {"__doc__": doc, "__module__": __name__, **declared})
 
 
 Difference = _of_any_type(actors.Difference, "output")
@@ -26,6 +36,15 @@ Extreme = _of_any_type(actors.Extreme, "value")
 MathFunction = _of_any_type(actors.MathFunction, "output")
 MovingAverage = _of_any_type(actors.MovingAverage, "output")
 MovingStatistics = _of_any_type(actors.MovingStatistics, "min", "max")
+LookupTable = _with_default(
+    actors.LookupTable, "outside", "nothing", "Looks a number up in a table; nothing is sent for one outside."
+)
+Select = _with_default(
+    actors.Select, "unread", "kept", "Passes on tokens of the channel that ``control`` names; those of the others wait."
+)
+Switch = _with_default(
+    actors.Switch, "outside", "nothing", "Sends each token to the channel that ``control`` names, or to none."
+)
 
 
 def _are_numbers(tokens: list[Any]) -> bool:
@@ -39,24 +58,18 @@ def added(left: Any, right: Any) -> Any:
     return item_by_item(left, right, operator.add)
 
 
-def less(left: Any, right: Any) -> Any:
-    """The difference."""
-    return item_by_item(left, right, operator.sub)
-
-
 def item_by_item(left: Any, right: Any, compute: Callable[[Any, Any], Any]) -> Any:
     """A sum or similar of numbers, of lists of them, or of fields that both sides have; a number is combined with each
     item of a list."""
     left, right = operand(left), operand(right)
     if isinstance(left, Mapping) and isinstance(right, Mapping):
         return {name: item_by_item(left[name], right[name], compute) for name in left if name in right}
-    lists = [isinstance(each, (list, tuple)) for each in (left, right)]
-    if any(lists) and not any(isinstance(each, (str, Mapping)) for each in (left, right)):
-        if all(lists) and len(left) != len(right):
+    lists = [each for each in (left, right) if isinstance(each, (list, tuple))]
+    if lists:
+        if len(lists[0]) != len(lists[-1]):
             raise EpicycleError(f"{left!r} has {counted(len(left), 'item')}, but {right!r} has {len(right)}")
-        count = len(left if lists[0] else right)
-        pairs = zip(left if lists[0] else [left] * count, right if lists[1] else [right] * count, strict=True)
-        return [item_by_item(one, other, compute) for one, other in pairs]
+        ones, others = (each if isinstance(each, (list, tuple)) else repeat(each) for each in (left, right))
+        return [item_by_item(one, other, compute) for one, other in zip(ones, others, strict=False)]
     if not isinstance(left, (int, float)) or not isinstance(right, (int, float)):
         raise EpicycleError(f"{left!r} and {right!r} cannot be combined")
     return compute(left, right)
@@ -75,7 +88,8 @@ class AddSubtract(actors.AddSubtract):
             if _are_numbers(above + below):
                 self.output.send(actors.elementary.total(above) - actors.elementary.total(below))
             else:
-                self.output.send(reduce(less, below, reduce(added, above[1:], above[0] if above else 0)))
+                whole = reduce(added, above[1:], above[0] if above else 0)
+                self.output.send(reduce(partial(item_by_item, compute=operator.sub), below, whole))
 
 
 class MultiplyDivide(actors.MultiplyDivide):
@@ -176,12 +190,6 @@ class Default(actors.Default):
             self.output.send(token)
 
 
-class LookupTable(actors.LookupTable):
-    """Looks a number up in a table; nothing is sent for one outside."""
-
-    outside = preset(actors.LookupTable.outside, "nothing")
-
-
 class PID(actors.PID):
     """A PID controller whose reset takes effect after the measurement of its tag."""
 
@@ -208,18 +216,6 @@ class Ramp(actors.Ramp):
         return found
 
 
-class Select(actors.Select):
-    """Passes on tokens of the channel that ``control`` names; those of the others wait."""
-
-    unread = preset(actors.Select.unread, "kept")
-
-
-class Switch(actors.Switch):
-    """Sends each token to the channel that ``control`` names, or to none."""
-
-    outside = preset(actors.Switch.outside, "nothing")
-
-
 class Test(actors.Test):
     """Compares tokens with expected values; others may follow, a number matches its text, and NaN any number."""
 
@@ -227,29 +223,54 @@ class Test(actors.Test):
 
     def equals(self, token: Any, expected: Any) -> bool:
         if isinstance(expected, str) is not isinstance(token, str):
-            return _is_text_of(expected, token) if isinstance(expected, str) else _is_text_of(token, expected)
-        return (
-            super().equals(token, expected)
-            or (_is_nan(token) and _is_number(expected))
-            or (_is_nan(expected) and _is_number(token))
-        )
+            text, value = (expected, token) if isinstance(expected, str) else (token, expected)
+            if isinstance(value, float):
+                with suppress(ValueError):
+                    return not text.lstrip("-").isdigit() and float(text) == value
+            return bool(text == text_of(value))
+        pair = token, expected
+        is_nan = any(isinstance(each, float) and math.isnan(each) for each in pair)
+        is_of_numbers = all(isinstance(each, (int, float)) and not isinstance(each, bool) for each in pair)
+        return super().equals(token, expected) or (is_nan and is_of_numbers)
 
 
-def _is_number(value: Any) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool)
+class Dictionary(Actor):
+    """Stores tokens by keys, and sends them when asked.
 
+    A key is any token, by its text.  One at ``write_key`` stores the token at ``value``, or forgets the key if none has
+    come.  A key that is not stored gives null, and is sent by ``not_found``.  Writing comes before reading.
+    Ptolemy: ``Dictionary``.
+    """
 
-def _is_nan(value: Any) -> bool:
-    return isinstance(value, float) and math.isnan(value)
+    write_key: InputPort[Any] = InputPort(required=False, doc="the key of the token at 'value'")
+    value: InputPort[Any] = InputPort(required=False, doc="the token to store")
+    read_key: InputPort[Any] = InputPort(required=False, doc="the key to look up")
+    read_key_array: InputPort[list[Any]] = InputPort(list, required=False, doc="several keys to look up")
+    trigger_keys: InputPort[Any] = InputPort(required=False, doc="when to send all keys")
+    result: OutputPort[Any] = OutputPort(doc="the token of 'read_key'")
+    result_array: OutputPort[list[Any]] = OutputPort(list, doc="the tokens of 'read_key_array'")
+    not_found: OutputPort[list[str]] = OutputPort(list, doc="the keys that are not stored")
+    keys: OutputPort[list[str]] = OutputPort(list, doc="all keys, in the order in which they were first stored")
 
+    def initialize(self) -> None:
+        self._stored: dict[str, Any] = {}
 
-def _is_text_of(text: str, value: Any) -> bool:
-    """Whether a text is a truth value or a number as written by Java."""
-    if isinstance(value, bool):
-        return text == ("true" if value else "false")
-    if isinstance(value, int):
-        return text == str(value)
-    try:
-        return isinstance(value, float) and not text.lstrip("-").isdigit() and float(text) == value
-    except ValueError:
-        return False
+    def fire(self) -> None:
+        if self.write_key.present:
+            key = text_of(self.write_key.value)
+            if self.value.present and self.value.value is not None:
+                self._stored[key] = self.value.value
+            else:
+                self._stored.pop(key, None)
+        if self.read_key.present:
+            self._look_up(self.result, [self.read_key.value], lambda found: found[0])
+        if self.read_key_array.present:
+            self._look_up(self.result_array, self.read_key_array.value, list)
+        if self.trigger_keys.present:
+            self.keys.send([*self._stored])
+
+    def _look_up(self, port: OutputPort[Any], tokens: list[Any], made: Callable[[list[Any]], Any]) -> None:
+        keys = [text_of(each) for each in tokens]
+        port.send(made([self._stored.get(key) for key in keys]))
+        if missing := [key for key in keys if key not in self._stored]:
+            self.not_found.send(missing)

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable
 from functools import cache
 from importlib import import_module
-from types import ModuleType
 from typing import Any
 
 from epicycle.actors import Actor
@@ -21,9 +20,11 @@ class Ptolemy(Dialect):
 
     @classmethod
     def types(cls) -> Iterable[type]:
-        files = ("computing", "dictionary", "generators", "machine", "timing")
+        files = ("computing", "generators", "machine", "timing")
         modules = (import_module(f".{each}", __package__) for each in files)
-        return [each for module in modules for each in vars(module).values() if _is_type_of(module, each)]
+        named = [(module.__name__, each) for module in modules for name, each in vars(module).items() if name[0] != "_"]
+        types = [(module, each) for module, each in named if isinstance(each, type) and each.__module__ == module]
+        return [each for _, each in types if issubclass(each, (Actor, Aspect))]
 
     @classmethod
     def director(cls) -> Any:
@@ -36,9 +37,3 @@ class Ptolemy(Dialect):
 def known_types() -> Catalogue:
     """Epicycle's own actors and aspects, as they are under ``like: ptolemy``."""
     return built_in().like(Ptolemy)
-
-
-def _is_type_of(module: ModuleType, found: object) -> bool:
-    if not isinstance(found, type) or not issubclass(found, (Actor, Aspect)):
-        return False
-    return found.__module__ == module.__name__ and not found.__name__.startswith("_")

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from bisect import bisect_left
 from collections.abc import Sequence
-from typing import Any, ClassVar
+from typing import Any
 
 from epicycle import actors
 from epicycle.actors import (
@@ -28,13 +28,9 @@ LAWS = frozenset({"Bernoulli", "Choice", "Constant", "Exponential", "Normal", "T
 class Numbers:
     """Random numbers with the methods of a ``Stream`` that distributions use: write ``random``."""
 
-    def __init__(self, seed: int) -> None:
-        self._state = self.begin(seed)
+    def __init__(self, state: int) -> None:
+        self._state = state
         self._gaussian: float | None = None  # the second of a pair
-
-    def begin(self, seed: int) -> int:
-        """The state to begin with."""
-        raise NotImplementedError
 
     def random(self) -> float:
         """Uniform in [0, 1)."""
@@ -84,19 +80,14 @@ class Numbers:
 class Generator(Configurable):
     """A generator of another program, for an actor to use in place of its own stream."""
 
-    kind: ClassVar[type[Numbers]]
-
     seed = Parameter(int, doc="a whole number")
 
     def numbers(self) -> Numbers:
         """Its numbers, from the first one."""
-        return self.kind(self.seed)
+        raise NotImplementedError
 
 
 class _OfJava(Numbers):
-    def begin(self, seed: int) -> int:
-        return (seed ^ 0x5DEECE66D) % 2**48
-
     def _bits(self, count: int) -> int:
         self._state = (self._state * 0x5DEECE66D + 0xB) % 2**48
         return self._state >> 48 - count
@@ -112,14 +103,11 @@ class JavaRandom(Generator):
     Source: Lehmer's linear congruential generator modulo 2^48, as given in the documentation of Java 8.
     """
 
-    kind = _OfJava
+    def numbers(self) -> Numbers:
+        return _OfJava((self.seed ^ 0x5DEECE66D) % 2**48)
 
 
 class _OfDRand(Numbers):
-    def begin(self, seed: int) -> int:
-        seed = abs((seed + 2**31) % 2**32 - 2**31)  # of 32 bits, with its sign
-        return 4 * (seed if seed < (2**32 - 1) // 4 else seed >> 3) + 1
-
     def random(self) -> float:
         self._state = self._state * 0x278DDE6D % 2**32
         return self._state * 2.3283064365386963e-10
@@ -138,7 +126,9 @@ class DRand(Generator):
     The seed is as for ``JavaRandom``.  Source: Colt 1.2, ``cern.jet.random``.
     """
 
-    kind = _OfDRand
+    def numbers(self) -> Numbers:
+        seed = abs((self.seed + 2**31) % 2**32 - 2**31)  # of 32 bits, with its sign
+        return _OfDRand(4 * (seed if seed < (2**32 - 1) // 4 else seed >> 3) + 1)
 
 
 class _Drawing(Actor):

@@ -7,24 +7,18 @@ import re
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from epicycle.actors import ParameterError, declared_parameters
 from epicycle.actors.expression import ExpressionError as OwnError
 from epicycle.actors.expression import evaluate
 
-from ..dialect import known_types
-from .budget import spend
-from .entities import Property, is_aside, is_text, is_variable
-from .notes import Notes
+from ..generators import LAWS
+from .document import Property, is_aside, is_priority, is_text
+from .limits import Notes
 from .parts import Part
 from .syntax import ExpressionError, names_of, parse
-from .table import UNSAID, Row, Setting
-from .tables import WORDS
-from .translation import Code, Kind, Meaning, Value, code_of, kind_of, named
-from .variables import Changing, Variables
-from .writing import plain, seconds
-
-_TIMES = ("time", "times", "end", "once")
-_OF_PATTERNS = frozenset("\\^$.|?*+()[]{}")
+from .table import UNSAID, WORDS, Row, Setting
+from .translation import Code, Kind, Meaning, Value, code_of, named
+from .variables import Variables
+from .writing import Names, plain, seconds
 
 
 class Actor:
@@ -39,7 +33,6 @@ class Actor:
         self.held: dict[str, object] = {}  # the initial values of our inputs that keep their latest token
         self.ports: dict[str, str] = {}  # our names for its ports that are not in the row
         self.told: set[str] = set()  # parameters that have been handled
-        self.reads: dict[str, Changing] = {}  # our ports that are connected to variables
 
     # -- reading the file -----------------------------------------------------------------------------------------
 
@@ -103,8 +96,11 @@ class Actor:
         """An expression, over inputs that are connected to the variables in it."""
         found = self.variables.in_(said)
         for each in found:
-            self.reads[each.named()], self.ports[each.named()] = each, each.named()
-            self.held[each.named()] = each.first()
+            if each.owner is not self.part.around:
+                raise ExpressionError(f"{each.name}, a variable outside, has no counterpart in an expression")
+            name = self.ports[each.named()] = each.named()
+            self.held[name] = each.first()
+            each.inputs[f"{self.part.name}.{name}"] = None
         return named(self.variables.text(said)) if found else said
 
     def expression(self, said: Meaning) -> None:
@@ -123,14 +119,14 @@ class Actor:
 
     # -- parameters -----------------------------------------------------------------------------------------------
 
-    def convert(self, special: Mapping[str, Callable[[Actor], None]]) -> None:
-        """Find the values of all parameters; ``special`` has what a row cannot express."""
+    def convert(self) -> None:
+        """Find the values of all parameters."""
         settings = self.row.settings
         if "note" in settings:
             self.notes.note(f"{self.path}: {settings['note']}")
         try:
             if "how" in settings:
-                special[settings["how"]](self)
+                SPECIAL[settings["how"]](self)
             for name, row in self.row.parameters.items():
                 if name not in self.told:
                     self._parameter(name, row)
@@ -138,16 +134,19 @@ class Actor:
                 if (value := self.value(text)) is not None:
                     self.values[ours] = plain(value)
             if "law" in settings:
-                special["law"](self)
+                _law(self)
             if "expression" in settings:
                 self.expression(self.meaning(settings["expression"]))
         except (ExpressionError, ValueError, TypeError) as error:
             self.notes.error(f"{self.path}: {error}")
         for name, said in self.part.entity.properties.items():
-            if name not in self.row.parameters and said.value and not is_aside(said):
-                self._rest(name, said)
-        given = {name: value for name, value in self.values.items() if not self._is_default(name, value)}
-        self.values = {**settings.get("set", {}), **given}
+            if name in self.row.parameters or not said.value or is_aside(said) or is_priority(said):
+                continue
+            if name not in self.told and name not in WORDS["parameters without effect"]:
+                self._tell(self.notes.note, said)
+            elif name in self.told and not self.held and self.variables.changes(said, self.scope):
+                self._tell(self.notes.note, said, " keeps its initial value")
+        self.values = {**settings.get("set", {}), **self.values}
 
     def _parameter(self, name: str, row: Setting) -> None:
         self.told.add(name)
@@ -159,27 +158,21 @@ class Actor:
             if word.lower() not in (row.words or {}):
                 self.notes.error(f"{self.path}.{name} = {word!r} has no counterpart")
             self.values[row.ours] = (row.words or {}).get(word.lower())
+        elif row.kind == "nothing":
+            return
         elif said is None:
-            if (
-                row.default is not UNSAID
-                and row.kind not in ("must", "same", "nothing")
-                and row.ours not in self.values
-            ):
-                self.values[row.ours] = written(row.default, row.kind)
-        elif row.kind in ("text", "pattern"):
-            self.values[row.ours] = text = self.text(name)
-            if row.kind == "pattern" and self.widths.get(name, 0) and name == "pattern":
-                self.notes.error(f"{self.path}.{name}: regular expressions from a port have no counterpart")
-            elif row.kind == "pattern" and _OF_PATTERNS & set(text):
-                self.notes.error(f"{self.path}.{name} = {text!r}: regular expressions have no counterpart")
-        elif row.kind != "nothing":
+            if row.default is not UNSAID and row.kind != "must":
+                self.values.setdefault(row.ours, written(row.default, row.kind))
+        elif row.kind == "text":
+            self.values[row.ours] = self.text(name)
+        else:
             try:
                 found = self.scope.value_of(said)
-                if row.kind not in ("must", "same"):
+                if row.kind == "must" and found != row.default:
+                    self._tell(self.notes.error, said)
+                elif row.kind != "must":
                     value = self._by_name(said, found, row.kind) or written(found, row.kind)
                     self.values |= {} if value is None else {row.ours: value}
-                elif found != row.default:
-                    self._tell(self.notes.error if row.kind == "must" else self.notes.note, said)
             except (ExpressionError, TypeError, ValueError, OverflowError) as error:
                 self._tell(self.notes.error, said, f": {error}")
 
@@ -195,51 +188,16 @@ class Actor:
             found = evaluate(ours.text, {own[each]: scope(each) for each in used}) if isinstance(ours, Code) else None
         except (ExpressionError, OwnError, KeyError):
             return None
-        if not isinstance(ours, Code) or found != value or (kind not in _TIMES and kind_of(found) != kind_of(value)):
+        is_time = kind in ("time", "end", "once")
+        if not isinstance(ours, Code) or found != value or not (is_time or type(found) is type(value)):
             return None
         self.part.around.used |= used
         return f"${{{ours.text}}}"
 
-    def _rest(self, name: str, said: Property) -> None:
-        """A parameter that is not in the row."""
-        if name in self.told:
-            if not self.reads and self.variables.changes(said, self.scope):
-                self._tell(self.notes.note, said, " keeps its initial value")
-        elif name == "_priority" or said.kind == "Priority":
-            self.values["priority"] = self.get(name)
-        elif name == "firingCountLimit":
-            count = self.get(name)
-            if isinstance(count, int) and count > 0:
-                if self.row.type in ("Const", "Ramp", "Pulse"):
-                    self.values["limit"] = count
-                else:
-                    self._tell(self.notes.note, said)
-        elif name not in WORDS["parameters without effect"] and not self._is_only_named(name, said):
-            self._tell(self.notes.note, said)
-
-    def _is_only_named(self, name: str, said: Property) -> bool:
-        """Whether this is an added parameter that only serves expressions of other parameters."""
-        others = [each.value or "" for each in self.part.entity.properties.values() if each is not said]
-        spend(len(others) // 10)
-        return is_variable(said) and any(re.search(rf"(?<!\w){re.escape(name)}(?!\w)", each) for each in others)
-
-    def _is_default(self, name: str, value: object) -> bool:
-        """Whether our actor has this value by default under a director with ``like: ptolemy``."""
-        kind = known_types().actors.get(self.row.type)
-        parameter = None if kind is None or "type" in self.values else declared_parameters(kind).get(name)
-        if parameter is None or parameter.required or (isinstance(value, str) and "${" in value):
-            return False
-        try:
-            found = parameter.convert(value)
-        except ParameterError:
-            return False
-        default = parameter.default_value
-        return isinstance(found, (bool, int, float, str)) and type(found) is type(default) and found == default
-
 
 def written(value: Any, kind: str) -> object:
     """A value in the form written for a parameter of this kind; None if that is to be left out."""
-    if _has_nil(value):
+    if value is None:
         raise ValueError("nil cannot be written")
     is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
     match kind:
@@ -251,16 +209,163 @@ def written(value: Any, kind: str) -> object:
             return seconds(value) if not is_number or 0 <= value < math.inf else "1e8 s"
         case "time":
             return seconds(value)
-        case "times" | "list":
+        case "list":
             return [plain(each) for each in (value if isinstance(value, list) else [value])]
-        case "whole":
-            return int(value)
-        case "flag" if not isinstance(value, bool):
-            raise ValueError("it is not a truth value")
     return plain(value)
 
 
-def _has_nil(value: object) -> bool:
-    if isinstance(value, (list, dict)):
-        return any(map(_has_nil, value.values() if isinstance(value, dict) else value))
-    return value is None
+# -- what a row cannot express ----------------------------------------------------------------------------------------
+
+
+Special = Callable[[Actor], None]
+
+
+def _set_variable(actor: Actor) -> None:
+    """A SetVariable, which starts with the value set in the model."""
+    try:
+        value = None if actor.scope.around is None else actor.scope.around(actor.text("variableName"))
+    except (KeyError, ExpressionError):
+        return
+    if value is not None:
+        actor.values["value"] = plain(value)
+
+
+def _chosen_input(actor: Actor) -> None:
+    """A ConfigurationSelect, which passes on one of its inputs."""
+    is_true = actor.get("selector", False) is True
+    actor.part.unwired.add("falseInput" if is_true else "trueInput")
+
+
+def _fields(actor: Actor) -> None:
+    """The ports added to a RecordAssembler or RecordDisassembler are the fields: inputs, or outputs."""
+    sends = any(face.direction == "output" for face in actor.row.ports.values())
+    known = Names(actor.row.ports)
+    for port in actor.part.entity.ports.values():
+        is_field = port.flag("input" if sends else "output") and port.name not in actor.row.ports
+        if is_field and actor.widths.get(port.name, 0):
+            actor.ports[port.name] = known.of(port.name)
+    actor.values["fields"] = [*actor.ports.values()]
+    for name, ours in known.renamed().items():
+        actor.notes.note(f"{actor.path}.{name} is renamed {ours}")
+
+
+def _expression(actor: Actor) -> None:
+    """An Expression, whose inputs are ports added in the model."""
+    entity = actor.part.entity
+    actor.told.add("expression")
+    names = Names(("output", "gives", "hold"), in_expressions=True)
+    parameters = [name for name, said in entity.properties.items() if said.kind.endswith("PortParameter")]
+    # Inputs with an initial value: linked PortParameters, and ports with a default.
+    held = {name: entity.properties[name] for name in parameters if actor.widths.get(name, 0)}
+    for port in entity.ports.values():
+        if port.flag("input") and port.word("defaultValue"):
+            held[port.name] = port.properties["defaultValue"]
+    ports = [port.name for port in entity.ports.values() if port.flag("input") and port.name not in parameters]
+    actor.ports |= {name: names.of(name) for name in dict.fromkeys([*ports, *held])}
+    for name, ours in names.renamed().items():
+        actor.notes.note(f"{actor.path}.{name} is renamed {ours}")
+    known: dict[str, Meaning] = {name: named(ours, actor.kinds.get(name)) for name, ours in actor.ports.items()}
+    known |= {"time": named("time"), "iteration": named("iteration", int)}
+    try:
+        tree = parse(entity.text("expression") or "")
+        used = names_of(tree)
+        actor.told |= used
+        said = actor.following(actor.scope.meaning(tree, known))
+        for name in held.keys() & used:
+            actor.held[actor.ports[name]] = plain(actor.scope.value_of(held[name]))
+    except (ExpressionError, ValueError) as error:
+        actor.notes.error(f"{actor.path}: expression: {error}")
+        return
+    actor.values |= {"iteration": True} if "iteration" in used else {}
+    actor.expression(said)
+
+
+# -- random numbers ---------------------------------------------------------------------------------------------------
+
+
+def _law(actor: Actor) -> None:
+    """The distribution of a random actor."""
+    said = dict(actor.row.settings["law"])
+    found: dict[str, Any] = {"type": said.pop("type")}
+    for ours, text in said.items():
+        value = actor.value(text)
+        fed = [name for name in names_of(parse(text)) if actor.widths.get(name, 0)]
+        if fed:
+            actor.notes.error(f"{actor.path}.{fed[0]}: a distribution that changes during the run has no counterpart")
+        if value is not None:
+            found[ours] = value
+    actor.values["distribution"] = found
+    _generator(actor)
+
+
+def java_hash(text: str) -> int:
+    """The hash of a text in Java."""
+    found = 0
+    for character in text:
+        found = (31 * found + ord(character)) % 2**32
+    return (found + 2**31) % 2**32 - 2**31
+
+
+def _generator(actor: Actor) -> None:
+    """The numbers of Java's generators, if the model fixes them by its own seed or the shared one."""
+    root = actor.part.root
+    own, shared = actor.get("privateSeed"), actor.get("seed")
+    for each in root.with_property("seed") if shared is None else ():  # the value set at one holds for all
+        if each.row is not None and each.row.type in ("Random", "PoissonClock"):
+            shared = shared or each.value(each.entity.properties["seed"], actor.notes)
+    kind = "DRand" if ".colt." in actor.part.entity.java else "JavaRandom"
+    law = actor.values.get("distribution", {}).get("type", "Exponential")  # which a PoissonClock draws
+    if law not in LAWS and (own or shared):
+        actor.notes.note(f"{actor.path}: the numbers of its {law} distribution will differ")
+    elif isinstance(own, int):
+        actor.values["generator"] = {"type": kind, "seed": own}
+    elif isinstance(shared, int) and shared:
+        actor.values["generator"] = {"type": kind, "seed": shared + java_hash(f".{root.entity.name}.{actor.path}")}
+
+
+# -- checks -----------------------------------------------------------------------------------------------------------
+
+
+def _test(actor: Actor) -> None:
+    """A Test or NonStrictTest: expected values, on one channel or on several together."""
+    actor.told.add("correctValues")
+    said, written, why = actor.said("correctValues"), None, "is in training mode and checks nothing"
+    if _shared(actor, "trainingMode") is not True:
+        try:
+            values = [True] if said is None else actor.scope.value_of(said)
+            written = plain(values if isinstance(values, list) else [values])
+        except (ExpressionError, ValueError) as error:
+            why = f"checks nothing: correctValues: {error}"
+    if not isinstance(written, list):
+        actor.notes.note(f"{actor.path} {why}")
+        actor.values = {"type": "Recorder"}
+        actor.told |= actor.row.parameters.keys()
+        return
+    width = actor.widths.get("input", 1)
+    is_strict = actor.part.entity.kind == "Test"
+    if is_strict and width == 1:  # an array holds the values of all channels, here of one
+        written = [each[0] if type(each) is list and len(each) == 1 else each for each in written]
+    elif is_strict and written and all(type(each) is list for each in written):
+        actor.values["together"] = True
+    complete = _shared(actor, "requireAllCorrectValues")
+    actor.values = {"values": written, **actor.values}
+    actor.values |= {"complete": complete} if isinstance(complete, bool) else {}
+
+
+def _shared(actor: Actor, name: str) -> object:
+    """A parameter that all actors of a class share: the last one in the file sets it for all."""
+    actor.told.add(name)
+    for each in reversed(actor.part.root.with_property(name)):
+        if each.entity.java == actor.part.entity.java:
+            return actor.part.value(each.entity.properties[name], actor.notes)
+    return None
+
+
+SPECIAL: Mapping[str, Special] = {
+    "set_variable": _set_variable,
+    "chosen_input": _chosen_input,
+    "fields": _fields,
+    "expression": _expression,
+    "generator": _generator,
+    "test": _test,
+}

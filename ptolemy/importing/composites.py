@@ -11,20 +11,17 @@ from epicycle.runner.catalogue import installed
 
 from .actors import Actor
 from .aspects import aspects_of
-from .connections import connections_of
-from .directors import said_of
-from .entities import Entity, Property, director_of, is_aside, is_text, is_variable, version_of
-from .leftovers import about_links, about_ports, about_properties, about_unknown, is_watched
+from .document import Entity, Property, director_of, is_aside, is_layout, is_text, is_variable, version_of
+from .limits import Notes
 from .machines import Machine
-from .names import Names
-from .nets import wire
-from .notes import Notes
-from .parts import Part, parts_of
-from .reach import Reach, kinds_at, leave_out_idle, trigger
-from .special import SPECIAL
+from .nets import Reach, connections_of, kinds_at, leave_out_idle, wire
+from .parts import Part, about_ports, about_properties, about_unknown, is_watched, parts_of
+from .scope import Scope
 from .syntax import ExpressionError
+from .table import WORDS, why_not
+from .translation import Code
 from .variables import Variables
-from .writing import Flow, plain
+from .writing import Flow, Lines, Names, plain, seconds
 
 
 class Conversion:
@@ -40,13 +37,12 @@ class Conversion:
         self._class_names = Names([*known.actors, *known.aspects, *own])
         self._variables = Variables(self.root, notes)
         wire(self.root, notes)
-        trigger(self.root)
         leave_out_idle(self.root, notes)
         self._reach = Reach()
 
     # -- composites -----------------------------------------------------------------------------------------------
 
-    def body(self, part: Part) -> dict[str, Any]:
+    def body(self, part: Part, director: Flow | None = None) -> dict[str, Any]:
         """The sections of a composite, or of the model."""
         entity, parameters = part.entity, Names(in_expressions=True)
         changing = self._variables.names_of(part)
@@ -54,7 +50,7 @@ class Conversion:
             if is_variable(said) and not is_aside(said) and name not in changing and _stays(part, name, said):
                 part.own_names[name] = parameters.of(name)
         for name in [*entity.ports, *(name for name, child in part.parts.items() if child.is_border)]:
-            part.names.take(part.ports.of(name))
+            part.names.fresh(part.ports.of(name))  # which no actor may have
         for port, ours in part.ports.renamed().items():
             self.notes.note(f"{part.told(port)} is renamed {ours}")
         actors: dict[str, Flow] = {}
@@ -62,27 +58,26 @@ class Conversion:
             if child.is_border:
                 continue
             about_ports(child, self.notes)
-            about_links(child, self.notes)
             child.name = "" if child.role == "aspect" else part.names.of(child.entity.name)
             child.entry = self._entry(child)
             if child.entry is not None:
-                actors[child.name] = child.entry
+                actors[child.name] = child.with_priority(child.entry, self.notes)
                 if child.name != child.entity.name:
                     self.notes.note(f"{child.path} is renamed {child.name}")
-        connections = connections_of(part, self._reach, self.notes)
+        connections = connections_of(part, self.notes)
         following = self._variables.write(part, actors, connections)
         inputs, outputs = _borders(part)
+        about_properties(entity, part.path, self.notes)
         found = {
-            "doc": " ".join(entity.doc.split()), "inputs": inputs, "outputs": outputs, "actors": actors,
-            "connections": connections + part.added[2],
+            "inputs": inputs, "outputs": outputs, "director": director if actors else None, "actors": actors,
+            "connections": Lines(connections),
             "aspects": {**aspects_of(part, self.model_entry, self.notes), **following},
         }  # fmt: skip
-        about_properties(part, self.notes)
-        return {key: value for key, value in found.items() if value}
+        return {key: value for key, value in found.items() if value or (key == "director" and value is not None)}
 
     def parameters(self, part: Part) -> dict[str, Any]:
         """The parameters that are used inside."""
-        return {ours: plain(part.scope(name)) for name, ours in part.own_names.items() if name in part.used}
+        return Flow({ours: plain(part.scope(name)) for name, ours in part.own_names.items() if name in part.used})
 
     def _entry(self, part: Part) -> Flow | None:
         """What a part becomes; None if it is left out."""
@@ -102,20 +97,17 @@ class Conversion:
 
     def model_entry(self, part: Part) -> Flow:
         """A composite as an instance of a composite class."""
-        part.at = f"{part.around.at}{part.name}."
-        body = self.body(part)
-        values = self.parameters(part)
-        if (director := director_of(part.entity)) is not None:
-            found = said_of(director, part.told(director.name), part.scope, self.notes)
-            if body.get("actors"):
-                found.pop("stop", None)
-                front = {key: body.pop(key) for key in ("doc", "inputs", "outputs") if key in body}
-                body = front | {"director": Flow(found)} | body
-        entry = self.instance(part, body, values)
-        part.give_priority(entry, self.notes)
-        return entry
+        director = director_of(part.entity)
+        found = None if director is None else said_of(director, part, self.notes)
+        if found is not None:
+            found.pop("stop", None)
+        return self._instance_of(part, found)
 
-    def instance(self, part: Part, body: dict[str, Any], values: dict[str, Any]) -> Flow:
+    def _instance_of(self, part: Part, director: Flow | None = None) -> Flow:
+        part.at = f"{part.around.at}{part.name}."
+        return self._instance(part, self.body(part, director), self.parameters(part))
+
+    def _instance(self, part: Part, body: dict[str, Any], values: dict[str, Any]) -> Flow:
         """The entry of an instance; reuses an existing class with the same content."""
         # The type of a parameter's default decides which values it takes.
         key = json.dumps([body, sorted((name, type(value).__name__) for name, value in values.items())], default=str)
@@ -123,18 +115,10 @@ class Conversion:
             name = self._known[key] = self._class_names.fresh(
                 part.entity.of_class.rpartition(".")[2] or part.entity.name
             )
-            ordered = {"doc": body.pop("doc")} if "doc" in body else {}
-            self.classes[name] = {**ordered, **({"parameters": Flow(values)} if values else {}), **body}
+            self.classes[name] = ({"parameters": values} if values else {}) | body
         name = self._known[key]
         default = self.classes[name].get("parameters", {})
-        changed = {each: value for each, value in values.items() if not _same(default[each], value)}
-        return Flow({"type": name, **changed})
-
-    def inside(self, name: str, body: dict[str, Any]) -> dict[str, Any]:
-        """The body of a model with one composite, which contains everything."""
-        kind = self._class_names.fresh(name)
-        self.classes[kind] = body
-        return {"actors": {kind: Flow({"type": kind})}}
+        return Flow({"type": name, **{each: value for each, value in values.items() if default[each] != value}})
 
     # -- actors and state machines -----------------------------------------------------------------------------------
 
@@ -147,43 +131,29 @@ class Conversion:
             is_unfed = face is not None and face.direction == "input" and not self._reach.feeds(part, name)
             actor.widths[name] = 0 if is_unfed else around.widths.get(f"{part.entity.name}.{name}", 0)
         actor.kinds = kinds_at(part, row)
-        actor.convert(SPECIAL)
+        actor.convert()
         part.own_ports = actor.ports
-        for port, changing in actor.reads.items():
-            self._variables.lead_to(changing, around, f"{part.name}.{port}")
-        if row.type == "SetVariable":
-            self._variables.lead_from(part, has_value="value" in actor.values)
         return Flow({"type": row.type, **actor.values})
 
     def _machine(self, part: Part) -> Flow:
         """A state machine as an actor, a modal model as a composite with modes."""
         part.at = f"{part.around.at}{part.name}."
         machine = Machine(part, self.notes, self._version)
-        for child, name in machine.handed():
-            self._variables.add_port(child, name)
-        machine.tell_rest()
         found = machine.written(self._refinement)
-        is_refinement = part.around.role == "machine"
-        if part.entity is part.controller and not is_refinement:
-            entry = Flow({"type": "StateMachine", **found})
-            part.unnamed = machine.words.unnamed()
-        else:
-            entry = self.instance(part, machine.head() | found, {})
-        if not is_refinement:
-            part.give_priority(entry, self.notes)
-        return entry
+        if part.entity is part.controller and part.around.role != "machine":
+            part.unnamed = machine.unnamed()
+            return Flow({"type": "StateMachine", **found})
+        return self._instance(part, machine.head() | found, {})
 
     def _refinement(self, part: Part, mode: str) -> Flow:
         """The refinement of a mode: a composite, possibly with its own modes."""
         part.name, part.ports = mode, part.around.ports
         if part.role == "machine":
             return self._machine(part)
-        part.at = f"{part.around.at}{mode}."
-        body = self.body(part)
         if (director := director_of(part.entity)) is not None:
-            for key in said_of(director, part.told(director.name), part.scope, self.notes):
+            for key in said_of(director, part, self.notes):
                 self.notes.note(f"{part.path}: {key} of the director of a refinement has no counterpart")
-        return self.instance(part, body, self.parameters(part))
+        return self._instance_of(part)
 
 
 def _stays(part: Part, name: str, said: Property) -> bool:
@@ -207,10 +177,42 @@ def _borders(part: Part) -> tuple[list[str], list[str]]:
         if child.is_border:
             found[child.role == "response"].append(part.ports.of(name))
     found[0].extend(part.ports.of(name) for name in part.variable_ports if name not in part.entity.ports)
-    found[0].extend(part.added[0])
-    found[1].extend(part.added[1])
     return found
 
 
-def _same(one: object, other: object) -> bool:
-    return type(one) is type(other) and one == other
+def said_of(director: Property, part: Part, notes: Notes) -> Flow:
+    """The settings of a director, including its stop time in s."""
+    found, path = Flow(), part.told(director.name)
+    if director.kind in WORDS["directors inside"] and part.outer is not None:
+        notes.note(f"{path}, a {director.kind}: the actors inside fire by the rules of DE")
+    elif director.kind not in WORDS["directors like DE"]:
+        notes.error(f"{path} is a {director.java}, which has no counterpart{why_not(director.java)}")
+    scope, clock = Scope(director, part.scope), director.properties.get("localClock", Property(""))
+    said = [(each, f"{path}.{name}", scope) for name, each in director.properties.items() if each is not clock]
+    inner = Scope(clock, scope)
+    said += [(each, f"{path}.localClock.{name}", inner) for name, each in clock.properties.items()]
+    for each, where, here in said:
+        if is_layout(each) or each.name in WORDS["settings without effect"] or not (each.value or "").strip():
+            continue
+        try:
+            if not _note(each.name, here.value_of(each), found):
+                notes.note(f"{where} = {each.value!r} has no counterpart")
+            elif isinstance(here.meaning_of(each), Code):
+                notes.note(f"{where} = {each.value!r} keeps its initial value")
+        except (ExpressionError, ValueError, TypeError) as error:
+            notes.note(f"{where} = {each.value!r}: {error}")
+    return found
+
+
+def _note(name: str, value: Any, found: Flow) -> bool:
+    """Store a parameter of a director; return whether it has a counterpart, or needs none."""
+    match name:
+        case "startTime":
+            found |= {"start": seconds(value)} if value else {}
+        case "stopTime":
+            found |= {} if value is None or value > 1e300 else {"stop": seconds(value)}
+        case "clockDrift" | "clockRate":
+            found |= {} if value == 1.0 else {"drift": plain(value)}
+        case _:
+            return not value
+    return True

@@ -1,7 +1,7 @@
 """Reads a MoML file: its elements are carried out as they come; nothing is fetched or expanded.
 
 MoML is a list of instructions: an element creates what it names, or changes it if it exists.  An instance of a class
-that the file defines starts as a copy of it.
+that the file defines starts as a copy of it.  The result: entities with ports, relations, links and attributes.
 
 A file of Ptolemy II names its DTD on the line before the first element.  That line is blanked, and any other part of a
 DTD is refused, so a file can neither define nor request entities.
@@ -9,9 +9,10 @@ DTD is refused, so a file can neither define nor request entities.
 
 from __future__ import annotations
 
-import codecs
+import pickle
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -20,22 +21,156 @@ from xml.sax.handler import ContentHandler
 
 from epicycle.actors import EpicycleError
 
-from .entities import COMPOSITE, Entity, Link, Port, Property, Relation, copied
-from .notes import Notes
+from .limits import Notes, spend
+from .table import WORDS, table
+
+COMPOSITE = "ptolemy.actor.TypedCompositeActor"
+BYTES = 10  # of a copy, for a step
+
+
+@dataclass
+class Property:
+    """An attribute: its Java class, its text, and its own attributes."""
+
+    name: str
+    java: str = ""
+    value: str | None = None
+    properties: dict[str, Property] = field(default_factory=dict)
+
+    @property
+    def kind(self) -> str:
+        """The name of its Java class without the package."""
+        return self.java.rpartition(".")[2]
+
+    def text(self, name: str) -> str | None:
+        """The value of one of its attributes."""
+        found = self.properties.get(name)
+        return None if found is None else found.value
+
+    def word(self, name: str, default: str = "") -> str:
+        """The value of one of its attributes without blanks and quotes around it."""
+        return (self.text(name) or default).strip().strip('"')
+
+
+@dataclass
+class Port(Property):
+    """A port that the file mentions."""
+
+    def flag(self, name: str) -> bool:
+        """Whether it is an ``input``, ``output`` or ``multiport``."""
+        found = self.properties.get(name)
+        return found is not None and (found.value or "true").strip() != "false"
+
+
+@dataclass
+class Link:
+    """A port's link to a relation; without one, ``relation`` is None and the link only occupies a channel."""
+
+    relation: str | None
+    order: int  # of creation
+
+
+@dataclass
+class Entity(Property):
+    """An actor, a composite, or a state."""
+
+    ports: dict[str, Port] = field(default_factory=dict)
+    entities: dict[str, Entity] = field(default_factory=dict)
+    classes: dict[str, Entity] = field(default_factory=dict)
+    relations: dict[str, Property] = field(default_factory=dict)  # and the transitions of a state machine
+    # The links of each port ("actor.port", or "port" for one of its own), in the order of its channels.
+    links: dict[str, list[Link]] = field(default_factory=dict)
+    joined: list[tuple[str, str, int]] = field(default_factory=list)  # linked relations, and their order of creation
+    of_class: str = ""  # the class in the file that it instantiates
+
+    def everything(self) -> Iterator[Entity]:
+        """The entity and everything inside it."""
+        yield self
+        for each in self.entities.values():
+            yield from each.everything()
+
+    def down(self, names: list[str]) -> Entity | None:
+        """An entity inside, by the names on the path to it."""
+        found: Entity | None = self
+        for name in names:
+            found = None if found is None else found.classes.get(name) or found.entities.get(name)
+        return found
+
+
+def copied(entity: Entity) -> Entity:
+    """A copy of an entity, paid by its size."""
+    data = pickle.dumps(entity)  # much faster than deepcopy
+    spend(len(data) // BYTES)
+    found: Entity = pickle.loads(data)
+    return found
+
+
+def director_of(entity: Entity) -> Property | None:
+    """The composite's own director, if it has one."""
+    found = [each for each in entity.properties.values() if each.kind.endswith("Director") and not is_layout(each)]
+    return found[-1] if found else None
+
+
+def version_of(model: Entity) -> tuple[int, int]:
+    """The version of Ptolemy that wrote a model; a recent one if the file does not state it."""
+    said = re.match(r"(\d+)\.(\d+)", model.text("_createdBy") or "")
+    return (int(said[1]), int(said[2])) if said is not None else (11, 0)
+
+
+# -- kinds of attributes ----------------------------------------------------------------------------------------------
+
+# Which are written on several lines.
+_LAYOUT, _DECORATION = (re.compile(table("words")[name].replace(" ", "")) for name in ("layout", "decoration"))
+
+
+def is_text(said: Property) -> bool:
+    """Whether the value is used as written, except for ``$name``."""
+    return said.kind in WORDS["texts"] or said.text("_stringMode") == "true"
+
+
+def is_variable(said: Property) -> bool:
+    """Whether expressions may name it."""
+    return said.value is not None and (
+        said.kind.endswith(("Parameter", "Variable", "ParameterSet")) or said.kind in ("", "Priority")
+    )
+
+
+def is_priority(said: Property) -> bool:
+    """Whether an attribute is its owner's priority."""
+    return said.name == "_priority" or said.kind == "Priority"
+
+
+def is_layout(said: Property) -> bool:
+    """Whether an attribute only concerns a model's appearance or its authoring history."""
+    return bool(_LAYOUT.search(said.java)) or (said.name.startswith("_") and said.name != "_priority")
+
+
+def is_decoration(said: Property) -> bool:
+    """Whether an attribute holds an aspect's settings for a port or an actor."""
+    return bool(_DECORATION.search(said.java)) or said.name.startswith("DecoratorAttributesFor")
+
+
+def is_aside(said: Property) -> bool:
+    """Whether an attribute says nothing about its owner's own work."""
+    return is_layout(said) or is_decoration(said)
+
+
+# -- reading ----------------------------------------------------------------------------------------------------------
+
 
 MAX_BYTES = 20_000_000
 MAX_ELEMENTS = 300_000
 MAX_DEPTH = 100
 MAX_ENTITIES = 20_000
 MAX_CHANNEL = 1000
-_CHANGES = ("deleteEntity", "deletePort", "deleteProperty", "deleteRelation", "rename", "unlink")  # of what is there
+_REFUSED = ("deleteEntity", "deletePort", "deleteProperty", "deleteRelation", "rename", "unlink", "group")
 _DOCTYPE = re.compile(
     rb"""<!DOCTYPE\s+[\w.:-]+(?:\s+PUBLIC\s+(?:"[^"<>]*"|'[^'<>]*')|\s+SYSTEM)?(?:\s+(?:"[^"<>]*"|'[^'<>]*'))?\s*>"""
 )
 _PROLOG = re.compile(
-    rb"\s*(?:<\?xml[^>]*\?>)?(?:\s|<!--(?:(?!-->).){0,100000}-->|<\?(?:(?!\?>).){0,100000}\?>)*", re.DOTALL
+    rb"(?:\xef\xbb\xbf)?\s*(?:<\?xml[^>]*\?>)?(?:\s|<!--(?:(?!-->).){0,100000}-->|<\?(?:(?!\?>).){0,100000}\?>)*",
+    re.DOTALL,
 )
-_ENCODING = re.compile(rb"<\?xml[^>]*\bencoding\s*=")
 
 
 class MomlError(EpicycleError):
@@ -59,7 +194,7 @@ def read_model(path: Path, notes: Notes) -> Entity:
     parser: Any = DefusedExpatParser(forbid_dtd=True)
     parser.setContentHandler(builder)
     try:
-        parser.parse(BytesIO(_without_doctype(_decodable(data))))
+        parser.parse(BytesIO(_without_doctype(data)))
     except DefusedXmlException:
         raise MomlError(
             f"{path}:{parser.getLineNumber()}: the file declares entities or its own DTD, which is not allowed\n"
@@ -74,21 +209,9 @@ def read_model(path: Path, notes: Notes) -> Entity:
     return builder.root
 
 
-def _decodable(data: bytes) -> bytes:
-    """The bytes as UTF-8.  Files that declare no encoding and are not UTF-8 are in Latin-1, as Java wrote some."""
-    if data.startswith((codecs.BOM_UTF8, codecs.BOM_UTF16_BE, codecs.BOM_UTF16_LE)) or _ENCODING.match(data):
-        return data
-    try:
-        data.decode()
-    except UnicodeDecodeError:
-        return data.decode("latin-1").encode()
-    return data
-
-
 def _without_doctype(data: bytes) -> bytes:
     """The text with the line that names the DTD blanked, so that lines keep their numbers."""
-    mark = len(codecs.BOM_UTF8) if data.startswith(codecs.BOM_UTF8) else 0
-    prolog = _PROLOG.match(data, mark)
+    prolog = _PROLOG.match(data)
     found = None if prolog is None else _DOCTYPE.match(data, prolog.end())
     return data if found is None else data[: found.start()] + re.sub(rb"[^\n]", b" ", found[0]) + data[found.end() :]
 
@@ -101,7 +224,6 @@ class _Builder(ContentHandler):
         self.root: Entity | None = None
         self._file, self._notes = file, notes
         self._open: list[Property | None] = []
-        self._text = ""
         self._elements = self._entities = self._links = 0
         self._locator: Any = None
 
@@ -114,39 +236,24 @@ class _Builder(ContentHandler):
             raise MomlError(f"{self._file}: more than the maximum of {MAX_ELEMENTS:,} elements")
         if len(self._open) >= MAX_DEPTH:
             raise self._error(f"elements are nested deeper than {MAX_DEPTH} levels")
-        self._text = ""
         said = dict(attrs.items())
-        if self.root is None and name != "group":
+        if self.root is None:
             if name not in ("entity", "class", "model"):
                 raise self._error(f"<{name}> is not a model: MoML starts with <entity>")
             self.root = self._made(name, self._name(name, said), said)
             self._open.append(self.root)
             return
         around = self._open[-1] if self._open else None
-        if name == "group":
-            self._open.append(around)
-        elif isinstance(around, Entity):
-            self._open.append(self._in_entity(around, name, said))
-        else:
-            self._open.append(None if around is None else self._in_property(around, name, said))
+        self._open.append(None if around is None else self._within(around, name, said))
 
     def endElement(self, name: str) -> None:  # noqa: N802
         self._open.pop()
-        around = self._open[-1] if self._open else None
-        if name == "doc" and isinstance(around, Entity):
-            around.doc = self._text.strip()
-
-    def characters(self, content: str) -> None:
-        self._text += content
 
     def skippedEntity(self, name: str) -> None:  # noqa: N802
         raise self._error(f"unknown entity &{name};")
 
     def _error(self, text: str) -> MomlError:
         return MomlError(f"{self._file}:{self._locator.getLineNumber()}: {text}")
-
-    def _refuse(self, tag: str) -> None:
-        self._notes.error(f"line {self._locator.getLineNumber()}: <{tag}> is not supported")
 
     def _tell(self, text: str) -> None:
         self._notes.note(f"line {self._locator.getLineNumber()}: {text}")
@@ -158,23 +265,27 @@ class _Builder(ContentHandler):
 
     # -- entities and properties ------------------------------------------------------------------------------------
 
-    def _in_entity(self, entity: Entity, tag: str, said: Mapping[str, str]) -> Property | None:
-        """Apply an element to the entity that contains it; returns what elements inside it belong to."""
+    def _within(self, owner: Property, tag: str, said: Mapping[str, str]) -> Property | None:
+        """Apply an element to what contains it; returns what elements inside it belong to."""
         match tag:
             case "property" | "director":  # the latter in the first version of MoML
-                return self._property(entity, tag, said)
+                for name in self._name(tag, said).split("."):
+                    owner = owner.properties.setdefault(name, Property(name))
+                return self._about(owner, said)
+            case _ if tag in _REFUSED:
+                self._notes.error(f"line {self._locator.getLineNumber()}: <{tag}> is not supported")
+            case _ if not isinstance(owner, Entity):
+                return None
             case "port":
                 name = self._name(tag, said)
-                return self._about(entity.ports.setdefault(name, Port(name)), said)
+                return self._about(owner.ports.setdefault(name, Port(name)), said)
             case "relation":
                 name = self._name(tag, said)
-                return self._about(entity.relations.setdefault(name, Relation(name)), said)
+                return self._about(owner.relations.setdefault(name, Property(name)), said)
             case "entity" | "model" | "class":
-                return self._child(entity, tag, said)
+                return self._child(owner, tag, said)
             case "link":
-                self._link(entity, said)
-            case _ if tag in _CHANGES:
-                self._refuse(tag)
+                self._link(owner, said)
             case "input" | "import":
                 self._tell(f"the file {said.get('source')!r} is not read")
             case _ if tag not in ("configure", "display", "doc", "location", "rendition", "vertex"):
@@ -217,21 +328,6 @@ class _Builder(ContentHandler):
             return around[0].down(parts) if around and around[0].name == first else None
         return next((found for each in reversed(around) if (found := each.down([first, *parts])) is not None), None)
 
-    def _property(self, owner: Property, tag: str, said: Mapping[str, str]) -> Property:
-        for name in self._name(tag, said).split("."):
-            owner = owner.properties.setdefault(name, Property(name))
-        return self._about(owner, said)
-
-    def _in_property(self, owner: Property, tag: str, said: Mapping[str, str]) -> Property | None:
-        """Apply an element to a property, port or relation."""
-        if tag in ("property", "director"):
-            return self._property(owner, tag, said)
-        if tag in _CHANGES:
-            self._refuse(tag)
-        elif tag == "entity" and "name" in said:  # a model inside an attribute
-            owner.properties.setdefault(said["name"], Property(said["name"]))
-        return None
-
     def _about(self, owner: Property, said: Mapping[str, str]) -> Property:
         owner.java = said.get("class") or owner.java
         owner.value = said.get("value", owner.value)
@@ -242,7 +338,8 @@ class _Builder(ContentHandler):
     def _link(self, entity: Entity, said: Mapping[str, str]) -> None:
         self._links += 1
         port, relation = said.get("port"), said.get("relation")
-        place = _number(said.get("insertAt") or said.get("insertInside"))
+        text = said.get("insertAt") or said.get("insertInside") or ""
+        place = int(text) if text.isdecimal() and len(text) < 7 else None
         if "relation1" in said and "relation2" in said:
             entity.joined.append((said["relation1"], said["relation2"], self._links))
         elif port is None:
@@ -255,7 +352,3 @@ class _Builder(ContentHandler):
             links = entity.links.setdefault(port, [])
             links += [Link(None, 0) for _ in range((place or 0) - len(links))]
             links.insert(len(links) if place is None else place, Link(relation, self._links))
-
-
-def _number(text: str | None) -> int | None:
-    return int(text) if text is not None and text.isdecimal() and len(text) < 7 else None

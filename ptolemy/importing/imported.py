@@ -6,24 +6,14 @@ import tempfile
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from epicycle.actors import Actor, EpicycleError, visible_lines
 from epicycle.actors.expression import BudgetError
 
-from .budget import limited_steps
-from .channels import join_channels
-from .composites import Conversion
-from .directors import needs_word, said_of
-from .document import MomlError, read_model
-from .entities import Entity, director_of
-from .iterations import plain_iterations
-from .names import Names
-from .notes import Notes
-from .writing import Flow, block, seconds
-
-LIKE = {"like": "ptolemy"}
-"""The director of an imported model."""
+from .composites import Conversion, said_of
+from .document import Entity, MomlError, director_of, read_model
+from .limits import Notes, limited_steps
+from .writing import Flow, Names, document
 
 
 @dataclass(frozen=True)
@@ -34,20 +24,17 @@ class Imported:
     notes: tuple[str, ...]
 
 
-def import_moml(
-    path: Path, load: Callable[[Path], object] | None = None, types: Iterable[type] = (), *, as_de: bool = False
-) -> Imported:
+def import_moml(path: Path, load: Callable[[Path], object] | None = None, types: Iterable[type] = ()) -> Imported:
     """Import a file; raises ``MomlError`` with everything that prevents it.
 
     ``load`` is called with a file that holds the result, and must raise its errors.  ``types`` are the user's actors:
-    one with the name of a Java class replaces it.  ``as_de``: the actors of a model with an SDF or SR director fire by
-    the rules of DE; otherwise such a model is refused.
+    one with the name of a Java class replaces it.
     """
     notes = Notes()
     own = {each.__name__: each for each in types if issubclass(each, Actor)}
     try:
         with limited_steps():
-            text = _text(read_model(path, notes), path.name, notes, own, as_de=as_de)
+            text = _text(read_model(path, notes), path.name, notes, own)
     except BudgetError as error:
         raise MomlError(f"{path.name} cannot be imported: {error}") from None
     except RecursionError:
@@ -60,35 +47,23 @@ def import_moml(
     return Imported(text, (*notes.lines, notes.summary()))
 
 
-def _text(model: Entity, file: str, notes: Notes, own: Mapping[str, type[Actor]], *, as_de: bool) -> str:
+def _text(model: Entity, file: str, notes: Notes, own: Mapping[str, type[Actor]]) -> str:
     director = director_of(model)
-    if director is not None and needs_word(director) and not as_de:
-        notes.error(f"{director.name} is a {director.java}: to let its actors fire by the rules of DE, say --as-de")
-    plain_iterations(model, notes)
-    join_channels(model, notes)
     conversion = Conversion(model, notes, own)
     body = conversion.body(conversion.root)
     name = Names().of(model.name or Path(file).stem)
-    parameters = conversion.parameters(conversion.root)
-    head: dict[str, Any] = {"model": name, "doc": body.pop("doc", None)}
-    said = {} if director is None else said_of(director, director.name, conversion.root.scope, notes, of_model=True)
-    start = float(str(said.get("start", "0 s")).removesuffix(" s"))
-    stop = said.pop("stop", None)
+    said = {} if director is None else said_of(director, conversion.root, notes)
+    run = Flow({"stop": said.pop("stop")} if "stop" in said else {})
+    for key, value in said.items():
+        notes.error(f"the {key} of the model, {value}, has no counterpart")
     for key in ("inputs", "outputs"):
         if body.pop(key, None):
             notes.note(f"the {key} of the model are connected to nothing and are left out")
-    if said:
-        notes.note("the model has its own time: it becomes a composite with its own director")
-        inner = {"parameters": Flow(parameters), "director": Flow(said), **body}
-        body, parameters = conversion.inside(name, {key: value for key, value in inner.items() if value}), {}
-    sections = {
-        **head, "parameters": Flow(parameters), "director": Flow(LIKE), "composites": conversion.classes, **body,
-    }  # fmt: skip
-    sections = {key: value for key, value in sections.items() if value}
-    run = Flow({} if stop is None else {"stop": seconds(max(stop - start, 0.0))})
+    head = {"model": name, "parameters": conversion.parameters(conversion.root)}
+    sections = {**head, "director": Flow({"like": "ptolemy"}), "composites": conversion.classes, **body}
     lines = [f"# Imported from {file}, a model of Ptolemy II; {notes.summary()}."]
     lines += [f"# - {visible_lines(' '.join(each.split()))}" for each in notes.lines]
-    return "\n".join([*lines, *block({**sections, "run": run})]) + "\n"
+    return "\n".join([*lines, document({key: value for key, value in sections.items() if value} | {"run": run})])
 
 
 def _check(text: str, file: str, load: Callable[[Path], object]) -> None:

@@ -3,19 +3,20 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
+from functools import reduce
 from typing import Any
 
-from .actions import QUOTED, Words
-from .entities import Entity, Property, Relation, is_variable
-from .leftovers import about_property
-from .names import Names
-from .notes import Notes
-from .parts import Part
-from .syntax import ExpressionError
-from .tables import WORDS
-from .writing import Flow, plain
+from .document import Entity, Property, is_variable
+from .limits import Notes
+from .parts import Part, about_properties
+from .syntax import ExpressionError, Tree, conjuncts, names_of, parse
+from .table import WORDS
+from .translation import Meaning, Value, code_of, named
+from .writing import Flow, Lines, Names, plain, seconds
 
+_PRESENT, _OURS = "_isPresent", "_is_present"
+_ACTION = re.compile(r"""(?:"[^"]*"|'[^']*'|[^;"'])+""")  # up to a semicolon outside of texts
 _RESERVED = ("mode", "trigger", "time", "mode_time", "error", "machine")
 _WORD = re.compile(r"(?<![\w.])(on|after|when|do)(?![\w.])")
 _LAST_WITH_HISTORY = (9, 0)  # up to this version, transitions kept history by default
@@ -25,7 +26,11 @@ Refine = Callable[[Part, str], Flow]  # writes the refinement of a mode
 
 
 class Machine:
-    """One state machine that is being imported, with or without refinements."""
+    """One state machine that is being imported, with or without refinements.
+
+    In Ptolemy, the name of an input, with or without ``_isPresent``, refers to its last channel, or to the one whose
+    number follows.  Here, each channel is a separate port.
+    """
 
     def __init__(self, part: Part, notes: Notes, version: tuple[int, int]) -> None:
         controller = part.controller
@@ -46,10 +51,19 @@ class Machine:
             {name: [part.port_name(name, each) for each in range(owner.count(name))] for name in names}
             for names in (inputs, outputs)
         )
-        heard = self.inputs | (self.outputs if self._is_modal else {})  # ports to which refinements send, too
-        self.words = Words(self._scope, heard, self.outputs, self._tell)
+        self._variables: dict[str, str] = {}  # ours
+        self._asked: set[str] = set()  # our names
+        self._sent: set[str] = set()
         self._ends = self._found_ends()
-        self._find_variables()
+        for transition in controller.relations.values():
+            for name, _ in self._parted(transition, "setActions"):
+                if name not in self.outputs and self._scope.home(name) is not None:
+                    self._variables[name] = part.ports.of(name)
+        self._known = {"time": "time"}  # the names that guards and actions may use, and ours
+        for name, channels in (self.inputs | (self.outputs if self._is_modal else {})).items():
+            for each, ours in ((name, channels[-1]), *((f"{name}_{n}", ours) for n, ours in enumerate(channels))):
+                self._known |= {each: ours, f"{each}{_PRESENT}": f"{ours}{_OURS}"}
+        self._known |= self._variables
 
     def _found_ends(self) -> dict[str, dict[str, str]]:
         """The states at the ends of each transition."""
@@ -61,123 +75,57 @@ class Machine:
                     found[link.relation][end] = state
         return found
 
-    def _find_variables(self) -> None:
-        taken = {ours for names in (*self.inputs.values(), *self.outputs.values()) for ours in names}
-        variables = self.words.variables
-        for transition in self._controller.relations.values():
-            for name in self.words.targets(transition, "setActions"):
-                is_plain = "." not in name and "(" not in name and name not in self.outputs
-                if is_plain and self._scope.home(name) is not None:
-                    variables[name] = self._part.ports.of(name)
-                elif (inner := self._inner_of(name)) is not None:
-                    ours = self._part.ports.of(inner[1])
-                    if ours not in taken | {said for each, said in variables.items() if each != name}:
-                        variables[name] = ours  # otherwise two refinements, or a port, would share the name
-
-    def _inner_of(self, name: str) -> tuple[Part, str] | None:
-        """The refinement and its parameter that an action sets; None if it sets no such parameter."""
-        refinement, _, inner = name.partition(".")
-        child = self._refinements.get(refinement)
-        is_one = child is not None and inner in child.entity.properties and child.role != "machine"
-        return (child, inner) if child is not None and is_one else None
-
-    def handed(self) -> Iterator[tuple[Part, str]]:
-        """The refinements that follow a variable, which arrives at an input of that name at each entry."""
-        for name in self.words.variables:
-            inner = self._inner_of(name)
-            if inner is not None:
-                yield inner
-                continue
-            for child in self._refinements.values():
-                if child.role != "machine" and self._readers(child, name):
-                    yield child, name
-
-    def _readers(self, child: Part, name: str) -> list[tuple[Entity, Property]]:
-        """The parameters in a refinement that are computed from a variable."""
-        pattern = re.compile(rf"(?<![\w.]){re.escape(name)}(?!\w)")
-        found = ((each, said) for each in child.entity.everything() for said in each.properties.values())
-        return [(each, said) for each, said in found if is_variable(said) and pattern.search(said.value or "")]
-
     def _tell(self, text: str) -> None:
         self._notes.note(f"{self._part.path}: {text}")
 
     def _refuse(self, text: str) -> None:
         self._notes.error(f"{self._part.path}{text}")
 
-    def tell_rest(self) -> None:
-        """Report attributes without a counterpart."""
-        for owner in {id(each): each for each in (self._part.entity, self._controller)}.values():
-            for name, said in owner.properties.items():
-                path = f"{self._part.path}.{name}"
-                about_property(said, path, self._notes, WORDS["attributes of machines without effect"])
-
     # -- writing --------------------------------------------------------------------------------------------------
 
     def head(self) -> dict[str, Any]:
         """The sections of a composite with modes that stand before these."""
         ports = {"inputs": self.inputs, "outputs": self.outputs}
-        found: dict[str, Any] = {"doc": " ".join(self._part.entity.doc.split())}
-        found |= {key: [ours for names in said.values() for ours in names] for key, said in ports.items()}
-        return {key: value for key, value in found.items() if value}
+        return {key: [ours for names in said.values() for ours in names] for key, said in ports.items() if said}
 
     def written(self, refine: Refine) -> dict[str, Any]:
-        """The sections for modes and transitions."""
-        modes: dict[str, Any] = {}
+        """The sections for modes and transitions; tells what has no counterpart."""
         states = list(self._controller.entities.values())
         said = self._controller.word("initialStateName")  # in files of former versions
         marked = [each.name for each in states if self._flag(each, "isInitialState")]
         initial = marked[-1] if marked else said if said in self._controller.entities else None
-        named = [each.strip() for each in self._controller.word("finalStateNames").split(",")]
-        finals = {each.name for each in states if self._flag(each, "isFinalState") or each.name in named}
-        reached = self._reachable(initial or next(iter(self._controller.entities), ""), finals)
+        finals = [each.strip() for each in self._controller.word("finalStateNames").split(",")]
+        modes: dict[str, Any] = {}
         for state in states:
-            if state.name not in reached:
-                self._tell(f"{state.name} is left out: no transition leads there")
-                continue
-            mode = self._refinement(state, refine) | ({"final": True} if state.name in finals else {})
+            mode = self._refinement(state, refine)
+            mode |= {"final": True} if state.name in finals or self._flag(state, "isFinalState") else {}
             modes[self._names.of(state.name)] = Flow(mode) if mode else None
-        transitions = []
-        for name, each in self._controller.relations.items():
-            source = self._ends[name].get("outgoingPort")
-            if source in finals & reached:
-                self._tell(f"the transition {name} is left out: nothing leaves a final state")
-            elif source is None or source in reached:
-                transitions.append(self._transition(each))
+        transitions = [*map(self._transition, self._controller.relations.values())]
         first = None if initial is None else self._names.of(initial)
         found = {
-            "variables": Flow({ours: self._initial(name) for name, ours in self.words.variables.items()}),
-            "modes": modes if any(modes.values()) else list(modes),
+            "variables": Flow({ours: self._initial(name) for name, ours in self._variables.items()}),
+            "modes": Flow(modes) if any(modes.values()) else list(modes),
             "initial": first if first in modes and first != next(iter(modes)) else None,
-            "transitions": [each for each in transitions if each is not None],
+            "transitions": Lines(each for each in transitions if each is not None),
         }
         if not modes:
             self._refuse(" has no states")
-        for name in self.words.variables:
-            for child in self._refinements.values():
-                for owner, said_ in self._readers(child, name) if child.role == "machine" else ():
-                    self._tell(f"{owner.name}.{said_.name} uses the initial value of {name} throughout")
         for name, ours in {**self._part.ports.renamed(), **self._names.renamed()}.items():
             self._tell(f"{name} is renamed {ours}")
+        for owner in {id(each): each for each in (self._part.entity, self._controller)}.values():
+            about_properties(owner, self._part.path, self._notes, WORDS["attributes of machines without effect"])
         return {key: value for key, value in found.items() if value or key == "modes"}
 
-    def _reachable(self, initial: str, finals: set[str]) -> set[str]:
-        """The states that may be entered; Ptolemy allows others."""
-        found, waiting = {initial}, [initial]
-        while waiting:
-            here = waiting.pop()
-            for ends in self._ends.values() if here not in finals else ():
-                target = ends.get("incomingPort")
-                if ends.get("outgoingPort") == here and target is not None and target not in found:
-                    found.add(target)
-                    waiting.append(target)
-        return found
-
     def _initial(self, name: str) -> object:
-        """The value with which a variable begins."""
-        inner = self._inner_of(name)
+        """The value with which a variable begins; refused if a refinement uses the variable."""
+        pattern = re.compile(rf"(?<![\w.]){re.escape(name)}(?!\w)")
+        for owner in (each for child in self._refinements.values() for each in child.entity.everything()):
+            for said in owner.properties.values():
+                if is_variable(said) and pattern.search(said.value or ""):
+                    self._refuse(f": {owner.name}.{said.name} in a refinement uses {name}, which a transition sets")
         try:
-            value = plain(self._scope(name) if inner is None else inner[0].scope(inner[1]))
-        except (ExpressionError, KeyError, ValueError) as error:
+            value = plain(self._scope(name))
+        except (ExpressionError, ValueError) as error:
             self._refuse(f".{name}: {error}")
             return 0
         return 0 if value is None else value
@@ -192,58 +140,108 @@ class Machine:
 
     def _refinement(self, state: Entity, refine: Refine) -> dict[str, Any]:
         """The class of a refinement, whose ports keep the names that they have outside."""
-        names = [each.strip() for each in (state.text("refinementName") or "").split(",") if each.strip()]
-        if len(names) > 1:
-            self._tell(f"{state.name} has {len(names)} refinements; only {names[0]} is kept")
-        if not names or not self._is_modal:
+        name = state.word("refinementName")
+        if not name or not self._is_modal:
             return {}
-        child = self._part.parts.get(names[0])
+        child = self._part.parts.get(name)
         if child is None:
-            self._refuse(f": there is no refinement named {names[0]!r}")
+            self._refuse(f": there is no refinement named {name!r}")
             return {}
         found = refine(child, self._names.of(state.name))
         return {"refinement": found["type"] if len(found) == 1 else found}
 
     # -- transitions ----------------------------------------------------------------------------------------------
 
-    def _transition(self, transition: Relation) -> Any:
+    def _transition(self, transition: Property) -> Any:
         ends = self._ends[transition.name]
         source, target = ends.get("outgoingPort"), ends.get("incomingPort")
         if source is None or target is None:
             self._tell(f"the transition {transition.name} is left out: it needs a state at each end")
             return None
         flags = [ours for name, ours in _FLAGS.items() if self._flag(transition, name)]
-        if (
-            self._is_modal
-            and self._controller.entities[target].word("refinementName")
-            and self._has_history(transition)
-        ):
+        is_refined = self._is_modal and self._controller.entities[target].word("refinementName")
+        if is_refined and self._has_history(transition):
             flags.append("history")
         if self._flag(transition, "termination"):
             self._refuse(f".{transition.name}: termination transitions have no counterpart")
         if transition.word("refinementName"):
             self._refuse(f".{transition.name}: a refinement of a transition has no counterpart")
         try:
-            said = self.words.guard(transition)
-            actions = [*self.words.actions(transition, "outputActions"), *self.words.actions(transition, "setActions")]
-        except ExpressionError as error:
+            said = self._guard(transition)
+            actions = [*self._actions(transition, "outputActions"), *self._actions(transition, "setActions")]
+        except (ExpressionError, ValueError) as error:
             self._refuse(f".{transition.name}: {error}")
             return None
         said |= {"do": "; ".join(actions)} if actions else {}
         return _line(self._names.of(source), self._names.of(target), flags, said)
 
-    def _has_history(self, transition: Relation) -> bool:
+    def _has_history(self, transition: Property) -> bool:
         for name, keeps in (("history", True), ("reset", False)):
             if name in transition.properties:
                 return self._flag(transition, name) is keeps
         return self._version <= _LAST_WITH_HISTORY
 
+    # -- guards and actions --------------------------------------------------------------------------------------
+
+    def _meaning(self, tree: Tree) -> Meaning:
+        self._asked |= {self._known[each].removesuffix(_OURS) for each in names_of(tree) & self._known.keys()}
+        return self._scope.meaning(tree, {each: named(ours) for each, ours in self._known.items()}, during_run=False)
+
+    def _said(self, tree: Tree) -> str:
+        """An expression over these names."""
+        return code_of(self._meaning(tree)).text
+
+    def _guard(self, transition: Property) -> dict[str, str]:
+        """``on``, ``after`` and ``when`` of a guard."""
+        text = (transition.text("guardExpression") or "true").strip() or "true"
+        said, rest = dict[str, str](), list[Tree]()
+        for part in conjuncts(parse(self._scope.filled(text))):
+            called = part.parts[0].said if part.form == "call" and len(part.parts) == 2 else ""
+            if part.form == "name" and part.said.endswith(_PRESENT) and part.said in self._known and "on" not in said:
+                said["on"] = self._said(part).removesuffix(_OURS)
+            elif called == "timeout" and "after" not in said:
+                time = self._meaning(part.parts[1])
+                said["after"] = str(seconds(time.value)) if isinstance(time, Value) else time.text
+            elif part != Tree("value", (), said=True):
+                rest.append(part)
+        if rest:
+            said["when"] = self._said(reduce(lambda one, other: Tree("&&", (one, other)), rest))
+        return said
+
+    @staticmethod
+    def _parted(transition: Property, name: str) -> list[tuple[str, str]]:
+        """The target and the expression of each action of a kind."""
+        parts = (part.partition("=") for part in _ACTION.findall(transition.text(name) or "") if part.strip())
+        return [(target.strip(), text.strip()) for target, _, text in parts]
+
+    def _actions(self, transition: Property, name: str) -> list[str]:
+        """The actions of a kind."""
+        said = []
+        for target, text in self._parted(transition, name):
+            ours = [self._variables[target]] if target in self._variables else self.outputs.get(target, ())
+            if ours:
+                value = self._said(parse(self._scope.filled(text)))
+                self._sent |= {*ours}
+                said += [f"{each} = {value}" for each in ours]
+            elif "(" in target:
+                raise ExpressionError(f"{target} = ...: an action for one channel has no counterpart")
+            else:
+                left_out = f"{transition.name}: {target} = {text} is left out"
+                self._tell(f"{left_out}: {target} is neither an output nor a variable")
+        return said
+
+    def unnamed(self) -> set[str]:
+        """Our ports that no guard or action names."""
+        for name, channels in self.inputs.items():
+            if self._asked.isdisjoint(channels):
+                self._tell(f"{name} is left out: nothing reads it")
+        asked, sent = ({each for some in ports.values() for each in some} for ports in (self.inputs, self.outputs))
+        return (asked - self._asked) | (sent - self._sent)
+
 
 def _line(source: str, target: str, flags: list[str], said: dict[str, str]) -> Any:
     """A transition on one line, or as a mapping where the line would be ambiguous."""
-    if " " in said.get("probability", "") or any(_WORD.search(QUOTED.sub("", each)) for each in said.values()):
+    if any(map(_WORD.search, said.values())):
         return Flow({"from": source, "to": target, **dict.fromkeys(flags, True), **said})
-    if "probability" in said:
-        flags = [*flags, f"probability {said['probability']}"]
     clauses = [f"{key} {said[key]}" for key in ("on", "after", "when", "do") if key in said]
     return " ".join([f"{source} -> {target}", *flags, *clauses])

@@ -1,16 +1,23 @@
-"""Finds the widths of relations, and the nets of one channel each: which ports of a composite are joined."""
+"""Which ports of a composite each channel joins, how these nets become connections, and what they feed."""
 
 from __future__ import annotations
 
+import heapq
 from collections.abc import Iterator
+from graphlib import CycleError, TopologicalSorter
+from itertools import pairwise
+from typing import Any
 
-from .budget import spend
-from .entities import Link
-from .notes import Notes
+from epicycle.actors import InputPort, declared_ports
+
+from ..dialect import known_types
+from .document import Link
+from .limits import Notes, spend
 from .parts import End, Net, Part
 from .syntax import ExpressionError
-from .table import Face
-from .tables import table
+from .table import WORDS, Face, Row, table
+from .translation import Kind
+from .writing import Flow
 
 MAX_WIDTH = 1000
 
@@ -27,16 +34,21 @@ class _Groups:
 
     def __init__(self, part: Part, notes: Notes) -> None:
         self.part = part
-        self._of: dict[str, str] = {name: name for name in part.entity.relations}
-        self.joined: dict[str, list[tuple[int, str]]] = {}
+        self._of: dict[str, str] = {}
+        self.joined: dict[str, list[tuple[int, str]]] = {name: [] for name in part.entity.relations}
         for one, other, order in part.entity.joined:
-            if one in self._of and other in self._of:
-                self._of[self._root(one)] = self._root(other)
-                self.joined.setdefault(one, []).append((order, other))
-                self.joined.setdefault(other, []).append((order, one))
+            if one in self.joined and other in self.joined:
+                self.joined[one].append((order, other))
+                self.joined[other].append((order, one))
         self.members: dict[str, list[str]] = {}
-        for name in self._of:
-            self.members.setdefault(self._root(name), []).append(name)
+        for first in self.joined:
+            waiting = [] if first in self._of else [first]
+            while waiting:
+                name = waiting.pop()
+                if name not in self._of:
+                    self._of[name] = first
+                    self.members.setdefault(first, []).append(name)
+                    waiting += [other for _, other in self.joined[name]]
         self.width: dict[str, int | None] = dict.fromkeys(self.members)
         for name, relation in part.entity.relations.items():
             said = relation.word("width", "Auto")
@@ -46,17 +58,11 @@ class _Groups:
                 notes.note(f"the width {said!r} of {name}: {error}")
                 continue
             if isinstance(found, int) and found >= 0:
-                self.width[self._root(name)] = min(found, MAX_WIDTH)
-
-    def _root(self, name: str) -> str:
-        while self._of[name] != name:
-            self._of[name] = self._of[self._of[name]]  # halves the way for the next time
-            name = self._of[name]
-        return name
+                self.width[self._of[name]] = min(found, MAX_WIDTH)
 
     def of(self, link: Link) -> str | None:
         """The group that a link leads to."""
-        return None if link.relation is None or link.relation not in self._of else self._root(link.relation)
+        return self._of.get(link.relation or "")
 
     def total(self, links: list[Link]) -> int:
         """How many channels links have in all, as far as that is known."""
@@ -88,22 +94,18 @@ def _infer(groups: dict[int, _Groups]) -> None:
             for group in map(here.of, links):
                 if group is not None and here.width[group] is None and face is not None and not face.multi:
                     here.width[group] = 1
-    unknown = [(here, group) for here in groups.values() for group in here.width]  # outer ones first
-    for first in [None, *unknown]:
-        if first is not None and first[0].width[first[1]] is not None:
-            continue
-        if first is not None:
-            first[0].width[first[1]] = 1
-        while _propagate(groups):
-            pass
+    _spread(groups)
+    for here in groups.values():  # outer ones first
+        for group, width in here.width.items():
+            if width is None and here.width[group] is None:
+                here.width[group] = 1
+                _spread(groups)
 
 
-def _propagate(groups: dict[int, _Groups]) -> bool:
-    """Carry known widths on; whether any was found."""
-    found = False
-    for each in _sides(groups):
-        found = _balance(*each) or found
-    return found
+def _spread(groups: dict[int, _Groups]) -> None:
+    """Carry known widths on, as far as they lead."""
+    while sum(_balance(*each) for each in _sides(groups)):
+        pass
 
 
 def _sides(groups: dict[int, _Groups]) -> Iterator[_Side]:
@@ -193,5 +195,196 @@ def _places(
             yield order, name, channel
         elif name not in seen:
             seen.add(name)
-            others = [(order, other, -1) for order, other in groups.joined.get(name, [])]
+            others = [(order, other, -1) for order, other in groups.joined[name]]
             stack += sorted([*at.get(name, []), *others], reverse=True)
+
+
+# -- connections ------------------------------------------------------------------------------------------------------
+
+
+def name_of(part: Part, end: End) -> str | None:
+    """Our name for one end of a net inside a composite; None if it is left out."""
+    if end.is_own:
+        return part.port_name(end.port, end.channel)
+    if end.part.is_border:
+        return part.ports.of(end.part.entity.name)
+    if end.part.entry is None or end.port in end.part.unwired:
+        return None
+    ours = end.part.port_name(end.port, end.channel)
+    return None if ours in end.part.unnamed else f"{end.part.name}.{ours}"
+
+
+def connections_of(part: Part, notes: Notes) -> list[Any]:
+    """The connections of a composite."""
+    lines = [line for net in part.nets if (line := _Line(part, net)).sources and line.sinks]
+    return [line for each in _ordered(part, lines, notes) for line in each.written()]
+
+
+class _Line:
+    """One connection, with what must be known about its ends."""
+
+    def __init__(self, part: Part, net: Net) -> None:
+        self.ends = [
+            (end, name) for end in net.ends if not end.part.is_idle and (name := name_of(part, end)) is not None
+        ]
+        self.sources = [*dict.fromkeys(name for end, name in self.ends if end.is_source)]
+        sinks = [name for end, name in self.ends if not end.is_source]
+        self.sinks = [*dict.fromkeys(sinks)]
+        self._again = [name for place, name in enumerate(sinks) if name in sinks[:place]]  # through further channels
+        # Whether the connection must be marked as one shared channel.
+        self._is_shared = len(self.sources) > 1 or (
+            len(self.sinks) > 1 and any(_sends_by_channel(end) for end, _ in self.ends)
+        )
+
+    def written(self) -> list[Any]:
+        """The line, and further lines if it reaches a port through several channels."""
+        return [self._written(sinks) for sinks in (self.sinks, *([each] for each in self._again))]
+
+    def _written(self, sinks: list[str]) -> Any:
+        if not self._is_shared:
+            return f"{', '.join(self.sources)} -> {', '.join(sinks)}"
+        source, sink = (each[0] if len(each) == 1 else each for each in (self.sources, sinks))
+        return Flow({"from": source, "to": sink, "shared": True})
+
+
+def _sends_by_channel(end: End) -> bool:
+    """Whether this is an output with channels of one of our actors."""
+    row = end.part.row
+    if row is None or end.port not in row.ports or not end.is_source:
+        return False
+    kind = known_types().actors.get(row.type)
+    port = None if kind is None else declared_ports(kind).get(row.ports[end.port].ours)
+    return kind is not None and (port is None or port.multi)
+
+
+def _ordered(part: Part, lines: list[_Line], notes: Notes) -> list[_Line]:
+    """The lines in their order, changed where the channels of a multiport require it."""
+    channels: dict[str, list[tuple[int, int, int]]] = {}
+    for number, line in enumerate(lines):
+        for end, name in line.ends:
+            # Among the ports of an actor that become one port of ours, they come in the order of the row.
+            rank = list(end.part.row.ports).index(end.port) if end.part.row and end.port in end.part.row.ports else 0
+            channels.setdefault(name, []).append((rank, end.channel, number))
+    order = TopologicalSorter[int](dict.fromkeys(range(len(lines)), ()))
+    for taken in channels.values():
+        for one, other in pairwise([number for _, _, number in sorted(taken)]):
+            if one != other:
+                order.add(other, one)
+    try:
+        order.prepare()
+    except CycleError:
+        notes.note(f"{part.path or 'the model'}: some channels of multiports are in a different order")
+        return lines
+    ready, found = list[int](), list[_Line]()
+    while order.is_active():
+        for number in order.get_ready():
+            heapq.heappush(ready, number)
+        found.append(lines[ready[0]])
+        order.done(heapq.heappop(ready))
+    return found
+
+
+# -- what is fed ------------------------------------------------------------------------------------------------------
+
+
+class Reach:
+    """Which nets anything sends into."""
+
+    def __init__(self) -> None:
+        self._fed: dict[int, bool] = {}
+
+    def feeds(self, part: Part, port: str) -> bool:
+        """Whether anything sends to a port of a part."""
+        return any(self._is_fed(net) for _, net in part.outside.get(port, ()))
+
+    def _is_fed(self, net: Net) -> bool:
+        if id(net) not in self._fed:
+            self._fed[id(net)] = False  # while it is being found out
+            self._fed[id(net)] = any(map(self._sends, net.ends))
+        return self._fed[id(net)]
+
+    def _sends(self, end: End) -> bool:
+        part = end.part
+        if part.is_idle or not end.is_source:
+            return False
+        is_leaf = not end.is_own and (part.role == "machine" or not (part.parts or part.entity.relations))
+        if is_leaf or (end.is_own and part.outer is not None and part.outer.role == "machine"):
+            return True  # refinements are joined to their machine by name
+        nets = (part.outside if end.is_own else part.inside).get(end.port, ())
+        return any(channel == end.channel and self._is_fed(net) for channel, net in nets)
+
+
+# -- actors that never fire -------------------------------------------------------------------------------------------
+
+
+def leave_out_idle(model: Part, notes: Notes) -> None:
+    """Leave out the actors that can never fire, and those that then never receive anything."""
+    actors = [(each, row) for each in model.everything() if (row := each.row) is not None and not row.is_view]
+    found = True
+    while found:
+        reach, found = Reach(), False
+        spend(len(actors))
+        lacking = [(part, _lacks(part, row, reach)) for part, row in actors if not part.is_idle]
+        for part, port in lacking:
+            if port is not None:
+                part.is_idle = found = True
+                notes.note(f"{part.path} is left out: it never fires because nothing sends to its {port}")
+
+
+def _lacks(part: Part, row: Row, reach: Reach) -> str | None:
+    """The input for lack of which an actor never fires; None if it may."""
+    kind = known_types().actors.get(row.type)
+    if kind is None:
+        return None
+    needs = row.settings.get("needs", "").split()
+    if needs and not any(reach.feeds(part, name) for name in needs):
+        return " and ".join(sorted(needs))
+    names = dict.fromkeys([*row.ports, *part.entity.ports, *row.parameters, *part.entity.properties])
+    inputs = [name for name in names if (face := part.face(name)) is not None and face.direction == "input"]
+    if not kind.is_source and not any(reach.feeds(part, name) for name in inputs):
+        return inputs[0] if inputs else "inputs"
+    required = [name for name, port in declared_ports(kind).items() if isinstance(port, InputPort) and port.required]
+    groups = [[name] for name in _waits_for(part, row)]
+    groups += [[name for name, said in row.ports.items() if said.ours == ours] for ours in required]
+    return next((names[0] for names in groups if names and not any(reach.feeds(part, each) for each in names)), None)
+
+
+def _waits_for(part: Part, row: Row) -> list[str]:
+    """The linked inputs added in the model to an actor that waits for a token at each of them."""
+    if row.type not in ("Expression", "RecordAssembler") or row.settings.get("set", {}).get("apart"):
+        return []
+    added = [port for name, port in part.entity.ports.items() if name not in row.ports and port.flag("input")]
+    has_value = part.entity.properties
+    return [each.name for each in added if each.name in part.linked and each.name not in has_value
+            and "defaultValue" not in each.properties]  # fmt: skip
+
+
+# -- kinds of tokens --------------------------------------------------------------------------------------------------
+
+
+def kinds_at(part: Part, row: Row) -> dict[str, Kind]:
+    """The kinds of what the ports of an actor receive, judging by the parameters of the actors connected to it.
+
+    In Ptolemy, the quotient of whole numbers has no fraction.
+    """
+    found: dict[str, Kind] = {}
+    for port in (*row.ports, *part.entity.ports):
+        ends = [end for _, net in part.outside.get(port, ()) for end in net.ends if end.is_source]
+        kinds = {_sent(end.part) for end in ends if not end.part.is_idle}
+        found[port] = kinds.pop() if len(kinds) == 1 else None
+    return found
+
+
+def _sent(part: Part) -> Kind:
+    """The kind of everything that an actor sends; None if it is not known."""
+    names = table("words")["what is sent"].get(part.entity.kind)
+    if names is None:
+        return list if part.entity.kind in WORDS["senders of arrays"] else None
+    kinds: set[Kind] = set()
+    for said in (part.entity.properties.get(name) for name in names):
+        try:
+            value = 0 if said is None else part.scope.value_of(said)
+        except ExpressionError:
+            return None
+        kinds |= {type(each) for each in (value if names == ["values"] and isinstance(value, list) else [value])}
+    return kinds.pop() if len(kinds) == 1 else None

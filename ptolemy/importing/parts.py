@@ -2,27 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 from epicycle.actors import Actor as OwnActor
 
-from .budget import spend
-from .entities import Entity, Property, director_of
-from .names import Names, snake
-from .notes import Notes
+from .document import Entity, Property, director_of, is_aside, is_decoration, is_layout, is_priority, is_variable
+from .limits import Notes, spend
 from .scope import Scope
 from .syntax import ExpressionError
-from .table import UNSAID, Face, Row, row_of, row_of_type
-from .tables import WORDS
-from .writing import Flow
+from .table import UNSAID, WORDS, Face, Row, row_of, row_of_type, table, why_not
+from .writing import Flow, Names, snake
 
 _FACE = 5  # steps to look up a port, which is most of the work of wiring
 ASPECT_MODELS: frozenset[str] = WORDS["aspect models"]
-_SCHEDULERS: frozenset[str] = WORDS["schedulers"]
-_MACHINES: frozenset[str] = WORDS["machines"]
-_COMPOSITES: frozenset[str] = WORDS["composites"]
 
 
 @dataclass(frozen=True)
@@ -55,13 +49,13 @@ class Part:
     row: Row | None = None  # only of an actor
     controller: Entity | None = None  # only of a machine: with refinements, it is inside
     parts: dict[str, Part] = field(default_factory=dict)
+    linked: list[str] = field(default_factory=list)  # its ports that are linked outside
     is_idle: bool = False  # it never fires, and is left out
     variable_ports: list[str] = field(default_factory=list)  # parameters of a composite that get values from a port
     widths: dict[str, int] = field(default_factory=dict)  # of the ports linked inside: "actor.port" or "port"
     nets: list[Net] = field(default_factory=list)  # inside
     inside: dict[str, list[tuple[int, Net]]] = field(default_factory=dict)  # the nets at its ports, by channel
     outside: dict[str, list[tuple[int, Net]]] = field(default_factory=dict)
-    triggers: dict[str, str] = field(default_factory=dict)  # the input that fires an actor to which nothing is linked
     # As it is written:
     name: str = ""
     at: str = ""  # where what is inside stands in the written model: "" or a path with a final dot
@@ -73,10 +67,7 @@ class Part:
     own_ports: Mapping[str, str] = field(default_factory=dict)  # of an actor: ours that are not in its row
     unwired: set[str] = field(default_factory=set)  # ports in the file without a counterpart
     unnamed: set[str] = field(default_factory=set)  # our ports of a machine that no guard or action names
-    added: tuple[list[str], list[str], list[str]] = field(default_factory=lambda: ([], [], []))
-    # Inputs, outputs and connections through which something inside reads and sets variables outside.
     _with: dict[str, list[Part]] = field(default_factory=dict)
-    _linked: dict[str, list[str]] = field(default_factory=dict)  # the linked ports of each part inside
 
     @property
     def around(self) -> Part:
@@ -103,17 +94,6 @@ class Part:
         """Whether it stands for a port of an aspect's model."""
         return self.role in ("request", "response")
 
-    @property
-    def linked(self) -> list[str]:
-        """Its ports that are linked outside."""
-        around = self.around
-        if not around._linked:
-            for path, links in around.entity.links.items():
-                actor, _, port = path.rpartition(".")
-                if links:
-                    around._linked.setdefault(actor, []).append(port)
-        return around._linked.get(self.entity.name, [])
-
     def everything(self) -> Iterator[Part]:
         """The part and everything inside it."""
         yield self
@@ -135,12 +115,12 @@ class Part:
             return default
         return default if found is None else found
 
-    def give_priority(self, entry: Flow, notes: Notes) -> None:
-        """Put its priority into its entry, if it has one."""
+    def with_priority(self, entry: Flow, notes: Notes) -> Flow:
+        """Its entry with its priority, if it has one."""
         for said in self.entity.properties.values():
-            is_priority = said.name == "_priority" or said.kind == "Priority"
-            if is_priority and (said.value or "").strip() and (value := self.value(said, notes)) is not None:
+            if is_priority(said) and (said.value or "").strip() and (value := self.value(said, notes)) is not None:
                 entry["priority"] = value
+        return entry
 
     # -- ports ----------------------------------------------------------------------------------------------------
 
@@ -181,31 +161,26 @@ class Part:
         return snake(port) if said is None else said.ours
 
 
-def is_composite(entity: Entity) -> bool:
-    """Whether it contains a graph."""
-    is_known = entity.java.startswith("ptolemy.actor.lib.hoc") or row_of(entity.java) is not None
-    return entity.kind in _COMPOSITES | ASPECT_MODELS or (bool(entity.entities) and not is_known)
-
-
 def role_of(entity: Entity) -> str:
     """What an entity is, unless it is a machine."""
     for role in ("request", "response"):
         if entity.kind in WORDS[role]:
             return role
     is_in_package = any(each in entity.java for each in (".aspect.", ".resourceScheduler", ".aspects."))
-    if is_in_package or entity.kind in ASPECT_MODELS | _SCHEDULERS:
+    if is_in_package or entity.kind in ASPECT_MODELS | table("words")["schedulers"].keys():
         return "aspect"
-    return "composite" if is_composite(entity) else "actor"
+    is_known = entity.java.startswith("ptolemy.actor.lib.hoc") or row_of(entity.java) is not None
+    return "composite" if entity.kind in WORDS["composites"] or (entity.entities and not is_known) else "actor"
 
 
 def controller_of(entity: Entity) -> Entity | None:
     """The state machine of an entity: the entity itself, or the one inside a modal model; None without one."""
-    if entity.kind in _MACHINES:
+    if entity.kind in WORDS["machines"]:
         return entity
     director = director_of(entity)
     name = "" if director is None else director.word("controllerName")
     found = entity.entities.get(name or "_Controller")
-    return found if found is not None and found.kind in _MACHINES else None
+    return found if found is not None and found.kind in WORDS["machines"] else None
 
 
 def parts_of(model: Entity, own: Mapping[str, type[OwnActor]]) -> Part:
@@ -222,6 +197,70 @@ def parts_of(model: Entity, own: Mapping[str, type[OwnActor]]) -> Part:
         scope = Scope(entity, None if outer is None else outer.scope, defaults)
         part = Part(entity, outer, scope, role, row, controller)
         part.parts = {name: made(each, part) for name, each in entity.entities.items()}
+        for path, links in entity.links.items():
+            actor, _, port = path.rpartition(".")
+            if links and actor in part.parts:
+                part.parts[actor].linked.append(port)
         return part
 
     return made(model, None)
+
+
+# -- what has no counterpart ------------------------------------------------------------------------------------------
+
+
+def about_ports(part: Part, notes: Notes) -> None:
+    """Report settings of ports that have no counterpart, and linked ports that our actors do not have."""
+    for port in part.entity.ports.values():
+        for said in port.properties.values():
+            known = said.name in ("input", "output", "multiport") or is_aside(said)
+            known = known or (said.name == "defaultValue" and part.entity.kind == "Expression")
+            if not known and said.value:
+                notes.note(f"{part.told(port.name)}.{said.name} = {said.value!r} has no counterpart")
+    if part.row is not None and not part.row.is_view and not part.is_idle:
+        for name in part.linked:
+            if part.face(name) is None:
+                notes.note(f"{part.told(name)} has no counterpart; its wires are left out")
+
+
+def about_properties(owner: Property, path: str, notes: Notes, known: Collection[str] = ()) -> None:
+    """Report attributes that have no counterpart."""
+    for name, said in owner.properties.items():
+        is_known = name in known or is_aside(said) or is_variable(said) or said.kind.endswith("Director")
+        if not is_known and (said.value is not None or said.java):
+            notes.note(f"{path}.{name}, a {said.kind or 'property'}, has no counterpart".removeprefix("."))
+
+
+def about_unknown(part: Part, notes: Notes) -> None:
+    """Report an actor whose class has no row: an error, or a note if the model can do without it."""
+    what = f"{part.path} is a {part.entity.java}, which has no counterpart"
+    linked = part.linked
+    if not linked and is_layout(part.entity):
+        return
+    if not linked:
+        notes.note(f"{what} and is left out: nothing is connected to it")
+    elif all(_only_takes(part, port) for port in linked):
+        notes.note(f"{what} and is left out: it only receives tokens")
+    else:
+        notes.error(f"{what}{why_not(part.entity.java)}")
+
+
+def _only_takes(part: Part, port: str) -> bool:
+    face = part.face(port)
+    return face is not None and face.direction == "input" and (port.startswith("input") or port in part.entity.ports)
+
+
+def is_watched(part: Part) -> bool:
+    """Whether a view must be kept: an aspect is enabled there, or it occupies a channel of a multiport."""
+    owners: list[Property] = [part.entity, *part.entity.ports.values()]
+    if any(is_enabled(said) for owner in owners for said in owner.properties.values()):
+        return True
+    ends = [end for nets in part.outside.values() for _, net in nets for end in net.ends]
+    others = [(end.part.face(end.port), f"{end.part.entity.name}.{end.port}") for end in ends if not end.is_own]
+    links = part.around.entity.links
+    return any(face and face.multi and face.direction == "output" and len(links[path]) > 1 for face, path in others)
+
+
+def is_enabled(said: Property) -> bool:
+    """Whether an attribute enables an aspect."""
+    return is_decoration(said) and said.word("enable") not in ("", "false")

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping
-from functools import cached_property
 from typing import Any
 
 from epicycle.actors.expression import text_of
 
-from .entities import Property, is_text, is_variable
+from .document import Property, is_text, is_variable
 from .syntax import ExpressionError, Tree, parse
 from .translation import Code, Meaning, Value, meaning_of
 
@@ -30,7 +29,7 @@ class Scope:
     ) -> None:
         self.entity, self.around, self._defaults = entity, around, defaults or {}
         self.changes: Changes = {} if around is None else around.changes
-        self._found: dict[tuple[str, bool], Meaning | ExpressionError] = {}
+        self._found: dict[tuple[str, bool], Meaning] = {}
         self._open: set[str] = set()
 
     def _outwards(self) -> Iterator[Scope]:
@@ -44,16 +43,9 @@ class Scope:
         return next((scope for scope in self._outwards() if scope.own(name) is not None), None)
 
     def own(self, name: str) -> Property | None:
-        """The attribute of that name here, or in an attribute that extends the scope."""
+        """The attribute of that name here."""
         found = self.entity.properties.get(name)
-        if found is not None and is_variable(found):
-            return found
-        return next((each.properties[name] for each in self._extending if name in each.properties), None)
-
-    @cached_property
-    def _extending(self) -> list[Property]:
-        extending = ("ScopeExtendingAttribute", "ScopeExtender")
-        return [each for each in self.entity.properties.values() if each.java.endswith(extending)]
+        return found if found is not None and is_variable(found) else None
 
     # -- what names and texts mean ----------------------------------------------------------------------------------
 
@@ -79,16 +71,9 @@ class Scope:
             self._open.add(name)
             try:
                 self._found[key] = self.meaning_of(said, during_run=during_run)
-            except ExpressionError as error:
-                if len(self._open) > 1:  # it may be too deep only from where it was asked for
-                    raise
-                self._found[key] = error
             finally:
                 self._open.discard(name)
-        found = self._found[key]
-        if isinstance(found, ExpressionError):
-            raise ExpressionError(str(found))
-        return found
+        return self._found[key]
 
     def meaning_of(self, said: Property, *, during_run: bool = True) -> Meaning:
         """What an attribute means in a run, or before it."""
@@ -109,8 +94,7 @@ class Scope:
         def lookup(name: str) -> Meaning:
             return known[name] if name in known else self._named(name, asking, during_run=during_run)
 
-        tree = parse(text) if isinstance(text, str) else text
-        return meaning_of(tree, lookup, {each.text for each in known.values() if isinstance(each, Code)})
+        return meaning_of(parse(text) if isinstance(text, str) else text, lookup)
 
     def value_of(self, said: Property) -> Any:
         """The value of an attribute before the run; raises ``ExpressionError``."""

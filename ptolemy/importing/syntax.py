@@ -6,7 +6,7 @@ import re
 from dataclasses import dataclass
 from typing import Any, NoReturn
 
-from .budget import spend
+from .limits import spend
 
 MAX_LENGTH, MAX_DEPTH, LARGEST = 100_000, 40, 2**63
 
@@ -31,7 +31,7 @@ class Tree:
 
 _TOKEN = re.compile(
     r"""\s*(?:(?P<comment>//[^\n]*|/\*.*?\*/)
-    |(?P<number>(?:0[xX][0-9a-fA-F]+|(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)(?:[lLuUbBfFdDpPiIjJsS]+(?!\w))?)
+    |(?P<number>(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?(?:[lLuUbBfFdDpPsS]+(?!\w))?)
     |(?P<text>"(?:[^"\\]|\\.)*"|'(?:[^'\\]|\\.)*')
     |(?P<name>[A-Za-z_$](?:[\w$@]|::)*)
     |(?P<sign>>>>|\|\||&&|==|!=|<=|>=|<<|>>|\{\||\|\}|[-+*/%^!~<>?:;,.(){}\[\]=|&\#@]))""",
@@ -205,11 +205,11 @@ class _Parser:
     def _matrix(self) -> Tree:
         rows = [[self._choice()]]
         if self._skip(":"):
-            step = self._choice()
+            rows[0].append(self._choice())
             self._expect(":")
-            steps = Tree("steps", (rows[0][0], step, self._choice()))
+            rows[0].append(self._choice())
             self._expect("]")
-            return steps
+            return Tree("steps", tuple(rows[0]))
         while not self._skip("]"):
             if self._skip(";"):
                 rows.append([])
@@ -228,15 +228,11 @@ def _token(kind: str, text: str) -> tuple[str, Any]:
 
 
 def _number(said: str) -> float:
-    is_hexadecimal = said[:2].lower() == "0x"
-    text = said.rstrip("lLuUsS") if is_hexadecimal else said.rstrip("lLuUbBfFdDpPiIjJsS")
-    suffix = said[len(text) :].lower()
-    if "i" in suffix or "j" in suffix:
-        raise ExpressionError(f"{said.lower()}: complex numbers are not supported")
+    text = said.rstrip("lLuUbBfFdDpPsS")
+    if "." in text or "e" in text.lower() or said[-1] in "fFdDpP":
+        return float(text)
     try:
-        if not is_hexadecimal and ("." in text or "e" in text.lower() or suffix in ("f", "d", "p")):
-            return float(text)
-        found = int(text, 16 if is_hexadecimal else 8 if text[0] == "0" else 10)  # as in Java
+        found = int(text, 8 if text[0] == "0" else 10)  # as in Java
     except ValueError:
         raise ExpressionError(f"{_short(text)} is not a number") from None
     if found > LARGEST:

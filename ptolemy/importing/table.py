@@ -1,4 +1,7 @@
-"""The table of counterparts, ``rows.yaml``: which of our actors stands for one of Ptolemy's, and with what settings."""
+"""The tables of the importer, YAML files beside it, and the rows of counterparts in them.
+
+A row tells which of our actors stands for one of Ptolemy's, and with what settings.
+"""
 
 from __future__ import annotations
 
@@ -7,23 +10,48 @@ import re
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
+from pathlib import Path
 from typing import Any, NamedTuple
+
+import yaml
 
 from epicycle.actors import Actor as OwnActor
 from epicycle.actors import declared_parameters, declared_ports, has_own_ports
 
 from ..dialect import known_types
-from .names import snake
-from .tables import table
+from .writing import snake
+
+
+@cache
+def table(name: str) -> Mapping[str, Any]:
+    """The contents of a table."""
+    text = Path(__file__).with_name(f"{name}.yaml").read_text(encoding="utf-8")
+    found: Mapping[str, Any] = yaml.load(text, getattr(yaml, "CSafeLoader", yaml.SafeLoader))
+    return found
+
+
+WORDS = {name: frozenset(said.split()) for name, said in table("words").items() if isinstance(said, str)}
+CONSTANTS: Mapping[str, Any] = table("functions")["constants"]
+OPERATORS: Mapping[str, str] = table("functions")["operators"]
+FUNCTIONS: Mapping[str, tuple[str, ...]] = {
+    name: (said,) if isinstance(said, str) else tuple(said) for name, said in table("functions")["functions"].items()
+}
+
+
+def why_not(java: str) -> str:
+    """The end of the message about a class without a counterpart: a reason, or nothing."""
+    reasons = table("words")["reasons"].items()
+    return next((f": {reason}" for pattern, reason in reasons if re.search(pattern, java)), "")
+
+
+# -- rows -------------------------------------------------------------------------------------------------------------
+
 
 UNSAID: Any = object()
 _PORT = re.compile(r"(?P<name>\w+)(?P<multi>\*?)(?:=(?P<ours>\w+))?\Z")
 _PARAMETER = re.compile(r"(?P<kind>[a-z]+)(?::(?P<ours>\w+))?(?:=(?P<default>[^|]*[^| ]))?(?: *\|(?P<words>.*))?\Z")
 _SETTINGS = ("type", "ports", "set", "compute", "expression", "law", "given", "needs", "how", "note")
-_PACKAGES = ("ptolemy.", "org.ptolemy.", "kepler.")
-# Packages in which names of the table mean something else, and such of which only sinks are known.
-_FOREIGN = ("ptolemy.actor.lib.vhdl.", "ptolemy.matlab.", "ptolemy.domains.ci.", "ptolemy.domains.ptera.")
-_CONTINUOUS = ("ptolemy.domains.continuous.", "ptolemy.domains.ct.")
+_PACKAGES, _FOREIGN, _OF_SINKS = (tuple(WORDS[f"packages {each}"]) for each in ("known", "foreign", "of sinks"))
 
 
 class Face(NamedTuple):
@@ -64,7 +92,7 @@ def row_of(java: str) -> Row | None:
     name = java if java in table("rows") else java.rpartition(".")[2]
     row = _row(name) if java.startswith(_PACKAGES) and not java.startswith(_FOREIGN) else None
     is_sink = row is not None and (row.is_view or row.type in ("Test", "Recorder", "Stop"))
-    return row if is_sink or not java.startswith(_CONTINUOUS) else None
+    return row if is_sink or not java.startswith(_OF_SINKS) else None
 
 
 @cache

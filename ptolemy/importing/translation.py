@@ -7,8 +7,7 @@ of the same pattern, so that a constant and an expression of the run have one me
 from __future__ import annotations
 
 import ast
-import math
-from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from copy import deepcopy
 from dataclasses import dataclass
@@ -18,23 +17,14 @@ from typing import Any, TypeAlias
 from epicycle.actors.expression import BudgetError, evaluate
 from epicycle.actors.expression import ExpressionError as OwnError
 
-from .budget import budget, spend
+from .limits import budget, spend
 from .syntax import ExpressionError, Tree
-from .tables import CONSTANTS, FUNCTIONS
+from .table import CONSTANTS, FUNCTIONS, OPERATORS
 
 MAX_PARTS = 500  # of one expression of the model language
-MAX_ELEMENTS = 10_000
 LETTERS = "abcdfghijlmnopqrstuvwxyz"  # the names of operands in patterns
 
-
-@dataclass(frozen=True)
-class Array:
-    """The kind of a list: the kind of its items, or None."""
-
-    items: Kind
-
-
-Kind: TypeAlias = "type | Array | None"  # None: any
+Kind: TypeAlias = type | None  # None: any
 
 
 @dataclass(frozen=True)
@@ -46,7 +36,7 @@ class Value:
     @property
     def kind(self) -> Kind:
         """The kind of the value."""
-        return kind_of(self.value)
+        return type(self.value)
 
 
 @dataclass(frozen=True)
@@ -67,20 +57,6 @@ Meaning: TypeAlias = Value | Code
 Lookup = Callable[[str], Meaning]  # raises KeyError
 
 
-def kind_of(value: object) -> Kind:
-    """The kind of a value; of an array whose items are of different kinds, that of an array of anything."""
-    return Array(_common(map(kind_of, value))) if isinstance(value, list) else type(value)
-
-
-def _common(kinds: Iterable[Kind]) -> Kind:
-    found = [*dict.fromkeys(kinds)]
-    if len(found) < 2:
-        return found[0] if found else None
-    if all(isinstance(each, Array) for each in found):
-        return Array(_common(each.items for each in found if isinstance(each, Array)))
-    return float if {*found} == {int, float} else None
-
-
 def named(name: str, kind: Kind = None) -> Code:
     """A name, or a dotted path, that changes in a run."""
     return Code(ast.parse(name, mode="eval").body, kind)
@@ -88,14 +64,12 @@ def named(name: str, kind: Kind = None) -> Code:
 
 def literal(value: Any) -> Code:
     """A value as an expression; raises ``ExpressionError``."""
-    if value is None:
+    node = ast.parse(repr(value), mode="eval").body
+    parts = [*ast.walk(node)]
+    spend(len(parts))
+    if any(isinstance(each, ast.Constant) and each.value is None for each in parts):
         raise ExpressionError("nothing cannot be a value here")
-    if isinstance(value, (list, dict)):
-        items = value.values() if isinstance(value, dict) else value
-        return _whole([literal(each) for each in items], kind_of(value), value if isinstance(value, dict) else None)
-    if isinstance(value, (int, float)) and not isinstance(value, bool) and math.copysign(1.0, value) < 0:
-        return Code(ast.UnaryOp(ast.USub(), literal(-value).node), type(value))
-    return Code(ast.Name("inf") if value == math.inf else ast.Constant(value), type(value))
+    return _checked(node, type(value), len(parts) // 2)
 
 
 def code_of(said: Meaning) -> Code:
@@ -103,18 +77,11 @@ def code_of(said: Meaning) -> Code:
     return literal(said.value) if isinstance(said, Value) else said
 
 
-def _whole(parts: Sequence[Code], kind: Kind, keys: Collection[str] | None = None) -> Code:
-    """A list, or a dict with these keys."""
-    nodes, names = [each.node for each in parts], [ast.Constant(each) for each in keys or ()]
-    return _checked(ast.List(nodes) if keys is None else ast.Dict([*names], nodes), kind, parts)
-
-
-def _checked(node: ast.expr, kind: Kind, parts: Iterable[Code]) -> Code:
-    size = 1 + sum(each.size for each in parts)
-    spend(min(size, MAX_PARTS))
-    if size > MAX_PARTS:
+def _checked(node: ast.expr, kind: Kind, size: int) -> Code:
+    spend(min(1 + size, MAX_PARTS))
+    if 1 + size > MAX_PARTS:
         raise ExpressionError(f"it has more than the maximum of {MAX_PARTS} parts")
-    return Code(node, kind, size)
+    return Code(node, kind, 1 + size)
 
 
 # -- patterns ---------------------------------------------------------------------------------------------------------
@@ -140,12 +107,6 @@ class _Filled(ast.NodeTransformer):
 def replaced(tree: ast.expr, names: Mapping[str, Code]) -> ast.expr:
     """An expression with other expressions in place of some names."""
     found: ast.expr = _Filled(names).visit(deepcopy(tree))
-    if (
-        isinstance(found, ast.BoolOp)
-        and isinstance(first := found.values[0], ast.BoolOp)
-        and type(first.op) is type(found.op)
-    ):
-        found.values[:1] = first.values  # (a and b) and c
     return found
 
 
@@ -159,7 +120,7 @@ def filled(pattern: str, *operands: Meaning) -> Meaning:
     tree, places = _pattern(pattern)
     codes = {name: code_of(each) for name, each in names.items()}
     kind = _kind(pattern, tuple(each.kind for each in codes.values()))
-    return _checked(replaced(tree, codes), kind, [codes[name] for name in places if name in codes])
+    return _checked(replaced(tree, codes), kind, sum(codes[name].size for name in places if name in codes))
 
 
 def _computed(pattern: str, values: Mapping[str, Any]) -> Any:
@@ -169,62 +130,43 @@ def _computed(pattern: str, values: Mapping[str, Any]) -> Any:
         return evaluate(pattern, values, budget())
     except OwnError as error:
         spend(0)  # raises if this is why
-        said = str(error)
-    with suppress(ExpressionError):  # what it says of the operands themselves
-        text = ast.unparse(replaced(_pattern(pattern)[0], {name: literal(each) for name, each in values.items()}))
-        try:
-            evaluate(text, {}) if len(text) < MAX_PARTS else None
-        except OwnError as error:
-            said = str(error)
-    raise ExpressionError(f"it cannot be evaluated: {said}")
+        known = ", ".join(f"{name} = {value!r:.40}" for name, value in values.items())
+        raise ExpressionError(f"it cannot be evaluated: {error}, with {known}") from None
 
 
-_ANY: tuple[Kind, ...] = (int, float, str, bool, Array(int))
-_SAMPLES: dict[Kind, Any] = {int: 1, float: 1.0, str: "1", bool: True, dict: {}}
-
-
-def _sample(kind: Kind) -> Any:
-    return [_sample(kind.items or int)] * 2 if isinstance(kind, Array) else _SAMPLES.get(kind)
+_SAMPLES: Mapping[Kind, Any] = {int: 1, float: 1.0, str: "1", bool: True}
 
 
 @cache
 def _kind(pattern: str, kinds: tuple[Kind, ...]) -> Kind:
     """The kind of what a pattern gives: that of its value for samples of the operands, if it is always the same."""
     found = set()
-    for each in _ANY if None in kinds else (None,):
-        values = dict(zip(LETTERS, (_sample(kind or each) for kind in kinds), strict=False))
+    for each in _SAMPLES.values():
+        samples = {**_SAMPLES, None: each, list: [each] * 2, dict: {}}
         with suppress(OwnError):
-            found.add(kind_of(evaluate(pattern, values)))
+            found.add(type(evaluate(pattern, dict(zip(LETTERS, (samples[kind] for kind in kinds), strict=False)))))
     return found.pop() if len(found) == 1 else None
 
 
 # -- trees ------------------------------------------------------------------------------------------------------------
 
 
-def meaning_of(tree: Tree, lookup: Lookup, taken: Collection[str] = ()) -> Meaning:
+def meaning_of(tree: Tree, lookup: Lookup) -> Meaning:
     """What an expression means; raises ``ExpressionError``.
 
-    ``lookup`` tells what a name means, or raises ``KeyError``; ``taken`` are names of the model language in use.
+    ``lookup`` tells what a name means, or raises ``KeyError``.
     """
     try:
-        return _Translation(lookup, taken).of(tree)
+        return _Translation(lookup).of(tree)
     except RecursionError:
         raise ExpressionError("the expression is nested too deeply") from None
-
-
-_SIGNS: Mapping[str, str] = {
-    "||": "a or b", "|": "a or b", "&&": "a and b", "&": "a and b", "#": "a != b", "==": "a == b", "!=": "a != b",
-    "<": "a < b", "<=": "a <= b", ">": "a > b", ">=": "a >= b", "+": "a + b", "-": "a - b", "*": "a * b", "/": "a / b",
-    "^": "a ** b", "!": "not a",
-}  # fmt: skip
 
 
 class _Translation:
     """Goes through a tree."""
 
-    def __init__(self, lookup: Lookup, taken: Collection[str]) -> None:
+    def __init__(self, lookup: Lookup) -> None:
         self._lookup = lookup
-        self._taken = taken
 
     def of(self, tree: Tree) -> Meaning:
         spend()
@@ -237,17 +179,12 @@ class _Translation:
                 return self._call(*tree.parts)
             case "?" | "&&" | "||" if isinstance(test := self.of(tree.parts[0]), Value):
                 return self._decided(tree, test.value)
-            case "==" | "!=" if tree.parts[0].form == "%" and tree.parts[1] == Tree("value", (), 0):
-                # Whether there is a remainder does not depend on signs.
-                return filled(f"a % b {tree.form} 0", *map(self.of, tree.parts[0].parts))
         operands = [self.of(each) for each in tree.parts]
         match tree.form:
             case "array" | "matrix":
-                return array(operands)
-            case "steps":
-                return _steps(*operands)
+                return whole(operands)
             case "record":
-                return _record(tree.said, operands)
+                return whole(operands, tree.said)
             case "method" | "field":
                 return self._member(tree, *operands)
             case "?":
@@ -288,7 +225,7 @@ class _Translation:
         if name not in FUNCTIONS:
             raise ExpressionError(f"the function {name!r} is not supported")
         for pattern in FUNCTIONS[name]:
-            if pattern in _SIGNS or pattern == "%":
+            if pattern in OPERATORS:
                 return self._operator(pattern, given)
             if len({*_pattern(pattern)[1]}) == len(given):
                 return filled(pattern, *given)
@@ -298,44 +235,29 @@ class _Translation:
 
     def _operator(self, sign: str, operands: list[Meaning]) -> Meaning:
         kinds = [each.kind for each in operands]
-        if sign in ("+", "-", "*", "/", "%") and any(isinstance(each, Array) for each in kinds):
+        is_logical = sign in ("||", "&&", "|", "&", "#", "!", "==", "!=")
+        if list in kinds and not is_logical:
             return self._by_items(sign, operands)
-        if sign == "%":
-            return _rest(*operands)
         if sign == "/" and kinds == [int, int]:
             return filled("int(a / b)", *operands)
         if sign == "+" and str in kinds:
             operands = [_text(each) for each in operands]
-        is_logical = sign in ("||", "&&", "|", "&", "#", "!", "==", "!=")
-        if (
-            sign not in _SIGNS
-            or (sign in "|&#" and int in kinds)
-            or (bool in kinds and not is_logical and str not in kinds)
-        ):
+        is_of_truth = bool in kinds and not is_logical and str not in kinds
+        if sign not in OPERATORS or is_of_truth or (sign in "|&#" and int in kinds):
             what = " of truth values" if bool in kinds else ""
             raise ExpressionError(f"the operator {sign!r}{what} is not supported")
-        return filled("-a" if len(operands) == 1 and sign == "-" else _SIGNS[sign], *operands)
+        return filled("-a" if len(operands) == 1 and sign == "-" else OPERATORS[sign], *operands)
 
     def _by_items(self, sign: str, operands: list[Meaning]) -> Meaning:
         """Arrays are combined item by item; what is not an array is combined with each item."""
-        arrays = [each for each in operands if isinstance(each.kind, Array)]
-        if any(isinstance(each.kind, Array) and isinstance(each.kind.items, Array) for each in arrays):
-            raise ExpressionError("operators of matrices, and of arrays in arrays, are not supported")
-        if all(isinstance(each, Value) for each in operands):
-            lengths = {len(each.value) for each in arrays if isinstance(each, Value)}
-            if len(lengths) > 1:
-                raise ExpressionError("the arrays have different lengths")
-            rows = [[_item(each, Value(place)) for each in operands] for place in range(lengths.pop())]
-            return array([self._operator(sign, row) for row in rows])
-        index = "k"
-        while index in self._taken:
-            index += "_"
-        body = self._operator(sign, [_item(each, named(index, int)) for each in operands])
-        return filled("[a for c in range(len(b))]", body, arrays[0], named(index, int))
-
-
-def _item(whole: Meaning, index: Meaning) -> Meaning:
-    return filled("a[b]", whole, index) if isinstance(whole.kind, Array) else whole
+        values = [each.value for each in operands if isinstance(each, Value)]
+        arrays = [each for each in values if isinstance(each, list)]
+        if len(values) < len(operands) or any(isinstance(item, list) for each in arrays for item in each):
+            raise ExpressionError("operators of matrices, and of arrays that are not constant, are not supported")
+        if len(lengths := {*map(len, arrays)}) > 1:
+            raise ExpressionError("the arrays have different lengths")
+        rows = [[Value(each[k] if isinstance(each, list) else each) for each in values] for k in range(lengths.pop())]
+        return whole([self._operator(sign, [*row]) for row in rows])
 
 
 def _element(whole: Meaning, indices: Iterable[Meaning]) -> Meaning:
@@ -348,54 +270,27 @@ def _text(said: Meaning) -> Meaning:
     return said if said.kind is str else filled("str(a)", said)
 
 
-def _rest(left: Meaning, right: Meaning) -> Meaning:
-    """The remainder has the sign of the first operand in Ptolemy, and that of the second here."""
-    if not (isinstance(right, Value) and right.kind in (int, float) and right.value > 0):
-        right = filled("abs(a)", right)
-    is_positive = isinstance(left, Value) and left.kind in (int, float) and left.value >= 0
-    return filled("a % b" if is_positive else "a % b if a >= 0 else -(-a % b)", left, right)
-
-
 def _unified(items: Sequence[Meaning]) -> list[Meaning]:
     """Items of one kind: texts if one is a text, otherwise doubles if one is a double."""
     kinds = {each.kind for each in items}
     if str in kinds and len(kinds) > 1 and kinds <= {str, int, float, bool}:
         return [_text(each) for each in items]
-    common = _common(kinds)
-    while isinstance(common, Array):
-        common = common.items
-    return [_double(each) for each in items] if common is float else [*items]
+    if kinds == {int, float}:
+        return [filled("float(a)", each) if each.kind is int else each for each in items]
+    return [*items]
 
 
-def _double(said: Meaning) -> Meaning:
-    if isinstance(said, Value) and isinstance(said.value, list):
-        return array([_double(Value(each)) for each in said.value])
-    return filled("float(a)", said) if said.kind is int else said
-
-
-def array(items: Sequence[Meaning]) -> Meaning:
-    """An array of items, which become of one kind."""
-    items = _unified(items)
+def whole(items: Sequence[Meaning], names: Sequence[str] | None = None) -> Meaning:
+    """An array, whose items become of one kind, or a record with these names."""
+    items = _unified(items) if names is None else items
     values = [each.value for each in items if isinstance(each, Value)]
     if len(values) == len(items):
-        return _weighed(values)
+        return _weighed(values if names is None else dict(zip(names, values, strict=True)))
     codes = [*map(code_of, items)]
-    return _whole(codes, Array(_common(each.kind for each in codes)))
-
-
-def _record(names: Sequence[str], items: Sequence[Meaning]) -> Meaning:
-    values = {name: each.value for name, each in zip(names, items, strict=True) if isinstance(each, Value)}
-    return _weighed(values) if len(values) == len(items) else _whole([*map(code_of, items)], dict, names)
-
-
-def _steps(*parts: Meaning) -> Meaning:
-    first, step, last = (each.value if isinstance(each, Value) and each.kind in (int, float) else 0 for each in parts)
-    if not step:
-        raise ExpressionError("the steps of a matrix are not numbers that are known before the run")
-    count = math.floor((last - first) / step + 1e-9) + 1
-    if count > MAX_ELEMENTS:
-        raise ExpressionError(f"it has more than the maximum of {MAX_ELEMENTS:,} elements")
-    return Value([[first + number * step for number in range(count)]])
+    nodes, size = [each.node for each in codes], sum(each.size for each in codes)
+    if names is None:
+        return _checked(ast.List(nodes), list, size)
+    return _checked(ast.Dict([ast.Constant(each) for each in names], nodes), dict, size)
 
 
 def _weighed(value: Any) -> Value:

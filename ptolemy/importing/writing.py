@@ -1,35 +1,82 @@
-"""Writes YAML as a person would: short values on one line, sections in the usual order."""
+"""Names, values and sections as the model language has them: YAML as a person would write it."""
 
 from __future__ import annotations
 
-import json
 import math
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
+from keyword import iskeyword
 from typing import Any
 
-WIDTH = 118
-_PLAIN = re.compile(r"[A-Za-z_./][A-Za-z0-9_./*%()\[\], +^<>=;-]*\Z")
-_IN_FLOW = re.compile(r"[\[\]{},]")
-_SPECIAL = {"true", "false", "null", "yes", "no", "on", "off", "~", "y", "n"}
-_BARE_KEY = re.compile(r"[A-Za-z_][A-Za-z0-9_]*\Z")
-_QUANTITY = re.compile(r"-?\d+(\.\d+)?(e-?\d+)? (s|ms|us|ns)\Z")
+import yaml
+
+from epicycle.actors.expression import CONSTANTS, FUNCTIONS
+
+_STRANGE = re.compile(r"[^A-Za-z0-9_]+")
+_WORDS = re.compile(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])")
+_TAKEN = {"index", "time", "mode_time", "token", *CONSTANTS, *FUNCTIONS}
+
+
+def snake(name: str) -> str:
+    """``trueOutput`` as ``true_output``."""
+    return _WORDS.sub("_", name).lower()
+
+
+class Names:
+    """The names of one namespace: each name of the file has a unique name of ours."""
+
+    def __init__(self, taken: Iterable[str] = (), *, in_expressions: bool = False) -> None:
+        self._of: dict[str, str] = {}
+        self._taken = set(taken)
+        self._next: dict[str, int] = {}  # the number to try first, by name
+        self._in_expressions = in_expressions  # in which keywords and functions cannot be names
+
+    def of(self, name: str) -> str:
+        """Our name for a name of the file."""
+        if name not in self._of:
+            self._of[name] = self.fresh(name)
+        return self._of[name]
+
+    def fresh(self, name: str) -> str:
+        """A similar name that is still unused."""
+        base = _STRANGE.sub("_", name.strip()).strip("_") if _STRANGE.search(name) else name
+        if not base or not base[0].isalpha():
+            base = f"_{base}" if base[:1] != "_" else base
+        if self._in_expressions and (iskeyword(base) or base in _TAKEN):
+            base += "_"
+        found, number = base, self._next.get(base, 2)
+        while found in self._taken:
+            found, number = f"{base}_{number}", number + 1
+        self._next[base] = number
+        self._taken.add(found)
+        return found
+
+    def renamed(self) -> dict[str, str]:
+        """The names that could not be kept."""
+        return {name: ours for name, ours in self._of.items() if name != ours}
+
+
+# -- YAML -------------------------------------------------------------------------------------------------------------
+
+
+_WIDTH = 140  # of what is on one line, with quotes around all texts
+_MAP, _SEQ = "tag:yaml.org,2002:map", "tag:yaml.org,2002:seq"
 
 
 class Flow(dict[str, object]):
-    """A mapping that is written on one line if it fits."""
+    """A mapping that is written on one line if it fits, as lists are."""
+
+
+class Lines(list[object]):
+    """A list that is written with a line for each item."""
 
 
 def plain(value: Any) -> object:
-    """A value of Ptolemy's in its YAML form; raises ``ValueError``."""
+    """A value of Ptolemy's in its YAML form."""
     if isinstance(value, list):
         return [plain(each) for each in value]
     if isinstance(value, dict):
-        return {name: plain(each) for name, each in value.items()}
-    if isinstance(value, float) and math.isnan(value):
-        raise ValueError("NaN cannot be written")
-    if value is not None and not isinstance(value, (bool, int, float, str)):
-        raise ValueError("a function cannot be written")
+        return Flow({name: plain(each) for name, each in value.items()})
     return value.replace("${", "$${") if isinstance(value, str) else value
 
 
@@ -43,67 +90,27 @@ def seconds(value: Any) -> object:
     return f"{number!r} s"
 
 
-def scalar(value: object, *, flow: bool = False) -> str:
-    """A value without parts; ``flow``: inside brackets."""
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if value is None:
-        return "null"
-    if isinstance(value, float):
-        if math.isinf(value):
-            return ".inf" if value > 0 else "-.inf"
-        text = repr(value)
-        return text if "." in text or "e" not in text else text.replace("e", ".0e")
-    if isinstance(value, int):
-        return str(value)
-    text = str(value)
-    is_plain = _QUANTITY.match(text) or (
-        _PLAIN.match(text)
-        and text.lower() not in _SPECIAL
-        and not text.endswith((" ", ":"))
-        and not (flow and _IN_FLOW.search(text))
-        and not text.startswith("- ")
-        and not re.match(r"\.?(inf|nan|\d)", text, re.IGNORECASE)
-    )
-    return text if is_plain else json.dumps(text, ensure_ascii=not text.isprintable())
+class _Dumper(yaml.SafeDumper):
+    def ignore_aliases(self, data: object) -> bool:
+        return True
+
+    def increase_indent(self, flow: bool = False, indentless: bool = False) -> None:
+        super().increase_indent(flow, False)
+
+    def mapping(self, said: Flow) -> yaml.Node:
+        return self.represent_mapping(_MAP, said, flow_style=len(str(said)) < _WIDTH)
+
+    def sequence(self, said: list[object]) -> yaml.Node:
+        return self.represent_sequence(_SEQ, said, flow_style=not isinstance(said, Lines) and len(str(said)) < _WIDTH)
 
 
-def line(value: object) -> str:
-    """A value on one line, inside of brackets."""
-    if isinstance(value, Mapping):
-        return "{" + ", ".join(f"{_key(key)}: {line(each)}" for key, each in value.items()) + "}"
-    if isinstance(value, (list, tuple)):
-        return "[" + ", ".join(map(line, value)) + "]"
-    return scalar(value, flow=True)
+_Dumper.add_representer(Flow, _Dumper.mapping)
+for _kind in (list, Lines):
+    _Dumper.add_representer(_kind, _Dumper.sequence)
+# Models take what looks like a number of YAML 1.2 for one; a quantity, such as "1 s", is not like that.
+_Dumper.add_implicit_resolver("tag:yaml.org,2002:float", re.compile(r"[-+.\d]\S*\Z"), [*"-+.0123456789"])
 
 
-def _key(key: object) -> str:
-    text = str(key)
-    return text if _BARE_KEY.match(text) and text.lower() not in _SPECIAL - {"on", "y", "n"} else json.dumps(text)
-
-
-def block(value: Mapping[str, object], indent: int = 0) -> Iterable[str]:
-    """The lines of a mapping."""
-    start = " " * indent
-    for key, each in value.items():
-        head = f"{start}{_key(key)}:"
-        if isinstance(each, Mapping) and not isinstance(each, Flow) and each:
-            yield head
-            yield from block(each, indent + 2)
-        elif isinstance(each, Flow) and len(head) + 1 + len(line(each)) > WIDTH and len(each) > 1:
-            yield head
-            yield from block(
-                {key: Flow(part) if isinstance(part, Mapping) else part for key, part in each.items()}, indent + 2
-            )
-        elif isinstance(each, (list, tuple)) and each and _is_long(head, each):
-            yield head
-            for item in each:
-                yield f"{start}  - {line(item) if isinstance(item, (Mapping, list, tuple)) else scalar(item)}"
-        elif isinstance(each, (Mapping, list, tuple)):
-            yield f"{head} {line(each)}"
-        else:
-            yield head if each is None else f"{head} {scalar(each)}"
-
-
-def _is_long(head: str, items: Sequence[object]) -> bool:
-    return head.strip() in ("connections:", "transitions:") or len(head) + 1 + len(line(items)) > WIDTH
+def document(sections: Mapping[str, object]) -> str:
+    """The text of a model."""
+    return yaml.dump(sections, Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=math.inf)

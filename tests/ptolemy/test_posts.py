@@ -7,7 +7,7 @@ from typing import Any
 from hypothesis import given
 from hypothesis import strategies as st
 
-from epicycle.ptolemy.posts import Place, Posts
+from epicycle.ptolemy.posted import Place, Posts
 
 
 class Queue:

@@ -59,11 +59,11 @@ def model(*inner: str, stop: object = 10, name: str = "m", **parameters: object)
     return HEAD + entity(name, COMPOSITE, director, *inner, **parameters)
 
 
-def imported(tmp_path: Path, text: str, *, as_de: bool = False) -> Imported:
+def imported(tmp_path: Path, text: str) -> Imported:
     """What becomes of a text, which has to load."""
     file = tmp_path / "m.xml"
     file.write_text(text, encoding="utf-8")
-    return import_moml(file, load_model, as_de=as_de)
+    return import_moml(file, load_model)
 
 
 def written(tmp_path: Path, text: str) -> str:
@@ -77,10 +77,10 @@ def notes(tmp_path: Path, text: str) -> list[str]:
     return list(imported(tmp_path, text).notes[:-1])
 
 
-def run(tmp_path: Path, text: str, *, as_de: bool = False) -> Simulation:
+def run(tmp_path: Path, text: str) -> Simulation:
     """The run of an imported model."""
     file = tmp_path / "m.yaml"
-    file.write_text(imported(tmp_path, text, as_de=as_de).text, encoding="utf-8")
+    file.write_text(imported(tmp_path, text).text, encoding="utf-8")
     simulation = Simulation(load_model(file), keep_log=True)
     simulation.run()
     return simulation
@@ -100,7 +100,7 @@ def sent(tmp_path: Path, text: str) -> list[tuple[float, int, str, int, Any]]:
     ]
 
 
-def recorded(tmp_path: Path, text: str, path: str = "Recorder", *, as_de: bool = False) -> list[tuple[float, int, Any]]:
+def recorded(tmp_path: Path, text: str, path: str = "Recorder") -> list[tuple[float, int, Any]]:
     """What a Recorder has heard, with time and microstep."""
-    sink = run(tmp_path, text, as_de=as_de)[path]
+    sink = run(tmp_path, text)[path]
     return [(tag.seconds, tag.microstep, token) for tag, token in zip(sink.tags, sink.tokens, strict=True)]

@@ -85,15 +85,6 @@ def test_classes_in_classes_are_counted_before_they_are_made(tmp_path: Path) -> 
     assert refusal(tmp_path, text) == "m.xml:7: more than the maximum of 20,000 entities"
 
 
-def test_texts_that_java_wrote_in_latin_1(tmp_path: Path) -> None:
-    text = model("<doc>f\u00fcr alle</doc>").encode("latin-1")
-    (tmp_path / "m.xml").write_bytes(text)
-    assert (
-        "doc: für alle\n" in import_moml(tmp_path / "m.xml").text
-        or "f\u00fcr alle" in import_moml(tmp_path / "m.xml").text
-    )
-
-
 def test_a_file_that_is_not_there(tmp_path: Path) -> None:
     with pytest.raises(MomlError) as caught:
         import_moml(tmp_path / "none.xml")

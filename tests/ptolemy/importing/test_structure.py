@@ -25,7 +25,6 @@ from tests.ptolemy.importing.moml_parts import (
     wires,
 )
 
-SDF = "ptolemy.domains.sdf.kernel.SDFDirector"
 IN, OUT = port("in", "input"), port("out", "output")
 CLOCK, RECORDER = entity("Clock", "DiscreteClock", values="{1, 2, 3}"), entity("Recorder", "Recorder")
 
@@ -77,61 +76,12 @@ def test_widths_that_ports_of_an_actor_have_in_common(tmp_path: Path) -> None:
 # -- iterations -------------------------------------------------------------------------------------------------------
 
 
-def sdf(**parameters: object) -> str:
-    return prop("SDF", java=SDF, inner="".join(prop(name, value) for name, value in parameters.items()))
-
-
-def test_iterations_with_a_period(tmp_path: Path) -> None:
-    inner = composite("C", OUT, sdf(period="1.0 / 2"), entity("Ramp", "Ramp"), wires("Ramp.output out"))
-    text = model(inner, RECORDER, wires("C.out Recorder.input"), stop=1)
-    assert values(tmp_path, text) == [(0.0, 0), (0.5, 1), (1.0, 2)]
-
-
-def whole(*inner: str, **parameters: object) -> str:
-    """A model with an SDF director."""
-    return HEAD + entity("m", COMPOSITE, sdf(**parameters), *inner)
-
-
-@pytest.mark.parametrize(
-    ("parameters", "expected"),
-    [
-        ({"iterations": 3}, [(0.0, 1, 0), (0.0, 2, 3), (0.0, 3, 6)]),
-        ({"iterations": 3, "period": 0.5}, [(0.0, 1, 0), (0.5, 1, 3), (1.0, 1, 6)]),
-        ({"iterations": "AUTO"}, [(0.0, 1, 0)]),
-    ],
-)
-def test_a_model_of_iterations(tmp_path: Path, parameters: dict[str, object], expected: list[Any]) -> None:
-    inner = composite("D", IN, OUT, entity("S", "Scale", factor=3), wires("in S.input", "S.output out"), director=True)
-    nets = wires("Ramp.output D.in", "D.out Recorder.input")
-    text = whole(entity("Ramp", "Ramp"), inner, RECORDER, nets, **parameters)
-    assert recorded(tmp_path, text, as_de=True) == expected
-
-
-def test_a_model_of_iterations_needs_a_word(tmp_path: Path) -> None:
-    text = whole(entity("Ramp", "Ramp"), RECORDER, wires("Ramp.output Recorder.input"), iterations=3)
+@pytest.mark.parametrize("name", ["SDF", "SR"])
+def test_a_model_of_iterations_is_refused(tmp_path: Path, name: str) -> None:
+    java = f"ptolemy.domains.{name.lower()}.kernel.{name}Director"
     with pytest.raises(MomlError) as caught:
-        imported(tmp_path, text)
-    assert str(caught.value) == (
-        "m.xml cannot be imported:\n   - SDF is a ptolemy.domains.sdf.kernel.SDFDirector: "
-        "to let its actors fire by the rules of DE, say --as-de"
-    )
-    found = imported(tmp_path, text, as_de=True)
-    assert found.notes[0] == "SDF, a SDFDirector: the actors inside fire by the rules of DE"
-
-
-def test_a_model_of_endless_iterations(tmp_path: Path) -> None:
-    text = whole(entity("Ramp", "Ramp"), RECORDER, wires("Ramp.output Recorder.input"), iterations=0)
-    with pytest.raises(MomlError) as caught:
-        imported(tmp_path, text, as_de=True)
-    assert str(caught.value).endswith("   - m: endlessly many iterations at one time have no counterpart")
-
-
-def test_a_delay_of_one_iteration_in_a_loop(tmp_path: Path) -> None:
-    delay = entity("D", "ptolemy.domains.sdf.lib.SampleDelay", initialOutputs="{5}")
-    inner = entity("Add", "AddSubtract") + wires("in Add.plus", "D.output Add.plus", "Add.output D.input out")
-    nets = wires("Clock.output C.in", "C.out Recorder.input")
-    text = model(CLOCK, composite("C", IN, OUT, sdf(), delay, inner), RECORDER, nets)
-    assert values(tmp_path, text)[:3] == [(0.0, 6), (1.0, 8), (2.0, 11)]
+        imported(tmp_path, HEAD + entity("m", COMPOSITE, prop("D", java=java), entity("Ramp", "Ramp")))
+    assert str(caught.value) == f"m.xml cannot be imported:\n   - D is a {java}, which has no counterpart"
 
 
 def test_a_delay_of_several_tokens(tmp_path: Path) -> None:
@@ -143,16 +93,32 @@ def test_a_delay_of_several_tokens(tmp_path: Path) -> None:
 # -- parameters that change, and ports with a default -----------------------------------------------------------------
 
 
+def over_a_variable(*, inside: bool) -> str:
+    """An Expression over a parameter that changes, through another parameter."""
+    made = entity("E", "Expression", port("x", "input"), expression="x + q")
+    inner = composite("C", IN, OUT, made, wires("in E.x", "E.output out"))
+    setter = entity("Set", "SetVariable", prop("variableName", "p", TEXT)) + entity("Late", "TimeDelay", delay=0.5)
+    ends = ("C.in", "C.out") if inside else ("E.x", "E.output")
+    nets = wires("Clock.output Set.input Late.input", f"Late.output {ends[0]}", f"{ends[1]} Recorder.input")
+    return model(prop("p", 0), prop("q", "p * 10"), CLOCK, setter, inner if inside else made, RECORDER, nets, stop=2)
+
+
 def test_an_expression_over_a_parameter_that_changes(tmp_path: Path) -> None:
-    """Also through another parameter, and in a composite."""
-    inner = composite(
-        "C", IN, OUT, entity("E", "Expression", port("x", "input"), expression="x + q"), wires("in E.x", "E.output out")
+    assert values(tmp_path, over_a_variable(inside=False)) == [(0.5, 11), (1.5, 22)]
+    with pytest.raises(MomlError) as caught:
+        imported(tmp_path, over_a_variable(inside=True))
+    assert str(caught.value) == (
+        "m.xml cannot be imported:\n   - C.E: expression: p, a variable outside, has no counterpart in an expression"
     )
-    setter = entity("Set", "SetVariable", prop("variableName", "p", TEXT))
-    late = entity("Late", "TimeDelay", delay=0.5)
-    nets = wires("Clock.output Set.input Late.input", "Late.output C.in", "C.out Recorder.input")
-    text = model(prop("p", 0), prop("q", "p * 10"), CLOCK, setter, late, inner, RECORDER, nets, stop=2)
-    assert values(tmp_path, text) == [(0.5, 11), (1.5, 22)]
+
+
+def test_a_parameter_of_a_composite_around_is_not_set(tmp_path: Path) -> None:
+    setter = entity("Set", "SetVariable", prop("variableName", "p", TEXT)) + wires("in Set.input")
+    with pytest.raises(MomlError) as caught:
+        imported(tmp_path, model(prop("p", 0), CLOCK, composite("C", IN, setter), wires("Clock.output C.in")))
+    assert str(caught.value) == (
+        "m.xml cannot be imported:\n   - C.Set sets p of a composite around it, which has no counterpart"
+    )
 
 
 def test_a_parameter_that_is_set_by_what_it_is(tmp_path: Path) -> None:
@@ -184,10 +150,11 @@ def test_an_expression_with_inputs_that_hold_a_value(tmp_path: Path) -> None:
 
 def test_a_distribution_that_changes(tmp_path: Path) -> None:
     mean = entity("Mean", "DiscreteClock", values="{10.0, 1000.0}")
-    law = entity("G", "Gaussian", standardDeviation="0.0")
     nets = wires("Clock.output G.trigger", "Mean.output G.mean", "G.output Recorder.input")
-    text = model(CLOCK, mean, law, RECORDER, nets, stop=1)
-    assert values(tmp_path, text) == [(0.0, 10.0), (1.0, 1000.0)]
+    with pytest.raises(MomlError) as caught:
+        imported(tmp_path, model(CLOCK, mean, entity("G", "Gaussian"), RECORDER, nets))
+    expected = "m.xml cannot be imported:\n   - G.mean: a distribution that changes during the run has no counterpart"
+    assert str(caught.value) == expected
 
 
 # -- what chooses and joins -------------------------------------------------------------------------------------------

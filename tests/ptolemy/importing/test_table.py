@@ -6,8 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from epicycle.ptolemy.importing.table import Row, row_of
-from epicycle.ptolemy.importing.tables import table
+from epicycle.ptolemy.importing.table import Row, row_of, table
 from tests.ptolemy.importing.moml_parts import DE, LIB, TEXT, entity, model, notes, port, prop, run, wires
 
 ROWS = [name for name, said in table("rows").items() if isinstance(said, dict)]
@@ -30,7 +29,26 @@ GIVEN: dict[str, dict[str, object]] = {
     "IIR": {"numerator": "{1.0}", "denominator": "{1.0}"},
 }
 # What cannot change in a run, and what does not go with something else.
-NOT_WIRED = {"lambda", "alpha", "gamma", "cut", "pattern", "newServiceTime", "defaultDelay"}
+NOT_WIRED = {
+    "mean",
+    "standardDeviation",
+    "lowerBound",
+    "upperBound",
+    "trueProbability",
+    "min",
+    "max",
+    "mode",
+    "n",
+    "p",
+    "freedom",
+    "lambda",
+    "alpha",
+    "gamma",
+    "cut",
+    "pattern",
+    "newServiceTime",
+    "defaultDelay",
+}
 FED = {
     "ArrayToElements": "{1, 2}", "ArrayToSequence": "{1, 2}", "ArrayAppend": "{1, 2}", "DotProduct": "{1, 2}",
     "RecordDisassembler": "{x = 1}", "RecordUpdater": "{y = 1}", "UnionDisassembler": "{x = 1}",

@@ -1,10 +1,14 @@
-"""Notes of an import: what has no counterpart, and why a model cannot be imported."""
+"""What one import may take and tell: its steps, whatever its parts do with them, and its notes."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass, field
 
 from epicycle.actors import counted
+from epicycle.actors.expression import Budget
 
 MAX_NOTES = 500
 
@@ -34,3 +38,31 @@ class Notes:
     def summary(self) -> str:
         """One line for everything that makes no difference to a run."""
         return "left out: layout" + (f", {counted(self.views, 'view')}" if self.views else "")
+
+
+# -- steps ------------------------------------------------------------------------------------------------------------
+
+
+MAX_STEPS = 1_000_000
+
+_BUDGET: ContextVar[Budget | None] = ContextVar("_BUDGET", default=None)
+
+
+@contextmanager
+def limited_steps() -> Iterator[None]:
+    """Give all that is done inside one budget; ``spend`` raises ``BudgetError`` when it is spent."""
+    token = _BUDGET.set(Budget(MAX_STEPS, "it takes"))
+    try:
+        yield
+    finally:
+        _BUDGET.reset(token)
+
+
+def budget() -> Budget:
+    """The budget of the import, or one for each question outside of an import."""
+    return _BUDGET.get() or Budget()
+
+
+def spend(steps: int = 1) -> None:
+    """Deduct some steps: one is a part of an expression, or ten elements or characters."""
+    budget().spend(steps)
