@@ -29,12 +29,12 @@ class Waiting:
     """The tokens of some inputs, which wait until they are taken out: a queue for each channel."""
 
     def __init__(self, ports: Sequence[InputPort[Any]]) -> None:
-        self._ports = ports
+        self.ports = ports
         self._lines = {port.name: [deque[Any]() for _ in range(port.width)] for port in ports}
 
     def come(self) -> int:
         """Let in what has arrived; returns how many tokens wait."""
-        for port in self._ports:
+        for port in self.ports:
             tokens, channels = port.take()
             for place, token in enumerate(tokens):
                 self._lines[port.name][channels[place] if channels else 0].append(token)
@@ -63,11 +63,6 @@ class Waiting:
         found = [(line.popleft(), channel) for channel, line in enumerate(self._lines[port.name]) if line]
         return [token for token, _ in found], [channel for _, channel in found]
 
-    def show(self) -> None:
-        """Show the first tokens at their inputs."""
-        for port in self._ports:
-            port.give(self.firsts(port))
-
 
 class Singly(Actor):
     """An actor that takes one token of each channel per firing, and fires again at the same tag for the rest."""
@@ -82,8 +77,8 @@ class Singly(Actor):
 
     def fire(self) -> None:
         for _ in self._waiting.firings():
-            if self.is_ready():
-                self._waiting.show()
+            for port in self._waiting.ports if self.is_ready() else ():
+                port.give(self._waiting.firsts(port))
             self.fire_once()
             for port in self.inputs.values():
                 port.clear()

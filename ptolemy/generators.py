@@ -8,18 +8,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from epicycle import actors
-from epicycle.actors import (
-    Actor,
-    Configurable,
-    EpicycleError,
-    InputPort,
-    OutputPort,
-    Parameter,
-    elementary,
-    rounds,
-    to_nanoseconds,
-    to_seconds,
-)
+from epicycle.actors import Actor, Configurable, EpicycleError, InputPort, OutputPort, Parameter, elementary, rounds
 
 LAWS = frozenset({"Bernoulli", "Choice", "Constant", "Exponential", "Normal", "Triangular", "Uniform"})
 """The distributions that can be drawn with these generators."""
@@ -193,8 +182,8 @@ class PoissonClock(_Drawing, actors.PoissonClock):
             return super().interval()
         # The rounding to whole nanoseconds is added to the next wait, or the difference to Java would accumulate.
         interval = self._numbers.exponential(self.mean_interval) + self._rest
-        self._rest = interval - to_seconds(to_nanoseconds(interval))
-        return to_nanoseconds(interval)
+        self._rest = interval - actors.to_seconds(actors.to_nanoseconds(interval))
+        return actors.to_nanoseconds(interval)
 
     def fire(self) -> None:
         if self._is_over:
@@ -205,7 +194,7 @@ class PoissonClock(_Drawing, actors.PoissonClock):
             self._send(self._tick)
             self._tick += 1
             interval = self.interval()
-            if self.stop_time is not None and self.tag.time >= to_nanoseconds(self.stop_time):
+            if self.stop_time is not None and self.tag.time >= actors.to_nanoseconds(self.stop_time):
                 self._is_over, self._wake = True, None
                 return
         self._wake = self.context.wake(self, self.tag.time + interval)

@@ -21,7 +21,7 @@ from epicycle.runner.engine import (
     ModeDirector,
     Outer,
     Refinement,
-)
+)  # fmt: skip
 from epicycle.runner.graph import ModelGraph, is_within, steps
 from epicycle.runner.text import Limits
 
@@ -127,6 +127,7 @@ class PostedComposites(Directors):
     """Makes the borders of such composites."""
 
     director: PostedDirector
+    boundary_ports: dict[str, Any]
 
     def __init__(self, graph: ModelGraph, actors: dict[str, Actor], director: PostedDirector) -> None:
         self.borders: dict[str, CompositeBoundary] = {}  # of strict composites
@@ -136,30 +137,28 @@ class PostedComposites(Directors):
         return is_posted(self.graph.dialects[composite], type(self.director))
 
     def boundary_port(self, path: str, outside: Director | Refinement) -> BoundaryPort:
-        kind = PostedPassage if self._is_ours(self.graph.owner(path)) else BoundaryPort
+        kind = PostedPort if self._is_ours(self.graph.owner(path)) else BoundaryPort
         return kind(path, outside)
 
     def prepare(self, composite: str, outside: Director | Refinement) -> None:
         if not composite or not self._is_ours(composite):
             return
-        boundary_ports: list[list[Any]] = [
-            [self.boundary_ports[path] for path in paths] for paths in self.graph.borders(composite)
-        ]
+        inputs, outputs = ([self.boundary_ports[path] for path in paths] for paths in self.graph.borders(composite))
         if self.graph.is_strict(composite):
-            border = CompositeBoundary(composite, self.graph.end_of(composite), self.director, outside, *boundary_ports)
-            for boundary_port in (*boundary_ports[0], *boundary_ports[1]):
-                boundary_port.border = border
+            border = CompositeBoundary(composite, self.graph.end_of(composite), self.director, outside, inputs, outputs)
+            for port in (*inputs, *outputs):
+                port.border = border
             self.borders[composite] = border
             if composite not in self.graph.modal:  # whose parts are posted one by one
                 self.director.posted[composite] = border
         if composite in self.graph.modal or self.graph.refinement_of(composite) == composite:
-            for boundary_port in (*boundary_ports[0], *boundary_ports[1]):
-                boundary_port.is_refired = True
-            for boundary_port in boundary_ports[1] if composite in self.graph.modal else ():
-                boundary_port.holds_one = True
+            for port in (*inputs, *outputs):
+                port.is_refired = True
+            for port in outputs if composite in self.graph.modal else ():
+                port.holds_one = True
 
     def mode_director(self, composite: str, machine: StateMachine) -> ModeDirector:
-        kind = PostedConductor if self._is_ours(composite) else ModeDirector
+        kind = PostedModeDirector if self._is_ours(composite) else ModeDirector
         return kind(composite, machine, self.director, self.of[composite])
 
     def refinement(self, path: str, outside: Outer, mode_director: ModeDirector) -> Refinement:
@@ -179,7 +178,7 @@ class PostedComposites(Directors):
                 self.borders[around].post()
 
 
-class PostedPassage(BoundaryPort):
+class PostedPort(BoundaryPort):
     """A port of such a composite: with a ``border``, it lets one token through per firing of the composite.
 
     If it ``is_refired`` with the surroundings of the composite, one per firing of those.  One that ``holds_one`` keeps
@@ -245,8 +244,8 @@ class CompositeBoundary(Actor):
         end: str,
         director: PostedDirector,
         outside: Director | Refinement,
-        inputs: list[PostedPassage],
-        outputs: list[PostedPassage],
+        inputs: list[PostedPort],
+        outputs: list[PostedPort],
     ) -> None:
         super().__init__(end)
         self.enter(outside)
@@ -290,26 +289,26 @@ class CompositeBoundary(Actor):
         """An actor inside now fires after its firing was deferred from outside."""
         self._resumed = self.tag
 
-    def lets_pass(self, boundary_port: PostedPassage) -> bool:
+    def lets_pass(self, port: PostedPort) -> bool:
         """Whether waiting tokens may pass a port now."""
         now = self.tag
-        if boundary_port in self.before:
+        if port in self.before:
             self._came_in = now
             self._outside.trigger(self)
             return True
         return self._resumed != now or self._came_in == now
 
     def fire(self) -> None:
-        if any(boundary_port.is_waited_for for boundary_port in self.before):
-            for boundary_port in (*self.before, *self.behind):
-                if boundary_port.is_waited_for:
-                    self._outside.trigger(boundary_port)
+        if any(port.is_waited_for for port in self.before):
+            for port in (*self.before, *self.behind):
+                if port.is_waited_for:
+                    self._outside.trigger(port)
         else:
             self.post()
 
 
-class PostedConductor(ModeDirector):
-    """Conducts a machine that fires again at a tag as long as tokens wait at the inputs of its composite."""
+class PostedModeDirector(ModeDirector):
+    """Directs the modes of a machine that fires again at a tag while tokens wait at the inputs of its composite."""
 
     @property
     def hears_inputs(self) -> bool:
@@ -446,6 +445,4 @@ class PostedDirector(Director):
         """Whether an activation of these ranks is still to come at the present tag, and none of them is being taken."""
         if self.present is None or not self.is_between(first, last):
             return False
-        return any(
-            activation is not None and activation.is_scheduled for activation in self.activations[first : last + 1]
-        )
+        return any(each is not None and each.is_scheduled for each in self.activations[first : last + 1])

@@ -92,6 +92,7 @@ def test_what_is_left_out_no_plan_can_break(random: np.random.Generator) -> None
     assert dropped > 1000
 
 
+@pytest.mark.slow
 def test_who_is_out_of_reach_changes_no_bit(random: np.random.Generator) -> None:
     alone = 0
     for _ in range(30):

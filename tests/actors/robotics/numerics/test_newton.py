@@ -85,6 +85,7 @@ def test_a_block_that_is_no_bowl_counts_as_the_nearest_one(random: np.random.Gen
         assert step == pytest.approx(nearest, rel=1e-8, abs=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("curvature", [(-1.0, 0.0, -2.0), (1.0, 2.0, 1.0), (np.nan, 0.0, 1.0)])
 def test_where_the_cost_of_controls_is_no_bowl_there_is_no_descent(curvature: tuple[float, float, float]) -> None:
     flat, controls = np.zeros((3, 5)), np.array([[1.0, 1.0, 1.0, 0.0, 1.0]] * 3)
