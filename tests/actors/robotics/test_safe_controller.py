@@ -156,7 +156,7 @@ def test_a_controller_that_there_is_not(capsys: pytest.CaptureFixture[str]) -> N
         "command line:1:18: error: controller: 'careful' is not one of paper, safe\n"
         "    1 | --set controller=careful\n"
         "      |                  ^^^^^^^\n"
-        "    help: declared by SafeRobot.controller\n"
+        "   help: declared by SafeRobot.controller\n"
     )
 
 
