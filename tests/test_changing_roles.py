@@ -53,6 +53,7 @@ def next_role(number: int, role: str, far: float, near: float, spread: float, ag
     return "relaying" if role == "chaining" and far < another - SLACK else role
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("disturbance", [0.0, 0.5])
 def test_roles_follow_from_what_each_observer_knows(disturbance: float) -> None:
     """From the plans of the main robot that it has heard and its own estimate alone, after every one of them."""

@@ -204,6 +204,7 @@ def lift(environment: Any, passengers: list[Passenger], bell: Any) -> Iterator[A
             floor += direction
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("seed", "rush"), [pytest.param(1, 0.8, marks=pytest.mark.slow), (2, 0.0)])
 def test_every_passenger_gets_on_and_off_when_plain_simpy_says(seed: int, rush: float) -> None:
     results = run("lift_group", seed, keep_log=True, rush=rush)

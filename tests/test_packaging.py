@@ -149,6 +149,7 @@ def test_mypy_redirects_equal_the_tree() -> None:
     assert found == expected
 
 
+@pytest.mark.slow
 def test_imports_go_one_way() -> None:
     found = [
         problem
@@ -191,6 +192,7 @@ def test_an_import_the_right_way_is_not(file: str, line: str) -> None:
     assert forbidden_imports(line, Path(file)) == []
 
 
+@pytest.mark.slow
 def test_nothing_is_imported_twice() -> None:
     """Look in a fresh interpreter started at the root, where a bare `import actors` would work too."""
     script = f"""

@@ -304,6 +304,7 @@ def behaviour(settings: tuple[tuple[str, float], ...], seed: int) -> dict[str, f
     }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("base", "change", "what", "sign"),
     [

@@ -82,6 +82,7 @@ def test_programs_are_shown_the_same(capsys: pytest.CaptureFixture[str]) -> None
     assert [Path(each).name for each in found["reads"]] == ["collision_avoidance.yaml", "mobile_robot.yaml"]
 
 
+@pytest.mark.slow
 def test_variants_are_compared(capsys: pytest.CaptureFixture[str]) -> None:
     words = ("compare", "m.yaml", "--vary", "period=1 s", "--replications", "2", "--seed", "5")
     assert (

@@ -175,6 +175,7 @@ def test_runs_that_fail_or_cannot_be_judged_are_told(capsys: pytest.CaptureFixtu
 BOTH = "  low: always far.output < 4.3\n"
 
 
+@pytest.mark.slow
 def test_all_monitors_of_the_model_by_default(capsys: pytest.CaptureFixture[str]) -> None:
     Path("both.yaml").write_text(TEXT + BOTH, encoding="utf-8")
     words = ["falsify", "both.yaml", "--vary", "y=0 m..1 m", "--out", "out", "--jobs", "1"]
@@ -204,6 +205,7 @@ def test_a_model_without_monitors(capsys: pytest.CaptureFixture[str]) -> None:
         )
 
 
+@pytest.mark.slow
 def test_aspects_and_a_stop_time_as_run_has_them(capsys: pytest.CaptureFixture[str]) -> None:
     aspects = "aspects:\n  rounds: {type: Noise, deviation: 0.5, at: noise.output}\n"
     Path("far.yaml").write_text(TEXT + aspects, encoding="utf-8")
@@ -333,6 +335,7 @@ def test_it_depends_on_its_seed_alone() -> None:
     assert table("one") != table("other")
 
 
+@pytest.mark.slow
 def test_more_runs_continue_it() -> None:
     options = ["--vary", "x=0.0..1.0", "--out", "out"]
     falsify(*options, "--runs", 10)

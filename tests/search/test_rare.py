@@ -114,6 +114,7 @@ def test_without_levels_it_is_plain_sampling() -> None:
     assert late.runs_made == 5 * 50
 
 
+@pytest.mark.slow
 def test_another_monitor_can_say_how_far_a_run_is() -> None:
     model, probability = chain(3, 4)
     found = rare(model, "is", guide="never", runs=40, repetitions=10, seed=2)

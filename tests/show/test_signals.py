@@ -146,6 +146,7 @@ def restored(row: dict[str, Any]) -> Any:
     return made.get(kind, lambda: text)()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(packaged_models()))
 def test_what_models_send_can_be_read_from_the_file(name: str, tmp_path: Path) -> None:
     """Every port of every packaged model, recorded or not."""

@@ -94,6 +94,7 @@ NOT_YOURS = (
 )
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("how", ["another key", "forged", "no seal", "more code"])
 def test_a_folder_of_somebody_else_runs_no_code(
     tmp_path: Path, how: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
@@ -154,6 +155,7 @@ def test_changed_code_is_not_run(tmp_path: Path, part: str, capsys: pytest.Captu
     assert not place.has_run()
 
 
+@pytest.mark.slow
 def test_a_study_notices_that_what_its_types_import_has_changed(tmp_path: Path) -> None:
     place = Place(tmp_path / "study", "Importing")
     words = ["study", str(tmp_path / "study" / "walks.yaml"), "--types", str(place.code), "--out", str(place.out)]

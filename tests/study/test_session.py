@@ -20,6 +20,7 @@ from tests.study.study_commands import message, study
 from tests.study.study_parts import MODEL, STUDY, moved, plan_of, write
 
 
+@pytest.mark.slow
 def test_extension_makes_only_what_is_new(done: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     shutil.copytree(done, tmp_path, dirs_exist_ok=True)
     before = open_study(tmp_path / "out").table().to_pylist()
@@ -53,6 +54,7 @@ def test_identity_hangs_on_content_and_not_on_place(
     assert set(keys[0]) == {row["run"] for row in open_study(done / "out").table().to_pylist()}
 
 
+@pytest.mark.slow
 def test_another_first_seed_is_that_of_a_study_that_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     write(tmp_path)
     assert study(tmp_path, "--replications", 2, "--seed", 120, out="asked") == 0

@@ -26,6 +26,7 @@ def filtered(samples: list[float], **parameters: Any) -> list[float]:
 coefficients = st.lists(st.floats(-2, 2), min_size=1, max_size=5)
 
 
+@pytest.mark.slow
 @settings(max_examples=60, deadline=None)
 @given(numerator=coefficients, denominator=coefficients, first=st.sampled_from([-2.0, 1.0, 0.5]))
 def test_difference_equations_are_lfilter(numerator: list[float], denominator: list[float], first: float) -> None:

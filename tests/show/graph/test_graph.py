@@ -299,6 +299,7 @@ def test_same_model_same_bytes(tmp_path: Path) -> None:
         assert b"matplotlib" not in written.lower()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(packaged_models()))
 @pytest.mark.parametrize(
     "endings", [(".svg", ".mmd", ".md"), pytest.param((".png", ".pdf"), marks=pytest.mark.slow)], ids=("text", "other")

@@ -110,6 +110,7 @@ def test_a_page_loads_by_itself_at_any_width(width: int, scheme: str, opened: Op
     assert tab.locator("h2").all_inner_texts() == order
 
 
+@pytest.mark.slow
 def test_the_policy_lets_nothing_else_run(page: Path, browser: Any) -> None:
     tab = browser.new_page()
     said: list[str] = []
@@ -155,6 +156,7 @@ def test_a_tip_comes_up_where_the_pointer_is(figure: int, width: int, opened: Op
     assert not tip.is_visible()
 
 
+@pytest.mark.slow
 def test_a_picture_is_enlarged_and_closed_again(opened: Open) -> None:
     tab = opened()
     stage, tip = tab.locator("dialog"), tab.locator(".tip")

@@ -39,6 +39,7 @@ def pair(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return written(path, *runs, names=("calm", "lossy"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("width", "height", "scheme"), [(390, 844, "light"), (1280, 900, "dark"), (3840, 2160, "light")]
 )
@@ -92,6 +93,7 @@ def test_a_dropped_plan_tells_why_the_robot_did_as_it_did(wifi: Path, opened: Op
     assert {"main.vehicle", "clearance"} <= set(cone[1])
 
 
+@pytest.mark.slow
 def test_time_can_be_scrubbed_stepped_and_played(wifi: Path, opened: Open) -> None:
     page = opened(wifi)
     box = page.tab.locator("canvas[data-view=scrubber]").bounding_box()
@@ -229,6 +231,7 @@ def test_monitors_say_when_they_broke_and_lead_there(tmp_path: Path, opened: Ope
     assert page.do("return state.time") == 4e9
 
 
+@pytest.mark.slow
 def test_two_runs_are_shown_side_by_side_with_their_first_difference(pair: Path, opened: Open) -> None:
     page = opened(pair)
     page.do("state.setTime(2e9)")

@@ -108,6 +108,7 @@ def test_nothing_is_lost(tmp_path: Path) -> None:
     kill_and_resume(tmp_path, "--jobs", 2, kills=2, replications=15, seed=2)
 
 
+@pytest.mark.slow
 def test_an_interrupt_ends_it_with_a_word(tmp_path: Path) -> None:
     write(tmp_path)
     out = tmp_path / "out"

@@ -81,6 +81,7 @@ def _width(values: Any) -> float:
     return float(stats.t.ppf(0.975, len(values) - 1) * np.std(values, ddof=1) / np.sqrt(len(values)))
 
 
+@pytest.mark.slow
 def test_runs_that_fail_hang_or_die_are_rows(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     text = STUDY.replace("[0 m/s, 100 cm/s]", "[0 m/s]").replace("replications: 5", "replications: 10")
     write(tmp_path, text + "set: {fails: [3], hangs: [5], dies: [7]}\n")

@@ -89,6 +89,7 @@ def test_association_probabilities(random: np.random.Generator, kind: int) -> No
     assert shared > 100
 
 
+@pytest.mark.slow
 def test_tracks_that_may_not_exist(random: np.random.Generator) -> None:
     """Joint events of all subsets of the tracks that may be there."""
     for number in range(200):

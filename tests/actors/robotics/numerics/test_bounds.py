@@ -24,6 +24,7 @@ for d in (2, 3):
 """
 
 
+@pytest.mark.slow
 def test_no_kernel_leaves_its_arrays() -> None:
     environment = {**os.environ, "NUMBA_DISABLE_JIT": "1"}
     done = subprocess.run([sys.executable, "-c", SCRIPT], env=environment, capture_output=True, text=True, check=False)
