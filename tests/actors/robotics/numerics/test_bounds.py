@@ -6,6 +6,8 @@ import sys
 
 SCRIPT = """
 import numpy as np
+import pytest
+
 from epicycle.actors import BodyState, Estimate, Inform, RobustController
 from epicycle.actors.robotics.numerics import warm_up
 from epicycle.actors.testing import Harness
