@@ -4,10 +4,10 @@ import os
 import subprocess
 import sys
 
-SCRIPT = """
-import numpy as np
 import pytest
 
+SCRIPT = """
+import numpy as np
 from epicycle.actors import BodyState, Estimate, Inform, RobustController
 from epicycle.actors.robotics.numerics import warm_up
 from epicycle.actors.testing import Harness
