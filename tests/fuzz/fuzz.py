@@ -37,10 +37,11 @@ import hypothesis
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 
+from epicycle.actors import part_finders
 from epicycle.actors.expression.translation import KNOWN
 from epicycle.runner import Simulation
 from epicycle.runner.build import load_model
-from epicycle.runner.catalogue import built_in, model_folders
+from epicycle.runner.catalogue import built_in, figure_types, model_folders
 from epicycle.runner.engine import ActorError, LoopError
 from epicycle.runner.text import NORMAL, ModelError
 from tests.fuzz.mutants import Mutation, Seedling, of_options, of_text, of_tree, seedling
@@ -299,6 +300,9 @@ def plot(folder: str) -> Plot:
     # What is imported and compiled at the first use is not the doing of a mutant.
     for plant in made.seedlings:
         Simulation(load_model(plant.model, disturb=plant.disturb)).run(until=0.0)
+    figure_types().get("")  # which looks once for those of installed packages
+    for find in part_finders:
+        find("")
     for name in FAULTY:
         with suppress(ModelError):
             load_model(BAD_MODELS / f"{name}.yaml", disturb=BAD_MODELS / "parts" / "storm.yaml")
