@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.plugins import ROOT, copied, main
+from tests.plugins import ABSENT, ROOT, copied, main
 
 HOUSE = ("actors", "aspects", "api", "runner")
 # What belongs to Ptolemy's room: its rules, its actors' ways, the order of posting, Java's generators.
@@ -82,6 +82,7 @@ print(json.dumps(found))
 """
 
 
+@pytest.mark.skipif(bool(ABSENT), reason="there are none")
 def test_epicycle_without_plugins(tmp_path: Path) -> None:
     from epicycle.runner import Simulation, load_model
     from epicycle.runner.commands import COMMANDS
