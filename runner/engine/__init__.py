@@ -15,12 +15,12 @@ from ..results import (
     plain,
     write_log,
 )
-from .acts import Interventions
 from .agenda import Activation, Delivery, Instant
 from .copies import CopyError
 from .director import Director, Entry
 from .directors import Directors
 from .errors import ActorError, LoopError
+from .interventions import Interventions
 from .local_time import BoundaryPort, LocalDirector
 from .log_filter import LogFilter
 from .pace import SLOWEST, Pace

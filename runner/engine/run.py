@@ -17,12 +17,12 @@ from ..graph import WovenAspect
 from ..interrupt import between_steps
 from ..results import STOP_TIME, EventLog, Record, Results, Signal, Verdict
 from ..text import describe, raised_at
-from .acts import Interventions
 from .copies import Copies
 from .director import Director
 from .directors import director_of
 from .errors import ActorError
 from .forms import attach
+from .interventions import Interventions
 from .listeners import Measuring, Recording
 from .loop import handle_events
 from .measured import Measured, add_computed

@@ -14,9 +14,9 @@ from ..collection import without_collection
 from ..graph import WovenAspect
 from ..results import STOP_TIME, EventLog, Record, Results, Signal, Verdict
 from ..tables import Table, Tabled
-from .acts import Interventions
 from .copies import Copies
 from .director import Director
+from .interventions import Interventions
 from .log_filter import LogFilter
 from .pace import Pace
 from .run import Run

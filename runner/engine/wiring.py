@@ -31,12 +31,12 @@ from epicycle.aspects import (
 from ..graph import Clock, Hop, ModelGraph, WovenAspect, connection_place
 from ..results import EventLog, Signal
 from ..text import describe
-from .acts import Interventions, NamedCall
 from .aspect_context import EngineContext
 from .director import Director
 from .directors import Directors
 from .errors import ActorError, LoopError
 from .execution import Execution
+from .interventions import Interventions, NamedCall
 from .local_time import LocalDirector
 from .parameters import VaryingParameter
 from .receivers import AspectCall, Call, Delayed, Deliver, Sender, WovenSender, all_of
