@@ -56,6 +56,7 @@ def named(path: Path) -> Iterator[str]:
         yield from (str(getattr(node, name)) for name in ("id", "attr", "arg", "name", "module") if hasattr(node, name))
 
 
+@pytest.mark.slow
 def test_ptolemy_is_a_source_in_docstrings_and_nothing_else() -> None:
     """Nothing that runs knows it."""
     assert [str(path) for path in sources() if path.suffix == ".py" for each in named(path) if "tolemy" in each] == []

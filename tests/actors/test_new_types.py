@@ -222,6 +222,7 @@ def test_ports_that_there_are_not_and_those_that_are_missing(kind: str) -> None:
 CRASH = "aspects: {crash: {type: CrashRestart, at: it, times: [1.2 s], repair: 0.2 s}}"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ROWS)
 def test_snapshots_crashes_and_traces(kind: str) -> None:
     row, whole = ROWS[kind], {}

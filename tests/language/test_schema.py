@@ -311,6 +311,7 @@ LISTS = st.lists(SCALARS, max_size=3)
 VALUES = st.one_of(SCALARS, LISTS, st.lists(LISTS, max_size=3), st.just({"a": 1}))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("parameter", PARAMETERS, ids=lambda parameter: parameter._expected())
 @given(value=VALUES)
 def test_values_are_those_that_the_parameter_takes(parameter: Parameter[Any], value: Any) -> None:

@@ -245,6 +245,7 @@ EVERY = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "number", "actor", "feeds"), EVERY)
 def test_snapshots_and_crashes(kind: str, number: int, actor: str, feeds: Feeds) -> None:
     """A run that goes on from a snapshot is the whole one; after a crash that costs the state the actor begins anew."""

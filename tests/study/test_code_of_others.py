@@ -174,6 +174,7 @@ def test_a_key_that_others_can_read_seals_nothing(tmp_path: Path, capsys: pytest
     assert not place.has_run()
 
 
+@pytest.mark.slow
 def test_a_model_that_a_folder_of_somebody_else_names_is_not_read(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -136,6 +136,7 @@ def test_removal_moves_no_stream_of_others(aspect: Aspect, models: list[str], re
     record_property("pairs of aspect and model: removal moves nothing", pairs)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("aspect", OBSERVERS, ids=repr)
 def test_observers_only_observe(aspect: Aspect, record_property: Any) -> None:
     pairs = over_models(aspect, assert_observes_only)

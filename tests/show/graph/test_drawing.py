@@ -99,6 +99,7 @@ def test_two_nets_that_change_places_take_a_detour() -> None:
     assert (len(trunks), count) == (3, 3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", sorted(packaged_models()))
 @pytest.mark.parametrize(("depth", "expand"), [(None, False), (0, False), (None, True)])
 def test_packaged_models_are_drawn_right(name: str, depth: int | None, expand: bool) -> None:
