@@ -13,7 +13,7 @@ cdef class Director:
     cdef public long long firings, steps, _on_their_way, _most_times, _most_microsteps, _most_steps, _time
     cdef public long rank
     cdef public Instant present, _last, _next, _past
-    cdef public bint _is_interrupted
+    cdef public bint _is_interrupted, is_plain
     @cython.locals(last=Instant, time=cython.longlong)
     cpdef Instant now(self)
     cpdef wake(self, actor, long long time)
@@ -44,7 +44,9 @@ cdef class Director:
     @cython.locals(activation=Activation)
     cpdef Activation next_activation(self)
     cpdef bint has_reason(self, Activation activation) except -1
-    @cython.locals(activation=Activation, delivery=Delivery, place=cython.Py_ssize_t)
+    @cython.locals(
+        activation=Activation, delivery=Delivery, place=cython.Py_ssize_t, ready=ReadyQueue, is_plain=cython.bint
+    )
     cpdef handle(self, Instant instant)
     cpdef _wake_up(self, Activation activation, Wake wake)
     cpdef _begin(self, Instant instant)
@@ -58,5 +60,5 @@ cdef class Entry(Receiver):
     cdef public InputPort port
     cdef public object channel
     cdef public bint is_plain
-    @cython.locals(activation=Activation)
+    @cython.locals(activation=Activation, director=Director)
     cpdef put(self, token)

@@ -65,10 +65,10 @@ class Director:
     """Fires the actors of one run."""
 
     __slots__ = (
-        "_environment", "_is_interrupted", "_last", "_most_microsteps", "_most_steps",
-        "_most_times", "_next", "_on_their_way", "_past", "_queue", "_ready", "_reason", "_recent",
-        "_stop_after", "_time", "_times", "activations", "crowd", "events", "firings", "present", "rank",
-        "ranks", "seed", "steps", "streams", "watch",
+        "_environment", "_is_interrupted", "_last", "_most_microsteps", "_most_steps", "_most_times", "_next",
+        "_on_their_way", "_past", "_queue", "_ready", "_reason", "_recent", "_stop_after", "_time", "_times",
+        "activations", "crowd", "events", "firings", "is_plain", "present", "rank", "ranks", "seed", "steps",
+        "streams", "watch",
     )  # fmt: skip
 
     # The subclass of ``Directors`` that makes the borders of composites; None is the usual one.
@@ -99,6 +99,7 @@ class Director:
         self._next: Instant | None = None
         self._times = Calendar()
         self.rank = -1  # the rank of the activation handled now
+        self.is_plain = type(self) is Director  # a subclass may have another order
         self._stop_after: Tag | None = None
         self._reason = "no events left"
         self._recent: list[str] | None = None  # actors that fire while time seems to stand still
@@ -323,13 +324,21 @@ class Director:
             for delivery in instant.pending:
                 delivery.arrive()
             self._on_their_way -= len(instant.pending)
-        activation = None
+        activation, ready, is_plain = None, self._ready, self.is_plain
         try:
             while True:
-                activation = self.next_activation()
-                if activation is None:
+                if is_plain:  # as in next_activation and has_reason, without the calls: this happens for every firing
+                    if not ready.size:
+                        break
+                    activation = self.activations[ready.pop()]
+                    assert activation is not None
+                    activation.is_scheduled = False
+                    self.rank = activation.rank
+                    if activation.wake is not None and not self.use_wakes(activation):
+                        continue
+                elif (activation := self.next_activation()) is None:
                     break
-                if not self.has_reason(activation):
+                elif not self.has_reason(activation):
                     continue
                 if self.present is not instant:
                     self._begin(instant)
@@ -409,6 +418,11 @@ class Entry(Receiver):
         else:
             self.port.receive(token, self.channel)
         if not activation.is_scheduled:
-            self.director.schedule(activation)
+            director = self.director
+            if director.is_plain and director.present is not None:  # as in schedule, without the calls
+                activation.is_scheduled = True
+                director._ready.push(activation.rank)
+            else:
+                director.schedule(activation)
         elif not len(self.port.arrived) % REPORTED:
             self.director.crowd.add(self.director.tag, self.port.path, REPORTED)
