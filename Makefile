@@ -2,7 +2,7 @@
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
-PIP := $(BIN)/python -m pip --quiet --disable-pip-version-check
+INSTALL := $(BIN)/python -m pip --quiet --disable-pip-version-check install --no-compile # what is imported is compiled then
 USE := $(VENV)/installed
 DEV := $(VENV)/installed-dev
 DOCS := $(VENV)/installed-docs
@@ -110,21 +110,22 @@ $(LINKED): pyproject.toml | $(BIN)/python
 
 $(USE): pyproject.toml setup.py | $(BIN)/python $(LINKED)
 	@echo "Installing epicycle into $(VENV) (first time only, and when pyproject.toml changes)"
-	@$(PIP) install --editable .
+	@$(INSTALL) --editable .
 	@touch $@
 
 $(DEV): pyproject.toml setup.py | $(BIN)/python $(LINKED)
 	@echo "Installing epicycle[dev] into $(VENV) (first time only, and when pyproject.toml changes)"
-	@$(PIP) install --editable '.[dev]'
+	@$(INSTALL) --editable '.[dev]'
 	@touch $(USE) $@
 
 # The compiled core, for what makes many runs; where there is no compiler, all goes on in Python.
 $(CORE): setup.py actors/compiled.py | $(USE)
-	@echo "Compiling the core (a minute, the first time and after a change of the list of its modules)"
-	@EPICYCLE_BUILD=all $(PIP) install --editable .
+	@echo "Compiling the core and the robots' kernels (two minutes, the first time and after a change of their list)"
+	@EPICYCLE_BUILD=all $(INSTALL) --editable .
+	@$(BIN)/python -m epicycle.actors.robotics.numerics.warm_up
 	@touch $@
 
 $(DOCS): pyproject.toml setup.py | $(BIN)/python $(LINKED)
 	@echo "Installing epicycle[docs] into $(VENV) (first time only, and when pyproject.toml changes)"
-	@$(PIP) install --editable '.[docs]'
+	@$(INSTALL) --editable '.[docs]'
 	@touch $(USE) $@

@@ -290,9 +290,9 @@ def compiling() -> Iterator[Row]:
     """The first call of all kernels on a machine."""
     program = (
         "import time\n"
-        "from epicycle.actors.robotics.numerics.warm_up import compile_kernels\n"
+        "from epicycle.actors.robotics.numerics.warm_up import compile_now\n"
         "before = time.perf_counter()\n"
-        "compile_kernels()\n"
+        "compile_now()\n"
         "print(time.perf_counter() - before)\n"
     )
     paces = [pace()]

@@ -35,7 +35,7 @@ from tests.mutation.mutants import KERNELS, Mutant
 ROOT = Path(__file__).parents[2]
 CACHE = ROOT / ".mutants"
 # What has to do with compiling is tried with numba, and everything is compiled anew.
-COMPILERS = {"actors/robotics/numerics/compiled.py", "actors/core/elementary/in_numba.py"}
+COMPILERS = {"actors/robotics/numerics/jit.py", "actors/core/elementary/in_numba.py"}
 COMPILING = 120.0  # s, at most
 # Those that run the guarded folders in this process.
 TESTS = (
@@ -113,9 +113,9 @@ def warm_up(tree: Path) -> None:
         import pytest
 
         pytest.main([*trial.OPTIONS, "--collect-only", *TESTS])
-        from epicycle.actors.robotics.numerics.warm_up import compile_kernels
+        from epicycle.actors.robotics.numerics.warm_up import compile_now
 
-        compile_kernels()
+        compile_now()
         return True
 
     if trial.in_child(tree, True, 300.0, work)[0] is None:

@@ -121,8 +121,6 @@ def in_child(tree: Path, compiled: bool, limit: float, work: Callable[[], Any]) 
 
 def _settle(tree: Path, compiled: bool, limit: float) -> None:
     """Make this process one that was started in the copy."""
-    import numba
-
     os.chdir(tree)
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
     resource.setrlimit(resource.RLIMIT_CPU, (int(limit) + 1, int(limit) + 3))
@@ -133,7 +131,6 @@ def _settle(tree: Path, compiled: bool, limit: float) -> None:
         PYTEST_DISABLE_PLUGIN_AUTOLOAD="1",
         NUMBA_DISABLE_JIT=str(int(not compiled)),
     )
-    numba.config.DISABLE_JIT = int(not compiled)
     sys.path[:] = [str(tree), *(each for each in sys.path if each and Path(each) != ROOT)]
     ours = {path.stem for path in tree.iterdir()}
     for name in [name for name in sys.modules if name.partition(".")[0] in ours]:

@@ -22,8 +22,7 @@ import math
 import numpy as np
 
 from ...core.elementary import exp, hypot
-from .compiled import Array, inner, kernel
-from .entry import entry
+from .compiled import Array, entry, inner, kernel
 from .ukf import _KIND as KIND
 from .ukf import _OBSERVER as OBSERVER
 from .ukf import RANGE, _finite, _root, constant_velocity, measurement_noise, predict, sigma_points, update

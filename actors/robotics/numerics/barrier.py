@@ -25,9 +25,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .compiled import Array, borrower
+from .compiled import Array, borrower, entry
 from .constraints import BOUND, ROUNDING, VALUE
-from .entry import entry
 from .horizon import TOLERANCE, HorizonProblem, Solution
 from .newton import newton_step
 from .task import (

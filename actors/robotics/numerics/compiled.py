@@ -1,116 +1,145 @@
-"""How the kernels are compiled: numba, cached on disk, strict IEEE arithmetic (the same bits in every run)."""
+"""How the kernels are run: by Python at first, and compiled as soon as that pays.
+
+Compiling takes some 20 s, once for all runs; Python needs 8 s for a run that compiled kernels make in 30 ms.  So the
+first process that needs kernels takes them as they are written, unless its run is long; the next one compiles them.
+Both give the same bits.  Numba is heavy, and imported where it compiles or loads (``jit``).
+"""
 
 from __future__ import annotations
 
-import hashlib
-import logging
+import importlib
 import os
-import pickle
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
-from pathlib import Path
+import sys
+import time
+from collections.abc import Callable
 from typing import Any, TypeVar, cast
 
-import numba
 import numpy as np
-from numba.core import caching as _caching
 from numpy.typing import NDArray
 
-from ...core import elementary
-from ...core.elementary.in_numba import register
+from .kept import folder, mark
 
-config: Any = numba.config
 Array = NDArray[np.float64]  # the one array type of the kernels
-_LOGGER = logging.getLogger("epicycle")
-caching: Any = _caching
 Function = TypeVar("Function", bound=Callable[..., object])
 
-
-def options(**others: bool) -> dict[str, Any]:
-    """The options of every compilation, and ``others``; ``error_model="numpy"`` gives inf and NaN instead of
-    exceptions."""
-    return {"error_model": "numpy", "fastmath": False, **others}
+_LIMIT = 10.0  # s that a process spends in kernels as Python before it compiles them
 
 
-def _compiled(function: Function, **others: bool) -> Function:
-    """Strict, with explicit ``_nrt`` (whether references to arrays are counted): numba would otherwise use its
-    caller's.
+class _Ledger:
+    """What this process has spent in kernels as Python."""
 
-    The unused entry from C would take a tenth of the time of compiling.
-    """
-    compiler: Any = numba.njit
-    return cast(Function, compiler(**options(no_cfunc_wrapper=True, **others))(function))
+    def __init__(self) -> None:
+        self.spent = 0.0
+        self._limit: float | None = None  # not known before the first kernel is needed
+        self.is_open = False  # a kernel is being called
+        self.prepared: list[Callable[[], None]] = []  # what compiles the kernels that actors here need
 
+    def close(self) -> None:
+        """From now on, kernels are compiled."""
+        self._limit = 0.0
 
-def folder() -> Path:
-    """Where numba keeps compiled code; named after all sources of this package and of the elementary functions.
+    def allows(self) -> bool:
+        """Whether kernels are still run by Python: nobody did so before this process, and it has not spent much."""
+        if self._limit is None:
+            self._limit = 0.0 if (folder() / "python").exists() else _LIMIT
+            mark("python")
+        return self.spent < self._limit
 
-    By itself, numba checks only the file of a kernel, and would keep using old code that it calls from others.
-    """
-    if _FOLDER:  # the user's own, NUMBA_CACHE_DIR
-        above = Path(_FOLDER)
-    elif os.access(_HERE, os.W_OK):
-        above = _HERE / "__pycache__"
-    else:
-        above = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "epicycle"
-    return above / _SOURCES
+    def prepare(self) -> None:
+        """Compile what actors asked for."""
+        while self.prepared:
+            self.prepared.pop(0)()
 
-
-@contextmanager
-def cached() -> Iterator[None]:
-    """Kernels declared in this context are cached in the ``folder``, with checksums."""
-    before = config.CACHE_DIR, caching.IndexDataCacheFile
-    config.CACHE_DIR, caching.IndexDataCacheFile = str(folder()), _Checked
-    try:
-        yield
-    finally:
-        config.CACHE_DIR, caching.IndexDataCacheFile = before
-
-
-def kernel(function: Function, counts: bool = True) -> Function:
-    """Compile a pure function on arrays."""
-    with cached():
-        return _compiled(function, cache=True, _nrt=counts)
-
-
-_Kept: Any = caching.IndexDataCacheFile
-
-
-class _Checked(_Kept):  # type: ignore[misc]
-    """Compiled code on disk with its checksum; what is damaged is compiled again, and what cannot be kept is not."""
-
-    def load(self, key: object) -> Any:
-        """The code for a signature; None if there is none, or none that is whole."""
+    def call(self, function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
+        """What a kernel gives as Python; kernels that it calls are counted with it."""
+        began, self.is_open = time.perf_counter(), True
         try:
-            if (found := super().load(key)) is None:
-                return None
-            digest, data = found
-            if digest == hashlib.sha256(data).digest():
-                return pickle.loads(data)
-            damage = "it does not match its checksum"
-        except Exception as error:  # unpickling bytes that were damaged may raise anything
-            damage = f"{type(error).__name__}: {error}"
-        _LOGGER.warning("compiled code in %s is damaged (%s) and is made again", self._index_path, damage)
-        with suppress(OSError):
-            self.flush()
-        return None
+            with np.errstate(all="ignore"):
+                return function(*arguments)
+        finally:
+            self.is_open = False
+            self.spent += time.perf_counter() - began
 
-    def save(self, key: object, data: object) -> None:
-        """Keep the code for a signature."""
-        written = self._dump(data)
-        try:
-            super().save(key, (hashlib.sha256(written).digest(), written))
-        except Exception as error:  # such as a full disk; the index may be damaged
-            _LOGGER.warning("compiled code cannot be kept in %s: %s", self._index_path, error)
+
+LEDGER = _Ledger()
+
+
+class Kernel:
+    """A kernel that Python runs until it is worth compiling."""
+
+    def __init__(self, function: Callable[..., Any], compiled: Callable[[], Any]) -> None:
+        self.__module__, self.__name__, self.__doc__ = function.__module__, function.__name__, function.__doc__
+        self._function = function
+        self._compile = compiled
+        self._compiled: Any = None
+
+    def __call__(self, *arguments: Any) -> Any:
+        if self._compiled is None:
+            if LEDGER.is_open:
+                return self._function(*arguments)
+            try:
+                if LEDGER.allows():
+                    return LEDGER.call(self._function, arguments)
+            except (ArithmeticError, ValueError):  # where compiled code gives inf or NaN
+                LEDGER.close()
+            LEDGER.prepare()
+            self._compiled = self._compile()
+        return self._compiled(*arguments)
+
+    def __reduce__(self) -> Any:
+        return kernel_of, (self.__module__, self.__name__)
+
+    @property
+    def _numba_type_(self) -> Any:
+        """As numba sees it where a kernel calls another."""
+        return jit().typed(self._function)
+
+
+def kernel_of(module: str, name: str) -> Any:
+    """A kernel by its name."""
+    return getattr(importlib.import_module(module), name)
+
+
+def _made(function: Function, compiled: Callable[[], Any]) -> Function:
+    if IS_PYTHON:
+        return function
+    return compiled() if IS_READY else cast(Function, Kernel(function, compiled))
+
+
+def kernel(function: Function) -> Function:
+    """A pure function on arrays that Python calls."""
+    return _made(function, lambda: jit().dispatcher(function))
+
+
+def entry(signature: str) -> Callable[[Function], Function]:
+    """A ``kernel`` that Python calls often, with the types of a numba signature.
+
+    It takes and returns floats, ints, bools, and contiguous arrays of floats.
+    """
+
+    def decorate(function: Function) -> Function:
+        def compiled() -> Any:
+            jit()
+            from .entry import entered_by_address
+
+            return entered_by_address(function, signature)
+
+        return _made(function, compiled)
+
+    return decorate
+
+
+def _called_by_kernels(function: Function, **options: bool) -> Function:
+    _declare(lambda jit: jit.callable_from_kernels(function, **options))
+    return function
 
 
 def inner(function: Function) -> Function:
-    """Like ``kernel``, for functions that only kernels call: without the entry from Python, which takes long to
-    compile.
+    """A function that only kernels call: without an entry from Python, which takes long to compile.
 
     It is not cached on disk by itself, as the cached code of every calling kernel contains it.
     """
-    return _compiled(function, no_cpython_wrapper=True, _nrt=True)
+    return _called_by_kernels(function, _nrt=True)
 
 
 def borrower(function: Function) -> Function:
@@ -119,16 +148,39 @@ def borrower(function: Function) -> Function:
 
     Counting is an atomic operation for each array of a tuple at each call; it took a third of a solve.
     """
-    return _compiled(function, no_cpython_wrapper=True, _nrt=False)
+    return _called_by_kernels(function, _nrt=False)
 
 
 def inlined(function: Function) -> Function:
     """A ``borrower`` that is inlined in its callers, for calls in long loops."""
-    return _compiled(function, no_cpython_wrapper=True, _nrt=False, forceinline=True)
+    return _called_by_kernels(function, _nrt=False, forceinline=True)
 
 
-_HERE = Path(__file__).parent
-_FILES = [path for folder in (_HERE, Path(elementary.__file__).parent) for path in sorted(folder.glob("*.py"))]
-_FOLDER = config.CACHE_DIR
-_SOURCES = hashlib.sha256(b"".join(path.read_bytes() for path in _FILES)).hexdigest()[:16]
-register()
+def in_kernels(function: Callable[..., Any]) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """What stands for a function in compiled code: given the types of its arguments, a function of the same."""
+
+    def decorate(typed: Callable[..., Any]) -> Callable[..., Any]:
+        _declare(lambda jit: jit.overloaded(function, typed))
+        return typed
+
+    return decorate
+
+
+def _declare(declaration: Callable[[Any], None]) -> None:
+    _DECLARED.append(declaration)
+    if IS_READY or f"{__package__}.jit" in sys.modules:
+        jit()
+
+
+def jit() -> Any:
+    """The module that compiles, which knows all that is declared so far."""
+    from . import jit as module
+
+    while _DECLARED:
+        _DECLARED.pop(0)(module)
+    return module
+
+
+IS_PYTHON = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
+IS_READY = not IS_PYTHON and (folder() / "compiled").exists()
+_DECLARED: list[Callable[[Any], None]] = []

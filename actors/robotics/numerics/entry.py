@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from types import FunctionType
-from typing import Any, TypeVar, cast
+from typing import Any
 
 import numba.core.cgutils
 import numba.core.sigutils
@@ -17,11 +17,8 @@ import numba.extending
 import numba.np.arrayobj
 
 from ..arrays import entered
-from .compiled import cached, config, kernel, options
+from .jit import cached, dispatcher, options, types
 
-Function = TypeVar("Function", bound=Callable[..., object])
-# numba's declarations of their types are not sufficient.
-types: Any = numba.types
 _code: Any = numba.core.cgutils
 _arrays: Any = numba.np.arrayobj
 _signatures: Any = numba.core.sigutils
@@ -29,20 +26,10 @@ _extending: Any = numba.extending
 _KINDS = {types.float64: "d", types.int64: "i", types.boolean: "b"}
 
 
-def entry(signature: str) -> Callable[[Function], Function]:
-    """A ``kernel`` that Python calls often, with the types of a numba signature.
-
-    It takes and returns floats, ints, bools, and contiguous arrays of floats.
-    """
-
-    def decorate(function: Function) -> Function:
-        jitted: Any = kernel(function)
-        if config.DISABLE_JIT:
-            return function
-        takes, gives = _signatures.normalize_signature(signature)
-        return cast(Function, entered(jitted, lambda: _compile(function, takes), _kinds(takes), _kinds(_each(gives))))
-
-    return decorate
+def entered_by_address(function: Callable[..., Any], signature: str) -> Any:
+    """A kernel with the types of a numba signature, called by its address where the compiled core is there."""
+    takes, gives = _signatures.normalize_signature(signature)
+    return entered(dispatcher(function), lambda: _compile(function, takes), _kinds(takes), _kinds(_each(gives)))
 
 
 def _each(gives: Any) -> Any:
@@ -57,7 +44,7 @@ def _compile(function: Any, takes: Any) -> Any:
     """The code of ``_enter`` for a kernel, with its ``address``; it is in the cache as a part of its module."""
     compiler: Any = numba.njit
     names = {
-        "_kernel": compiler(**options(_nrt=True, no_cpython_wrapper=True, no_cfunc_wrapper=True))(function),
+        "_kernel": compiler(**options(no_cpython_wrapper=True))(function),
         "_taken": _reader(takes),
         "_put": _extending.intrinsic(_write),
         "__name__": function.__module__,
@@ -68,7 +55,7 @@ def _compile(function: Any, takes: Any) -> Any:
     )
     enter.__qualname__ = f"{function.__name__}_entry"
     with cached():
-        return numba.cfunc("i8(CPointer(i8))", cache=True, **options(_nrt=True))(enter)
+        return numba.cfunc("i8(CPointer(i8))", cache=True, **options())(enter)
 
 
 def _enter(words: Any) -> int:

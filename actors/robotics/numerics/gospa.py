@@ -10,8 +10,7 @@ import math
 import numpy as np
 
 from ...core.elementary import hypot
-from .compiled import Array, inner
-from .entry import entry
+from .compiled import Array, entry, inner
 
 
 @inner

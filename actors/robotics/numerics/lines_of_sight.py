@@ -12,8 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...core.elementary import hypot
-from .compiled import Array, borrower, inner, kernel
-from .entry import entry
+from .compiled import Array, borrower, entry, inner, kernel
 from .ukf import (
     RANGE,
     _add_congruence,

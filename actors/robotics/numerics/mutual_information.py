@@ -16,8 +16,7 @@ import math
 import numpy as np
 
 from ...core.elementary import exp, hypot, log
-from .compiled import Array, borrower, inlined
-from .entry import entry
+from .compiled import Array, borrower, entry, inlined
 from .vectors import (
     Term,
     Vector,

@@ -7,8 +7,7 @@ import math
 
 import numpy as np
 
-from .compiled import Array, inner, kernel
-from .entry import entry
+from .compiled import Array, entry, inner, kernel
 from .horizon import trajectory
 from .ukf import congruence, constant_velocity, mapped, predict, sigma_points
 

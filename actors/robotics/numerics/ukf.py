@@ -7,8 +7,7 @@ import math
 import numpy as np
 
 from ...core.elementary import hypot
-from .compiled import Array, borrower, inner, kernel
-from .entry import entry
+from .compiled import Array, borrower, entry, inner, kernel
 
 RELATIVE_POSITION = 0
 RANGE = 1

@@ -13,11 +13,8 @@ import math
 from collections.abc import Callable
 from typing import Any
 
-import numba.cpython.unsafe.tuple
-import numba.extending
-
 from ...core.elementary import hypot
-from .compiled import Array, borrower, inlined
+from .compiled import Array, borrower, in_kernels, inlined
 
 Vector = tuple[float, ...]  # d numbers
 Matrix = tuple[float, ...]  # d * d
@@ -25,19 +22,18 @@ Symmetric = tuple[float, ...]  # d (d + 1) / 2
 Quadratic = tuple[float, ...]  # d, then d (d + 1) / 2
 Term = tuple[float, ...]  # 1, then those of a quadratic function
 
-_extending: Any = numba.extending
-_tuples: Any = numba.cpython.unsafe.tuple
-_set = _tuples.tuple_setitem
-
 
 def replaced(values: Vector, place: int, value: float) -> Vector:
     """The tuple with another value at one place."""
     return (*values[:place], value, *values[place + 1 :])
 
 
-@_extending.overload(replaced, strict=False)  # type: ignore[untyped-decorator]
+@in_kernels(replaced)
 def _replaced(values: Any, place: Any, value: Any) -> Any:
-    return lambda values, place, value: _set(values, place, value)  # noqa: PLW0108 - numba reads its names
+    from numba.cpython.unsafe import tuple as tuples
+
+    set_item: Any = tuples.tuple_setitem
+    return lambda values, place, value: set_item(values, place, value)  # noqa: PLW0108 - numba reads its names
 
 
 @inlined
@@ -58,11 +54,11 @@ def _zeros(size_of: Callable[[int], int]) -> Callable[[Vector], Vector]:
     def zeros(vector: Vector) -> Vector:
         return (0.0,) * size_of(len(vector))
 
-    def typed(vector: Any) -> Any:
+    @in_kernels(zeros)
+    def _(vector: Any) -> Any:
         made = (0.0,) * size_of(vector.count)
         return lambda vector: made
 
-    _extending.overload(zeros, strict=False)(typed)
     return zeros
 
 

@@ -9,15 +9,16 @@ import os
 import subprocess
 import sys
 import threading
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 import numpy as np
 
 from .barrier import solve
-from .compiled import config, folder
+from .compiled import IS_PYTHON, IS_READY, LEDGER
 from .definitions import INFORM
 from .horizon import HorizonProblem
+from .kept import folder, mark
 from .mutual_information import pairwise_distance
 from .reachability import expected_target, peer_tubes, standing_plan
 from .ukf import constant_velocity, fuse_images, predict_and_fuse, sigma_points
@@ -33,24 +34,42 @@ def compile_kernels(dimensions: int = 2) -> None:
 
     All take any number of dimensions but the solver, which is compiled for the plane and for space by itself.
     """
-    with _announced("compiling the numeric kernels (once, about 20 s) ..."):
-        _call_every_kernel(dimensions)
+    _prepare("the numeric kernels", functools.partial(_call_every_kernel, dimensions))
 
 
 @functools.cache
 def compile_tracking() -> None:
     """The same for the kernels of a tracker, which other models do not need."""
     compile_kernels()
-    with _announced("compiling the kernels of the tracker (once, about 20 s) ..."):
-        _call_tracking()
+    _prepare("the kernels of the tracker", _call_tracking)
 
 
 @functools.cache
 def compile_retreats() -> None:
     """The same for the kernels of a main robot that keeps a retreat open, and of its filter."""
     compile_kernels()
-    with _announced("compiling the kernels of the safe robot (once, about 20 s) ..."):
-        _call_retreats()
+    _prepare("the kernels of the safe robot", _call_retreats)
+
+
+def compile_now() -> None:
+    """Compile the kernels of the plane for all later processes: ``python -m`` this module."""
+    LEDGER.close()
+    compile_kernels()
+
+
+def _prepare(what: str, call: Callable[[], None]) -> None:
+    """Compile some kernels before time starts, or as soon as Python has run kernels for long enough."""
+
+    def compile_them() -> None:
+        with _announced(f"compiling {what} (once, about 20 s) ..."):
+            call()
+
+    if IS_PYTHON:
+        return
+    if IS_READY or not LEDGER.allows():
+        compile_them()
+    else:
+        LEDGER.prepared.append(compile_them)
 
 
 @contextmanager
@@ -73,6 +92,7 @@ def _call_every_kernel(dimensions: int) -> None:
     with _others_meanwhile():
         _call_solver(dimensions)
     call_others()
+    mark("compiled")
 
 
 @contextmanager
@@ -82,10 +102,10 @@ def _others_meanwhile() -> Iterator[None]:
     Both write to the same cache, each the code of kernels that the other does not need.  If the second one fails,
     everything is compiled here.
     """
-    if config.DISABLE_JIT or (os.cpu_count() or 1) == 1 or any(folder().rglob("*.nbc")):
+    if (os.cpu_count() or 1) == 1 or any(folder().rglob("*.nbc")):
         yield
         return
-    program = f"from {__name__} import call_others; call_others()"
+    program = f"from {__spec__.name} import LEDGER, call_others; LEDGER.close(); call_others()"
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
     null = subprocess.DEVNULL
     try:
@@ -149,3 +169,7 @@ def _call_retreats() -> None:
     reaches = retreat.support(one, mean, covariance, 0.0, 1.0, 1.0)
     retreat.best_retreat(one, reaches, zero, zero, zero, 1.0, 2.0, 1.0, 0.1)
     retreat.kept_distance(1.0, 0.0, 0.0, zero, zero, zero, 1.0, 2.0, 1.0, 0.1)
+
+
+if __name__ == "__main__":
+    compile_now()

@@ -126,7 +126,7 @@ def test_clusters_are_independent(random: np.random.Generator) -> None:
         found, rough = association.association_probabilities(np.column_stack([missed, likelihood / 0.3]))
         assert found == pytest.approx(definitions.association(missed, likelihood, 0.3), abs=1e-12)
         assert rough == 0
-        sizes.add(len(np.unique(association._labels.py_func(np.column_stack([missed, likelihood])))))
+        sizes.add(len(np.unique(association._labels(np.column_stack([missed, likelihood])))))
     assert sizes == {1, 2, 3, 4, 5}
 
 
@@ -214,7 +214,7 @@ def test_gospa(random: np.random.Generator) -> None:
     for _ in range(50):  # larger than can be listed
         costs = random.uniform(size=(12, 30))
         rows, columns = linear_sum_assignment(costs)
-        chosen = kernels._least_cost.py_func(costs).astype(int)
+        chosen = kernels._least_cost(costs).astype(int)
         assert costs[rows, chosen].sum() == pytest.approx(costs[rows, columns].sum())
 
 

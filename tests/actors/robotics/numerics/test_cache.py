@@ -21,13 +21,14 @@ def twice(number):
 """
 USER = """
 import numba
-from .compiled import cached, kernel, options
+from .compiled import kernel
 from .inner import twice
+from .jit import cached, options
 @kernel
 def twice_and(number):
     return twice(number) + 1.0
 with cached():
-    numba.cfunc("f8(f8)", cache=True, **options(_nrt=True))(lambda number: twice(number))
+    numba.cfunc("f8(f8)", cache=True, **options())(lambda number: twice(number))
 """
 
 
@@ -37,10 +38,12 @@ def packed(folder: Path) -> Path:
     package.mkdir()
     (package / "__init__.py").touch()
     # Here it stands in no package of ours, whose elementary functions it finds by their full name.
-    source = (SOURCES / "compiled.py").read_text("utf-8").replace("from ...core", "from epicycle.actors.core")
-    (package / "compiled.py").write_text(source, "utf-8")
+    for name in ("compiled.py", "jit.py", "kept.py"):
+        source = (SOURCES / name).read_text("utf-8").replace("from ...core", "from epicycle.actors.core")
+        (package / name).write_text(source, "utf-8")
     (package / "user.py").write_text(USER)
     (package / "inner.py").write_text(INNER.format(factor="2.0"))
+    assert result(package) == ("3.0", "")  # as Python
     assert result(package) == ("3.0", "")
     return package
 
@@ -70,6 +73,7 @@ def test_a_kernel_is_compiled_anew_when_what_it_calls_has_changed(package: Path)
     assert result(package) == ("3.0", "")
     assert len(list(package.glob("__pycache__/*/*/*.nbc"))) == 2  # the one that was there
     (package / "inner.py").write_text(INNER.format(factor="3.0"))
+    assert result(package) == ("4.0", "")  # as Python
     assert result(package) == ("4.0", "")
     assert len(list(package.glob("__pycache__/*/*/*.nbc"))) == 4
 
