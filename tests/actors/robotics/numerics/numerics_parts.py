@@ -8,9 +8,7 @@ import numpy as np
 import pytest
 
 PREFIX = "epicycle.actors.robotics.numerics."
-importlib.import_module(
-    PREFIX + "compiled"
-).jit()  # which functions compiled here may call
+importlib.import_module(PREFIX + "compiled").jit()  # which functions compiled here may call
 barrier = importlib.import_module(PREFIX + "barrier")
 definitions = importlib.import_module(PREFIX + "definitions")
 horizon = importlib.import_module(PREFIX + "horizon")

@@ -21,14 +21,13 @@ def twice(number):
 """
 USER = """
 import numba
-from .compiled import kernel
+from .compiled import jit, kernel
 from .inner import twice
-from .jit import cached, options
 @kernel
 def twice_and(number):
     return twice(number) + 1.0
-with cached():
-    numba.cfunc("f8(f8)", cache=True, **options())(lambda number: twice(number))
+with jit().cached():
+    numba.cfunc("f8(f8)", cache=True, **jit().options())(lambda number: twice(number))
 """
 
 
