@@ -28,84 +28,37 @@ if TYPE_CHECKING:
         Tracks,
     )
     from .vehicles import Pose
-else:
-    from .accumulation import Accumulator, Counter, Derivative, Difference, Integrator, TimeAverage
-    from .arithmetic import AddSubtract, Extreme, MathFunction, MultiplyDivide, Scale
-    from .distributions import (
-        Bernoulli,
-        Binomial,
-        Cauchy,
-        ChiSquare,
-        Choice,
-        Constant,
-        Distribution,
-        Exponential,
-        Gamma,
-        LogNormal,
-        NegativeBinomial,
-        Normal,
-        Poisson,
-        RandomInteger,
-        StudentT,
-        Triangular,
-        Uniform,
-        VonMises,
-    )
-    from .flow import BooleanSwitch, Merge, MostRecent, Repeat, Router, Sampler, Select, Switch, Synchronizer
-    from .functions import Expression, Function, LookupTable
-    from .logic import Comparator, Equals, LogicGate
-    from .passing import (
-        BooleanSelect,
-        Changes,
-        Commutator,
-        Default,
-        Filter,
-        FirstOfInstant,
-        Inhibit,
-        IsPresent,
-        LatestOfAll,
-        Previous,
-        Register,
-        Sequencer,
-    )
-    from .queues import Queue, Server, SharedQueue
-    from .replay import Replay, ReplayError
-    from .sinks import Display, Histogram, Recorder, Stop, Test
-    from .sources import Clock, PoissonClock, Random, SingleEvent, VaryingRandom
-    from .statistics import MovingAverage, MovingStatistics
-    from .timing import ResettableTimer, TimeCompare, TimeDelay, TimeGap, Timer, WaitingTime
-    from .triggered import Const, CurrentMicrostep, CurrentTime, Pulse, Ramp, Sequence
-    from .variables import SetVariable, Variable
 
 __all__ = [
     "ABSENT", "CORE", "CORE_MODULES", "CORE_REASON", "FORMER", "MAX_DEPTH", "NANOSECONDS_PER_SECOND", "NEVER",
     "NO_TOKENS", "ODE", "PID", "REQUIRED", "Accumulator", "Ackermann", "Actor", "AddSubtract", "ArqReceiver",
     "ArqSender", "Barrier", "Batch", "Beliefs", "Bernoulli", "Binomial", "BlockExpression", "BodyState",
     "BooleanSelect", "BooleanSwitch", "BroadcastChannel", "Butterworth", "Calendar", "Casadi", "Cauchy", "Changes",
-    "ChannelError", "ChiSquare", "Choice", "CircularMotion", "ClearanceMonitor", "Clock", "Collect", "Commutator",
-    "Comparator", "Configurable", "Const", "Constant", "Context", "Counter", "CurrentMicrostep", "CurrentTime",
-    "DeadZone", "Default", "Derivative", "Detections", "Difference", "DiscreteFilter", "Display", "DistanceMonitor",
-    "Distribution", "DoubleIntegrator", "Dynamics", "Emitter", "Environment", "EpicycleError", "Equals", "Estimate",
-    "Estimator", "Events", "Exponential", "Expression", "ExtendedEstimator", "Extreme", "Fault", "FaultError", "Filter",
-    "FilterDesign", "FilterError", "FilterPyEstimator", "FirstOfInstant", "FirstOrder", "Flooding", "Function", "Gamma",
-    "GoalMonitor", "Histogram", "HoldingExpression", "Host", "Hysteresis", "InertialSensor", "Inform", "Inhibit",
-    "InputPort", "IntegratedOUEstimator", "Integrator", "IsPresent", "JPDATracker", "Latest", "LatestOfAll", "Limiter",
-    "Link", "LogNormal", "LogicGate", "LookupTable", "Machine", "MappingParameter", "Match", "MathFunction",
-    "Measurement", "Merge", "ModalActor", "Mode", "Moment", "MostRecent", "MotionState", "MovingAverage",
-    "MovingStatistics", "MultiTargetSensor", "MultiplyDivide", "NegativeBinomial", "NetworkSwitch", "Normal",
-    "Objective", "Observation", "OutputPort", "Parameter", "ParameterError", "ParticleEstimator", "Pending", "Plan",
-    "Poisson", "PoissonClock", "Pool", "Pools", "PortError", "PortParameter", "Pose", "Previous", "Problem", "Process",
-    "Pulse", "Quantity", "Quantizer", "Queue", "Ramp", "Random", "RandomInteger", "RangeBearingSensor", "RangeScanner",
-    "ReachGoal", "ReadyQueue", "Receiver", "RecordAssembler", "RecordDisassembler", "Recorder", "Register", "Repeat",
-    "Replay", "ReplayError", "ResettableTimer", "RobustController", "Router", "SafeController", "SampledEstimate",
-    "Sampler", "Scale", "Select", "Sensor", "SensorModel", "SeparationMonitor", "Sequence", "Sequencer", "Server",
-    "SetFields", "SetVariable", "SharedQueue", "SingleEvent", "Solver", "Span", "Spread", "StateMachine", "StateSpace",
-    "Station", "StayNear", "Stop", "Stream", "Streams", "StudentT", "Switch", "Synchronizer", "Tag", "Test",
-    "TextFunction", "TimeAverage", "TimeCompare", "TimeDelay", "TimeGap", "TimedQueue", "Timer", "TrackingError",
-    "Tracks", "Trajectory", "TransferFunction", "Triangular", "Unbatch", "Unicycle", "Uniform", "UnitError",
-    "UnscentedEstimator", "Variable", "VaryingRandom", "Vehicle", "VonMises", "WaitingLine", "WaitingTime", "Wake",
-    "WaypointFollower", "WaypointMotion", "abridged", "accepts", "array_parameter", "bounds_text", "brief", "convert",
-    "counted", "counted_in_si", "cut", "declared_parameters", "declared_ports", "did_you_mean", "digits", "elementary",
+    "Changing", "ChannelError", "ChiSquare", "Choice", "CircularMotion", "ClearanceMonitor", "Clock", "Collect",
+    "Commutator", "Comparator", "Configurable", "Const", "Constant", "Context", "Counter", "CurrentMicrostep",
+    "CurrentTime", "DeadZone", "Default", "Derivative", "Detections", "Difference", "DiscreteFilter", "Display",
+    "DistanceMonitor", "Distribution", "DoubleIntegrator", "Dynamics", "Emitter", "Environment", "EpicycleError",
+    "Equals", "Estimate", "Estimator", "Events", "Exponential", "Expression", "ExtendedEstimator", "Extreme", "Fault",
+    "FaultError", "Filter", "FilterDesign", "FilterError", "FilterPyEstimator", "FirstOfInstant", "FirstOrder",
+    "Flooding", "Function", "Gamma", "GoalMonitor", "Histogram", "HoldingExpression", "Host", "Hysteresis",
+    "InertialSensor", "Inform", "Inhibit", "InputPort", "IntegratedOUEstimator", "Integrator", "IsPresent",
+    "JPDATracker", "Latest", "LatestOfAll", "Limiter", "Link", "LogNormal", "LogicGate", "LookupTable", "Machine",
+    "MappingParameter", "Match", "MathFunction", "Measurement", "Merge", "ModalActor", "Mode", "Moment", "MostRecent",
+    "MotionState", "MovingAverage", "MovingStatistics", "MultiTargetSensor", "MultiplyDivide", "NegativeBinomial",
+    "NetworkSwitch", "Normal", "Objective", "Observation", "OutputPort", "Parameter", "ParameterError",
+    "ParticleEstimator", "Pending", "Plan", "Poisson", "PoissonClock", "Pool", "Pools", "PortError", "PortParameter",
+    "Pose", "Previous", "Problem", "Process", "Pulse", "Quantity", "Quantizer", "Queue", "Queues", "Ramp", "Random",
+    "RandomInteger", "RangeBearingSensor", "RangeScanner", "ReachGoal", "ReadyQueue", "Receiver", "RecordAssembler",
+    "RecordDisassembler", "Recorder", "Register", "Repeat", "Replay", "ReplayError", "ResettableTimer",
+    "RobustController", "Router", "SafeController", "SampledEstimate", "Sampler", "Scale", "Select", "Sensor",
+    "SensorModel", "SeparationMonitor", "Sequence", "Sequencer", "Server", "SetFields", "SetVariable", "SharedQueue",
+    "SingleEvent", "Solver", "Span", "Spread", "StateMachine", "StateSpace", "Station", "StayNear", "Stop", "Stream",
+    "Streams", "StudentT", "Switch", "Synchronizer", "Tag", "Test", "TextFunction", "TimeAverage", "TimeCompare",
+    "TimeDelay", "TimeGap", "TimedQueue", "Timer", "TrackingError", "Tracks", "Trajectory", "TransferFunction",
+    "Triangular", "Unbatch", "Unicycle", "Uniform", "UnitError", "UnscentedEstimator", "Variable", "VaryingRandom",
+    "Vehicle", "VonMises", "WaitingLine", "WaitingTime", "Wake", "WaypointFollower", "WaypointMotion", "abridged",
+    "accepts", "any_parameter", "array_parameter", "below_nanoseconds", "bounds_text", "brief", "convert", "counted",
+    "counted_in_si", "cut", "declared_parameters", "declared_ports", "did_you_mean", "digits", "elementary",
     "found_variants", "has_own_ports", "in_si", "irregular", "is_alone", "is_too_deep", "nearest", "new_tag",
     "new_wake", "normal_quantile", "normal_share", "on_entry", "on_exit", "open_regular", "parse_unit", "part_finders",
     "paths", "plain", "present", "random_stream", "read_regular", "read_table", "readable", "rounds", "shaped",
@@ -114,22 +67,46 @@ __all__ = [
 ]  # fmt: skip
 
 
-# Modules of the names in __all__ that are imported on first use: few models need them, and with the robots and the
-# solvers of differential equations they take as long as everything else.
-_LATER = {
+# Modules of the other names in __all__, which are imported on first use: a model needs few of them, and all together
+# take as long as everything else.  What is not here is in ``robotics``.
+_MODULES = {
+    ".accumulation": ("Accumulator", "Counter", "Derivative", "Difference", "Integrator", "TimeAverage"),
+    ".arithmetic": ("AddSubtract", "Extreme", "MathFunction", "MultiplyDivide", "Scale"),
     ".blocks": ("BlockExpression", "HoldingExpression"),
     ".continuous": ("ODE",),
     ".control": (
         "PID", "Butterworth", "DeadZone", "DiscreteFilter", "FilterDesign", "FirstOrder", "Hysteresis", "Limiter",
         "Quantizer", "StateSpace", "TransferFunction",
     ),
+    ".distributions": (
+        "Bernoulli", "Binomial", "Cauchy", "ChiSquare", "Choice", "Constant", "Distribution", "Exponential", "Gamma",
+        "LogNormal", "NegativeBinomial", "Normal", "Poisson", "RandomInteger", "StudentT", "Triangular", "Uniform",
+        "VonMises",
+    ),
     ".entities": (
         "Batch", "Collect", "Match", "RecordAssembler", "RecordDisassembler", "SetFields", "Spread", "Unbatch",
     ),
+    ".flow": (
+        "BooleanSwitch", "Merge", "MostRecent", "Repeat", "Router", "Sampler", "Select", "Switch", "Synchronizer",
+    ),
+    ".functions": ("Expression", "Function", "LookupTable"),
     ".links": ("ArqReceiver", "ArqSender", "Link", "NetworkSwitch"),
+    ".logic": ("Comparator", "Equals", "LogicGate"),
     ".modes": ("ModalActor", "Mode", "StateMachine", "on_entry", "on_exit", "transition"),
+    ".passing": (
+        "BooleanSelect", "Changes", "Commutator", "Default", "Filter", "FirstOfInstant", "Inhibit", "IsPresent",
+        "LatestOfAll", "Previous", "Register", "Sequencer",
+    ),
+    ".queues": ("Queue", "Server", "SharedQueue"),
+    ".replay": ("Replay", "ReplayError"),
     ".resources": ("Machine", "Pool", "Pools", "Station", "WaitingLine"),
+    ".sinks": ("Display", "Histogram", "Recorder", "Stop", "Test"),
+    ".sources": ("Clock", "PoissonClock", "Random", "SingleEvent", "VaryingRandom"),
+    ".statistics": ("MovingAverage", "MovingStatistics"),
     ".texts": ("TextFunction",),
+    ".timing": ("ResettableTimer", "TimeCompare", "TimeDelay", "TimeGap", "Timer", "WaitingTime"),
+    ".triggered": ("Const", "CurrentMicrostep", "CurrentTime", "Pulse", "Ramp", "Sequence"),
+    ".variables": ("SetVariable", "Variable"),
     ".vehicles": (
         "Ackermann", "InertialSensor", "Pose", "RangeBearingSensor", "RangeScanner", "Unicycle", "WaypointFollower",
     ),
@@ -148,7 +125,7 @@ def __getattr__(name: str) -> Any:
     if name not in __all__:
         former = f": {FORMER[name]}" if name in FORMER else ""
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}{former}")
-    module = next((module for module, names in _LATER.items() if name in names), ".robotics")
+    module = next((module for module, names in _MODULES.items() if name in names), ".robotics")
     found = globals()[name] = getattr(import_module(module, __name__), name)
     return found
 

@@ -45,10 +45,10 @@ class Accumulator(Actor):
     reset = InputPort(multi=True, required=False, doc="resets the sum, before the tokens of the tag are added")
     output = OutputPort(float, doc="the sum, sent for each round of tokens and at a reset")
 
-    initial: Parameter[float] = Parameter(int | float, 0, doc="the sum at the start and after a reset")
+    initial = Parameter(int | float, 0, doc="the sum at the start and after a reset")
     reset_by = Parameter(str, "any", choices=("any", "true"), doc="which tokens reset: any, or only true ones")
-    low: Parameter[float | None] = Parameter(int | float, None, doc="the lowest value of the sum")
-    high: Parameter[float | None] = Parameter(int | float, None, doc="the highest value of the sum")
+    low = Parameter(int | float, None, doc="the lowest value of the sum")
+    high = Parameter(int | float, None, doc="the highest value of the sum")
 
     def initialize(self) -> None:
         self._sum = self.initial
@@ -184,7 +184,7 @@ class Difference(Actor):
     input = InputPort(float, doc="the numbers")
     output = OutputPort(float, doc="x[k] - x[k-1]")
 
-    initial: Parameter[float | None] = Parameter(int | float, None, doc="used as the token before the first")
+    initial = Parameter(int | float, None, doc="used as the token before the first")
 
     def initialize(self) -> None:
         self._before = self.initial

@@ -92,8 +92,8 @@ class Scale(Actor):
     input = InputPort(float, doc="the numbers to multiply")
     output = OutputPort(float, doc="factor * input + offset")
 
-    factor: PortParameter[float] = PortParameter(int | float, 1, doc="what each token is multiplied by")
-    offset: PortParameter[float] = PortParameter(int | float, 0, doc="what is added to the product")
+    factor = PortParameter(int | float, 1, doc="what each token is multiplied by")
+    offset = PortParameter(int | float, 0, doc="what is added to the product")
 
     def fire(self) -> None:
         for token in self.input.tokens:

@@ -14,6 +14,7 @@ from .core import (
     OutputPort,
     Parameter,
     ParameterError,
+    any_parameter,
     brief,
     rounds,
 )
@@ -79,7 +80,7 @@ class BlockExpression(Actor):
 
     expression = FormulaParameter(doc="the expression, over 'block' and 'past'")
     number = Parameter(int, 1, min=1, doc="tokens in a block")
-    past: Parameter[Any] = Parameter(object, (), shape=(None,), doc="the tokens before the first one, oldest first")
+    past = any_parameter((), shape=(None,), doc="the tokens before the first one, oldest first")
     items = Parameter(bool, False, doc="whether the value is a list whose items are sent one by one")
 
     def check(self) -> None:

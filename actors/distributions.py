@@ -10,6 +10,7 @@ from .core import (
     Parameter,
     ParameterError,
     Stream,
+    any_parameter,
     array_parameter,
     counted,
     elementary,
@@ -123,7 +124,7 @@ class Cauchy(Distribution):
 
     median = Parameter(float, 0.0, doc="the median")
     scale = Parameter(float, 1.0, above=0, doc="half the width at half the height")
-    cut: Parameter[float | None] = Parameter(
+    cut = Parameter(
         float, None, above=0, doc="distance from the median at which it is truncated; not truncated if left out"
     )
 
@@ -223,8 +224,8 @@ class RandomInteger(Distribution):
 class Choice(Distribution):
     """One of several values of any kind, with equal probability or by weight."""
 
-    values: Parameter[Any] = Parameter(object, shape=(None,), doc="the values to choose from")
-    weights: Parameter[Any] = array_parameter(
+    values = any_parameter(shape=(None,), doc="the values to choose from")
+    weights = array_parameter(
         (None,), None, unit="1", min=0, doc="relative probability of each value; all equal if left out"
     )
 

@@ -9,12 +9,14 @@ from typing import Any
 
 from .core import (
     Actor,
+    Changing,
     EpicycleError,
     InputPort,
     MappingParameter,
     OutputPort,
     Parameter,
     ParameterError,
+    Queues,
     Wake,
     brief,
     texts_parameter,
@@ -69,9 +71,7 @@ class RecordAssembler(Actor):
     output: OutputPort[Any] = OutputPort(dict, doc="tokens with these fields")
 
     fields = texts_parameter(doc="names of the fields and the inputs")
-    onto: Parameter[str | None] = Parameter(
-        str, None, doc="name of an input whose tokens get these fields in addition to their own"
-    )
+    onto = Parameter(str, None, doc="name of an input whose tokens get these fields in addition to their own")
     apart = Parameter(bool, False, doc="whether each token makes a token by itself, in the order of the fields")
 
     def own_ports(self) -> dict[str, InputPort[Any] | OutputPort[Any]]:
@@ -84,17 +84,16 @@ class RecordAssembler(Actor):
         return ports if self.onto is None else {self.onto: InputPort(doc="tokens with fields"), **ports}
 
     def initialize(self) -> None:
-        self._waiting: dict[str, deque[Any]] = {name: deque() for name in self.inputs}
+        self._waiting = Queues(*self.inputs.values())
 
     def fire(self) -> None:
-        for name, queue in self._waiting.items():
-            if self.apart:
-                for token in self.inputs[name].tokens:
+        if self.apart:
+            for name, port in self.inputs.items():
+                for token in port.tokens:
                     self.output.send({name: token})
-            else:
-                queue.extend(self.inputs[name].tokens)
-        while all(self._waiting.values()):
-            found = {name: queue.popleft() for name, queue in self._waiting.items()}
+            return
+        for tokens in self._waiting.rounds():
+            found = dict(zip(self.inputs, tokens, strict=True))
             base = {} if self.onto is None else operand(found.pop(self.onto))
             if not isinstance(base, Mapping):
                 raise EpicycleError(f"the token {brief(base)} has no fields")
@@ -146,14 +145,12 @@ class Batch(Actor):
     output: OutputPort[Any] = OutputPort(list, doc="a batch, with its tokens in the order of arrival")
     waiting = OutputPort(int, doc="number of tokens that wait for the rest of their batch, whenever it changes")
 
-    number: Parameter[int | None] = Parameter(int, None, min=1, doc="tokens in a full batch")
-    size: Parameter[float | None] = Parameter(float, None, above=0, doc="largest size of a batch")
+    number = Parameter(int, None, min=1, doc="tokens in a full batch")
+    size = Parameter(float, None, above=0, doc="largest size of a batch")
     weight = TokenFormulaParameter(
         "1", known=("time",), doc="size of a token: an expression over its fields, token, time"
     )
-    after: Parameter[float | None] = Parameter(
-        float, None, unit="s", min=0, doc="longest wait of the first token of a batch"
-    )
+    after = Parameter(float, None, unit="s", min=0, doc="longest wait of the first token of a batch")
     key: Parameter[Any] = TokenFormulaParameter(
         None, doc="tokens of a batch have this value in common: an expression over their fields, and token"
     )
@@ -162,7 +159,7 @@ class Batch(Actor):
         if self.number is None and self.size is None and self.after is None and not self.trigger.width:
             raise ParameterError(f"{self.path} never sends: give 'number', 'size' or 'after', or connect 'trigger'")
         self._batches: dict[Any, _Open] = {}
-        self._count = 0
+        self._count = Changing(self.waiting)
 
     def fire(self) -> None:
         for key in [key for key, batch in self._batches.items() if batch.wake is not None and batch.wake.due]:
@@ -172,10 +169,7 @@ class Batch(Actor):
         if self.trigger.present:
             for key in list(self._batches):
                 self._close(key)
-        count = sum(len(batch.tokens) for batch in self._batches.values())
-        if count != self._count:
-            self._count = count
-            self.waiting.send(count)
+        self._count.tell(sum(len(batch.tokens) for batch in self._batches.values()))
 
     def _collect(self, token: Any) -> None:
         key = _hashable(None if self.key is None else self.key(token))
@@ -244,15 +238,12 @@ class Collect(Actor):
     joined = Parameter(bool, False, doc="whether the tokens are lists, to be joined")
 
     def initialize(self) -> None:
-        self._waiting: list[deque[Any]] = [deque() for _ in range(self.input.width)]
+        self._waiting = Queues(self.input)
 
     def fire(self) -> None:
-        for queue, tokens in zip(self._waiting, self.input.by_channel(), strict=True):
-            queue.extend(tokens)
-        while all(self._waiting):
-            found = [queue.popleft() for queue in self._waiting]
+        for found in self._waiting.rounds():
             if self.joined:
-                found = [item for each in found for item in _items(each)]
+                found[:] = [item for each in found for item in _items(each)]
             self.output.send(found)
 
 
@@ -289,10 +280,10 @@ class Match(Actor):
 
     def initialize(self) -> None:
         self._parts: dict[Any, list[deque[Any]]] = {}
-        self._count = 0
+        self._count = Changing(self.waiting)
 
     def fire(self) -> None:
-        count = self._count
+        count = self._count.number
         for channel, tokens in enumerate(self.input.by_channel()):
             for token in tokens:
                 key = _hashable(None if self.key is None else self.key(token))
@@ -306,9 +297,7 @@ class Match(Actor):
                     count -= len(parts)
                     if not any(parts):
                         del self._parts[key]
-        if count != self._count:
-            self._count = count
-            self.waiting.send(count)
+        self._count.tell(count)
 
 
 def _hashable(key: Any) -> Hashable:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections import deque
+from collections.abc import Sequence
 from typing import Any
 
 from .core import (
+    ABSENT,
     Actor,
     EpicycleError,
     InputPort,
@@ -14,13 +16,15 @@ from .core import (
     ParameterError,
     PortError,
     PortParameter,
+    Queues,
+    any_parameter,
     array_parameter,
     brief,
     counted,
     rounds,
 )
 from .core.choices import cumulated, weighted
-from .expression import TokenFormulaParameter
+from .expression import TokenFormula, TokenFormulaParameter
 
 
 class Merge(Actor):
@@ -36,23 +40,18 @@ class Merge(Actor):
     discard = Parameter(bool, False, doc="whether only the first token of a tag is sent")
 
     def initialize(self) -> None:
-        self._waiting: list[deque[Any]] = [deque() for _ in range(self.input.width)]
-
-    def come(self) -> None:
-        """Let the tokens of the present tag wait."""
-        for queue, tokens in zip(self._waiting, self.input.by_channel(), strict=True):
-            queue.extend(tokens)
+        self._waiting = Queues(self.input)
 
     def fire(self) -> None:
-        self.come()
-        first = next((queue for queue in self._waiting if queue), None)
+        self._waiting.come()
+        first = next((queue for queue in self._waiting.channels if queue), None)
         if first is None:
             return
         self.output.send(first.popleft())
         if self.discard:
-            for queue in self._waiting:
+            for queue in self._waiting.channels:
                 queue.clear()
-        elif any(self._waiting):
+        elif any(self._waiting.channels):
             self.wake_in(0)
 
 
@@ -77,7 +76,7 @@ class Router(Actor):
         renamed={"in turn": "round robin"},
         doc="how the channel is chosen",
     )
-    weights: Parameter[Any] = array_parameter(
+    weights = array_parameter(
         (None,), None, unit="1", min=0, doc="relative probability of each channel with 'random'; all equal if left out"
     )
     channel: Parameter[Any] = TokenFormulaParameter(
@@ -134,18 +133,23 @@ class Router(Actor):
         if self.policy == "random":
             return self.random.below(width) if self._sums is None else weighted(self.random, self._sums)
         if self.policy == "expression":
-            number = self.channel(token, self.now, width)
-            if isinstance(number, bool) or not isinstance(number, int) or not 0 <= number < width:
-                raise EpicycleError(
-                    f"{self.channel} gives {number!r} for {brief(token)}, but {self.output.path} has "
-                    f"{counted(width, 'channel')}, counted from 0"
-                )
-            return number
+            return channel_of(token, self.channel, self.output, self.now, width)
         least = min(self._loads)
         places = [place for place, load in enumerate(self._loads) if load == least]
         place = places[self.random.below(len(places))] if len(places) > 1 else places[0]
         self._loads[place] += 1.0
         return place
+
+
+def channel_of(token: Any, formula: TokenFormula, output: OutputPort[Any], *given: float) -> int:
+    """The channel of an output that an expression gives for a token; raises ``EpicycleError`` if there is none."""
+    number = formula(token, *given)
+    if isinstance(number, bool) or not isinstance(number, int) or not 0 <= number < max(output.width, 1):
+        raise EpicycleError(
+            f"{formula} gives {number!r} for {brief(token)}, but {output.path} has {counted(output.width, 'channel')}, "
+            "counted from 0"
+        )
+    return number
 
 
 class Switch(Actor):
@@ -213,20 +217,19 @@ class Select(Actor):
     output = OutputPort(doc="the tokens of the chosen channel")
 
     unread = Parameter(str, "lost", choices=("lost", "kept"), doc="what happens to tokens that are not chosen")
-    initial: Parameter[int | None] = Parameter(
+    initial = Parameter(
         int, 0, min=0, optional=True, doc="the channel until the first token of control comes; no channel if null"
     )
 
     def initialize(self) -> None:
         self._channel = self.initial
         self._controls: deque[int] = deque()
-        self._waiting: list[deque[Any]] = [deque() for _ in range(self.input.width)]
+        self._waiting = Queues(self.input)
 
     def fire(self) -> None:
         if self.unread == "kept":
             self._controls.extend(self.control.tokens)
-            for queue, tokens in zip(self._waiting, self.input.by_channel(), strict=True):
-                queue.extend(tokens)
+            self._waiting.come()
             while self._pass_on():
                 pass
             return
@@ -240,9 +243,10 @@ class Select(Actor):
         is_told = bool(self._controls)
         if is_told:
             self._channel = self._controls.popleft()
-        if self._channel is None or not 0 <= self._channel < self.input.width or not self._waiting[self._channel]:
+        waiting = self._waiting.channels
+        if self._channel is None or not 0 <= self._channel < len(waiting) or not waiting[self._channel]:
             return is_told
-        self.output.send(self._waiting[self._channel].popleft())
+        self.output.send(waiting[self._channel].popleft())
         return True
 
 
@@ -300,7 +304,27 @@ class Sampler(ByChannel):
                     self.send(token, channel)
 
 
-class MostRecent(ByChannel):
+class Holding(ByChannel):
+    """The common part of actors that send the latest token of each channel."""
+
+    initial = any_parameter(None, doc="value of a channel before its first token")
+
+    def initialize(self) -> None:
+        super().initialize()
+        self._held: list[Any] = [self.initial] * self.input.width
+
+    def hold(self, tokens: Sequence[Any]) -> None:
+        """Store new tokens, one for each channel, or ``ABSENT``."""
+        self._held = [old if new is ABSENT else new for old, new in zip(self._held, tokens, strict=True)]
+
+    def send_held(self) -> None:
+        """Send what is held."""
+        for channel, token in enumerate(self._held):
+            if token is not None:
+                self.send(token, channel)
+
+
+class MostRecent(Holding):
     """Sends the latest token of each channel whenever it is triggered, even if it has not changed: a zero-order hold.
 
     A channel on which no token has come yet sends ``initial``, or nothing if that is left out.
@@ -309,28 +333,18 @@ class MostRecent(ByChannel):
 
     trigger = InputPort(multi=True, doc="when to send; triggers that come together, one on each channel, count as one")
 
-    initial: Parameter[Any] = Parameter(object, None, doc="value of a channel before its first token")
-
-    def initialize(self) -> None:
-        super().initialize()
-        self._latest: list[Any] = [self.initial] * self.input.width
-
     def fire(self) -> None:
-        self.note()
-        self.send_latest()
+        self.hold_latest()
+        self.answer()
 
-    def note(self) -> None:
+    def hold_latest(self) -> None:
         """Store the latest tokens."""
-        for channel, tokens in enumerate(self.input.by_channel()):
-            if tokens:
-                self._latest[channel] = tokens[-1]
+        self.hold([tokens[-1] if tokens else ABSENT for tokens in self.input.by_channel()])
 
-    def send_latest(self) -> None:
-        """Send them for each trigger."""
+    def answer(self) -> None:
+        """Send what is held for each trigger."""
         for _ in rounds(self.trigger):
-            for channel, token in enumerate(self._latest):
-                if token is not None:
-                    self.send(token, channel)
+            self.send_held()
 
 
 class Synchronizer(ByChannel):
@@ -341,14 +355,12 @@ class Synchronizer(ByChannel):
 
     def initialize(self) -> None:
         super().initialize()
-        self._waiting: list[deque[Any]] = [deque() for _ in range(self.input.width)]
+        self._waiting = Queues(self.input)
 
     def fire(self) -> None:
-        for queue, tokens in zip(self._waiting, self.input.by_channel(), strict=True):
-            queue.extend(tokens)
-        while all(self._waiting):
-            for channel, queue in enumerate(self._waiting):
-                self.send(queue.popleft(), channel)
+        for tokens in self._waiting.rounds():
+            for channel, token in enumerate(tokens):
+                self.send(token, channel)
 
 
 def _channel(number: int, control: InputPort[Any], width: int, name: str) -> int:

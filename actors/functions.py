@@ -21,6 +21,7 @@ from .core import (
     OutputPort,
     Parameter,
     ParameterError,
+    any_parameter,
     array_parameter,
     counted,
     declared_parameters,
@@ -55,7 +56,7 @@ class Expression(Actor):
     output: OutputPort[Any] = OutputPort(float, doc="the value of the expression")
 
     expression = FormulaParameter(doc="the expression; its names are the input ports")
-    gives: Parameter[str | None] = Parameter(
+    gives = Parameter(
         str,
         None,
         choices=tuple(_KINDS),
@@ -223,8 +224,8 @@ class LookupTable(Actor):
     input = InputPort(float, doc="an index, or an argument if 'at' is given")
     output = OutputPort(doc="the value at the index or argument")
 
-    values: Parameter[Any] = Parameter(object, shape=(None,), doc="the table")
-    at: Parameter[Any] = array_parameter((None,), None, doc="the arguments of the values, ascending")
+    values = any_parameter(shape=(None,), doc="the table")
+    at = array_parameter((None,), None, doc="the arguments of the values, ascending")
     outside = Parameter(
         str,
         "error",

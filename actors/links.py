@@ -10,6 +10,7 @@ from typing import Any
 
 from .core import (
     Actor,
+    Changing,
     EpicycleError,
     InputPort,
     OutputPort,
@@ -17,12 +18,12 @@ from .core import (
     Pending,
     PortParameter,
     Wake,
+    below_nanoseconds,
     brief,
-    counted,
     to_nanoseconds,
-    to_seconds,
 )
 from .expression import TokenFormulaParameter, field_of
+from .flow import channel_of
 from .resources import Waiter, Waiters
 
 
@@ -39,7 +40,7 @@ class _Transmitter:
 class _Transmitting(Actor):
     """The common part of a link and a switch: a transmitter for each channel of the output."""
 
-    rate: PortParameter[float | None] = PortParameter(
+    rate = PortParameter(
         float, None, unit="bit/s", above=0, doc="rate at which frames are sent; without delay if left out"
     )
     size = TokenFormulaParameter(
@@ -50,14 +51,14 @@ class _Transmitting(Actor):
         known=("time",),
         doc="of waiting frames, the one with the lowest value is sent first: an expression like size",
     )
-    buffer: Parameter[float | None] = Parameter(
+    buffer = Parameter(
         float, None, unit="bit", min=0, doc="most bits that may wait, without the frame that is being sent"
     )
 
     def initialize(self) -> None:
         self._transmitters = [_Transmitter() for _ in range(max(self.outputs["output"].width, 1))]
         self._came = 0
-        self._count = 0
+        self._count = Changing(self.outputs["waiting"])
 
     def _finish(self) -> list[tuple[int, Any]]:
         """The frames that have been sent, each with its channel."""
@@ -97,14 +98,11 @@ class _Transmitting(Actor):
             transmitter.waiting.remove(frame)
             assert self.rate is not None
             time = frame.size / self.rate + transmitter.rest
-            transmitter.rest = time - to_seconds(to_nanoseconds(time))
+            transmitter.rest = below_nanoseconds(time)
             transmitter.sent, transmitter.wake = frame.token, self.wake_in(time)
 
     def _tell_waiting(self) -> None:
-        count = sum(len(each.waiting) for each in self._transmitters)
-        if count != self._count:
-            self._count = count
-            self.outputs["waiting"].send(count)
+        self._count.tell(sum(len(each.waiting) for each in self._transmitters))
 
 
 class Link(_Transmitting):
@@ -122,10 +120,8 @@ class Link(_Transmitting):
     rejected = OutputPort(doc="frames that found the buffer full")
     waiting = OutputPort(int, doc="number of waiting frames, whenever it changes")
 
-    delay: PortParameter[float] = PortParameter(float, 0.0, unit="s", min=0, doc="propagation delay")
-    loss: PortParameter[float] = PortParameter(
-        float, 0.0, unit="1", min=0, max=1, doc="probability that a frame is lost"
-    )
+    delay = PortParameter(float, 0.0, unit="s", min=0, doc="propagation delay")
+    loss = PortParameter(float, 0.0, unit="1", min=0, max=1, doc="probability that a frame is lost")
 
     def initialize(self) -> None:
         super().initialize()
@@ -178,12 +174,7 @@ class NetworkSwitch(_Transmitting):
         for channel, token in self._finish():
             self.output.send(token, channel if width > 1 else None)
         for token in self._looked_at.due():
-            channel = self.port(token, self.now)
-            if isinstance(channel, bool) or not isinstance(channel, int) or not 0 <= channel < max(width, 1):
-                raise EpicycleError(
-                    f"{self.port} gives {channel!r} for {brief(token)}, but {self.output.path} has "
-                    f"{counted(width, 'channel')}, counted from 0"
-                )
+            channel = channel_of(token, self.port, self.output, self.now)
             if self.rate is None:
                 self.output.send(token, channel if width > 1 else None)
             elif not self._enqueue(token, channel):
@@ -239,19 +230,17 @@ class ArqSender(Actor):
     )
 
     window = Parameter(int, 1, min=1, doc="most frames that may be unacknowledged")
-    timeout: PortParameter[float] = PortParameter(
-        float, unit="s", above=0, doc="how long to wait for an acknowledgement"
-    )
+    timeout = PortParameter(float, unit="s", above=0, doc="how long to wait for an acknowledgement")
     spacing = Parameter(
         float, 0.0, unit="s", min=0, doc="shortest time from one frame to the next, such as the time that a link takes"
     )
     repeat = Parameter(
         str, "all", choices=("all", "one"), doc="what is sent again: all outstanding frames, or those that are late"
     )
-    tries: Parameter[int | None] = Parameter(
+    tries = Parameter(
         int, None, min=1, doc="number of timeouts after which a token is abandoned; unlimited if left out"
     )
-    lifetime: Parameter[float | None] = Parameter(
+    lifetime = Parameter(
         float, None, unit="s", above=0, doc="age at which a token is abandoned, sent or not; unlimited if left out"
     )
 
@@ -266,7 +255,7 @@ class ArqSender(Actor):
         self._is_told = True  # whether the receiver was told of all that was abandoned
         self._free = 0  # when (ns) the next may be sent
         self._wake: Wake | None = None
-        self._count = 0
+        self._count = Changing(self.waiting)
 
     def fire(self) -> None:
         self._find_late()
@@ -342,9 +331,7 @@ class ArqSender(Actor):
             self._out[self._next] = self._queue.popleft()
             self._ahead.append(self._next)
             self._next += 1
-        if len(self._queue) != self._count:
-            self._count = len(self._queue)
-            self.waiting.send(self._count)
+        self._count.tell(len(self._queue))
 
     def _send(self) -> None:
         limit = {} if self.tries is None and self.lifetime is None else {"oldest": self._oldest}

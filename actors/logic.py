@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any, Final
 
-from .core import ABSENT, Actor, InputPort, Latest, OutputPort, Parameter, present, rounds
+from .core import ABSENT, Actor, InputPort, Latest, OutputPort, Parameter, any_parameter, present, rounds
 from .expression import operand
 
 GATES: Final[dict[str, Callable[[list[bool]], bool]]] = {
@@ -70,7 +70,7 @@ class Comparator(Actor):
     output = OutputPort(bool, doc="whether the comparison holds")
 
     comparison = Parameter(str, choices=tuple(COMPARISONS), doc="which comparison")
-    value: Parameter[Any] = Parameter(object, 0, doc="the right side if that port is not connected")
+    value = any_parameter(0, doc="the right side if that port is not connected")
     tolerance = Parameter(float, 0.0, min=0, doc="largest difference of numbers that still count as equal")
     hold = Parameter(bool, True, doc="whether an input without a token is used with its latest one")
 

@@ -6,9 +6,21 @@ from __future__ import annotations
 from collections import deque
 from typing import Any
 
-from .core import ABSENT, Actor, EpicycleError, InputPort, OutputPort, Parameter, brief, present, rounds
+from .core import (
+    ABSENT,
+    Actor,
+    EpicycleError,
+    InputPort,
+    OutputPort,
+    Parameter,
+    Queues,
+    any_parameter,
+    brief,
+    present,
+    rounds,
+)
 from .expression import TokenFormulaParameter
-from .flow import ByChannel, MostRecent
+from .flow import ByChannel, Holding, MostRecent
 
 
 class Filter(ByChannel):
@@ -96,7 +108,7 @@ class Previous(Actor):
     input = InputPort(doc="the stream")
     output = OutputPort(doc="the stream, one token behind")
 
-    initial: Parameter[Any] = Parameter(object, None, doc="value sent for the first token")
+    initial = any_parameter(None, doc="value sent for the first token")
 
     def initialize(self) -> None:
         self._before = self.initial
@@ -118,29 +130,20 @@ class Register(MostRecent):
     output = OutputPort(multi=True, depends_on=("trigger",), doc="the tokens from before this tag, channel by channel")
 
     def fire(self) -> None:
-        self.send_latest()
-        self.note()
+        self.answer()
+        self.hold_latest()
 
 
-class LatestOfAll(ByChannel):
+class LatestOfAll(Holding):
     """Sends the latest token of every channel whenever a token comes on any of them.
 
     A channel on which no token has come yet sends ``initial``, or nothing if that is left out.  Ptolemy: ``Wire``.
     """
 
-    initial: Parameter[Any] = Parameter(object, None, doc="value of a channel before its first token")
-
-    def initialize(self) -> None:
-        super().initialize()
-        self._latest: list[Any] = [self.initial] * self.input.width
-
     def fire(self) -> None:
         for (tokens,) in rounds(self.input):
-            for channel, token in enumerate(tokens):
-                if token is not ABSENT:
-                    self._latest[channel] = token
-                if self._latest[channel] is not None:
-                    self.send(self._latest[channel], channel)
+            self.hold(tokens)
+            self.send_held()
 
 
 class BooleanSelect(Actor):
@@ -162,20 +165,16 @@ class BooleanSelect(Actor):
     def initialize(self) -> None:
         self._control: bool | None = None
         self._controls: deque[bool] = deque()
-        ports = {True: self.true_input, False: self.false_input}
-        self._waiting: dict[bool, list[deque[Any]]] = {
-            choice: [deque() for _ in range(port.width)] for choice, port in ports.items()
-        }
+        self._waiting = {True: Queues(self.true_input), False: Queues(self.false_input)}
 
     def fire(self) -> None:
         if self.unread == "lost":
             self._hand_on()
             return
         self._controls.extend(self.control.tokens)
-        for port, queues in zip((self.true_input, self.false_input), self._waiting.values(), strict=True):
-            for queue, tokens in zip(queues, port.by_channel(), strict=True):
-                queue.extend(tokens)
-        while self._controls and all(chosen := self._waiting[self._controls[0]]):
+        for queues in self._waiting.values():
+            queues.come()
+        while self._controls and all(chosen := self._waiting[self._controls[0]].channels):
             self._controls.popleft()
             for channel, queue in enumerate(chosen):
                 self.output.send(queue.popleft(), None if len(chosen) == 1 else channel)
@@ -204,19 +203,19 @@ class Commutator(Actor):
     waits = Parameter(bool, True, doc="whether the others wait while a channel in its turn has too few tokens")
 
     def initialize(self) -> None:
-        self._waiting: list[deque[Any]] = [deque() for _ in range(self.input.width)]
+        self._waiting = Queues(self.input)
         self._next = 0
 
     def fire(self) -> None:
-        for queue, tokens in zip(self._waiting, self.input.by_channel(), strict=True):
-            queue.extend(tokens)
-        while any(len(each) >= self.block for each in self._waiting):
-            if len(queue := self._waiting[self._next]) >= self.block:
+        self._waiting.come()
+        queues = self._waiting.channels
+        while any(len(each) >= self.block for each in queues):
+            if len(queue := queues[self._next]) >= self.block:
                 for _ in range(self.block):
                     self.output.send(queue.popleft())
             elif self.waits:
                 break
-            self._next = (self._next + 1) % len(self._waiting)
+            self._next = (self._next + 1) % len(queues)
 
 
 class Sequencer(Actor):
@@ -233,16 +232,12 @@ class Sequencer(Actor):
     first = Parameter(int, 0, doc="the first number")
 
     def initialize(self) -> None:
-        self._tokens: deque[Any] = deque()
-        self._numbers: deque[int] = deque()
+        self._pairs = Queues(self.input, self.number)
         self._waiting: dict[int, Any] = {}
         self._next = self.first
 
     def fire(self) -> None:
-        self._tokens.extend(self.input.tokens)
-        self._numbers.extend(self.number.tokens)
-        while self._tokens and self._numbers:
-            token, number = self._tokens.popleft(), self._numbers.popleft()
+        for token, number in self._pairs.rounds():
             if number >= self._next:
                 self._waiting[number] = token
         while self._next in self._waiting:

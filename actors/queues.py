@@ -14,10 +14,9 @@ from .core import (
     ParameterError,
     Pending,
     PortParameter,
+    below_nanoseconds,
     present,
     rounds,
-    to_nanoseconds,
-    to_seconds,
 )
 from .distributions import Distribution
 
@@ -34,9 +33,7 @@ class Queue(Actor):
     size = OutputPort(int, doc="number of tokens in the queue, whenever it changes")
     rejected = OutputPort(depends_on=("input",), doc="tokens that found the queue full")
 
-    capacity: Parameter[int | None] = Parameter(
-        int, None, min=1, doc="most tokens that the queue holds; unlimited if left out"
-    )
+    capacity = Parameter(int, None, min=1, doc="most tokens that the queue holds; unlimited if left out")
     persistent_trigger = Parameter(bool, False, doc="whether a trigger that finds no token waits for the next one")
 
     def initialize(self) -> None:
@@ -73,9 +70,7 @@ class SharedQueue(Actor):
     size = OutputPort(int, doc="number of tokens in the queue, after each firing")
     rejected = OutputPort(depends_on=("input",), doc="tokens that found the queue full")
 
-    capacity: Parameter[int | None] = Parameter(
-        int, None, min=1, doc="most tokens that the queue holds; unlimited if left out"
-    )
+    capacity = Parameter(int, None, min=1, doc="most tokens that the queue holds; unlimited if left out")
 
     def initialize(self) -> None:
         self._tokens: deque[Any] = deque()
@@ -122,15 +117,9 @@ class Server(Actor):
     rejected = OutputPort(depends_on=("input", "service_time"), doc="tokens that found no place")
 
     service_time = PortParameter(float, 1.0, unit="s", min=0, doc="duration of a service")
-    distribution: Parameter[Distribution | None] = Parameter(
-        Distribution, None, unit="s", doc="distribution of service times, instead of service_time"
-    )
-    servers: Parameter[int | None] = Parameter(
-        int, 1, min=1, optional=True, doc="number of tokens served at a time; unlimited if null"
-    )
-    capacity: Parameter[int | None] = Parameter(
-        int, None, min=1, doc="most tokens that may wait or be served; unlimited if left out"
-    )
+    distribution = Parameter(Distribution, None, unit="s", doc="distribution of service times, instead of service_time")
+    servers = Parameter(int, 1, min=1, optional=True, doc="number of tokens served at a time; unlimited if null")
+    capacity = Parameter(int, None, min=1, doc="most tokens that may wait or be served; unlimited if left out")
 
     def check(self) -> None:
         if self.capacity is not None and (self.servers is None or self.capacity < self.servers):
@@ -166,10 +155,7 @@ class Server(Actor):
             self.size.send(self._size)
 
     def _serve(self, token: Any, time: float) -> None:
-        # The rounding to whole nanoseconds is added to the next service, or it would accumulate while the server is
-        # busy.
-        rest = time - to_seconds(to_nanoseconds(time))
-        self._served.put((token, rest), time)
+        self._served.put((token, below_nanoseconds(time)), time)
 
     def draw_time(self) -> float:
         """The service time of a token that arrives now."""

@@ -19,6 +19,7 @@ from .core import (
     Parameter,
     ParameterError,
     Tag,
+    any_parameter,
     array_parameter,
     counted,
     rounds,
@@ -36,9 +37,7 @@ class Recorder(Actor):
 
     input = InputPort(multi=True, doc="tokens to keep")
 
-    capacity: Parameter[int | None] = Parameter(
-        int, None, min=0, doc="number of latest tokens to keep; all if left out"
-    )
+    capacity = Parameter(int, None, min=0, doc="number of latest tokens to keep; all if left out")
 
     def initialize(self) -> None:
         self.tags: list[Tag] = []
@@ -140,10 +139,8 @@ class Test(Actor):
     input = InputPort(multi=True, doc="tokens to compare")
     output = OutputPort(bool, doc="whether all values have come, sent with each token if connected")
 
-    values: Parameter[Any] = Parameter(object, shape=(None,), doc="expected values, in order")
-    times: Parameter[Any] = array_parameter(
-        (None,), None, unit="s", doc="expected time of each value; not compared if left out"
-    )
+    values = any_parameter(shape=(None,), doc="expected values, in order")
+    times = array_parameter((None,), None, unit="s", doc="expected time of each value; not compared if left out")
     tolerance = Parameter(float, 1e-9, min=0, doc="largest difference of a number, or of a time in s")
     complete = Parameter(bool, True, doc="whether all values must have come by the end of the run")
     together = Parameter(bool, False, doc="whether a value is a list with a token for each channel")

@@ -14,6 +14,7 @@ from .core import (
     ParameterError,
     PortParameter,
     Wake,
+    any_parameter,
     array_parameter,
     declared_parameters,
     did_you_mean,
@@ -30,12 +31,8 @@ class _Ticking(Actor):
 
     output = OutputPort(doc="the values in turn; without values, the number of the tick, from 0")
 
-    values: Parameter[Any] = Parameter(
-        object, None, shape=(None,), doc="values of the ticks, used in turn and repeated"
-    )
-    stop_time: Parameter[float | None] = Parameter(
-        float, None, unit="s", min=0, doc="time after which there are no more ticks"
-    )
+    values = any_parameter(None, shape=(None,), doc="values of the ticks, used in turn and repeated")
+    stop_time = Parameter(float, None, unit="s", min=0, doc="time after which there are no more ticks")
 
     def check(self) -> None:
         if self.values is not None and not self.values:
@@ -78,7 +75,7 @@ class Clock(_Ticking):
     period = PortParameter(float, unit="s", above=0, doc="length of a cycle, rounded to whole nanoseconds")
     offset = Parameter(float, 0.0, unit="s", min=0, doc="time from the start to the first cycle")
     offsets = array_parameter((None,), [0.0], unit="s", min=0, doc="times of the ticks in a cycle, ascending")
-    cycles: Parameter[int | None] = Parameter(int, None, min=1, doc="number of cycles; unlimited if left out")
+    cycles = Parameter(int, None, min=1, doc="number of cycles; unlimited if left out")
     new_period = Parameter(
         str, "next cycle", choices=("next cycle", "at once"), doc="from when on a new period applies"
     )
@@ -226,7 +223,7 @@ class SingleEvent(Actor):
     output = OutputPort(doc="the value")
 
     time = Parameter(float, 0.0, unit="s", min=0, doc="when to send it")
-    value: Parameter[Any] = Parameter(object, True, doc="the token to send")
+    value = any_parameter(True, doc="the token to send")
 
     def check(self) -> None:
         self.output.type = token_type([self.value])
@@ -251,7 +248,7 @@ class Random(Actor):
     trigger = InputPort(multi=True, doc="when to send")
     output = OutputPort(doc="the drawn token")
 
-    distribution: Parameter[Distribution] = Parameter(Distribution, doc="the distribution to draw from")
+    distribution = Parameter(Distribution, doc="the distribution to draw from")
 
     def check(self) -> None:
         self.output.type = self.distribution.token_type

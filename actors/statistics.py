@@ -19,10 +19,8 @@ class _Window(Actor):
 
     input = InputPort(float, doc="the numbers")
 
-    size: Parameter[int | None] = Parameter(int, None, min=1, doc="number of latest tokens in the window")
-    span: Parameter[float | None] = Parameter(
-        float, None, unit="s", min=0, doc="largest age of a token in the window, inclusive"
-    )
+    size = Parameter(int, None, min=1, doc="number of latest tokens in the window")
+    span = Parameter(float, None, unit="s", min=0, doc="largest age of a token in the window, inclusive")
 
     def check(self) -> None:
         if self.size is None and self.span is None:

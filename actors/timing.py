@@ -14,6 +14,7 @@ from .core import (
     PortParameter,
     Tag,
     Wake,
+    any_parameter,
     to_seconds,
     token_type,
 )
@@ -48,7 +49,7 @@ class _Timing(Actor):
     input = InputPort(float, doc="time until the value is sent, in s")
     output = OutputPort(depends_on=(), doc="the value, when the time is over")
 
-    value: Parameter[Any] = Parameter(object, True, doc="the value to send")
+    value = any_parameter(True, doc="the value to send")
 
     def check(self) -> None:
         self.output.type = token_type([self.value])

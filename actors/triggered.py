@@ -16,6 +16,7 @@ from .core import (
     Parameter,
     ParameterError,
     PortParameter,
+    any_parameter,
     counted,
     rounds,
     token_type,
@@ -32,7 +33,7 @@ class _Answering(Actor):
 
     trigger = InputPort(multi=True, doc="when to send")
 
-    limit: Parameter[int | None] = Parameter(int, None, min=1, doc="number of answers; unlimited if left out")
+    limit = Parameter(int, None, min=1, doc="number of answers; unlimited if left out")
 
     def initialize(self) -> None:
         self._answers = 0
@@ -57,7 +58,7 @@ class Const(_Answering):
     trigger = InputPort(multi=True, required=False, doc="when to send; once at the start if not connected")
     output = OutputPort(doc="the value")
 
-    value: Parameter[Any] = Parameter(object, 1, doc="the value to send")
+    value = any_parameter(1, doc="the value to send")
 
     def check(self) -> None:
         self.output.type = token_type([self.value])
@@ -81,8 +82,8 @@ class Ramp(_Answering):
 
     output = OutputPort(float, doc="the number")
 
-    init: PortParameter[float] = PortParameter(int | float, 0, doc="the first number; a token sets the next one")
-    step: PortParameter[float] = PortParameter(int | float, 1, doc="difference between successive numbers")
+    init = PortParameter(int | float, 0, doc="the first number; a token sets the next one")
+    step = PortParameter(int | float, 1, doc="difference between successive numbers")
 
     def check(self) -> None:
         self.output.type = int if isinstance(self.init, int) and isinstance(self.step, int) else float
@@ -119,7 +120,7 @@ class Sequence(Actor):
     enable = InputPort(bool, required=False, doc="whether to send")
     output = OutputPort(doc="the values, in order")
 
-    values: Parameter[Any] = Parameter(object, shape=(None,), doc="the values to send, in order")
+    values = any_parameter(shape=(None,), doc="the values to send, in order")
     repeat = Parameter(bool, False, doc="whether to start again after the last value")
     hold = Parameter(bool, False, doc="whether to repeat the last value when all are used")
 
@@ -159,10 +160,8 @@ class Pulse(_Answering):
 
     output = OutputPort(doc="a value, or zero")
 
-    values: Parameter[Any] = Parameter(object, [1, 0], shape=(None,), doc="the values to send, in order")
-    indexes: Parameter[Any] = Parameter(
-        object, [0, 1], shape=(None,), doc="numbers of the triggers for the values, ascending"
-    )
+    values = any_parameter([1, 0], shape=(None,), doc="the values to send, in order")
+    indexes = any_parameter([0, 1], shape=(None,), doc="numbers of the triggers for the values, ascending")
     repeat = Parameter(bool, False, doc="whether to count from 0 again after the last value")
 
     def check(self) -> None:

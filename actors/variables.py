@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from .core import Actor, InputPort, OutputPort, Parameter, Pending
+from .core import Actor, InputPort, OutputPort, Parameter, Pending, any_parameter
 
 
 class Variable(Actor):
@@ -51,7 +51,7 @@ class SetVariable(Actor):
     variable = OutputPort(doc="the same, for the variable")
     output = OutputPort(doc="value of the variable; nothing if unknown")
 
-    value: Parameter[Any] = Parameter(object, None, doc="value of the variable")
+    value = any_parameter(None, doc="value of the variable")
     delayed = Parameter(bool, True, doc="whether the variable takes the new value at the next microstep")
 
     def fire(self) -> None:

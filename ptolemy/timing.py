@@ -7,7 +7,7 @@ from collections import deque
 from typing import Any
 
 from epicycle import actors, aspects
-from epicycle.actors import ABSENT, OutputPort, Tag, to_nanoseconds, to_seconds
+from epicycle.actors import ABSENT, OutputPort, Tag, below_nanoseconds, to_nanoseconds
 from epicycle.aspects import Task
 
 from .changing import Singly, but, preset
@@ -81,7 +81,7 @@ class Server(actors.Server):
             time = self._line[0][1] + rest
             self._free = self.tag.time + to_nanoseconds(time)
             self.wake_in(time)
-            self._rest = time - to_seconds(to_nanoseconds(time))
+            self._rest = below_nanoseconds(time)
 
 
 class TimeDelay(actors.TimeDelay):
@@ -146,16 +146,16 @@ class Merge(actors.Merge):
         self._left: Tag | None = None  # the tag at which a channel was sent and others had to wait
 
     def fire(self) -> None:
-        self.come()
-        first = next((queue for queue in self._waiting if queue), None)
+        self._waiting.come()
+        first = next((queue for queue in self._waiting.channels if queue), None)
         if first is None or self._left == self.tag:
             return
         while first:
             self.output.send(first.popleft())
         if self.discard:
-            for queue in self._waiting:
+            for queue in self._waiting.channels:
                 queue.clear()
-        elif any(self._waiting):
+        elif any(self._waiting.channels):
             self._left = self.tag
             self.wake_in(0)
 

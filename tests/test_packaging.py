@@ -279,7 +279,8 @@ def busy_folder(tmp_path: Path) -> Path:
 
 PROGRAM = """
 import epicycle
-from epicycle.actors import Actor, Clock, Exponential, InputPort, OutputPort, Parameter, PoissonClock, Random
+from epicycle.actors import Actor, Clock, Exponential, InputPort, OutputPort, Parameter, PoissonClock, PortParameter
+from epicycle.actors import Random
 from epicycle.aspects import JoinPoint, MeasurementAspect, PacketLoss
 from epicycle.runner import Model, Results, Simulation
 
@@ -288,6 +289,8 @@ class Gain(Actor):
     input = InputPort(float)
     output = OutputPort(float)
     factor = Parameter(float, 1.0)
+    limit = Parameter(int, None)
+    offset = PortParameter(float, None)
 
     def fire(self) -> None:
         for token in self.input.tokens:
@@ -324,6 +327,9 @@ Random("numbers", distribution=Exponential(mean=2, seed=1))
 model.metric("greatest", of=gain.output, take="maximum")
 model.metric("greatest", of=gain.output, take="max", afer=1.0)
 epicycle.run("mm1", sed=3)
+reveal_type(gain.limit)
+reveal_type(Gain.limit)
+reveal_type(gain.offset)
 """
 
 
@@ -338,21 +344,24 @@ def types_of_a_program(folder: Path, python: object, program: str) -> str:
 
 SUCCESS = "Success: no issues found in 1 source file\n"
 EXPECTED_TYPES = f"""\
-program.py:38: note: Revealed type is "float"
-program.py:39: note: Revealed type is "float"
-program.py:40: error: Argument 1 to "send" of "OutputPort" has incompatible type "str"; expected "float"  [arg-type]
-program.py:41: error: Unexpected keyword argument "perriod" for "Clock"; did you mean "period"?  [call-arg]
-program.py:41: note: "Clock" defined in "epicycle.actors.constructors"
-program.py:42: error: Unexpected keyword argument "probabilty" for "PacketLoss"; did you mean "probability"?  [call-arg]
-program.py:42: note: "PacketLoss" defined in "epicycle.aspects.constructors"
-program.py:43: error: Unexpected keyword argument "seed" for "Exponential"  [call-arg]
-program.py:43: note: "Exponential" defined in "epicycle.actors.constructors"
-program.py:44: error: Argument "take" to "metric" of "Model" has incompatible type "Literal['maximum']"; \
+program.py:41: note: Revealed type is "float"
+program.py:42: note: Revealed type is "float"
+program.py:43: error: Argument 1 to "send" of "OutputPort" has incompatible type "str"; expected "float"  [arg-type]
+program.py:44: error: Unexpected keyword argument "perriod" for "Clock"; did you mean "period"?  [call-arg]
+program.py:44: note: "Clock" defined in "epicycle.actors.constructors"
+program.py:45: error: Unexpected keyword argument "probabilty" for "PacketLoss"; did you mean "probability"?  [call-arg]
+program.py:45: note: "PacketLoss" defined in "epicycle.aspects.constructors"
+program.py:46: error: Unexpected keyword argument "seed" for "Exponential"  [call-arg]
+program.py:46: note: "Exponential" defined in "epicycle.actors.constructors"
+program.py:47: error: Argument "take" to "metric" of "Model" has incompatible type "Literal['maximum']"; \
 expected "Literal[{", ".join(map(repr, TAKES))}]"  [arg-type]
-program.py:45: error: Unexpected keyword argument "afer" for "metric" of "Model"; did you mean "after"?  [call-arg]
-program.py:45: note: "metric" defined in "epicycle.runner.build.model"
-program.py:46: error: Unexpected keyword argument "sed" for "run"; did you mean "seed"?  [call-arg]
-program.py:46: note: "run" defined in "epicycle.runner.calls.running"
+program.py:48: error: Unexpected keyword argument "afer" for "metric" of "Model"; did you mean "after"?  [call-arg]
+program.py:48: note: "metric" defined in "epicycle.runner.build.model"
+program.py:49: error: Unexpected keyword argument "sed" for "run"; did you mean "seed"?  [call-arg]
+program.py:49: note: "run" defined in "epicycle.runner.calls.running"
+program.py:50: note: Revealed type is "int | None"
+program.py:51: note: Revealed type is "epicycle.actors.core.parameter.Parameter[int | None]"
+program.py:52: note: Revealed type is "float | None"
 Found 7 errors in 1 file (checked 1 source file)
 """
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 from ..core import Actor, Configurable, EpicycleError, InputPort, OutputPort, Parameter, ParameterError, array_parameter
 from ..core.elementary import expm1, sin, tan, total
@@ -85,11 +84,9 @@ class DiscreteFilter(Actor):
     reset = InputPort(required=False, doc="restarts the filter, before the samples of the tag")
     output = OutputPort(float, depends_on=("input", "reset"), doc="the filtered samples")
 
-    numerator: Parameter[Any] = array_parameter((None,), None, doc="coefficients of u[k], u[k-1], ...")
-    denominator: Parameter[Any] = array_parameter(
-        (None,), None, doc="coefficients of y[k], y[k-1], ...; [1] if left out"
-    )
-    design: Parameter[FilterDesign | None] = Parameter(
+    numerator = array_parameter((None,), None, doc="coefficients of u[k], u[k-1], ...")
+    denominator = array_parameter((None,), None, doc="coefficients of y[k], y[k-1], ...; [1] if left out")
+    design = Parameter(
         FilterDesign, None, doc="a design that gives the coefficients, instead of numerator and denominator"
     )
     start = Parameter(

@@ -22,11 +22,9 @@ class Limiter(Actor):
 
     low = Parameter(float, -math.inf, doc="the lowest value")
     high = Parameter(float, math.inf, doc="the highest value")
-    rising: Parameter[float | None] = Parameter(float, None, min=0, doc="fastest rise, per s; unlimited if left out")
-    falling: Parameter[float | None] = Parameter(
-        float, None, min=0, doc="fastest fall, per s, as a positive number; unlimited if left out"
-    )
-    initial: Parameter[float | None] = Parameter(float, None, doc="the output before the first token")
+    rising = Parameter(float, None, min=0, doc="fastest rise, per s; unlimited if left out")
+    falling = Parameter(float, None, min=0, doc="fastest fall, per s, as a positive number; unlimited if left out")
+    initial = Parameter(float, None, doc="the output before the first token")
 
     def check(self) -> None:
         if self.low > self.high:

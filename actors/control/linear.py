@@ -170,8 +170,8 @@ class StateSpace(_LinearSystem):
     b = _MatrixParameter(doc="B, n x m: a column for each input")
     c = _MatrixParameter(None, doc="C, p x n: a row for each output; all states if left out")
     d = _MatrixParameter(None, doc="D, p x m; 0 if left out")
-    initial: Parameter[Any] = array_parameter((None,), None, doc="x at the start; 0 if left out")
-    held: Parameter[Any] = array_parameter((None,), None, doc="u before its first token; 0 if left out")
+    initial = array_parameter((None,), None, doc="x at the start; 0 if left out")
+    held = array_parameter((None,), None, doc="u before its first token; 0 if left out")
 
     def _matrices(self) -> tuple[Matrix, Matrix, Matrix, Matrix]:
         a, b = _rows("a", self.a), _rows("b", self.b)

@@ -82,14 +82,7 @@ class PID(Actor):
     reset = InputPort(
         required=False, triggers=False, doc="resets I and forgets the slope, before the measurement of the tag"
     )
-    output = OutputPort(
-        float,
-        depends_on=(
-            "measurement", "setpoint", "feedforward", "automatic", "manual", "reset",
-            "proportional", "integral", "derivative",
-        ),
-        doc="u, for each measurement",
-    )  # fmt: skip
+    output = OutputPort(float, independent_of=("tracking",), doc="u, for each measurement")
     error = OutputPort(float, depends_on=("measurement", "setpoint"), doc="r - y, for each measurement")
 
     setpoint = PortParameter(float, 0.0, doc="r, the desired value of y")
@@ -108,7 +101,7 @@ class PID(Actor):
         str, "clamping", choices=("clamping", "back_calculation", "none"),
         doc="what keeps I from growing while the output is at a limit",
     )  # fmt: skip
-    tracking_time: Parameter[float | None] = Parameter(
+    tracking_time = Parameter(
         float, None, unit="s", min=0,
         doc="time constant of back_calculation; sqrt(Kd / Ki) if left out, or Kp / Ki without Kd",
     )  # fmt: skip

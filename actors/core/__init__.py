@@ -2,7 +2,7 @@
 
 from . import elementary, paths
 from .actor import Actor, Context, declared_ports, has_own_ports
-from .authoring import ABSENT, Latest, Pending, present, rounds
+from .authoring import ABSENT, Changing, Latest, Pending, Queues, present, rounds
 from .environment import Environment, Events, Host
 from .errors import EpicycleError, Fault, FaultError, Span
 from .files import irregular, open_regular, read_regular, read_table
@@ -35,7 +35,7 @@ from .parameter import (
     unknown_parameter,
     variants,
 )
-from .parameter_kinds import MappingParameter, array_parameter, texts_parameter
+from .parameter_kinds import MappingParameter, any_parameter, array_parameter, texts_parameter
 from .port_parameter import PortParameter
 from .port_types import accepts, shaped, token_type, type_name
 from .ports import NO_TOKENS, Emitter, InputPort, OutputPort, PortError, Receiver
@@ -43,19 +43,19 @@ from .primitives import is_alone
 from .process import Process
 from .quantity import MAX_DEPTH, Quantity, counted_in_si, is_too_deep, plain
 from .random import Stream, Streams, random_stream
-from .tag import NANOSECONDS_PER_SECOND, Tag, new_tag, to_nanoseconds, to_seconds
+from .tag import NANOSECONDS_PER_SECOND, Tag, below_nanoseconds, new_tag, to_nanoseconds, to_seconds
 from .units import UnitError, convert, in_si, parse_unit
 
 __all__ = [
-    "ABSENT", "MAX_DEPTH", "NANOSECONDS_PER_SECOND", "NEVER", "NO_TOKENS", "REQUIRED", "Actor", "Calendar",
+    "ABSENT", "MAX_DEPTH", "NANOSECONDS_PER_SECOND", "NEVER", "NO_TOKENS", "REQUIRED", "Actor", "Calendar", "Changing",
     "Configurable", "Context", "Emitter", "Environment", "EpicycleError", "Events", "Fault", "FaultError", "Host",
     "InputPort", "Latest", "MappingParameter", "Moment", "OutputPort", "Parameter", "ParameterError", "Pending",
-    "PortError", "PortParameter", "Process", "Quantity", "ReadyQueue", "Receiver", "Span", "Stream", "Streams", "Tag",
-    "TimedQueue", "UnitError", "Wake", "abridged", "accepts", "array_parameter", "bounds_text", "brief", "convert",
-    "counted", "counted_in_si", "cut", "declared_parameters", "declared_ports", "did_you_mean", "digits", "elementary",
-    "found_variants", "has_own_ports", "in_si", "irregular", "is_alone", "is_too_deep", "nearest", "new_tag",
-    "new_wake", "normal_quantile", "normal_share", "open_regular", "parse_unit", "part_finders", "paths", "plain",
-    "present", "random_stream", "read_regular", "read_table", "readable", "rounds", "shaped", "shortened",
-    "texts_parameter", "to_nanoseconds", "to_seconds", "token_type", "type_name", "unknown_parameter", "variants",
-    "visible", "visible_character", "visible_lines",
+    "PortError", "PortParameter", "Process", "Quantity", "Queues", "ReadyQueue", "Receiver", "Span", "Stream",
+    "Streams", "Tag", "TimedQueue", "UnitError", "Wake", "abridged", "accepts", "any_parameter", "array_parameter",
+    "below_nanoseconds", "bounds_text", "brief", "convert", "counted", "counted_in_si", "cut", "declared_parameters",
+    "declared_ports", "did_you_mean", "digits", "elementary", "found_variants", "has_own_ports", "in_si", "irregular",
+    "is_alone", "is_too_deep", "nearest", "new_tag", "new_wake", "normal_quantile", "normal_share", "open_regular",
+    "parse_unit", "part_finders", "paths", "plain", "present", "random_stream", "read_regular", "read_table",
+    "readable", "rounds", "shaped", "shortened", "texts_parameter", "to_nanoseconds", "to_seconds", "token_type",
+    "type_name", "unknown_parameter", "variants", "visible", "visible_character", "visible_lines",
 ]  # fmt: skip

@@ -262,4 +262,9 @@ def declared_ports(cls: type) -> Mapping[str, InputPort[Any] | OutputPort[Any]]:
                 found[name] = value
             elif isinstance(value, PortParameter):
                 found[name] = value.port
+    inputs = [name for name, port in found.items() if isinstance(port, InputPort)]
+    for name, port in found.items():
+        if isinstance(port, OutputPort) and port.terms.independent_of:
+            found[name] = port.twin(None)
+            found[name].change("depends_on", tuple(each for each in inputs if each not in port.terms.independent_of))
     return _declared.setdefault(cls, MappingProxyType(found))

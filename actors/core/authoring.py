@@ -5,13 +5,14 @@ The k-th tokens of all channels form the k-th round, so one token per channel an
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Iterator, Sequence
 from itertools import zip_longest
 from typing import Any, Generic, TypeVar
 
 from .actor import Actor
 from .order import TimedQueue
-from .ports import InputPort
+from .ports import InputPort, OutputPort
 
 T = TypeVar("T")
 ABSENT: Any = type("_Absent", (), {"__repr__": lambda self: "absent"})()
@@ -28,6 +29,26 @@ def rounds(*ports: InputPort[Any]) -> Iterator[list[list[Any]]]:
 def present(tokens: Sequence[Any]) -> list[Any]:
     """The tokens without ``ABSENT``."""
     return [token for token in tokens if token is not ABSENT]
+
+
+class Queues:
+    """The tokens of inputs that wait until they are taken: a queue for each channel, one input after the other."""
+
+    def __init__(self, *ports: InputPort[Any]) -> None:
+        self._ports = ports
+        self.channels: list[deque[Any]] = [deque() for port in ports for _ in range(port.width)]
+
+    def come(self) -> None:
+        """Let the tokens of the present tag wait."""
+        arrived = (tokens for port in self._ports for tokens in port.by_channel())
+        for queue, tokens in zip(self.channels, arrived, strict=True):
+            queue.extend(tokens)
+
+    def rounds(self) -> Iterator[list[Any]]:
+        """Let them wait, and take one from each channel as long as all have one."""
+        self.come()
+        while self.channels and all(self.channels):
+            yield [queue.popleft() for queue in self.channels]
 
 
 class Latest:
@@ -53,6 +74,22 @@ class Latest:
                     self._tokens[port.name] = token
             if len(self._tokens) == len(self._ports):
                 yield dict(self._tokens)
+
+
+class Changing:
+    """A number that an output tells whenever it changes; 0 at first."""
+
+    __slots__ = ("_output", "number")
+
+    def __init__(self, output: OutputPort[int]) -> None:
+        self._output = output
+        self.number = 0
+
+    def tell(self, number: int) -> None:
+        """Send the number, if it is another one."""
+        if number != self.number:
+            self.number = number
+            self._output.send(number)
 
 
 class Pending(Generic[T]):

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from keyword import iskeyword
 from pathlib import Path
-from typing import Any, ClassVar, Generic, TypeVar, overload
+from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypedDict, TypeVar, Unpack, overload
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -20,6 +20,25 @@ from .quantity import MAX_DEPTH, Quantity, counted_in_si, is_too_deep
 from .units import UnitError, convert, in_si, quantity
 
 T = TypeVar("T")
+V = TypeVar("V")
+
+if TYPE_CHECKING:
+
+    class Options(TypedDict, total=False):
+        """What a declaration may say besides type and default."""
+
+        unit: str
+        min: float | None
+        above: float | None
+        max: float | None
+        choices: Sequence[str]
+        renamed: Mapping[str, str]
+        doc: str
+
+    class ShapedOptions(Options, total=False):
+        """The same, for a list of values."""
+
+        shape: tuple[int | None, ...] | None
 
 
 class ParameterError(FaultError):
@@ -75,10 +94,32 @@ class Parameter(Generic[T]):
     A parameter that accepts values of several kinds has one parameter for each kind as its ``forms``.
     """
 
+    # What it reads as, for type checkers: also as None, if that is the default or it is optional.
+    @overload
+    def __init__(self: Parameter[V | None], type: type[V], default: None, **options: Unpack[ShapedOptions]) -> None: ...
+    @overload
+    def __init__(
+        self: Parameter[V | None],
+        type: type[V],
+        default: V = ...,
+        *,
+        optional: bool,
+        **options: Unpack[ShapedOptions],
+    ) -> None: ...
+    @overload
+    def __init__(self: Parameter[V], type: type[V], default: V = ..., **options: Unpack[ShapedOptions]) -> None: ...
+    @overload
+    def __init__(
+        self: Parameter[float | None], type: types.UnionType, default: None, **options: Unpack[ShapedOptions]
+    ) -> None: ...
+    @overload
+    def __init__(
+        self: Parameter[float], type: types.UnionType, default: float = ..., **options: Unpack[ShapedOptions]
+    ) -> None: ...
     def __init__(
         self,
-        type: type[T] | types.UnionType,
-        default: T | None = REQUIRED,
+        type: Any,
+        default: Any = REQUIRED,
         *,
         unit: str = "",
         min: float | None = None,
@@ -93,7 +134,7 @@ class Parameter(Generic[T]):
         if self.__class__ is Parameter:  # others describe their types themselves
             _check_type(type)
         self.type: Any = type
-        self.default = default
+        self.default: T | None = default
         self.unit = unit
         self.min = min
         self.above = above

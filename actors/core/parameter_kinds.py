@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any, cast
+from typing import TYPE_CHECKING, Any, Unpack, cast, overload
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,21 +11,28 @@ from numpy.typing import NDArray
 from .errors import Fault
 from .parameter import REQUIRED, Parameter, ParameterError
 
+if TYPE_CHECKING:
+    from .parameter import Options, ShapedOptions
 
+
+@overload
 def array_parameter(
-    shape: tuple[int | None, ...],
-    default: object = REQUIRED,
-    *,
-    unit: str = "",
-    min: float | None = None,
-    above: float | None = None,
-    max: float | None = None,
-    doc: str = "",
-) -> Parameter[NDArray[np.float64]]:
+    shape: tuple[int | None, ...], default: None, **options: Unpack[Options]
+) -> Parameter[NDArray[np.float64] | None]: ...
+@overload
+def array_parameter(
+    shape: tuple[int | None, ...], default: object = ..., **options: Unpack[Options]
+) -> Parameter[NDArray[np.float64]]: ...
+def array_parameter(
+    shape: tuple[int | None, ...], default: object = REQUIRED, **options: Unpack[Options]
+) -> Parameter[Any]:
     """A parameter whose value is a read-only array of floats; ``None`` in ``shape`` is any length."""
-    given: Any = default
-    bounds: dict[str, Any] = {"min": min, "above": above, "max": max}
-    return Parameter(cast(Any, float), given, unit=unit, shape=shape, doc=doc, **bounds)
+    return Parameter(cast(Any, float), default, shape=shape, **options)
+
+
+def any_parameter(default: object = REQUIRED, **options: Unpack[ShapedOptions]) -> Parameter[Any]:
+    """A parameter whose value is anything that YAML can write: a token; with ``shape=(None,)``, a list of these."""
+    return Parameter(cast(Any, object), default, **options)
 
 
 def texts_parameter(default: object = REQUIRED, *, doc: str = "") -> Parameter[tuple[str, ...]]:

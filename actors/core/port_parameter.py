@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 import types
-from typing import Any, TypeVar, overload
+from typing import TYPE_CHECKING, Any, TypeVar, Unpack, overload
 
-from .parameter import Parameter, ParameterError
+from .parameter import REQUIRED, Parameter, ParameterError
 from .ports import InputPort
 
+if TYPE_CHECKING:
+    from .parameter import ShapedOptions
+
 T = TypeVar("T")
+V = TypeVar("V")
 _NOTHING: Any = object()
 
 
@@ -83,8 +87,18 @@ class PortParameter(Parameter[T]):
     reads as its value; the port is ``actor.inputs["delay"]`` and need not be connected.
     """
 
-    def __init__(self, type: type[T] | types.UnionType, *arguments: Any, **keywords: Any) -> None:
-        Parameter.__init__(self, type, *arguments, **keywords)
+    @overload
+    def __init__(
+        self: PortParameter[V | None], type: type[V], default: None, **options: Unpack[ShapedOptions]
+    ) -> None: ...
+    @overload
+    def __init__(self: PortParameter[V], type: type[V], default: V = ..., **options: Unpack[ShapedOptions]) -> None: ...
+    @overload
+    def __init__(
+        self: PortParameter[float], type: types.UnionType, default: float = ..., **options: Unpack[ShapedOptions]
+    ) -> None: ...
+    def __init__(self, type: Any, default: Any = REQUIRED, **options: Any) -> None:
+        Parameter.__init__(self, type, default, **options)
         self.port: ParameterPort[T] = ParameterPort(self, type, self.doc)
 
     def __set_name__(self, owner: type, name: str) -> None:

@@ -18,7 +18,7 @@ cdef class _Told(Emitter):
 
 
 cdef class Terms:
-    cdef public object depends_on, doc, type
+    cdef public object depends_on, doc, independent_of, type
     cdef public bint multi, required, triggers
     cdef public str name
     cpdef Terms but(self, str option, value)

@@ -66,7 +66,7 @@ class _Told(Emitter):
 class Terms:
     """What is declared of a port: the same object for the port of an actor class and those of all its instances."""
 
-    __slots__ = ("depends_on", "doc", "multi", "name", "required", "triggers", "type")
+    __slots__ = ("depends_on", "doc", "independent_of", "multi", "name", "required", "triggers", "type")
 
     def __init__(self, type: Any, multi: bool, doc: str) -> None:
         self.name = ""
@@ -75,11 +75,12 @@ class Terms:
         self.doc = doc
         self.required = self.triggers = False  # of inputs
         self.depends_on: tuple[str, ...] | None = None  # of outputs
+        self.independent_of: tuple[str, ...] = ()
 
     def but(self, option: str, value: object) -> Terms:
         """The same, except for one of them."""
         made = Terms(self.type, self.multi, self.doc)
-        made.name, made.depends_on = self.name, self.depends_on
+        made.name, made.depends_on, made.independent_of = self.name, self.depends_on, self.independent_of
         made.required, made.triggers = self.required, self.triggers
         setattr(made, option, value)
         return made
@@ -270,7 +271,7 @@ class OutputPort(Port[T]):
     """A port where tokens leave: of any type if none is given.
 
     ``depends_on`` names the inputs that a token may depend on within the same tag; ``None`` means all of them, ``()``
-    none (an actor that delays), so that the port may be part of a loop.
+    none (an actor that delays), so that the port may be part of a loop.  ``independent_of`` names the others instead.
     """
 
     __slots__ = ("emitter",)
@@ -286,10 +287,11 @@ class OutputPort(Port[T]):
         shape: tuple[int | None, ...] | None = None,
         multi: bool = False,
         depends_on: tuple[str, ...] | None = None,
+        independent_of: tuple[str, ...] = (),
         doc: str = "",
     ) -> None:
         Port.__init__(self, type, shape=shape, multi=multi, doc=doc)
-        self.terms.depends_on = depends_on
+        self.terms.depends_on, self.terms.independent_of = depends_on, independent_of
         self.emitter: Emitter | None = None
 
     def begin(self, like: Any) -> None:

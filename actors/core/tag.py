@@ -51,6 +51,11 @@ def to_nanoseconds(seconds: float) -> int:
     return round(nanoseconds)
 
 
+def below_nanoseconds(seconds: float) -> float:
+    """What rounding to whole nanoseconds leaves out of a time (s): added to the next time, it does not accumulate."""
+    return seconds - to_seconds(to_nanoseconds(seconds))
+
+
 def to_seconds(nanoseconds: int) -> float:
     """Seconds, as used outside the engine."""
     return nanoseconds / NANOSECONDS_PER_SECOND

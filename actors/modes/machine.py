@@ -16,6 +16,7 @@ from ..core import (
     ParameterError,
     Tag,
     Wake,
+    any_parameter,
     did_you_mean,
     to_seconds,
 )
@@ -86,7 +87,7 @@ class StateMachine(ModalActor):
     initial = Parameter(str, None, doc="the mode in which it starts; the first if left out")
     variables = MappingParameter(Parameter(object), {}, doc="values that it keeps, with their initial values")
     held = MappingParameter(
-        Parameter(object, None), {}, doc="inputs that keep their latest token, with a value before the first, or null"
+        any_parameter(None), {}, doc="inputs that keep their latest token, with a value before the first, or null"
     )
 
     method = Parameter(str, "DOP853", choices=tuple(STEPPERS), doc="the solver of flows; see ODE")

@@ -43,7 +43,8 @@ class WaitingLine(WaitingActor):
     def initialize(self) -> None:
         super().initialize()
         check_channels(self, "trigger", "output")
-        self._triggers = deque(channel for _ in range(self.credits) for channel in range(max(self.trigger.width, 1)))
+        self._credits = self.credits * max(self.trigger.width, 1)  # that are left, for the channels in turn
+        self._triggers: deque[int] = deque()
 
     def fire(self) -> None:
         self._send()
@@ -57,6 +58,7 @@ class WaitingLine(WaitingActor):
         ]
         self._join(newcomers, self._serve)
         if not self.persistent_trigger:
+            self._credits = 0
             self._triggers.clear()
         self._tell_count("waiting", len(self._waiting))
 
@@ -67,7 +69,13 @@ class WaitingLine(WaitingActor):
         return size
 
     def _serve(self) -> None:
-        while self._triggers and len(self._waiting):
-            first, channel = self._waiting.first, self._triggers.popleft()
+        while (self._credits or self._triggers) and len(self._waiting):
+            first, channel = self._waiting.first, self._next_channel()
             self._waiting.remove(first)
             self._tell("output", first.token, channel if self.trigger.width > 1 and self.output.width > 1 else None)
+
+    def _next_channel(self) -> int:
+        if not self._credits:
+            return self._triggers.popleft()
+        self._credits -= 1
+        return -(self._credits + 1) % max(self.trigger.width, 1)

@@ -25,7 +25,7 @@ class Station(Process):
     output = OutputPort(depends_on=(), doc="each token when its service ends")
 
     places = Parameter(int, 1, min=1, doc="number of tokens served at a time")
-    service_time: Parameter[Distribution] = Parameter(Distribution, unit="s", doc="duration of a service")
+    service_time = Parameter(Distribution, unit="s", doc="duration of a service")
 
     def run(self) -> Generator[Event, Any, None]:
         self.resource = simpy.PriorityResource(self.environment, self.places)
@@ -57,10 +57,8 @@ class Machine(Process):
     part = OutputPort(int, depends_on=(), doc="number of parts made so far, sent for each finished part")
 
     number = Parameter(int, 0, doc="the number that identifies the machine")
-    work_time: Parameter[Distribution] = Parameter(Distribution, unit="s", doc="time to make a part")
-    time_to_failure: Parameter[Distribution] = Parameter(
-        Distribution, unit="s", doc="time that it runs until it breaks down"
-    )
+    work_time = Parameter(Distribution, unit="s", doc="time to make a part")
+    time_to_failure = Parameter(Distribution, unit="s", doc="time that it runs until it breaks down")
 
     def run(self) -> Generator[Event, Any, None]:
         self._runs = True

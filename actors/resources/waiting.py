@@ -26,7 +26,7 @@ class PatienceParameter(Parameter[Distribution | TokenFormula | None]):
     def __init__(self, *, doc: str) -> None:
         super().__init__(float, None, unit="s", doc=doc)  # type: ignore[arg-type]
         self._time = Parameter(float, unit="s", min=0)
-        self._law: Parameter[Distribution] = Parameter(Distribution, unit="s")
+        self._law = Parameter(Distribution, unit="s")
         self._formula = TokenFormulaParameter(known=("time", "channel"))
         self.forms = (self._time, self._formula, self._law)
 
@@ -108,7 +108,7 @@ class WaitingActor(Actor):
         known=("time", "channel"),
         doc="the lowest value goes first: an expression over the token's fields, token, time, channel",
     )
-    room: Parameter[float | None] = Parameter(float, None, min=0, doc="how much may wait; unlimited if left out")
+    room = Parameter(float, None, min=0, doc="how much may wait; unlimited if left out")
     balking: Parameter[Any] = TokenFormulaParameter(
         None,
         known=("time", "channel", "waiting"),

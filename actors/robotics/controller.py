@@ -142,7 +142,7 @@ class RobustController(TargetModel, Actor):
     infeasible = OutputPort(int, doc="number of plans so far that broke a constraint")
     iterations = OutputPort(int, doc="Newton (or solver) iterations for this plan")
 
-    dynamics: Parameter[Dynamics | None] = Parameter(
+    dynamics = Parameter(
         Dynamics, None, doc="how the robot moves; if left out, as a DoubleIntegrator with the limits below"
     )
     objective = Parameter(Objective, ReachGoal(), doc="objective of the robot, until a role comes")
@@ -153,12 +153,8 @@ class RobustController(TargetModel, Actor):
     max_acceleration = Parameter(float, 8.0, unit="m/s^2", min=1e-6, doc="Amax")
     climb_speed = Parameter(float, 4.0, unit="m/s", above=0, doc="in space, largest vertical speed, up and down")
     climb_acceleration = Parameter(float, 4.0, unit="m/s^2", above=0, doc="in space, largest vertical acceleration")
-    lowest: Parameter[float | None] = Parameter(
-        float, 1.0, unit="m", doc="in space, height to stay above; none if null"
-    )
-    highest: Parameter[float | None] = Parameter(
-        float, None, unit="m", doc="in space, height to stay below; none if left out"
-    )
+    lowest = Parameter(float, 1.0, unit="m", optional=True, doc="in space, height to stay above; none if null")
+    highest = Parameter(float, None, unit="m", doc="in space, height to stay below; none if left out")
     horizon = Parameter(int, 10, min=3, doc="N: prediction horizon in periods")
     horizon_from = Parameter(
         str,

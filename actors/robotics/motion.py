@@ -20,7 +20,7 @@ class WaypointMotion(Actor):
     waypoints = array_parameter((None, 2), unit="m", doc="where it goes, one after the other")
     speed = Parameter(float, 1.0, unit="m/s", min=0, doc="constant speed")
     appears = Parameter(float, 0.0, unit="s", min=0, doc="when it appears, in the run")
-    leaves: Parameter[float | None] = Parameter(float, None, unit="s", min=0, doc="when it leaves; never if left out")
+    leaves = Parameter(float, None, unit="s", min=0, doc="when it leaves; never if left out")
     repeats = Parameter(bool, False, doc="whether it begins again after the last waypoint")
 
     def check(self) -> None:

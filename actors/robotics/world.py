@@ -47,9 +47,7 @@ class Vehicle(Actor):
     acceleration = InputPort(np.ndarray, shape=(None,), triggers=False, doc="m/s^2, control to apply from now on")
     state = OutputPort(BodyState, depends_on=("trigger",), doc="position and velocity at this time")
 
-    dynamics: Parameter[Dynamics | None] = Parameter(
-        Dynamics, None, doc="how it moves; if left out, as a DoubleIntegrator with the limits below"
-    )
+    dynamics = Parameter(Dynamics, None, doc="how it moves; if left out, as a DoubleIntegrator with the limits below")
     start = PlaceParameter(doc="position at the first trigger; with the height last for a vehicle that flies")
     start_velocity = PlaceParameter(None, unit="m/s", doc="velocity at the first trigger; at rest if left out")
     max_speed = Parameter(float, 8.0, unit="m/s", min=0, doc="limit of the speed")
@@ -161,13 +159,11 @@ class Sensor(Actor):
         Measurement, doc="measurement, sent at tags where both are known, and the target is in range and in sight"
     )
 
-    model: Parameter[SensorModel | None] = Parameter(
-        SensorModel, None, doc="what is measured; if left out, 'kind' with its deviations"
-    )
+    model = Parameter(SensorModel, None, doc="what is measured; if left out, 'kind' with its deviations")
     kind = Parameter(str, RELATIVE_POSITION, choices=(RELATIVE_POSITION, RANGE), doc="what is measured")
     along = Parameter(float, 0.2, unit="m", min=0, doc="standard deviation along the line of sight, sigma_d")
     across = Parameter(float, 2.0, unit="m", min=0, doc="standard deviation across the line of sight, sigma_b")
-    max_range: Parameter[float | None] = Parameter(
+    max_range = Parameter(
         float, None, unit="m", min=0, doc="no measurement beyond this distance; unlimited if left out"
     )
     occluders = array_parameter(

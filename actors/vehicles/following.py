@@ -37,12 +37,10 @@ class WaypointFollower(Actor):
         float, 1.0, unit="m", above=0, doc="distance along the path to the point that the vehicle heads for"
     )
     tolerance = Parameter(float, 0.1, unit="m", above=0, doc="distance from a waypoint that counts as passing it")
-    deceleration: Parameter[float | None] = Parameter(
+    deceleration = Parameter(
         float, None, unit="m/s^2", above=0, doc="deceleration before the last waypoint; no braking if left out"
     )
-    wheelbase: Parameter[float | None] = Parameter(
-        float, None, unit="m", above=0, doc="distance between the axles of a steered vehicle"
-    )
+    wheelbase = Parameter(float, None, unit="m", above=0, doc="distance between the axles of a steered vehicle")
     closed = Parameter(bool, False, doc="whether the path is closed: the first waypoint follows the last")
 
     def check(self) -> None:

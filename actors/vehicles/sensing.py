@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
@@ -31,7 +31,7 @@ class RangeBearingSensor(Actor):
     bearing = OutputPort(float, doc="rad, from the heading to the left, from -pi to pi")
     range = OutputPort(float, doc="m, the distance")
 
-    landmark: Parameter[Any] = array_parameter((2,), None, unit="m", doc="position of the target, if none is connected")
+    landmark = array_parameter((2,), None, unit="m", doc="position of the target, if none is connected")
     bearing_deviation = Parameter(float, 0.0, unit="rad", min=0, doc="standard deviation of the bearing")
     range_deviation = Parameter(float, 0.0, unit="m", min=0, doc="standard deviation of the range")
     max_range = Parameter(float, math.inf, unit="m", min=0, doc="nothing is seen beyond this distance")

@@ -102,7 +102,7 @@ class WarmUpParameter(Parameter[float | str]):
     """A time in s, or ``mser5``."""
 
     def __init__(self, default: float, *, doc: str) -> None:
-        super().__init__(float | str, default, unit="s", doc=doc)
+        super().__init__(float | str, default, unit="s", doc=doc)  # type: ignore[arg-type]
         self.forms = (Parameter(float, unit="s", min=0.0), Parameter(str, choices=(MSER5,)))
 
     def describe_type(self) -> str:

@@ -248,6 +248,26 @@ def test_in_random_order_everybody_goes_once() -> None:
     assert sorted(found) == list(range(50)) != found
 
 
+def test_credits_are_counted_and_go_round() -> None:
+    feeds: Feeds = [("input", [[n, n] for n in range(5)]), ("trigger", [])]
+    assert tokens(behave("{type: WaitingLine, credits: 1000000000}", feeds)) == [0, 1, 2, 3, 4]
+    _, results = simulate(
+        """
+actors:
+  jobs: {type: Clock, period: 1 s, stop_time: 4 s}
+  line: {type: WaitingLine, credits: 2}
+  desk: {type: TimeDelay, count: 2, delay: 1 h}
+connections:
+  - jobs.output -> line.input
+  - line.output -> desk[*].input
+  - desk[*].output -> line.trigger
+run: {stop: 20 s}
+"""
+    )
+    found = [(r.value, r.channel) for r in results.log.records if (r.actor, r.port) == ("line", "output")]
+    assert found == [(0, 0), (1, 1), (2, 0), (3, 1)]
+
+
 CHANNELS = """
 actors:
   jobs: {type: Clock, period: 1 s, stop_time: 3 s}

@@ -14,6 +14,7 @@ from epicycle.actors import (
     MappingParameter,
     Parameter,
     ParameterError,
+    any_parameter,
     array_parameter,
     did_you_mean,
     texts_parameter,
@@ -238,6 +239,12 @@ def test_the_name_that_was_meant_is_found_in_good_time_among_many() -> None:
 
     assert seconds(names) < 5 * seconds(names[:100]) + 0.05
     assert nearest(asked, [*names, f"{asked[:-3]}123"]) == f"{asked[:-3]}123"
+
+
+def test_any_value() -> None:
+    assert any_parameter().describe_type() == "any value"
+    assert any_parameter((1, "x"), shape=(None,)).default_value == (1, "x")
+    assert any_parameter(None).convert(None) is None
 
 
 @pytest.mark.parametrize("kind", [list[float], np.ndarray, list, dict, complex, float | str, "float"])

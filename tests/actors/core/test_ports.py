@@ -7,7 +7,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from epicycle.actors import Actor, InputPort, OutputPort, PortError, accepts, shaped, type_name
+from epicycle.actors import (
+    Actor,
+    InputPort,
+    OutputPort,
+    PortError,
+    PortParameter,
+    accepts,
+    declared_ports,
+    shaped,
+    type_name,
+)
 
 
 class Hub(Actor):
@@ -29,6 +39,25 @@ def test_what_ports_declare() -> None:
     assert repr(outs) == "<output port site.hub.outs: array[2, n]>"
     assert repr(Hub.one) == "<input port one: float>"
     assert Hub("b").one is not one
+
+
+class Loop(Hub):
+    """Has an output by which it may be part of a loop, whatever inputs a subclass adds."""
+
+    level = PortParameter(float, 0.0)
+    apart = OutputPort(float, independent_of=("many",))
+
+
+class WiderLoop(Loop):
+    """Adds an input."""
+
+    more = InputPort(float)
+
+
+def test_an_output_depends_on_all_inputs_but_some() -> None:
+    assert Loop("loop").apart.depends_on == ("one", "level")
+    assert WiderLoop("loop").apart.depends_on == ("one", "level", "more")
+    assert declared_ports(Loop)["apart"].depends_on == ("one", "level")  # type: ignore[union-attr]
 
 
 def test_a_port_may_differ_from_its_declaration() -> None:
