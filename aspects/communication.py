@@ -68,11 +68,7 @@ class Latency(CommunicationAspect):
         if not self.reordering:
             delay = max(delay, point.memory.get("last", 0.0) - point.now)
             point.memory["last"] = point.now + delay
-        if delay == 0.0:
-            point.forward(token)
-            return
-        point.act("delayed", token, delay)
-        point.forward(token, delay)
+        point.delay(token, delay)
 
 
 class Duplicate(CommunicationAspect):
@@ -184,6 +180,4 @@ class Throttle(CommunicationAspect):
             point.act("dropped", token)
         else:
             point.memory["permits"] = (permits - 1.0, point.now)
-            delay = (1.0 - permits) / self.rate
-            point.act("delayed", token, delay)
-            point.forward(token, delay)
+            point.delay(token, (1.0 - permits) / self.rate)

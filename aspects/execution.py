@@ -59,7 +59,7 @@ class ExecutionTime(ExecutionAspect):
     time = FiringTimeParameter(
         0.0, doc="execution time of a firing, or a distribution; or {port: time} for each input port that costs time"
     )
-    times: Parameter[Path | None] = Parameter(
+    times = Parameter(
         Path,
         None,
         doc="file of measured times, .csv or .parquet: column value (s), and signal (NAME@ACTOR) unless for all actors",
@@ -310,7 +310,7 @@ class CrashRestart(ExecutionAspect):
     in_model_time: ClassVar[bool] = True
 
     times = array_parameter((None,), (), unit="s", min=0.0, doc="when it crashes")
-    mtbf: Parameter[float | None] = Parameter(
+    mtbf = Parameter(
         float,
         None,
         above=0,

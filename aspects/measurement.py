@@ -42,7 +42,7 @@ class MeasurementFailure(RandomLoss, MeasurementAspect):
     events: ClassVar[tuple[str, ...]] = ("failed",)
 
     probability = Parameter(float, min=0.0, max=1.0, unit="1", doc="probability that a measurement fails")
-    burst: Parameter[float | None] = Parameter(
+    burst = Parameter(
         float, None, unit="1", min=1.0, doc="mean number of failures in a row; independent failures if left out"
     )
 

@@ -37,19 +37,15 @@ class Medium(CommunicationAspect):
     stands_at: ClassVar[frozenset[str]] = frozenset({"input", "output"})
     in_model_time: ClassVar[bool] = True
 
-    medium: Parameter[str | None] = Parameter(
+    medium = Parameter(
         str, None, doc="name of the medium, shared by declarations of the same type; if left out, a separate one"
     )
     message_length = Parameter(float, 1.0, min=0.0, doc="length of a message")
     number_length = Parameter(float, 0.0, min=0.0, doc="length added by each number in the message")
-    length_field: Parameter[str | None] = Parameter(
-        str, None, doc="field of the message that holds its length, instead of both"
-    )
+    length_field = Parameter(str, None, doc="field of the message that holds its length, instead of both")
     priority = Parameter(float, 0.0, doc="of the waiting messages, those with the smallest number go first")
-    priority_field: Parameter[str | None] = Parameter(
-        str, None, doc="field of the message that holds its priority, instead of priority"
-    )
-    capacity: Parameter[int | None] = Parameter(
+    priority_field = Parameter(str, None, doc="field of the message that holds its priority, instead of priority")
+    capacity = Parameter(
         int, None, min=0, doc="number of messages that can wait, without the carried one; unlimited if left out"
     )
     overflow = Parameter(

@@ -93,7 +93,7 @@ class RangeLoss(_SituatedLoss, CommunicationAspect):
         float, 3.0, min=0.0, unit="1", doc="path-loss exponent: 2 in free space, 3 to 5 around obstacles"
     )
     shadowing = Parameter(float, 4.0, min=0.0, unit="1", doc="standard deviation of the received power, in dB")
-    correlation: Parameter[float | None] = Parameter(
+    correlation = Parameter(
         float,
         None,
         above=0,

@@ -55,10 +55,10 @@ class TraceFile(Configurable):
         str, "delay", doc="the column of delays; without lost and received, a message with an empty delay was lost"
     )
     delay_unit = Parameter(str, "s", choices=tuple(UNITS), doc="the unit of the delays")
-    sequence: Parameter[str | None] = Parameter(
+    sequence = Parameter(
         str, None, doc="the column of sequence numbers, if there is one: messages whose numbers are missing were lost"
     )
-    wraps: Parameter[int | None] = Parameter(
+    wraps = Parameter(
         int, None, min=2, max=2**53, doc="how many sequence numbers there are before they start again, such as 65536"
     )
 
@@ -279,12 +279,9 @@ class TraceReplay(TraceFile, CommunicationAspect):
             point.forward(token)
         elif self._measured.lost[row]:
             point.act("dropped", token)
-        elif self._measured.delays is not None and (late := int(self._measured.delays[row])):
-            delay = to_seconds(late)
-            point.act("delayed", token, delay)
-            point.forward(token, delay)
         else:
-            point.forward(token)
+            delays = self._measured.delays
+            point.delay(token, 0.0 if delays is None else to_seconds(int(delays[row])))
 
     def _row(self, point: JoinPoint) -> int | None:
         """The row for the present message; None after the end."""

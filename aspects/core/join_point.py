@@ -21,9 +21,11 @@ the same number of random values whatever its strength, so that runs at differen
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, ClassVar, Generic, Protocol, TypeVar
+from typing import Any, ClassVar, Generic, Protocol, Self, TypeVar
 
 from epicycle.actors import EpicycleError, Parameter, Stream, Streams, Tag, to_nanoseconds, to_seconds
 from epicycle.actors.expression import PortFormula, PortFormulaParameter, value_at
@@ -46,6 +48,12 @@ class AspectContext(Protocol):
     def streams(self) -> Streams:
         """The random streams of the run."""
 
+    def forward(self, token: Any) -> None:
+        """Let a token continue behind the aspect."""
+
+    def enter(self, token: Any) -> None:
+        """Let a token into the composite, for an aspect that is a model."""
+
     def later(self, delay: int, deliver: Callable[[Any], None], token: Any) -> None:
         """Call ``deliver(token)`` after ``delay`` ns; 0 is the next microstep."""
 
@@ -55,8 +63,8 @@ class AspectContext(Protocol):
     def latest(self, port: str) -> Any:
         """The latest token of an output port; None if it has sent nothing yet."""
 
-    def note(self, aspect: str, owner: str, port: str, event: str, token: Any) -> None:
-        """Write an act of an aspect into the event log; ``port`` is a name, empty for an act at an actor."""
+    def note(self, place: Place, event: str, token: Any) -> None:
+        """Write an act of the aspect at a place into the event log."""
 
     def record(self, signal: str, token: Any) -> None:
         """Append a token to a signal among the results of the run."""
@@ -64,65 +72,84 @@ class AspectContext(Protocol):
     def stop(self, reason: str) -> None:
         """End the run when the present tag has been handled; the first call gives the reason."""
 
+    def blame(self, doing: str, error: Exception) -> Exception:
+        """The error to raise for one of the aspect, with what it was doing."""
 
-class JoinPoint:
-    """One port to which an aspect is attached.
+    def during(self, handling: Any) -> AspectContext:
+        """The same for one token, of which ``handling`` says what happens to it."""
 
-    ``counts`` holds how often each event happened here.  ``memory`` belongs to the aspect, for data about this port
-    that it keeps between tokens; ``shared`` is common to all its ports.  ``place`` is the connection, for an aspect on
-    a single connection to the port.  ``readings`` are the ports read by the aspect's expressions, ``selections`` the
-    paths selected by its parameters with patterns. ``source`` is the port that tokens come from over the connection, at
-    an output the port itself; ``owner`` is the actor or composite whose port it is.  ``enter`` lets a token into the
-    composite, for an aspect that is a model.
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where an aspect acts: a port, or an actor.
+
+    ``key`` names its random stream and memory: the path, or the connection, for an aspect on a single one.
+    ``readings`` are the ports read by the aspect's expressions, ``selections`` the paths selected by its parameters
+    with patterns.
     """
 
-    def __init__(
-        self,
-        aspect: str,
-        port: str,
-        context: AspectContext,
-        forward: Callable[[Any], None],
-        shared: dict[Any, Any] | None = None,
-        place: str = "",
-        readings: Mapping[PortFormula, Sequence[Reading]] | None = None,
-        source: str = "",
-        selections: Mapping[str, Selection] | None = None,
-    ) -> None:
-        self.aspect = aspect
-        self.port = port
-        self.owner, self._name = self._parts(port)
-        self.source = source or port
-        self.enter = forward
-        self.counts: dict[str, int] = {}
-        self.memory: dict[Any, Any] = {}
-        self.shared: dict[Any, Any] = {} if shared is None else shared
-        self._place = place or port
-        self._first: JoinPoint = self
-        self._context = context
-        self._forward = forward
-        self._readings = readings or {}
-        self._selections = selections or {}
+    aspect: str
+    port: str  # or parameter, or actor
+    key: str
+    source: str  # the port that tokens come from, at an output the port itself
+    is_actor: bool = False
+    readings: Mapping[PortFormula, Sequence[Reading]] = field(default_factory=dict)
+    selections: Mapping[str, Selection] = field(default_factory=dict)
 
-    @staticmethod
-    def _parts(port: str) -> tuple[str, str]:
-        """The path of the actor or composite whose port this is, and the port's name."""
-        owner, _, name = port.rpartition(".")
-        return owner, name
+    @property
+    def owner(self) -> str:
+        """The path of the actor, or of the actor or composite whose port this is."""
+        return self.port if self.is_actor else self.port.rpartition(".")[0]
+
+    @property
+    def name(self) -> str:
+        """The name of the port; empty for an actor."""
+        return "" if self.is_actor else self.port.rpartition(".")[2]
+
+
+@dataclass(eq=False, slots=True)
+class Memory:
+    """What an aspect keeps at a place, over all connections to it."""
+
+    shared: dict[Any, Any] = field(default_factory=dict)  # with all its places
+    own: dict[Any, Any] = field(default_factory=dict)
+    counts: dict[str, int] = field(default_factory=dict)
+    stream: Stream | None = None
+
+
+class JoinPoint:
+    """A place to which an aspect is attached: a port, or a single connection to it.
+
+    ``counts`` holds how often each event happened here.  ``memory`` belongs to the aspect, for data about this port
+    that it keeps between tokens; ``shared`` is common to all its ports.  ``source`` is the port that tokens come from
+    over the connection, at an output the port itself; ``owner`` is the actor or composite whose port it is.
+    """
+
+    def __init__(self, place: Place, memory: Memory, context: AspectContext) -> None:
+        self.place = place
+        self.aspect, self.port, self.owner, self.source = place.aspect, place.port, place.owner, place.source
+        self.counts, self.memory, self.shared = memory.counts, memory.own, memory.shared
+        self._memory = memory
+        self._context = context
 
     @cached_property
     def random(self) -> Stream:
-        """The random stream of the aspect at this port, made on first use."""
-        if self._first is not self:
-            return self._first.random
-        return aspect_stream(self._context.streams, self._place, self.aspect)
+        """The random stream of the aspect at this place, made on first use."""
+        if self._memory.stream is None:
+            self._memory.stream = aspect_stream(self._context.streams, self.place.key, self.aspect)
+        return self._memory.stream
+
+    def during(self, handling: Any) -> Self:
+        """Engine: the same place for one token, as ``AspectContext.during``; what does not happen is not counted."""
+        made = copy.copy(self)
+        made._context = self._context.during(handling)
+        if not handling.happens:
+            made.counts = {}
+        return made
 
     def is_at(self, other: JoinPoint) -> bool:
         """Whether it is the same place of the same aspect: a single token may have a join point of its own."""
-        return self._place == other._place and self.aspect == other.aspect
-
-    def share(self, first: JoinPoint) -> None:
-        """Engine: share stream and memory with ``first``, at another connection of the port."""
-        self._first, self.memory, self.counts = first, first.memory, first.counts
+        return self._memory is other._memory
 
     @property
     def tag(self) -> Tag:
@@ -144,7 +171,7 @@ class JoinPoint:
         None as long as one of its ports has sent nothing; raises ``EpicycleError``.
         """
         values = []
-        for port, fields in self._readings.get(formula, ()):
+        for port, fields in self.place.readings.get(formula, ()):
             latest = self._context.latest(port)
             if latest is None:
                 return None
@@ -153,18 +180,30 @@ class JoinPoint:
 
     def selected(self, parameter: str) -> Selection:
         """The full paths selected by each pattern in a ``SelectionParameter`` of the aspect."""
-        return self._selections.get(parameter, {})
+        return self.place.selections.get(parameter, {})
 
     def forward(self, token: Any, delay: float | None = None) -> None:
         """Let a token pass, at once or after ``delay`` seconds (0 is the next microstep)."""
         if delay is None:
-            self._forward(token)
+            self._context.forward(token)
         else:
-            self._context.later(to_nanoseconds(delay), self._forward, token)
+            self._context.later(to_nanoseconds(delay), self._context.forward, token)
+
+    def enter(self, token: Any) -> None:
+        """Let a token into the composite, for an aspect that is a model."""
+        self._context.enter(token)
+
+    def delay(self, token: Any, seconds: float) -> None:
+        """Let a token pass after some seconds, and note that as ``delayed``; at once and without a trace after none."""
+        if seconds == 0.0:
+            self.forward(token)
+        else:
+            self.act("delayed", token, seconds)
+            self.forward(token, seconds)
 
     def hold(self, token: Any) -> Callable[[], None]:
         """A function that lets a token pass: ``forward`` for a later time."""
-        return self._context.hold(self._forward, token)
+        return self._context.hold(self._context.forward, token)
 
     def later(self, delay: float, call: Callable[[Any], None], what: Any) -> None:
         """Call ``call(what)`` after ``delay`` seconds (0 is the next microstep), for decisions at that time."""
@@ -180,7 +219,7 @@ class JoinPoint:
         Details are a new token or a delay in seconds; with details the logged value is a list.
         """
         self.count(event)
-        self._context.note(self.aspect, self.owner, self._name, event, [token, *details] if details else token)
+        self._context.note(self.place, event, [token, *details] if details else token)
 
     def record(self, token: Any) -> None:
         """Append a token to the signal of this join point, ``aspect@port``, among the results of the run."""
@@ -189,6 +228,10 @@ class JoinPoint:
     def stop(self) -> None:
         """End the run when the present tag has been handled; the aspect is given as the reason."""
         self._context.stop(f"aspect {self.aspect}")
+
+    def blame(self, doing: str, error: Exception) -> Exception:
+        """Engine: the error to raise for one of the aspect here."""
+        return self._context.blame(doing, error)
 
 
 def aspect_stream(streams: Streams, place: str, aspect: str) -> Stream:
@@ -209,10 +252,8 @@ class JoinPointAspect(Aspect, Generic[Passing, Point]):
     in_model_time: ClassVar[bool] = False
 
     from_ = Parameter(float, 0.0, min=0.0, unit="s", doc="active from this time on")
-    until: Parameter[float | None] = Parameter(float, None, min=0.0, unit="s", doc="active only before this time")
-    every: Parameter[float | None] = Parameter(
-        float, None, above=0, unit="s", doc="period with which 'from' and 'until' repeat"
-    )
+    until = Parameter(float, None, min=0.0, unit="s", doc="active only before this time")
+    every = Parameter(float, None, above=0, unit="s", doc="period with which 'from' and 'until' repeat")
     when = PortFormulaParameter(
         None, doc="active while this expression over ports is true, such as main.state.position[0] < 20"
     )

@@ -18,12 +18,12 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, ClassVar, Protocol
 
 from epicycle.actors import Actor, InputPort, Parameter, Tag, Wake
 
-from .join_point import JoinPoint, JoinPointAspect, aspect_stream
+from .join_point import JoinPoint, JoinPointAspect, Memory, aspect_stream
 
 
 class PortAspect(JoinPointAspect[Any, JoinPoint]):
@@ -171,11 +171,6 @@ class ActorPoint(JoinPoint):
     target: Target
     keeper: Keeper
 
-    @staticmethod
-    def _parts(port: str) -> tuple[str, str]:
-        """The path of the actor."""
-        return port, ""
-
 
 _WHOLE = " as a whole"  # a part of the name of a random stream: with another one, results would change
 
@@ -184,10 +179,10 @@ class Target(ActorPoint):
     """The target of an execution aspect as a whole: the ``points`` of its actors."""
 
     def __init__(self, path: str, first: ActorPoint) -> None:
-        super().__init__(first.aspect, path, first._context, lambda job: None, first.shared)
+        place = replace(first.place, port=path, source=path, key=path)
+        super().__init__(place, Memory(first.shared), first._context)
         self.random = aspect_stream(first._context.streams, path, first.aspect + _WHOLE)
         self.points: list[ActorPoint] = []
-        self._readings = first._readings
 
     def suspend(self, keeps: Callable[[Job, ActorPoint], bool]) -> None:
         """Suspend its actors.  Forwarded jobs wait; a job that falls due also waits, before any aspect gets it, if

@@ -47,7 +47,7 @@ class DurationParameter(Parameter[Duration]):
 
     def __init__(self, default: Any = REQUIRED, *, doc: str = "") -> None:
         super().__init__(float, default, min=0.0, unit="s", doc=doc)
-        self._of_law: Parameter[Distribution] = Parameter(Distribution, unit="s")
+        self._of_law = Parameter(Distribution, unit="s")
         self.forms = (Parameter(float, min=0.0, unit="s"), self._of_law)
 
     def describe_type(self) -> str:

@@ -7,14 +7,13 @@ token goes on at once.
 
 from __future__ import annotations
 
-import copy
 import hashlib
-from collections.abc import Callable, Container
+from collections.abc import Container
 from dataclasses import replace
 from typing import Any
 
-from epicycle.actors import Receiver, Streams, Tag
-from epicycle.aspects import AspectContext
+from epicycle.actors import Receiver
+from epicycle.aspects import JoinPoint
 
 from ..graph import Act, ActName
 from ..results import canonical
@@ -46,128 +45,47 @@ class Interventions:
         self._noted[name] = replace(before, events=(*before.events, *events))
 
 
+class Handling:
+    """What an aspect does to one token: its name, whether it ``happens``, and whether it is anything at all."""
+
+    __slots__ = ("_acts", "_is_untouched", "_name", "_point", "_token", "happens")
+
+    def __init__(self, acts: Interventions, point: JoinPoint, token: Any) -> None:
+        self._acts = acts
+        self._name = acts.next(point.aspect, point.place.key)
+        self._point = point
+        self._token = token
+        self._is_untouched = False
+        self.happens = acts.exactly is None or self._name in acts.exactly
+
+    def forward(self, token: Any) -> None:
+        """The aspect lets a token continue."""
+        self._is_untouched = token is self._token and not self._is_untouched
+        if self.happens:
+            self._point.forward(token)
+
+    def note(self, *events: str) -> None:
+        """Something has happened to the token."""
+        self._acts.note(self._name, self._point.source, self._point.tag.time, self._token, *events)
+
+    def end(self) -> None:
+        """The aspect has been told of the token."""
+        if not self.happens:
+            self._point.forward(self._token)
+        elif not self._is_untouched:  # so far there may be nothing in the log
+            self.note()
+
+
 class NamedCall(Receiver):
     """An aspect at a place, whose acts have names."""
 
-    __slots__ = ("acts", "aspect_call", "key")
+    __slots__ = ("acts", "aspect_call")
 
-    def __init__(self, aspect_call: AspectCall, acts: Interventions, place: str) -> None:
+    def __init__(self, aspect_call: AspectCall, acts: Interventions) -> None:
         self.aspect_call = aspect_call
         self.acts = acts
-        self.key = aspect_call.point.aspect, place
 
     def put(self, token: Any) -> None:
-        name, point = self.acts.next(*self.key), self.aspect_call.point
-        point.random  # noqa: B018 (or a copy would have a stream of its own)
-        if self.acts.exactly is None or name in self.acts.exactly:
-            passing = _Passing(token, point._forward)
-            context = _Noting(point._context, self.acts, name, point.source, token)
-            self._act(token, context, passing, point.enter, point.counts)
-            if not passing.is_untouched:  # so far there may be nothing in the log
-                context.note_it()
-        else:
-            self._act(token, _Silent(point._context), _lose, _lose, {})
-            point._forward(token)
-
-    def _act(
-        self,
-        token: Any,
-        context: AspectContext,
-        forward: Callable[[Any], None],
-        enter: Callable[[Any], None],
-        counts: dict[str, int],
-    ) -> None:
-        """Let the aspect act; what it keeps of this token, it keeps with a join point that is this token's."""
-        aspect_call = self.aspect_call
-        seen = copy.copy(aspect_call.point)
-        seen._context, seen._forward, seen.enter, seen.counts = context, forward, enter, counts
-        AspectCall(
-            aspect_call.act, aspect_call.doing, seen, aspect_call.holds, aspect_call.pass_by, aspect_call.tell
-        ).put(token)
-
-
-class _Passing:
-    """Lets a token go on, and sees whether that is all."""
-
-    __slots__ = ("_forward", "_token", "is_untouched")
-
-    def __init__(self, token: Any, forward: Callable[[Any], None]) -> None:
-        self._token = token
-        self._forward = forward
-        self.is_untouched = False
-
-    def __call__(self, token: Any) -> None:
-        self.is_untouched = token is self._token and not self.is_untouched
-        self._forward(token)
-
-
-def _lose(token: Any) -> None:
-    """What becomes of a token that has gone on already."""
-
-
-class _Context:
-    """What the engine offers to a join point, for one token."""
-
-    def __init__(self, context: AspectContext) -> None:
-        self._context = context
-
-    @property
-    def tag(self) -> Tag:
-        return self._context.tag
-
-    @property
-    def streams(self) -> Streams:
-        return self._context.streams
-
-    def later(self, delay: int, deliver: Callable[[Any], None], token: Any) -> None:
-        self._context.later(delay, deliver, token)
-
-    def hold(self, deliver: Callable[[Any], None], token: Any) -> Callable[[], None]:
-        return self._context.hold(deliver, token)
-
-    def latest(self, port: str) -> Any:
-        return self._context.latest(port)
-
-    def note(self, aspect: str, owner: str, port: str, event: str, token: Any) -> None:
-        self._context.note(aspect, owner, port, event, token)
-
-    def record(self, signal: str, token: Any) -> None:
-        self._context.record(signal, token)
-
-    def stop(self, reason: str) -> None:
-        self._context.stop(reason)
-
-
-class _Noting(_Context):
-    """Notes what is done to a token under its name."""
-
-    def __init__(self, context: AspectContext, acts: Interventions, name: ActName, source: str, token: Any) -> None:
-        super().__init__(context)
-        self._acts = acts
-        self._name = name
-        self._source = source
-        self._token = token
-
-    def note_it(self, *events: str) -> None:
-        self._acts.note(self._name, self._source, self._context.tag.time, self._token, *events)
-
-    def note(self, aspect: str, owner: str, port: str, event: str, token: Any) -> None:
-        self.note_it(event)
-        self._context.note(aspect, owner, port, event, token)
-
-
-class _Silent(_Context):
-    """Lets nothing come of what is done to a token."""
-
-    def later(self, delay: int, deliver: Callable[[Any], None], token: Any) -> None:
-        if deliver is not _lose:
-            self._context.later(delay, deliver, token)
-
-    def note(self, aspect: str, owner: str, port: str, event: str, token: Any) -> None:
-        pass
-
-    def record(self, signal: str, token: Any) -> None:
-        pass
-
-    def stop(self, reason: str) -> None:
-        pass
+        handling = Handling(self.acts, self.aspect_call.point, token)
+        self.aspect_call.show(token, self.aspect_call.point.during(handling))
+        handling.end()

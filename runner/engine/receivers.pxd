@@ -1,4 +1,4 @@
-# Types for C; way.py has the documentation.
+# Types for C; receivers.py has the documentation.
 
 cimport cython
 from epicycle.actors cimport Emitter, Receiver
@@ -24,8 +24,11 @@ cdef class Delayed(Receiver):
 
 
 cdef class AspectCall(Receiver):
-    cdef public object act, doing, holds, pass_by, point, tell
+    cdef public object act, aspect, doing, point
+    cdef public bint is_always_active
     cpdef put(self, token)
+    cpdef show(self, token, point)
+    cpdef holds(self, point)
 
 
 cdef class Sender(Emitter):

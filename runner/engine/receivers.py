@@ -6,13 +6,13 @@ from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING, Any, Protocol
 
-from epicycle.actors import Emitter, PortError, Receiver, counted
+from epicycle.actors import Emitter, EpicycleError, PortError, Receiver, counted
 
 from .errors import ActorError, LoopError
 
 if TYPE_CHECKING:
     from epicycle.actors import OutputPort
-    from epicycle.aspects import JoinPoint
+    from epicycle.aspects import JoinPoint, JoinPointAspect
 
     from ..results import Writer
     from .director import Director
@@ -46,41 +46,47 @@ class Fork(Receiver):
 
 
 class AspectCall(Receiver):
-    """Passes each token, or job, to an aspect at a join point; an error in it is reported with what it was doing."""
+    """Shows each token, or job, to an aspect at a join point; an error in it is reported with what it was doing."""
 
-    __slots__ = ("act", "doing", "holds", "pass_by", "point", "tell")
+    __slots__ = ("act", "aspect", "doing", "is_always_active", "point")
 
     def __init__(
-        self,
-        act: Callable[[Any, Any], None],
-        doing: str,
-        point: JoinPoint,
-        holds: Callable[[], bool] | None,
-        pass_by: Callable[[Any, Any], None],
-        tell: Callable[[str, Exception], ActorError],
+        self, aspect: JoinPointAspect[Any, Any], act: Callable[[Any, Any], None], doing: str, point: JoinPoint
     ) -> None:
+        self.aspect = aspect
         self.act = act
         self.doing = doing
         self.point = point
-        self.holds = holds  # None if the aspect is always active
-        self.pass_by = pass_by
-        self.tell = tell
+        self.is_always_active = aspect.is_always_active
 
     def put(self, token: Any) -> None:
+        self.show(token, self.point)
+
+    def show(self, token: Any, point: JoinPoint) -> None:
+        """Show a token to the aspect, at its join point or the token's own."""
         doing = self.doing
         try:
-            if self.holds is not None:
+            if not self.is_always_active:
                 doing = "is_due()"
-                if not self.holds():
+                if not (self.aspect.is_due(point.tag.time) and self.holds(point)):
                     doing = "pass_by()"
-                    self.pass_by(token, self.point)
+                    self.aspect.pass_by(token, point)
                     return
                 doing = self.doing
-            self.act(token, self.point)
+            self.act(token, point)
         except (ActorError, LoopError):  # of something behind it
             raise
         except Exception as error:
-            raise self.tell(doing, error) from error
+            raise point.blame(f"{doing} at {point.port}", error) from error
+
+    def holds(self, point: JoinPoint) -> bool:
+        """Whether the ``when`` of the aspect holds for the latest tokens of its ports; not before their first ones."""
+        if self.aspect.when is None:
+            return True
+        try:
+            return bool(point.value_of(self.aspect.when))
+        except EpicycleError as error:
+            raise point.blame("when", error) from None
 
 
 class Waits(Protocol):

@@ -23,6 +23,8 @@ from epicycle.aspects import (
     JoinPoint,
     JoinPointAspect,
     Medium,
+    Memory,
+    Place,
     PortAspect,
     Target,
     aspect_stream,
@@ -78,6 +80,7 @@ class Wiring:
         self._listeners = listeners
         self._signals = signals
         self._points_at: dict[tuple[str, str], JoinPoint] = {}
+        self._memories: dict[tuple[str, str], Memory] = {}
         self._woven_at: dict[str, list[WovenAspect]] = {}
         self._woven_on: dict[tuple[str, str], list[WovenAspect]] = {}
         self._requests = {woven.name: Requests(woven) for woven in aspects if woven.model is not None}
@@ -266,7 +269,11 @@ class Wiring:
         aspect = woven.aspect
         assert isinstance(aspect, PortAspect)
         point = self._point(JoinPoint, woven, aspect, path, onward.put, place or path, source)
-        return self._aspect_call(woven, aspect, aspect.pass_token, point, "pass_token()", place or path)
+        return self._named(AspectCall(aspect, aspect.pass_token, "pass_token()", point))
+
+    def _named(self, aspect_call: AspectCall) -> Receiver:
+        """The act of an aspect on what comes to a join point, with a name if acts are to have names."""
+        return aspect_call if self.acts is None else NamedCall(aspect_call, self.acts)
 
     def _scheduled(self, path: str, onward: Callable[[Job], None]) -> Callable[[Job], None]:
         """``onward`` preceded by the aspects at an actor, the first declared outermost."""
@@ -275,28 +282,8 @@ class Wiring:
             assert isinstance(aspect, ExecutionAspect)
             point = self._point(ActorPoint, woven, aspect, path, onward, path)
             self._join(point, woven, aspect)
-            onward = self._aspect_call(woven, aspect, aspect.schedule, point, "schedule()", path).put
+            onward = self._named(AspectCall(aspect, aspect.schedule, "schedule()", point)).put
         return onward
-
-    def _aspect_call(
-        self,
-        woven: WovenAspect,
-        aspect: JoinPointAspect[T, P],
-        act: Callable[[T, P], None],
-        point: P,
-        name: str,
-        place: str,
-    ) -> Receiver:
-        """The act of an aspect on what comes to a join point; an error in it is reported with its ``name``."""
-        holds = None if aspect.is_always_active else partial(self._is_active, woven, aspect, point)
-        aspect_call = AspectCall(act, name, point, holds, aspect.pass_by, partial(self._told, woven, point.port))
-        return aspect_call if self.acts is None else NamedCall(aspect_call, self.acts, place)
-
-    def _is_active(self, woven: WovenAspect, aspect: JoinPointAspect[T, P], point: P) -> bool:
-        return aspect.is_due(point.tag.time) and self._holds(woven, aspect, point)
-
-    def _told(self, woven: WovenAspect, path: str, doing: str, error: Exception) -> ActorError:
-        return self._error(woven, f"{doing} at {path}", error)
 
     def _answer(self, woven: WovenAspect, request: Any) -> None:
         """Send a token onward that has come through an aspect's composite."""
@@ -306,15 +293,6 @@ class Wiring:
             raise
         except EpicycleError as error:
             raise self._error(woven, "delivering", error) from None
-
-    def _holds(self, woven: WovenAspect, aspect: JoinPointAspect[T, P], point: P) -> bool:
-        """Whether the ``when`` of an aspect holds for the latest tokens of its ports; not before their first ones."""
-        if aspect.when is None:
-            return True
-        try:
-            return bool(point.value_of(aspect.when))
-        except EpicycleError as error:
-            raise self._error(woven, "when", error) from None
 
     def _error(self, woven: WovenAspect, doing: str, error: Exception) -> ActorError:
         return ActorError(f"aspect {woven.name}", self.director.tag, doing, describe(error))
@@ -336,19 +314,17 @@ class Wiring:
         place: str,
         source: str = "",
     ) -> P:
-        """The place of an aspect: a port or parameter, or an actor."""
-        name, owner = woven.name, path if kind is ActorPoint else self.graph.owner(path)
-        local = self.director if aspect.in_model_time else self.directors.over(owner)
-        blame = partial(self._error, woven, f"later() at {path}")
-        context = EngineContext(local, self.director, self.log, self._latest, self._signals, blame)
-        point = kind(name, path, context, onward, self.shared(woven), place, woven.readings, source, woven.selections)
+        """The join point of an aspect at a port or parameter, or at an actor."""
+        is_actor, key = kind is ActorPoint, (woven.name, place)
+        at = Place(woven.name, path, place, source or path, is_actor, woven.readings, woven.selections)
+        local = self.director if aspect.in_model_time else self.directors.over(at.owner)
+        context = EngineContext(woven.name, path, local, onward, self.director, self.log, self._latest, self._signals)
+        point = kind(at, self._memories.setdefault(key, Memory(self.shared(woven))), context)
+        if key not in self._points_at:  # others, at other connections, share its memory
+            self.points[woven.name].append(point)
+            self._points_at[key] = point
         if woven.model is not None:
-            point.enter = self._requests[name].add_way(point, place)
-        first = self._points_at.setdefault((name, place), point)
-        if first is point:
-            self.points[name].append(point)
-        else:
-            point.share(first)
+            context.enter = self._requests[woven.name].add_way(point, place)
         return point
 
     def _join(self, point: ActorPoint, woven: WovenAspect, aspect: ExecutionAspect) -> None:

@@ -10,9 +10,23 @@ from functools import partial
 from typing import Any
 
 from epicycle.actors import Streams, Tag, declared_parameters
-from epicycle.aspects import JoinPoint, Medium, PortAspect, SelectionParameter
+from epicycle.aspects import JoinPoint, Medium, Memory, Place, PortAspect, SelectionParameter
 
 SECOND = 1_000_000_000
+
+
+class _At:
+    """The bench as seen from one port."""
+
+    def __init__(self, bench: Bench, port: str) -> None:
+        self.bench = bench
+        self.port = port
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self.bench, name)
+
+    def forward(self, token: Any) -> None:
+        self.bench.out.append((self.bench.tag.time / SECOND, self.port, token))
 
 
 class Bench:
@@ -91,14 +105,9 @@ class Bench:
                 for name, parameter in declared_parameters(type(aspect)).items()
                 if isinstance(parameter, SelectionParameter)
             }
-            point = JoinPoint(
-                "it", port, self, self._put(port), self._shared, source=self.source, selections=selections
-            )
-            self.points[port] = point
+            place = Place("it", port, port, self.source or port, selections=selections)
+            point = self.points[port] = JoinPoint(place, Memory(self._shared), _At(self, port))
         aspect.pass_token(token, point)
-
-    def _put(self, port: str) -> Callable[[Any], None]:
-        return lambda token: self.out.append((self.tag.time / SECOND, port, token))
 
     # What a join point asks of a run.
 
@@ -113,8 +122,8 @@ class Bench:
     def hold(self, deliver: Callable[[Any], None], token: Any) -> Callable[[], None]:
         return partial(deliver, token)
 
-    def note(self, aspect: str, owner: str, port: str, event: str, token: Any) -> None:
-        self.acts.append((self.tag.time / SECOND, f"{owner}.{port}", event, token))
+    def note(self, place: Place, event: str, token: Any) -> None:
+        self.acts.append((self.tag.time / SECOND, place.port, event, token))
 
     def record(self, signal: str, token: Any) -> None:
         raise AssertionError("nothing is recorded")

@@ -19,9 +19,11 @@ from epicycle.aspects import (
     Count,
     JoinPoint,
     MeasurementAspect,
+    Memory,
     Noise,
     ObservationAspect,
     PacketLoss,
+    Place,
     Probe,
     SelectionParameter,
 )
@@ -259,9 +261,13 @@ class Careless:
         self.log = []
         for place, each in enumerate(woven):
             for port in ["a.input", "b.input"] if each.at == "**" else each.at:
-                point = JoinPoint(each.name, port, self, lambda token: None, place="a" if self.one_stream else "")
+                where = Place(each.name, port, "a" if self.one_stream else port, port)
+                point = JoinPoint(where, Memory(), self)
                 each.aspect.pass_token(float(place if self.minds_order else 0), point)
         return sorted(self.log, key=lambda record: record.aspect)
+
+    def forward(self, token: Any) -> None:
+        pass
 
     def later(self, delay: int, deliver: Callable[[Any], None], token: Any) -> None:
         raise NotImplementedError
@@ -269,8 +275,8 @@ class Careless:
     def latest(self, port: str) -> Any:
         raise NotImplementedError
 
-    def note(self, aspect: str, owner: str, port: str, event: str, token: Any) -> None:
-        self.log.append(Record(self.tag, event, owner, port, None, aspect, token))
+    def note(self, place: Place, event: str, token: Any) -> None:
+        self.log.append(Record(self.tag, event, place.owner, place.name, None, place.aspect, token))
 
     def record(self, signal: str, token: Any) -> None:
         pass
