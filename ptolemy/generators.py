@@ -123,9 +123,7 @@ class DRand(Generator):
 class _Drawing(Actor):
     """An actor that may draw from a generator."""
 
-    generator: Parameter[Generator | None] = Parameter(
-        Generator, None, doc="the generator to draw from; the actor's own stream if left out"
-    )
+    generator = Parameter(Generator, None, doc="the generator to draw from; the actor's own stream if left out")
 
     def check(self) -> None:
         super().check()

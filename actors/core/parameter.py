@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-import types
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
 from keyword import iskeyword
 from pathlib import Path
+from types import MappingProxyType, UnionType
 from typing import TYPE_CHECKING, Any, ClassVar, Generic, TypedDict, TypeVar, Unpack, overload
 from weakref import WeakKeyDictionary
 
@@ -24,7 +24,7 @@ V = TypeVar("V")
 
 if TYPE_CHECKING:
 
-    class Options(TypedDict, total=False):
+    class Bounds(TypedDict, total=False):
         """What a declaration may say besides type and default."""
 
         unit: str
@@ -35,8 +35,8 @@ if TYPE_CHECKING:
         renamed: Mapping[str, str]
         doc: str
 
-    class ShapedOptions(Options, total=False):
-        """The same, for a list of values."""
+    class Options(Bounds, total=False):
+        """The same, and the shape of a list."""
 
         shape: tuple[int | None, ...] | None
 
@@ -96,7 +96,7 @@ class Parameter(Generic[T]):
 
     # What it reads as, for type checkers: also as None, if that is the default or it is optional.
     @overload
-    def __init__(self: Parameter[V | None], type: type[V], default: None, **options: Unpack[ShapedOptions]) -> None: ...
+    def __init__(self: Parameter[V | None], type: type[V], default: None, **options: Unpack[Options]) -> None: ...
     @overload
     def __init__(
         self: Parameter[V | None],
@@ -104,18 +104,14 @@ class Parameter(Generic[T]):
         default: V = ...,
         *,
         optional: bool,
-        **options: Unpack[ShapedOptions],
+        **options: Unpack[Options],
     ) -> None: ...
     @overload
-    def __init__(self: Parameter[V], type: type[V], default: V = ..., **options: Unpack[ShapedOptions]) -> None: ...
+    def __init__(self: Parameter[V], type: type[V], default: V = ..., **options: Unpack[Options]) -> None: ...
     @overload
-    def __init__(
-        self: Parameter[float | None], type: types.UnionType, default: None, **options: Unpack[ShapedOptions]
-    ) -> None: ...
+    def __init__(self: Parameter[float | None], type: UnionType, default: None, **options: Unpack[Options]) -> None: ...
     @overload
-    def __init__(
-        self: Parameter[float], type: types.UnionType, default: float = ..., **options: Unpack[ShapedOptions]
-    ) -> None: ...
+    def __init__(self: Parameter[float], type: UnionType, default: float = ..., **options: Unpack[Options]) -> None: ...
     def __init__(
         self,
         type: Any,
@@ -405,7 +401,7 @@ def declared_parameters(cls: type) -> Mapping[str, Parameter[Any]]:
         for value in vars(base).values():
             if isinstance(value, Parameter):
                 found.setdefault(value.name, value)
-    return _declared.setdefault(cls, types.MappingProxyType(found))
+    return _declared.setdefault(cls, MappingProxyType(found))
 
 
 def unknown_parameter(cls: type, name: str) -> str:

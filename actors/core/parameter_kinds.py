@@ -12,25 +12,25 @@ from .errors import Fault
 from .parameter import REQUIRED, Parameter, ParameterError
 
 if TYPE_CHECKING:
-    from .parameter import Options, ShapedOptions
+    from .parameter import Bounds, Options
 
 
 @overload
 def array_parameter(
-    shape: tuple[int | None, ...], default: None, **options: Unpack[Options]
+    shape: tuple[int | None, ...], default: None, **options: Unpack[Bounds]
 ) -> Parameter[NDArray[np.float64] | None]: ...
 @overload
 def array_parameter(
-    shape: tuple[int | None, ...], default: object = ..., **options: Unpack[Options]
+    shape: tuple[int | None, ...], default: object = ..., **options: Unpack[Bounds]
 ) -> Parameter[NDArray[np.float64]]: ...
 def array_parameter(
-    shape: tuple[int | None, ...], default: object = REQUIRED, **options: Unpack[Options]
+    shape: tuple[int | None, ...], default: object = REQUIRED, **options: Unpack[Bounds]
 ) -> Parameter[Any]:
     """A parameter whose value is a read-only array of floats; ``None`` in ``shape`` is any length."""
     return Parameter(cast(Any, float), default, shape=shape, **options)
 
 
-def any_parameter(default: object = REQUIRED, **options: Unpack[ShapedOptions]) -> Parameter[Any]:
+def any_parameter(default: object = REQUIRED, **options: Unpack[Options]) -> Parameter[Any]:
     """A parameter whose value is anything that YAML can write: a token; with ``shape=(None,)``, a list of these."""
     return Parameter(cast(Any, object), default, **options)
 

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import types
+from types import UnionType
 from typing import TYPE_CHECKING, Any, TypeVar, Unpack, overload
 
 from .parameter import REQUIRED, Parameter, ParameterError
 from .ports import InputPort
 
 if TYPE_CHECKING:
-    from .parameter import ShapedOptions
+    from .parameter import Options
 
 T = TypeVar("T")
 V = TypeVar("V")
@@ -88,14 +88,12 @@ class PortParameter(Parameter[T]):
     """
 
     @overload
-    def __init__(
-        self: PortParameter[V | None], type: type[V], default: None, **options: Unpack[ShapedOptions]
-    ) -> None: ...
+    def __init__(self: PortParameter[V | None], type: type[V], default: None, **options: Unpack[Options]) -> None: ...
     @overload
-    def __init__(self: PortParameter[V], type: type[V], default: V = ..., **options: Unpack[ShapedOptions]) -> None: ...
+    def __init__(self: PortParameter[V], type: type[V], default: V = ..., **options: Unpack[Options]) -> None: ...
     @overload
     def __init__(
-        self: PortParameter[float], type: types.UnionType, default: float = ..., **options: Unpack[ShapedOptions]
+        self: PortParameter[float], type: UnionType, default: float = ..., **options: Unpack[Options]
     ) -> None: ...
     def __init__(self, type: Any, default: Any = REQUIRED, **options: Any) -> None:
         Parameter.__init__(self, type, default, **options)

@@ -163,10 +163,16 @@ class KalmanEstimator(Estimator):
         noise, at = np.zeros((size := sum(map(len, errors)), size)), 0
         for each, error in zip(measurements, errors, strict=True):
             where = slice(at, at + len(error))
-            for point, weight in zip(points if self._averaged else [mean], floats(weights), strict=False):
-                noise[where, where] += (weight if self._averaged else 1.0) * np.array(each.noise(floats(point)))
+            noise[where, where] = self._noise_of(each, mean, points, weights)
             at += len(error)
         return np.hstack(rows), np.concatenate(errors), noise
+
+    def _noise_of(self, measurement: Measurement, mean: Array, points: Array, weights: Array) -> Array:
+        """The covariance of a measurement, averaged over the sigma points, or at the mean."""
+        total: Any = 0.0
+        for point, weight in zip(points, floats(weights), strict=True) if self._averaged else [(mean, 1.0)]:
+            total = total + weight * np.array(measurement.noise(floats(point)))
+        return np.array(total)
 
     def _rows_of(self, mean: Sequence[float], points: Array, measurement: Measurement) -> Array:
         """What a sensor measures at each point (M, k), less what it does at the mean."""
@@ -221,10 +227,18 @@ class ExtendedEstimator(KalmanEstimator):
     """
 
     def _rows_of(self, mean: Sequence[float], points: Array, measurement: Measurement) -> Array:
-        sensor, found = measurement.sensor, np.zeros((len(points), 1))
-        for j in range(len(mean)):
-            step = 1e-6 * max(1.0, abs(mean[j]))
-            sides = [[*mean[:j], mean[j] + sign * step, *mean[j + 1 :]] for sign in (1.0, -1.0)]
-            change = np.array(sensor.difference(*map(measurement.expected, sides)), dtype=float) / (2.0 * step)
+        found = np.zeros((len(points), 1))
+        for j, change in enumerate(slopes(measurement, mean)):
             found = found + (points[:, j] - mean[j])[:, np.newaxis] * change
         return found
+
+
+def slopes(measurement: Measurement, mean: Sequence[float]) -> list[Array]:
+    """How what a sensor measures changes with each number of the target's state: central differences."""
+    found = []
+    for j in range(len(mean)):
+        step = 1e-6 * max(1.0, abs(mean[j]))
+        sides = [[*mean[:j], mean[j] + sign * step, *mean[j + 1 :]] for sign in (1.0, -1.0)]
+        change = measurement.sensor.difference(*map(measurement.expected, sides))
+        found.append(np.array(change, dtype=float) / (2.0 * step))
+    return found

@@ -7,11 +7,10 @@ from typing import Any
 import numpy as np
 
 from ..core import EpicycleError, Parameter
-from ..core.elementary import hypot
-from .arrays import Array
-from .estimator import EXPECTED, KalmanEstimator, State
+from .arrays import Array, floats
+from .estimator import KalmanEstimator, State, slopes
 from .messages import Estimate, Measurement
-from .sensor_models import RANGE
+from .sensor_models import RELATIVE_POSITION
 
 # FilterPy's EnsembleKalmanFilter is left out: it draws from NumPy's global random state, so runs would not be
 # reproducible.
@@ -28,7 +27,8 @@ class FilterPyEstimator(KalmanEstimator):
 
     Late measurements are fused at their own time, as there.
 
-    ``KalmanFilter`` and ``SquareRootKalmanFilter`` are linear and take relative positions only.
+    ``KalmanFilter`` and ``SquareRootKalmanFilter`` are linear and take relative positions only; the others take an
+    ``Observation`` of any sensor.
     """
 
     filter = Parameter(
@@ -64,83 +64,56 @@ class FilterPyEstimator(KalmanEstimator):
             self._filter.predict()
 
     def _update(self, measurements: list[Measurement]) -> bool:
-        for each in measurements:
-            self._check(each)
-        noises = self._noises(measurements)
         before = np.array(self._filter.x), np.array(self._filter.P)
-        for each, (xx, xy, yy) in zip(measurements, noises, strict=True):
-            ranged = each.kind == RANGE
-            self._fuse(each, np.array([[xx]]) if ranged else np.array([[xx, xy], [xy, yy]]))
+        mean, covariance = self._told(before)
+        points, weights = self._sigma_points(mean, covariance, self.kappa)
+        # All as seen from the prediction, independent of the order of fusion.
+        noises = [self._noise_of(each, mean, points, weights) for each in measurements]
+        for each, noise in zip(measurements, noises, strict=True):
+            self._fuse(each, noise)
         if np.isfinite(self._filter.x).all() and np.isfinite(self._filter.P).all():
             return True
         self._filter.x, self._filter.P = before
         return False
 
-    def _check(self, measurement: Measurement) -> None:
-        if type(measurement) is not Measurement:
-            raise FilterError(
-                f"{self.path}: FilterPy's filters take relative positions and ranges, and {measurement.robot} has a "
-                f"{measurement.kind}; use an UnscentedEstimator, an ExtendedEstimator or a ParticleEstimator"
-            )
-        if len(measurement.observer) != 2:
-            raise FilterError(
-                f"{self.path}: FilterPy's filters take observers in the plane, and {measurement.robot} measures from a "
-                "height; use an UnscentedEstimator"
-            )
-
-    def _noises(self, measurements: list[Measurement]) -> Array:
-        """The measurements' covariances (m, 3), all as seen from the prediction, independent of the order of fusion."""
-        from .numerics.ukf import measurement_noise, sigma_points
-
-        mean, covariance = self._told((self._filter.x, self._filter.P))
-        if self.noise_direction == EXPECTED:
-            points, weights = sigma_points(mean, covariance, self.kappa)
-        else:
-            points, weights = np.array(mean)[np.newaxis], np.ones(1)
-        return measurement_noise(points, weights, self._rows(measurements))
-
     def _fuse(self, measurement: Measurement, noise: Array) -> None:
-        observer, ranged = measurement.observer, measurement.kind == RANGE
         used = self._filter
-
-        def observe(state: Array) -> Array:
-            offset = state[:2] - observer
-            return np.array([hypot(*offset.tolist())]) if ranged else np.array(offset)
-
-        def slope(state: Array) -> Array:
-            if not ranged:
-                return np.eye(2, 4)
-            offset = state[:2] - observer
-            return np.array([[*(offset / max(hypot(*offset.tolist()), 1e-9)), 0.0, 0.0]])
-
         if self.filter in LINEAR:
-            if ranged:
+            if measurement.kind != RELATIVE_POSITION:
                 raise FilterError(
-                    f"{self.path}: FilterPy's {self.filter} is linear and cannot fuse a range (from "
+                    f"{self.path}: FilterPy's {self.filter} is linear and cannot fuse a {measurement.kind} (from "
                     f"{measurement.robot}); set 'filter' to one of {', '.join(NONLINEAR)}, or the sensor's 'kind' to "
                     "relative_position"
                 )
-            position = measurement.value + observer
+            position, noise = (measurement.value + measurement.observer)[:2], noise[:2, :2]
             if self.filter == "SquareRootKalmanFilter":
                 used.update(position, np.linalg.cholesky(noise))
             else:
                 used.update(position, R=noise)
-        elif self.filter == "ExtendedKalmanFilter":
-            used.update(measurement.value, slope, observe, R=noise)
+            return
+        # Differences to what is measured at the mean, so that angles near a half turn do no harm.
+        mean = floats(np.ravel(used.x))
+        there, error = measurement.expected(mean), np.array(measurement.innovation(mean), dtype=float)
+
+        def observe(state: Array) -> Array:
+            return np.array(measurement.sensor.difference(measurement.expected(floats(state)), there), dtype=float)
+
+        if self.filter == "ExtendedKalmanFilter":
+            used.update(error, lambda state: np.transpose(slopes(measurement, floats(state))), observe, R=noise)
         elif self.filter == "UnscentedKalmanFilter":
             # Its points stay where the prediction left them; a second update needs them around the first
             # one's result.
             used.sigmas_f = used.points_fn.sigma_points(used.x, used.P)
-            used.update(measurement.value, R=noise, hx=observe)
+            used.update(error, R=noise, hx=observe)
         else:
             # It keeps the propagated points, which hold no process noise; draw them from the prediction
             # instead.
             from filterpy.kalman import spherical_radial_sigmas
 
             used.sigmas_f = spherical_radial_sigmas(used.x, used.P)
-            used.sigmas_h = np.zeros((len(used.sigmas_f), len(measurement.value)))
+            used.sigmas_h = np.zeros((len(used.sigmas_f), len(error)))
             used.hx = observe
-            used.update(measurement.value[:, np.newaxis], R=noise)
+            used.update(error[:, np.newaxis], R=noise)
 
     def _told(self, state: State) -> State:
         return np.array(state[0]).ravel(), 0.5 * (state[1] + state[1].T)

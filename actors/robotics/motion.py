@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from ..core import Actor, EpicycleError, InputPort, OutputPort, Parameter, array_parameter
-from ..core.elementary import distance
+from ..core.elementary import distance, total
 from .messages import BodyState
 
 
@@ -30,9 +30,7 @@ class WaypointMotion(Actor):
     def initialize(self) -> None:
         self._places = [(x, y) for x, y in self.waypoints.tolist()]
         self._legs = [distance(a, b) for a, b in zip(self._places, self._places[1:], strict=False)]
-        self._length = 0.0
-        for leg in self._legs:
-            self._length += leg
+        self._length: float = total(self._legs)
 
     def fire(self) -> None:
         now = self.now

@@ -7,7 +7,7 @@ from typing import TypeAlias
 import numpy as np
 
 from ..core import Parameter, Stream
-from ..core.elementary import exp
+from ..core.elementary import exp, total
 from .arrays import Array, floats
 from .estimator import Estimator
 from .messages import Measurement, SampledEstimate
@@ -76,26 +76,22 @@ class ParticleEstimator(Estimator):
 
 def _chosen(weights: Array, count: int, stream: Stream | None) -> list[int]:
     """Rows, each about as often as its weight says, at equal distances from a random start."""
-    first, total, row, chosen = 0.5 if stream is None else stream.random(), 0.0, -1, []
+    first, reached, row, chosen = 0.5 if stream is None else stream.random(), 0.0, -1, []
     each = floats(weights)
     for k in range(count):
-        while total <= (first + k) / count and row < len(each) - 1:
+        while reached <= (first + k) / count and row < len(each) - 1:
             row += 1
-            total += each[row]
+            reached += each[row]
         chosen.append(max(row, 0))
     return chosen
 
 
 def _dot(a: list[float], b: list[float]) -> float:
-    total = 0.0
-    for x, y in zip(a, b, strict=True):
-        total += x * y
-    return total
+    product: float = total(x * y for x, y in zip(a, b, strict=True))
+    return product
 
 
 def _sum(values: Array) -> float:
     """In index order, which is the same on every machine."""
-    total = 0.0
-    for each in floats(values):
-        total += each
-    return total
+    found: float = total(floats(values))
+    return found

@@ -11,27 +11,7 @@ from .signal import Signal, SignalError
 from .verdict import Verdict
 
 __all__ = [
-    "STOP_TIME",
-    "EventLog",
-    "Interval",
-    "LogError",
-    "LogFile",
-    "Names",
-    "Outcome",
-    "Past",
-    "Record",
-    "Results",
-    "Samples",
-    "Signal",
-    "SignalError",
-    "TokenError",
-    "Verdict",
-    "Writer",
-    "canonical",
-    "cell",
-    "check_log_path",
-    "leaves",
-    "plain",
-    "write_log",
-    "write_signals",
-]
+    "STOP_TIME", "EventLog", "Interval", "LogError", "LogFile", "Names", "Outcome", "Past", "Record", "Results",
+    "Samples", "Signal", "SignalError", "TokenError", "Verdict", "Writer", "canonical", "cell", "check_log_path",
+    "leaves", "plain", "write_log", "write_signals",
+]  # fmt: skip
