@@ -291,10 +291,11 @@ class _Air:
         upcoming = min([*starts, *(frame.end for frame in self.sending)], default=None)
         if upcoming is not None and (self._next is None or upcoming < self._next):
             self._next = upcoming
-            point.later(to_seconds(upcoming - point.tag.time), lambda at: self._settle(at, point), upcoming)
+            point.later(to_seconds(upcoming - point.tag.time), self._settle, (upcoming, point))
 
-    def _settle(self, now: int, point: JoinPoint) -> None:
+    def _settle(self, what: tuple[int, JoinPoint]) -> None:
         """End transmissions that are over, then begin those that are due."""
+        now, point = what
         if now != self._next:  # another call has replaced this one
             return
         self._next = None

@@ -1,8 +1,8 @@
 """Copies of the parts of a run: actors, agenda, ways of tokens, and everything that these hold.
 
-``copy.deepcopy`` would do but for two things: it treats functions as constants, while the ways of tokens are closures
-over ports and queues; and it recurses into every object, so that a chain of a thousand actors is too deep for it.  Here
-an object is first created empty, and then added to a list of objects to fill.
+``copy.deepcopy`` would do but for two things: it treats functions as constants, while actors of users may hold closures
+over their state; and it recurses into every object, so that a chain of a thousand actors is too deep for it.  Here an
+object is first created empty, and then added to a list of objects to fill.
 
 What cannot change is not copied: numbers and texts, classes, functions without a memory, tuples and frozen dataclasses
 of such things, arrays that are read-only.  Anything else is copied by Python's own protocol: ``__deepcopy__``, or the

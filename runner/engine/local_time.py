@@ -17,7 +17,6 @@ from epicycle.actors import NEVER, Actor, Environment, Receiver, Tag, Wake
 from ..graph import Clock
 from .agenda import Delivery
 from .director import Director
-from .receivers import Call
 from .refinement import Refinement
 
 
@@ -89,13 +88,7 @@ class BoundaryPort(Actor):
 
     def lane(self, channel: object, onward: Receiver) -> Receiver:
         """The way of a token of a channel that has come this far; ``onward`` is its way after passing."""
-        lane = self._lanes.setdefault(channel, Lane())
-
-        def arrive(token: Any) -> None:
-            lane.waiting.append(self._director.hold(onward, token))
-            self._director.trigger(self)
-
-        return Call(arrive)
+        return IntoLane(self, self._director, self._lanes.setdefault(channel, Lane()), onward)
 
     def fire(self) -> None:
         if self.gate is not None and not self.gate.is_open:
@@ -125,6 +118,24 @@ class BoundaryPort(Actor):
     def is_waited_for(self) -> bool:
         """Whether tokens wait."""
         return any(lane.waiting for lane in self._lanes.values())
+
+
+class IntoLane(Receiver):
+    """Lets each token wait in a lane of a boundary port, which then fires."""
+
+    __slots__ = ("boundary_port", "director", "lane", "onward")
+
+    def __init__(
+        self, boundary_port: BoundaryPort, director: Director | Refinement, lane: Lane, onward: Receiver
+    ) -> None:
+        self.boundary_port = boundary_port
+        self.director = director
+        self.lane = lane
+        self.onward = onward
+
+    def put(self, token: Any) -> None:
+        self.lane.waiting.append(self.director.hold(self.onward, token))
+        self.director.trigger(self.boundary_port)
 
 
 class Lane:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 from epicycle.actors import EpicycleError, Receiver, to_nanoseconds, to_seconds
@@ -27,30 +28,27 @@ class Requests:
     def add_way(self, point: JoinPoint, place: str) -> Callable[[Any], None]:
         """A further way through a place, to everything behind a port or to one channel: where its tokens enter."""
         ways = self._ways.setdefault(place, [])
-        way = len(ways)
         ways.append(point)
+        return partial(self._ask_for_firing if place in self.model.times else self._ask, point, place, len(ways) - 1)
 
-        def ask_for_firing(job: Job) -> None:
-            number = self._number[place] = self._number.get(place, -1) + 1
-            self._jobs[place, number] = job
-            seconds = time_needed(self.model.times[place], job, point.random) or 0.0
-            self.entries[place](FiringRequest(None, "", place, point.now, self.name, number, seconds))
+    def _ask_for_firing(self, point: JoinPoint, place: str, way: int, job: Job) -> None:
+        number = self._number[place] = self._number.get(place, -1) + 1
+        self._jobs[place, number] = job
+        seconds = time_needed(self.model.times[place], job, point.random) or 0.0
+        self.entries[place](FiringRequest(None, "", place, point.now, self.name, number, seconds))
 
-        def ask(token: Any) -> None:
-            self.entries[place](Request(token, point.source, place, point.now, self.name, way))
-
-        return ask_for_firing if place in self.model.times else ask
+    def _ask(self, point: JoinPoint, place: str, way: int, token: Any) -> None:
+        self.entries[place](Request(token, point.source, place, point.now, self.name, way))
 
     def told(self, place: str, onward: Receiver) -> Receiver:
         """The way of requests from a place onward; each is an act when it goes there."""
+        return Call(partial(self._come_in, place, onward))
 
-        def come_in(request: Any) -> None:
-            is_firing = isinstance(request, FiringRequest)
-            point = self._ways[place][0 if is_firing else request.way]
-            point.act("requested", request.execution_time if is_firing else request.token)
-            onward.put(request)
-
-        return Call(come_in)
+    def _come_in(self, place: str, onward: Receiver, request: Any) -> None:
+        is_firing = isinstance(request, FiringRequest)
+        point = self._ways[place][0 if is_firing else request.way]
+        point.act("requested", request.execution_time if is_firing else request.token)
+        onward.put(request)
 
     def answer(self, request: Any) -> None:
         """Take what the composite sends from its response port; raises ``EpicycleError`` if it is not a request."""

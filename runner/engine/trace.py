@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from epicycle.actors import Actor, InputPort, Moment, Receiver, Tag, Wake
@@ -156,25 +157,22 @@ class Tracing(_Base):
         enter = super().entry(port, channel, stand_in)
         if port.actor.path not in self._tracer.actors:
             return enter
+        return Call(partial(self._enter_and_tell, port, channel, enter))
 
-        def enter_and_tell(token: Any) -> None:
-            enter.put(token)
-            arrival = Arrival(port.name, channel, token, *self._tracer.origin)
-            self._arrivals.setdefault(port.actor.path, []).append(arrival)
-
-        return Call(enter_and_tell)
+    def _enter_and_tell(self, port: InputPort[Any], channel: int, enter: Receiver, token: Any) -> None:
+        enter.put(token)
+        arrival = Arrival(port.name, channel, token, *self._tracer.origin)
+        self._arrivals.setdefault(port.actor.path, []).append(arrival)
 
     def hold(self, way: Receiver, token: Any) -> Delivery:
-        origin = self._tracer.origin
+        return super().hold(Call(partial(self._release, self._tracer.origin, way)), token)
 
-        def release(token: Any) -> None:
-            self._tracer.origin, self._tracer.releasing = origin, True
-            try:
-                way.put(token)
-            finally:
-                self._tracer.releasing = False
-
-        return super().hold(Call(release), token)
+    def _release(self, origin: Origin, way: Receiver, token: Any) -> None:
+        self._tracer.origin, self._tracer.releasing = origin, True
+        try:
+            way.put(token)
+        finally:
+            self._tracer.releasing = False
 
     def use_wakes(self, activation: Activation) -> bool:
         asked = [
