@@ -6,17 +6,16 @@ from collections import deque
 from typing import Any
 
 from .core import (
-    ABSENT,
     Actor,
     EpicycleError,
     InputPort,
+    Latest,
     MappingParameter,
     OutputPort,
     Parameter,
     ParameterError,
     any_parameter,
     brief,
-    rounds,
 )
 from .expression import FormulaParameter, operand
 
@@ -52,17 +51,12 @@ class HoldingExpression(Actor):
         }
 
     def initialize(self) -> None:
-        self._ports = [port for port in self.inputs.values() if port.width]
-        self._needed = {name for name in self.inputs if name not in self.held}
-        self._values: dict[str, Any] = {name: operand(value) for name, value in self.held.items()}
+        self._latest = Latest(self.inputs.values(), hold=self.held, start=self.held)
 
     def fire(self) -> None:
-        for entries in rounds(*self._ports):
-            came = {port.name: operand(token) for port, (token,) in zip(self._ports, entries, strict=True)
-                    if token is not ABSENT}  # fmt: skip
-            self._values.update({name: token for name, token in came.items() if name in self.held})
-            if self._needed <= came.keys():
-                self.output.send(self.expression({**self._values, **came, "time": self.now}))
+        for values in self._latest.rounds():
+            known = {name: operand(value) for name, value in values.items()}
+            self.output.send(self.expression({**known, "time": self.now}))
 
 
 class BlockExpression(Actor):

@@ -75,8 +75,7 @@ class Expression(Actor):
         return {name: InputPort(doc="a name in the expression") for name in names}
 
     def initialize(self) -> None:
-        self._ports = list(self.inputs.values())
-        self._latest = Latest(self._ports, hold=self.hold)
+        self._latest = Latest(self.inputs.values(), hold=self.hold)
         self._count = 0
 
     def fire(self) -> None:
@@ -188,7 +187,7 @@ class Function(Actor):
         return ports
 
     def initialize(self) -> None:
-        self._latest = Latest(list(self.inputs.values()), hold=self.hold)
+        self._latest = Latest(self.inputs.values(), hold=self.hold)
 
     def fire(self) -> None:
         for values in self._latest.rounds():

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, Final
 
-from .core import ABSENT, Actor, EpicycleError, OutputPort, Parameter, PortParameter, counted, rounds
+from .core import Actor, EpicycleError, Latest, OutputPort, Parameter, PortParameter, counted
 
 MAX_TEXT = 100_000
 FUNCTIONS: Final[dict[str, Callable[[str, str, str], Any]]] = {
@@ -27,7 +27,6 @@ _TYPES: Final[dict[str, Any]] = {
     **dict.fromkeys(("find", "find last"), int),
     "split": list,
 }
-_NAMES = ("text", "other", "new")
 
 
 class TextFunction(Actor):
@@ -52,15 +51,12 @@ class TextFunction(Actor):
         self.output.type = _TYPES.get(self.function, str)
 
     def initialize(self) -> None:
-        self._values: dict[str, str] = {"text": self.text, "other": self.other, "new": self.new}
+        start = {"text": self.text, "other": self.other, "new": self.new}
+        self._latest = Latest([self.inputs[name] for name in start], hold=True, start=start)
 
     def fire(self) -> None:
-        ports = [self.inputs[name] for name in _NAMES if self.inputs[name].width]
-        for entries in rounds(*ports):
-            for port, (token,) in zip(ports, entries, strict=True):
-                if token is not ABSENT:
-                    self._values[port.name] = self._checked(token)
-            text, other, new = (self._values[name] for name in _NAMES)
+        for values in self._latest.rounds():
+            text, other, new = map(self._checked, values.values())
             if self.ignore_case:
                 text, other = text.lower(), other.lower()
             if self.function.startswith("replace") and other and text.count(other) * len(new) > MAX_TEXT:

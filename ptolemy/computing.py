@@ -159,11 +159,12 @@ class HoldingExpression(Together, actors.HoldingExpression):
     """Evaluates an expression over held values and the k-th tokens of the other inputs together."""
 
     def waited_for(self) -> list[InputPort[Any]]:
-        return [port for port in self._ports if port.name in self._needed]
+        return [port for port in self.inputs.values() if port.width and port.name not in self.held]
 
     def fire(self) -> None:
-        for port in self._ports if self._needed else ():
-            if port.name not in self._needed and port.present:
+        for name in self.held if self.waited_for() else ():
+            port = self.inputs[name]
+            if port.present:
                 port.give((port.take()[0][-1:], [0]))
         super().fire()
 

@@ -6,8 +6,9 @@ The k-th tokens of all channels form the k-th round, so one token per channel an
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from itertools import zip_longest
+from types import MappingProxyType
 from typing import Any, Generic, TypeVar
 
 from .actor import Actor
@@ -54,25 +55,33 @@ class Queues:
 class Latest:
     """Keeps the latest token of each of several single inputs, for actors that need all of them at once.
 
-    With ``hold``, an input without a token in a round has its latest token; otherwise, a round in which an input lacks
-    a token gives nothing.
+    An input that is held (all with ``hold``, or those that it names) has its latest token in a round that brings none,
+    and before the first one what it is to ``start`` with; a round in which another input lacks a token gives nothing.
     """
 
-    def __init__(self, ports: Sequence[InputPort[Any]], *, hold: bool) -> None:
+    def __init__(
+        self,
+        ports: Iterable[InputPort[Any]],
+        *,
+        hold: bool | Collection[str],
+        start: Mapping[str, Any] = MappingProxyType({}),
+    ) -> None:
         # An optional input without connections is left out.
         self._ports = [port for port in ports if port.width]
-        self._hold = hold
-        self._tokens: dict[str, Any] = {}
+        names = [port.name for port in self._ports]
+        self._fleeting = [name for name in names if not (hold if isinstance(hold, bool) else name in hold)]
+        self._tokens: dict[str, Any] = dict(start)
+        self._count = len({*names, *start})
 
     def rounds(self) -> Iterator[dict[str, Any]]:
         """The values by the names of the ports, for each round in which every connected input has one."""
         for entries in rounds(*self._ports):
-            if not self._hold:
-                self._tokens.clear()
+            for name in self._fleeting:
+                self._tokens.pop(name, None)
             for port, (token,) in zip(self._ports, entries, strict=True):
                 if token is not ABSENT:
                     self._tokens[port.name] = token
-            if len(self._tokens) == len(self._ports):
+            if len(self._tokens) == self._count:
                 yield dict(self._tokens)
 
 
