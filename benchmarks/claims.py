@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from epicycle.runner import StudyResults, open_study
-from epicycle.runner.language import ALWAYS
+from epicycle.runner.language.claims import ALWAYS
 from epicycle.runner.study import (
     CONFIRMED,
     NOT_REPRODUCED,

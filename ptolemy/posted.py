@@ -22,8 +22,9 @@ from epicycle.runner.engine import (
     Outer,
     Refinement,
 )  # fmt: skip
-from epicycle.runner.graph import ModelGraph, is_within, steps
-from epicycle.runner.text import Limits
+from epicycle.runner.graph.model_graph import ModelGraph, is_within
+from epicycle.runner.graph.ranks import steps
+from epicycle.runner.text.limits import Limits
 
 M = TypeVar("M", Wake, Moment)
 Place = tuple[tuple[int, int], ...]  # of a rank: its group and its number there, in each director from the outermost in

@@ -6,11 +6,14 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from .build import Composite, Model, load_composite, load_model
+    from .build.composite_class import load_composite
+    from .build.load import load_model
+    from .build.model import Model
+    from .build.scope import Composite
     from .engine import ActorError, Simulation
     from .results import Results, Signal
     from .study import StudyResults, open_study
-    from .text import ModelError
+    from .text.problems import ModelError
     from .trial import Trial
 
 __all__ = [
@@ -30,15 +33,15 @@ __all__ = [
 
 _HOMES = {
     "ActorError": "engine",
-    "Composite": "build",
+    "Composite": "build.scope",
     "Results": "results",
     "Signal": "results",
     "Simulation": "engine",
     "Trial": "trial",
-    "Model": "build",
-    "ModelError": "text",
-    "load_composite": "build",
-    "load_model": "build",
+    "Model": "build.model",
+    "ModelError": "text.problems",
+    "load_composite": "build.composite_class",
+    "load_model": "build.load",
     "StudyResults": "study",
     "open_study": "study",
 }

@@ -47,7 +47,7 @@ def _run(arguments: Sequence[str], *, is_program: bool) -> int:
         if options.debug:
             complain_traceback(error)
         from .engine import ActorError, LoopError  # here, because many commands do not need the engine
-        from .text import ModelError
+        from .text.problems import ModelError
 
         complain(str(error) if isinstance(error, ModelError) else f"error: {error}")
         return FAILED if isinstance(error, (ActorError, LoopError)) else BAD_INPUT

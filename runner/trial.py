@@ -7,7 +7,8 @@ from typing import Any
 
 from epicycle.aspects.testing import Woven
 
-from .build import Model, load_model
+from .build.load import load_model
+from .build.model import Model
 from .engine import Record, Simulation
 
 

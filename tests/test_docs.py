@@ -23,9 +23,10 @@ from typing import Any, NamedTuple
 import pytest
 
 from epicycle.runner import ModelError, Simulation, load_model
-from epicycle.runner.catalogue import TAKES, TIME, TOKENS, built_in
+from epicycle.runner.catalogue.measure import TAKES, TIME, TOKENS
+from epicycle.runner.catalogue.types import built_in
 from epicycle.runner.cli import main
-from epicycle.runner.language import read_study
+from epicycle.runner.language.study import read_study
 from epicycle.runner.study import Plan
 from tests.plugins import ABSENT
 

@@ -65,9 +65,9 @@ def test_ptolemy_is_a_source_in_docstrings_and_nothing_else() -> None:
 PROGRAM = """
 import json
 from epicycle.runner import Simulation, load_model
-from epicycle.runner.catalogue import dialects
+from epicycle.runner.catalogue.like import dialects
 from epicycle.runner.commands import commands
-from epicycle.runner.text import ModelError
+from epicycle.runner.text.problems import ModelError
 found = {"commands": [each.name for each in commands()], "dialects": [*dialects()]}
 found["digest"] = Simulation(load_model("mm1"), seed=1).run(until=1000).digest
 open("m.yaml", "w").write("model: m\\ndirector: {like: ptolemy}\\n")

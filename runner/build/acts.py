@@ -6,9 +6,10 @@ from collections.abc import Iterable
 
 from epicycle.actors import did_you_mean
 
-from ..graph import ActName, WovenAspect
-from ..language import ActText
-from ..text import Problems
+from ..graph.acts import ActName
+from ..graph.woven import WovenAspect
+from ..language.acts import ActText
+from ..text.problems import Problems
 
 _FEW = 8  # places that a message lists
 

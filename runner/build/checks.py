@@ -9,9 +9,13 @@ from typing import Any
 
 from epicycle.actors import InputPort, accepts, counted, type_name
 
-from ..catalogue import Dialect
-from ..graph import Detour, Hop, ModelGraph, Region, dependencies, find_loop, in_order
-from ..text import RAISE_IT, Problems, in_general
+from ..catalogue.dialect import Dialect
+from ..graph.digraph import find_loop, in_order
+from ..graph.model_graph import Detour, Hop, ModelGraph
+from ..graph.ranks import Region, dependencies
+from ..text.limits import RAISE_IT
+from ..text.patterns import in_general
+from ..text.problems import Problems
 from .draft import Draft
 
 MAX_PASSAGE = 200  # composite ports in a row

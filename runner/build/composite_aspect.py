@@ -11,12 +11,17 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain
 
-from epicycle.actors import OutputPort, accepts, declared_parameters, type_name
+from epicycle.actors import OutputPort, accepts, declared_parameters, did_you_mean, type_name
 from epicycle.aspects import Aspect, CompositeAspect, FiringTime, Request
 
-from ..graph import AspectModel, Detour, ModelGraph, WovenAspect, connection_place, find_loop
-from ..language import PartText, PointcutText, beside
-from ..text import POISON, Poison, Position, Problems, did_you_mean, place_in
+from ..graph.acts import connection_place
+from ..graph.digraph import find_loop
+from ..graph.model_graph import Detour, ModelGraph
+from ..graph.woven import AspectModel, WovenAspect
+from ..language.parts import PartText, beside
+from ..language.places import PointcutText
+from ..text.faults import place_in
+from ..text.problems import POISON, Poison, Position, Problems
 from .looks import PlaceOf, without_port
 from .weave import Places, Pointcuts, bind
 

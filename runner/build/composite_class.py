@@ -7,10 +7,19 @@ from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
-from ..catalogue import Catalogue, installed
-from ..graph import WovenAspect
-from ..language import CompositeText, PartText, Settings, Surroundings, beside, inherit, read_library
-from ..text import Position, Problems, Text, call_site, did_you_mean, entries_of
+from epicycle.actors import did_you_mean
+
+from ..catalogue.types import Catalogue, installed
+from ..graph.woven import WovenAspect
+from ..language.files import read_library
+from ..language.inheritance import inherit
+from ..language.models import CompositeText
+from ..language.parts import PartText, beside
+from ..language.settings import Settings
+from ..language.surroundings import Surroundings
+from ..text.problems import Position, Problems
+from ..text.program import call_site, entries_of
+from ..text.reading import Text
 from .draft import Draft
 from .settle import Settler
 from .unfold import Known, TooLargeError, Unfolding

@@ -7,19 +7,13 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, TypeAlias, TypeVar
 
-from epicycle.actors import Parameter, declared_parameters, unknown_parameter
+from epicycle.actors import Parameter, declared_parameters, nearest, unknown_parameter
 
-from ..language import Locals, Values
-from ..text import (
-    POISON,
-    Entry,
-    Poison,
-    Position,
-    Problems,
-    data_file,
-    nearest,
-)
-from ..text import Mapping as MappingNode
+from ..language.values import Locals, Values
+from ..text.document import Entry
+from ..text.document import Mapping as MappingNode
+from ..text.files import data_file
+from ..text.problems import POISON, Poison, Position, Problems
 
 T = TypeVar("T")
 Chosen: TypeAlias = tuple[Entry, Locals]  # a value, and what it may use

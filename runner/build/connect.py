@@ -7,11 +7,16 @@ from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import product
 
-from epicycle.actors import Actor, FaultError, counted, declared_ports, has_own_ports
+from epicycle.actors import Actor, FaultError, counted, declared_ports, did_you_mean, has_own_ports
 
-from ..graph import ModelGraph
-from ..language import CompositeText, ConnectionText, Endpoint, Locals, Values
-from ..text import POISON, RAISE_IT, Poison, Position, Problems, Scalar, did_you_mean, split, within
+from ..graph.model_graph import ModelGraph
+from ..language.models import CompositeText
+from ..language.places import ConnectionText, Endpoint
+from ..language.values import Locals, Values
+from ..text.document import Scalar
+from ..text.limits import RAISE_IT
+from ..text.problems import POISON, Poison, Position, Problems
+from ..text.reading import split, within
 from .draft import Draft
 
 _NUMBER = re.compile(r"-?\d{1,9}", re.ASCII)

@@ -8,26 +8,22 @@ from dataclasses import replace
 
 from epicycle.aspects import ObservationAspect, PortAspect
 
-from ..catalogue import Catalogue, installed
-from ..graph import ActName, WovenAspect
-from ..language import (
-    COMPOSITE_THERE,
-    PARAMETER_THERE,
-    CompositeText,
-    Disturbance,
-    ParameterText,
-    PartText,
-    PointcutText,
-    Setting,
-    Settings,
-    Surroundings,
-    inherit,
-    joined,
-    load_disturbance,
-    settings_in,
-    settings_of,
-)
-from ..text import Mapping, PathIndex, PatternError, Position, Problems, Text, call_site, node_of
+from ..catalogue.types import Catalogue, installed
+from ..graph.acts import ActName
+from ..graph.woven import WovenAspect
+from ..language.disturbance import COMPOSITE_THERE, PARAMETER_THERE, Disturbance, joined, load_disturbance
+from ..language.inheritance import inherit
+from ..language.models import CompositeText
+from ..language.parts import PartText
+from ..language.places import PointcutText
+from ..language.ports import ParameterText
+from ..language.settings import Setting, Settings, settings_in, settings_of
+from ..language.surroundings import Surroundings
+from ..text.document import Mapping
+from ..text.patterns import PathIndex, PatternError
+from ..text.problems import Position, Problems
+from ..text.program import call_site, node_of
+from ..text.reading import Text
 from .acts import acts_of
 from .draft import Draft
 from .paths import Paths

@@ -12,8 +12,8 @@ from dataclasses import dataclass, field
 
 from epicycle.actors import Actor, declared_ports, has_own_ports
 
-from ..graph import ModelGraph, PortNode
-from ..text import could_be_within
+from ..graph.model_graph import ModelGraph, PortNode
+from ..text.patterns import could_be_within
 
 
 @dataclass(frozen=True)

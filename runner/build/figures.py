@@ -6,11 +6,15 @@ from collections.abc import Collection, Iterator
 from collections.abc import Mapping as AnyMapping
 from typing import TypeVar
 
-from epicycle.actors import Configurable, Fault, declared_parameters
+from epicycle.actors import Configurable, Fault, declared_parameters, did_you_mean
 
-from ..catalogue import CatalogueError, Figure, figure_types
-from ..language import Locals, Values
-from ..text import Mapping, Poison, Problems, did_you_mean, place_in, select
+from ..catalogue.figure import Figure
+from ..catalogue.types import CatalogueError, figure_types
+from ..language.values import Locals, Values
+from ..text.document import Mapping
+from ..text.faults import place_in
+from ..text.patterns import select
+from ..text.problems import Poison, Problems
 from .configure import configure
 from .model import DeclaredFigure, Model
 

@@ -7,31 +7,22 @@ from pathlib import Path
 
 from epicycle.actors import counted_in_si, plain
 
-from ..catalogue import installed
+from ..catalogue.types import installed
 from ..collection import without_collection
-from ..graph import ModelGraph, check_processors
-from ..language import (
-    COMPOSITE_THERE,
-    Locals,
-    ModelText,
-    Setting,
-    Settings,
-    Surroundings,
-    Values,
-    add_disturbances,
-    change_aspect,
-    check_usage,
-    inherit,
-    joined,
-    load_disturbances,
-    only_acts,
-    read_model,
-    read_overrides,
-    settings_of,
-    without,
-)
-from ..text import NORMAL, POISON, Limits, Problems, noting
-from ..text import Mapping as MappingNode
+from ..graph.model_graph import ModelGraph
+from ..graph.woven import check_processors
+from ..language.disturbance import COMPOSITE_THERE, add_disturbances, joined, load_disturbances, only_acts
+from ..language.files import read_model
+from ..language.inheritance import inherit
+from ..language.models import ModelText
+from ..language.settings import Setting, Settings, change_aspect, read_overrides, settings_of, without
+from ..language.surroundings import Surroundings
+from ..language.usage import check_usage
+from ..language.values import Locals, Values
+from ..text.document import Mapping as MappingNode
+from ..text.files import noting
+from ..text.limits import NORMAL, Limits
+from ..text.problems import POISON, Problems
 from .acts import acts_of
 from .checks import check
 from .draft import Draft

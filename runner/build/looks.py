@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from typing import Any
 
-from epicycle.actors import Fault, declared_parameters
+from epicycle.actors import Fault, declared_parameters, did_you_mean
 from epicycle.actors.expression import PortFormula
 from epicycle.aspects import (
     Aspect,
@@ -20,8 +20,11 @@ from epicycle.aspects import (
     SelectionParameter,
 )
 
-from ..graph import ModelGraph, WovenAspect
-from ..text import PatternError, Position, did_you_mean, within
+from ..graph.model_graph import ModelGraph
+from ..graph.woven import WovenAspect
+from ..text.patterns import PatternError
+from ..text.problems import Position
+from ..text.reading import within
 from .paths import View
 
 PlaceOf = Callable[[Fault], Position]  # where a fault of an aspect's parameters is

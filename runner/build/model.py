@@ -10,25 +10,25 @@ from typing import Unpack
 
 from epicycle.actors import EpicycleError, Stop, Tag, counted, declared_parameters, visible
 
-from ..catalogue import Measure, MetricOptions, TakeName, take_fault
+from ..catalogue.measure import Measure, MetricOptions, TakeName, take_fault
 from ..collection import without_collection
-from ..graph import (
-    ActName,
-    Metric,
-    ModelGraph,
-    Monitor,
-    Watched,
-    WovenAspect,
-    check_processors,
-    firing_order,
-    is_within,
-)
-from ..language import Locals, MetricText, MonitorText, ParameterText, Values, nanoseconds
+from ..graph.acts import ActName
+from ..graph.model_graph import ModelGraph, is_within
+from ..graph.ranks import firing_order
+from ..graph.watched import Metric, Monitor, Watched
+from ..graph.woven import WovenAspect, check_processors
+from ..language.fields import nanoseconds
+from ..language.metrics import MetricText
+from ..language.monitors import MonitorText
+from ..language.ports import ParameterText
+from ..language.values import Locals, Values
 from ..shown import short
 from ..tables import Table, Tabled
 from ..temporal import Requirement, RequirementOptions
-from ..text import NAME, NAMES_HAVE, Position, Problem, Problems, Text, call_site, within
-from ..text import Mapping as MappingNode
+from ..text.document import Mapping as MappingNode
+from ..text.problems import Position, Problem, Problems
+from ..text.program import call_site
+from ..text.reading import NAME, NAMES_HAVE, Text, within
 from .checks import check
 from .composite_aspect import check_nesting, detours
 from .draft import Draft

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from ..language import CompositeText
-from ..text import Poison, Problems, did_you_mean
+from epicycle.actors import did_you_mean
+
+from ..language.models import CompositeText
+from ..text.problems import Poison, Problems
 from .draft import Draft, Gap
 
 

@@ -5,10 +5,14 @@ from __future__ import annotations
 from epicycle.actors import FaultError, Quantity, UnitError, parse_unit
 from epicycle.aspects import Reading
 
-from ..graph import Monitor, Part
-from ..language import MonitorText
+from ..graph.watched import Monitor, Part
+from ..language.monitors import MonitorText
 from ..temporal import Condition, Property, PropertyError, Requirement, Sends, Spread, leaves, property_of, spread_of
-from ..text import POISON, RAISE_IT, PathIndex, PatternError, Poison, Position, Problems, Scalar, TooManyError, within
+from ..text.document import Scalar
+from ..text.limits import RAISE_IT
+from ..text.patterns import PathIndex, PatternError, TooManyError
+from ..text.problems import POISON, Poison, Position, Problems
+from ..text.reading import within
 from .draft import Draft
 from .looks import Looks
 from .paths import Paths

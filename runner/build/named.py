@@ -10,22 +10,14 @@ from typing import Any, Protocol, TypeAlias, runtime_checkable
 from epicycle.actors import Actor, InputPort, OutputPort, ParameterError
 from epicycle.aspects import Aspect, FiringTime, FiringTimeParameter
 
-from ..graph import ModelGraph
-from ..language import Computed, ConnectionText, PointcutText, connection, endpoints, nanoseconds
-from ..text import (
-    POISON,
-    ModelError,
-    NodeReader,
-    Poison,
-    Position,
-    Problem,
-    Problems,
-    Scalar,
-    Text,
-    blame,
-    node_of,
-    within,
-)
+from ..graph.model_graph import ModelGraph
+from ..language.fields import Computed, nanoseconds
+from ..language.places import ConnectionText, PointcutText, connection, endpoints
+from ..text.document import Scalar
+from ..text.faults import blame
+from ..text.problems import POISON, ModelError, Poison, Position, Problem, Problems
+from ..text.program import node_of
+from ..text.reading import NodeReader, Text, within
 from .settle import OF_DIRECTORS
 
 

@@ -8,9 +8,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..catalogue import code_of
-from ..language import Setting
-from ..text import Noted, plain
+from ..catalogue.code import code_of
+from ..language.settings import Setting
+from ..text.document import plain
+from ..text.files import Noted
 
 
 @dataclass(frozen=True)

@@ -8,9 +8,13 @@ from functools import cached_property
 
 from epicycle.actors import FaultError
 
-from ..graph import ModelGraph
-from ..language import Locals, PointcutText, Values
-from ..text import Node, PathIndex, Poison, Position, Problems, Text
+from ..graph.model_graph import ModelGraph
+from ..language.places import PointcutText
+from ..language.values import Locals, Values
+from ..text.document import Node
+from ..text.patterns import PathIndex
+from ..text.problems import Poison, Position, Problems
+from ..text.reading import Text
 from .draft import Draft
 
 

@@ -12,12 +12,15 @@ from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import replace
 from typing import Any, Protocol, TypeVar, overload
 
-from epicycle.actors import Actor, accepts, type_name
+from epicycle.actors import Actor, accepts, did_you_mean, type_name
 from epicycle.aspects import Aspect, CompositeAspect, CompositeExecutionAspect, FiringTime
 
-from ..graph import ModelGraph, WovenAspect
-from ..language import Values
-from ..text import NAME, NAMES_HAVE, Position, Problems, call_site, did_you_mean
+from ..graph.model_graph import ModelGraph
+from ..graph.woven import WovenAspect
+from ..language.values import Values
+from ..text.problems import Position, Problems
+from ..text.program import call_site
+from ..text.reading import NAME, NAMES_HAVE
 from .composite_aspect import check_nesting, weave_model
 from .composite_class import CompositeInstance
 from .connect import Child, Inside, Link, Wiring, child_of_actors, make

@@ -6,22 +6,17 @@ import re
 from collections.abc import Callable, Mapping
 from typing import Any, TypeVar
 
-from epicycle.actors import Configurable, Parameter, declared_parameters, to_nanoseconds
+from epicycle.actors import Configurable, Parameter, declared_parameters, did_you_mean, nearest, to_nanoseconds
 
-from ..catalogue import LIKE
-from ..language import OUTSIDE, CompositeText, Locals, PartText, Setting, Settings, Values
-from ..text import (
-    POISON,
-    RAISE_IT,
-    Entry,
-    Poison,
-    Position,
-    Problems,
-    Scalar,
-    TooManyError,
-    did_you_mean,
-    nearest,
-)
+from ..catalogue.like import LIKE
+from ..language.models import CompositeText
+from ..language.parts import PartText
+from ..language.settings import Setting, Settings
+from ..language.values import OUTSIDE, Locals, Values
+from ..text.document import Entry, Scalar
+from ..text.limits import RAISE_IT
+from ..text.patterns import TooManyError
+from ..text.problems import POISON, Poison, Position, Problems
 from .configure import Chosen, as_meant, configure, tell_missing
 from .draft import Draft
 

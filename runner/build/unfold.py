@@ -12,12 +12,20 @@ from dataclasses import dataclass, replace
 from functools import cache, partial
 from typing import Any
 
-from epicycle.actors import Actor, FaultError, Parameter
+from epicycle.actors import Actor, FaultError, Parameter, did_you_mean
 
-from ..catalogue import Catalogue, CatalogueError, Dialect, read_type, token_types
-from ..graph import Modal
-from ..language import CompositeText, Locals, PartText, PortText, Settings, Values
-from ..text import POISON, RAISE_IT, Entry, Poison, Position, did_you_mean
+from ..catalogue.dialect import Dialect
+from ..catalogue.port_types import read_type, token_types
+from ..catalogue.types import Catalogue, CatalogueError
+from ..graph.model_graph import Modal
+from ..language.models import CompositeText
+from ..language.parts import PartText
+from ..language.ports import PortText
+from ..language.settings import Settings
+from ..language.values import Locals, Values
+from ..text.document import Entry
+from ..text.limits import RAISE_IT
+from ..text.problems import POISON, Poison, Position
 from .composite_aspect import as_actor
 from .connect import Child, Inside, Wiring, child_of_actors, make
 from .draft import Draft, Gap

@@ -6,9 +6,12 @@ from collections.abc import Collection
 
 from epicycle.actors import counted
 
-from ..graph import ModelGraph
-from ..language import CompositeText, Locals, Settings, Values
-from ..text import POISON, RAISE_IT, Limits, Problems
+from ..graph.model_graph import ModelGraph
+from ..language.models import CompositeText
+from ..language.settings import Settings
+from ..language.values import Locals, Values
+from ..text.limits import RAISE_IT, Limits
+from ..text.problems import POISON, Problems
 from .checks import check
 from .draft import Draft
 from .settle import Settler

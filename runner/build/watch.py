@@ -7,32 +7,22 @@ from graphlib import CycleError, TopologicalSorter
 from types import MappingProxyType
 from typing import Any
 
-from epicycle.actors import Parameter, accepts, declared_parameters, type_name
+from epicycle.actors import Parameter, accepts, declared_parameters, did_you_mean, type_name
 from epicycle.actors.expression import ExpressionError, Formula
 
-from ..catalogue import Measure
-from ..graph import Metric, Watched
-from ..language import Locals, MetricText, ModelText, MonitorText, Values
+from ..catalogue.measure import Measure
+from ..graph.watched import Metric, Watched
+from ..language.metrics import MetricText
+from ..language.models import ModelText
+from ..language.monitors import MonitorText
+from ..language.values import Locals, Values
 from ..temporal import Requirement
-from ..text import (
-    MAX_SEED,
-    POISON,
-    RAISE_IT,
-    Entry,
-    Node,
-    PathIndex,
-    PatternError,
-    Poison,
-    Position,
-    Problems,
-    Scalar,
-    Text,
-    TooManyError,
-    did_you_mean,
-    entries_of,
-    plain,
-    within,
-)
+from ..text.document import Entry, Node, Scalar, plain
+from ..text.limits import MAX_SEED, RAISE_IT
+from ..text.patterns import PathIndex, PatternError, TooManyError
+from ..text.problems import POISON, Poison, Position, Problems
+from ..text.program import entries_of
+from ..text.reading import Text, within
 from .configure import configure
 from .draft import Draft
 from .monitors import monitor_of

@@ -11,12 +11,15 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from epicycle.actors import declared_parameters
+from epicycle.actors import declared_parameters, did_you_mean, nearest
 from epicycle.aspects import Aspect
 
-from ..graph import WovenAspect, connection_place, is_within
-from ..language import PointcutText
-from ..text import POISON, PathIndex, PatternError, Poison, did_you_mean, in_general, nearest
+from ..graph.acts import connection_place
+from ..graph.model_graph import is_within
+from ..graph.woven import WovenAspect
+from ..language.places import PointcutText
+from ..text.patterns import PathIndex, PatternError, in_general
+from ..text.problems import POISON, Poison
 from .looks import Looks, PlaceOf, unknown_inputs
 from .paths import View
 

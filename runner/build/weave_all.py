@@ -7,7 +7,7 @@ from collections.abc import Mapping as AnyMapping
 from dataclasses import replace
 from functools import partial
 
-from epicycle.actors import Actor, EpicycleError, declared_parameters
+from epicycle.actors import Actor, EpicycleError, declared_parameters, did_you_mean
 from epicycle.aspects import (
     Aspect,
     CompositeAspect,
@@ -17,10 +17,18 @@ from epicycle.aspects import (
     decorations,
 )
 
-from ..catalogue import CatalogueError
-from ..graph import ModelGraph, WovenAspect
-from ..language import Locals, PartText, PointcutText
-from ..text import POISON, RAISE_IT, Mapping, Position, Problems, Text, TooManyError, did_you_mean, place_in
+from ..catalogue.types import CatalogueError
+from ..graph.model_graph import ModelGraph
+from ..graph.woven import WovenAspect
+from ..language.parts import PartText
+from ..language.places import PointcutText
+from ..language.values import Locals
+from ..text.document import Mapping
+from ..text.faults import place_in
+from ..text.limits import RAISE_IT
+from ..text.patterns import TooManyError
+from ..text.problems import POISON, Position, Problems
+from ..text.reading import Text
 from .composite_aspect import OWN, check_nesting, detours, weave_model
 from .draft import Draft
 from .paths import Paths

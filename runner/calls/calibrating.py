@@ -14,13 +14,13 @@ from typing import Any
 from epicycle.actors import counted, to_seconds
 
 from ..bars import bar
-from ..language import number_node
+from ..language.dimensions import number_node
 from ..provenance import version_of
 from ..search import Calibration, Fitted, Match, Task
 from ..search import calibrate as search
 from ..shown import finite, rounded
 from ..tables import Table, Tabled
-from ..text import call_site
+from ..text.program import call_site
 from .falsifying import as_ranges
 from .studying import as_settings
 

@@ -10,11 +10,11 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from epicycle.actors import EpicycleError, counted
+from epicycle.actors import EpicycleError, counted, did_you_mean
 
 from ..bars import SOON, bar
-from ..build import Model
-from ..catalogue import types_of_file
+from ..build.model import Model
+from ..catalogue.types import types_of_file
 from ..engine import ActorError, LoopError, Simulation
 from ..results import EventLog, Results
 from ..study import (
@@ -28,7 +28,6 @@ from ..study import (
     with_interval,
 )
 from ..tables import Table, Tabled, pandas_module
-from ..text import did_you_mean
 from .run_spec import Changes, seconds
 from .running import loaded
 

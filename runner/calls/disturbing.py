@@ -7,7 +7,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from ..language import Setting
+from ..language.settings import Setting
 from ..recorded import Passed, pass_recording
 from ..shown import short
 from ..tables import Table, Tabled

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Unpack
 
-from ..build import Model
+from ..build.model import Model
 from ..search import RareEvent, monitor_named
 from ..search import rare as search
 from .run_spec import Changes, seconds

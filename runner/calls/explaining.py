@@ -14,8 +14,8 @@ import yaml
 
 from epicycle.actors import EpicycleError, counted, to_seconds
 
-from ..build import Model
-from ..graph import Act
+from ..build.model import Model
+from ..graph.acts import Act
 from ..provenance import version_of
 from ..results import Verdict
 from ..search import INTERRUPT, RUNS, Effect, Explanation, monitors_named

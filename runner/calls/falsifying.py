@@ -15,8 +15,10 @@ from epicycle.actors import EpicycleError, abridged, counted
 
 from ..bars import bar
 from ..engine import Interventions, Simulation
-from ..graph import ActName
-from ..language import EXACTLY, Setting, split_number
+from ..graph.acts import ActName
+from ..language.dimensions import split_number
+from ..language.disturbance import EXACTLY
+from ..language.settings import Setting
 from ..provenance import version_of
 from ..results import Verdict
 from ..search import Asked, FaultSpace, Findings, Interval, Run
@@ -24,7 +26,7 @@ from ..search import falsify as search
 from ..shown import finite, short
 from ..study import OK, StudyResults, open_study
 from ..tables import Table, Tabled
-from ..text import Node, Scalar, plain
+from ..text.document import Node, Scalar, plain
 from .run_spec import Changes, RunSpec, seconds
 from .studying import as_settings
 

@@ -11,12 +11,12 @@ from typing import Any
 from epicycle.actors import abridged, counted
 
 from ..bars import bar
-from ..language import split_number
+from ..language.dimensions import split_number
 from ..search import Goal, Interval, Optimum, Outcome, Tested
 from ..search import optimise as search
 from ..study import StudyResults, open_study, with_interval
 from ..tables import Table, Tabled
-from ..text import Scalar, plain
+from ..text.document import Scalar, plain
 from .falsifying import as_ranges
 from .studying import as_settings
 

@@ -11,8 +11,11 @@ from typing import overload
 
 from epicycle.actors import EpicycleError, did_you_mean
 
-from ..build import Model, load_model, made_figure
-from ..catalogue import Figure, figure_types
+from ..build.figures import made_figure
+from ..build.load import load_model
+from ..build.model import Model
+from ..catalogue.figure import Figure
+from ..catalogue.types import figure_types
 from ..html import Html, tag
 from ..printing import complain
 from ..results import Results, write_log
@@ -21,7 +24,8 @@ from ..show import draw as draw_figure
 from ..show.graph import outline, statechart, write_graph
 from ..show.report import write_report
 from ..study import StudyResults, available_cores
-from ..text import Problems, select
+from ..text.patterns import select
+from ..text.problems import Problems
 from .comparing import Comparison
 
 

@@ -11,10 +11,12 @@ from typing import Any, Final, NamedTuple, TypedDict, cast
 
 from epicycle.actors import EpicycleError, convert, read_regular
 
-from ..build import Model, load_model
-from ..catalogue import types_of_file
-from ..language import Setting
-from ..text import call_site, node_of, plain
+from ..build.load import load_model
+from ..build.model import Model
+from ..catalogue.types import types_of_file
+from ..language.settings import Setting
+from ..text.document import plain
+from ..text.program import call_site, node_of
 
 FLAGS: Final = {
     "set": "--set", "overrides": "--overrides", "disturb": "--disturb", "aspects": "--aspect",

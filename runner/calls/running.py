@@ -13,12 +13,14 @@ from typing import Unpack
 from epicycle.actors import EpicycleError
 
 from ..bars import SOON, bar
-from ..build import Model, figures_of, load_model
+from ..build.figures import figures_of
+from ..build.load import load_model
+from ..build.model import Model
 from ..engine import ActorError, LogFilter, LoopError, Pace, Simulation
 from ..printing import complain, console, notices
 from ..results import LogFile, Results
 from ..shown import in_time
-from ..text import Problems
+from ..text.problems import Problems
 from .run_spec import Changes, RunSpec, seconds
 
 PATIENCE = 5.0  # s after which the length of a run can be judged

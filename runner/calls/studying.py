@@ -10,11 +10,12 @@ from typing import Literal
 
 import yaml
 
-from ..language import Study as StudyText
-from ..language import read_study, study_of_text
+from ..language.study import Study as StudyText
+from ..language.study import read_study, study_of_text
 from ..show.report import check_figures
 from ..study import Plan, StudyResults, open_study, progress, run_study
-from ..text import call_site, node_of, plain
+from ..text.document import plain
+from ..text.program import call_site, node_of
 
 PROGRAM = Path("<python>")  # stands for the file of a study that a program gives as a mapping
 

@@ -13,11 +13,12 @@ from typing import Unpack
 from epicycle.actors import EpicycleError
 
 from ..bars import SOON
-from ..build import Model, figures_of
+from ..build.figures import figures_of
+from ..build.model import Model
 from ..engine import ActorError, LoopError
 from ..printing import complain
 from ..show.view import Recording, page_of, write_page
-from ..text import Problems
+from ..text.problems import Problems
 from .run_spec import Changes, seconds
 from .running import loaded, watched
 

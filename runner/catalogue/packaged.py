@@ -6,9 +6,9 @@ from functools import partial
 from importlib import import_module
 from pathlib import Path
 
-from epicycle.actors import irregular
+from epicycle.actors import did_you_mean, irregular
 
-from ..text import Position, Problems, did_you_mean
+from ..text.problems import Position, Problems
 
 
 def model_folders() -> list[Path]:

@@ -12,10 +12,10 @@ from typing import Annotated, Any
 
 import numpy as np
 
-from epicycle.actors import FaultError, declared_ports, shaped
+from epicycle.actors import FaultError, declared_ports, did_you_mean, shaped
 from epicycle.aspects import Request
 
-from ..text import did_you_mean, split
+from ..text.reading import split
 from .types import Catalogue
 
 BUILT_IN: dict[str, Any] = {

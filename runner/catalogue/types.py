@@ -29,7 +29,7 @@ import epicycle.aspects
 from epicycle.actors import Actor, Configurable, EpicycleError, FaultError, ParameterError, Process, part_finders
 from epicycle.aspects import Aspect, CompositeAspect, CompositeExecutionAspect, JoinPointAspect
 
-from ..text import note_package
+from ..text.files import note_package
 from .dialect import Dialect
 from .figure import Figure, own_figures
 from .packaged import unreadable

@@ -63,10 +63,10 @@ def compare(options: argparse.Namespace) -> int:
     from dataclasses import asdict
 
     from ..calls import Away, compared, load, recorded, seconds
-    from ..language import parse_settings
+    from ..language.settings import parse_settings
     from ..shown import finite
     from ..study import available_cores
-    from ..text import Problems
+    from ..text.problems import Problems
 
     common: Changes = {
         "set": options.set,

@@ -11,7 +11,7 @@ from ..printing import complain, console, tell, tell_json, tell_json_text
 from .options import CHANGES, DONE, JSON, MODEL, TYPES, command, load, option, own_types, whole
 
 if TYPE_CHECKING:
-    from ..catalogue import Catalogue
+    from ..catalogue.types import Catalogue
 
 # -- models -----------------------------------------------------------------------------------------------------------
 
@@ -40,8 +40,8 @@ def validate(options: argparse.Namespace) -> int:
 
 def _is_study(name: str) -> bool:
     """Whether a packaged study has that name, or the file declares a study."""
-    from ..catalogue import is_path, packaged_models, packaged_studies
-    from ..language import is_study
+    from ..catalogue.packaged import is_path, packaged_models, packaged_studies
+    from ..language.study import is_study
 
     if is_path(name):
         return is_study(Path(name))
@@ -52,7 +52,7 @@ def _validate_study(options: argparse.Namespace) -> int:
     """Load the model at every level that the study varies."""
     from epicycle.actors import EpicycleError, counted
 
-    from ..language import read_study
+    from ..language.study import read_study
     from ..show.report import check_figures
     from ..study import Plan
 
@@ -116,10 +116,11 @@ def _write(text: str, write: Callable[[Path], None], path: Path | None) -> int:
 @command("list the packaged models, disturbances and studies", imports=("build",))
 def models(options: argparse.Namespace) -> int:
     """List the models that come with Epicycle, the disturbances for --disturb, and the studies."""
-    from ..build import load_model
-    from ..catalogue import packaged_disturbances, packaged_models, packaged_studies
-    from ..language import load_disturbance, read_study
-    from ..text import Problems
+    from ..build.load import load_model
+    from ..catalogue.packaged import packaged_disturbances, packaged_models, packaged_studies
+    from ..language.disturbance import load_disturbance
+    from ..language.study import read_study
+    from ..text.problems import Problems
 
     def tell_of(name: str, doc: str) -> None:
         tell(f"{name}: {doc.partition('. ')[0]}" if doc else name)
@@ -148,8 +149,8 @@ def _known_types(options: argparse.Namespace) -> Catalogue:
     """The types that a model may name, under the dialect that is asked for."""
     from epicycle.actors import EpicycleError, ParameterError
 
-    from ..catalogue import LIKE as DIALECT
-    from ..catalogue import installed
+    from ..catalogue.like import LIKE as DIALECT
+    from ..catalogue.types import installed
 
     known = installed().with_types(own_types(options))
     try:
@@ -191,7 +192,7 @@ def aspects(options: argparse.Namespace) -> int:
     in the order in which a token meets them."""
     from epicycle.actors import EpicycleError
 
-    from ..catalogue import is_path, packaged_models
+    from ..catalogue.packaged import is_path, packaged_models
 
     known = _known_types(options)
     name, packaged = options.model, packaged_models()
@@ -226,11 +227,11 @@ def _print_reference(
     """
     from dataclasses import asdict, replace
 
-    from epicycle.actors import EpicycleError
+    from epicycle.actors import EpicycleError, did_you_mean
 
-    from ..catalogue import describe, load_all, parts_of
+    from ..catalogue.reference import describe, parts_of
+    from ..catalogue.types import load_all
     from ..show import described, detail, overview, parts_described
-    from ..text import did_you_mean
 
     if name is None:
         loaded, errors = load_all(types)
@@ -281,8 +282,8 @@ def _print_reference(
 def schema(options: argparse.Namespace) -> int:
     """Write a JSON Schema of model files, made from the installed actors and aspects. An editor with a YAML language
     server completes and checks a model whose first line is '# yaml-language-server: $schema=FILE'."""
-    from ..catalogue import figure_types, load_all
-    from ..language import json_schema, schema_text
+    from ..catalogue.types import figure_types, load_all
+    from ..language.schema import json_schema, schema_text
     from ..show.report import study_figure_types
 
     catalogue, errors = _known_types(options).loaded()

@@ -209,7 +209,7 @@ def new(options: argparse.Namespace) -> int:
 
     from epicycle.actors import EpicycleError
 
-    from ..text import NAME, NAMES_HAVE
+    from ..text.reading import NAME, NAMES_HAVE
 
     name: str = options.name
     if not NAME.match(name) or iskeyword(name) or not name.isascii():

@@ -15,7 +15,7 @@ from ..printing import complain, complain_traceback
 if TYPE_CHECKING:
     from epicycle.actors import EpicycleError
 
-    from ..build import Model
+    from ..build.model import Model
     from ..calls import OpenedRun, RunSpec
 
 DONE, FAILED, BAD_INPUT, BROKEN, INTERRUPTED = 0, 1, 2, 3, 130
@@ -67,14 +67,14 @@ def whole(first: int, last: int | None = None, most: str = "") -> Callable[[str]
 
 def seed(text: str) -> int:
     """A seed: a whole number of at least 0."""
-    from ..text import MAX_SEED
+    from ..text.limits import MAX_SEED
 
     return whole(0, MAX_SEED)(text)
 
 
 def first_seed(text: str) -> int:
     """A first seed such that the seeds of all replications are valid, too."""
-    from ..language import MAX_STUDY_SEED
+    from ..language.study import MAX_STUDY_SEED
 
     return whole(0, MAX_STUDY_SEED)(text)
 
@@ -152,7 +152,7 @@ MODEL = (option("model", metavar="MODEL", help="a path to a YAML file, or the na
 
 def own_types(options: argparse.Namespace) -> list[type]:
     """The types of the files that ``--types`` names."""
-    from ..catalogue import types_of_file
+    from ..catalogue.types import types_of_file
 
     return [each for file in options.types for each in types_of_file(Path(file))]
 
@@ -193,8 +193,8 @@ def complain_of_change(name: str, before: str, digest: str) -> None:
 
 def load(options: argparse.Namespace, *, strict: bool = False) -> Model:
     """The model that the options describe; warnings are printed or, with ``strict``, raised."""
-    from ..build import load_model
-    from ..text import ModelError
+    from ..build.load import load_model
+    from ..text.problems import ModelError
 
     model = load_model(
         options.model,

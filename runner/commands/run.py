@@ -24,7 +24,7 @@ from .options import (
 )
 
 if TYPE_CHECKING:
-    from ..build import Model
+    from ..build.model import Model
     from ..calls import RunSpec
 
 

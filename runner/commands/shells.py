@@ -35,7 +35,8 @@ def script(shell: str) -> str:
 
 def _commands() -> Iterator[tuple[str, str, list[Given]]]:
     """Each command with its summary and its options and arguments."""
-    from ..catalogue import built_in, packaged_disturbances, packaged_models, packaged_studies
+    from ..catalogue.packaged import packaged_disturbances, packaged_models, packaged_studies
+    from ..catalogue.types import built_in
     from . import commands
 
     known = built_in()

@@ -10,7 +10,7 @@ from ..printing import columns, console, tell, tell_json
 from .options import DONE, MODEL, command, load, option
 
 if TYPE_CHECKING:
-    from ..build import Model
+    from ..build.model import Model
 
 
 @command(
@@ -23,7 +23,8 @@ def show(options: argparse.Namespace) -> int:
     """Show the parameters of a model with their types, units, values and docs, the files that it reads, its metrics
     and monitors, recorded ports, figures and aspects, and the packaged disturbances that fit it."""
     from ..shown import in_time
-    from ..text import folded, noting
+    from ..text.files import noting
+    from ..text.patterns import folded
 
     with noting() as noted:
         model = load(options)
@@ -96,10 +97,11 @@ def _disturbances(options: argparse.Namespace) -> Iterator[tuple[str, str]]:
     """The packaged disturbances that the model can be loaded with."""
     from epicycle.actors import EpicycleError
 
-    from ..build import load_model
-    from ..catalogue import first_sentence, packaged_disturbances
-    from ..language import load_disturbance
-    from ..text import Problems
+    from ..build.load import load_model
+    from ..catalogue.packaged import packaged_disturbances
+    from ..catalogue.reference import first_sentence
+    from ..language.disturbance import load_disturbance
+    from ..text.problems import Problems
     from .options import own_types
 
     for name in packaged_disturbances():

@@ -86,7 +86,7 @@ SESSION = (
 )
 def study(options: argparse.Namespace) -> int:
     """Make all runs of a study that are not yet in its results folder."""
-    from ..language import read_study
+    from ..language.study import read_study
     from ..show.report import check_figures
     from ..study import Plan, available_cores, check_size
 
@@ -258,12 +258,12 @@ def status(options: argparse.Namespace) -> int:
 )
 def replay(options: argparse.Namespace) -> int:
     """Repeat one run of a study, with its event log, all recorded signals and figures."""
-    from ..build import figures_of
+    from ..build.figures import figures_of
     from ..calls import RunSpec
     from ..results import write_log
     from ..show import check_folder, draw_figures, summary_table, write_folder
     from ..study import again, open_study, plan_of_folder
-    from ..text import Problems
+    from ..text.problems import Problems
 
     row = open_study(options.folder).find(options.run_key)
     plan = plan_of_folder(options.folder, map(Path, options.types))

@@ -13,9 +13,9 @@ from .options import CHANGES, DONE, RUN, SEED, command, open_run, option, severa
 if TYPE_CHECKING:
     from epicycle.actors import Actor, Tag
 
-    from ..build import Model
+    from ..build.model import Model
     from ..engine import Firing
-    from ..graph import ModelGraph
+    from ..graph.model_graph import ModelGraph
 
 WIDEST = 80  # characters of a token
 
@@ -67,9 +67,9 @@ def trace(options: argparse.Namespace) -> int:
 
 def _actors(patterns: list[str], model: Model) -> dict[str, Actor]:
     """The actors that patterns select, directly or as parts of selected composites."""
-    from epicycle.actors import EpicycleError
+    from epicycle.actors import EpicycleError, did_you_mean
 
-    from ..text import PatternError, did_you_mean, select
+    from ..text.patterns import PatternError, select
 
     graph = model.graph
     known = [*graph.actors, *graph.composites]

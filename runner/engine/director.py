@@ -47,7 +47,8 @@ from epicycle.actors import (
     new_wake,
 )
 
-from ..text import NORMAL, Limits, describe
+from ..text.limits import NORMAL, Limits
+from ..text.program import describe
 from . import errors
 from .agenda import Activation, Delivery, Instant, new_instant
 from .errors import ActorError, Crowd, CrowdError, LoopError
@@ -56,7 +57,7 @@ if TYPE_CHECKING:
     from epicycle.actors import Actor
     from epicycle.aspects import Job
 
-    from ..graph import ModelGraph
+    from ..graph.model_graph import ModelGraph
 
 REPORTED = 256  # tokens that come together at one port are counted in groups of this size
 

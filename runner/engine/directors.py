@@ -6,7 +6,8 @@ from collections.abc import Callable
 from functools import partial
 from typing import TYPE_CHECKING, cast
 
-from ..graph import Clock, ModelGraph, is_within
+from ..graph.clock import Clock
+from ..graph.model_graph import ModelGraph, is_within
 from .director import Director
 from .local_time import BoundaryPort, LocalDirector
 from .refinement import ModeDirector, Outer, Refinement

@@ -6,7 +6,9 @@ from collections.abc import Iterable
 
 from epicycle.actors import Actor, EpicycleError, Process, Tag, readable
 
-from ..text import RAISE_IT, Position, describe, told_raised
+from ..text.limits import RAISE_IT
+from ..text.problems import Position, told_raised
+from ..text.program import describe
 
 MAX_MICROSTEPS = 100_000
 MAX_STEPS = 1_000_000  # of SimPy at one instant

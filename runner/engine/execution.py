@@ -15,7 +15,7 @@ from typing import Any
 from epicycle.actors import Actor, InputPort, Tag, Wake
 from epicycle.aspects import ActorPoint, Job
 
-from ..text import describe
+from ..text.program import describe
 from .agenda import Activation
 from .director import Director
 from .errors import ActorError

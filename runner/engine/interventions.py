@@ -15,7 +15,7 @@ from typing import Any
 from epicycle.actors import Receiver
 from epicycle.aspects import JoinPoint
 
-from ..graph import Act, ActName
+from ..graph.acts import Act, ActName
 from ..results import canonical
 from .receivers import AspectCall
 

@@ -14,7 +14,7 @@ from simpy.events import Event, EventPriority
 
 from epicycle.actors import NEVER, Actor, Environment, Receiver, Tag, Wake
 
-from ..graph import Clock
+from ..graph.clock import Clock
 from .agenda import Delivery
 from .director import Director
 from .refinement import Refinement

@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 
-from ..build import Model
+from epicycle.actors import did_you_mean
+
+from ..build.model import Model
 from ..results import LogError
-from ..text import PatternError, did_you_mean, select
+from ..text.patterns import PatternError, select
 
 _SHOWN = 12  # names in a message
 

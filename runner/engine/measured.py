@@ -11,7 +11,7 @@ from graphlib import TopologicalSorter
 
 from epicycle.actors import EpicycleError, Quantity
 
-from ..graph import Metric
+from ..graph.watched import Metric
 from ..results import Outcome
 from ..shown import short
 from .measurement import Measurement

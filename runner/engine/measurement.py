@@ -12,8 +12,8 @@ from typing import Any
 from epicycle.actors import Quantity, to_nanoseconds, to_seconds
 from epicycle.actors.expression import Formula
 
-from ..catalogue import MSER5, TIME, Measure
-from ..graph import Metric
+from ..catalogue.measure import MSER5, TIME, Measure
+from ..graph.watched import Metric
 from ..results import Outcome
 from ..shown import short
 from .batches import BATCHES, LEAST_OF_MSER, OF_MSER, TimeBatches, TokenBatches, batch_interval, mser

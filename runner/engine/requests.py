@@ -9,7 +9,7 @@ from typing import Any
 from epicycle.actors import EpicycleError, Receiver, to_nanoseconds, to_seconds
 from epicycle.aspects import FiringRequest, Job, JoinPoint, Request, time_needed
 
-from ..graph import WovenAspect
+from ..graph.woven import WovenAspect
 from .receivers import Call, Deliver
 
 

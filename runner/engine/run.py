@@ -11,12 +11,12 @@ from typing import Any
 
 from epicycle.actors import Actor, EpicycleError, Receiver, did_you_mean, to_seconds
 
-from ..build import Model
+from ..build.model import Model
 from ..collection import seldom_collecting, without_collection
-from ..graph import WovenAspect
+from ..graph.woven import WovenAspect
 from ..interrupt import between_steps
 from ..results import STOP_TIME, EventLog, Record, Results, Signal, Verdict
-from ..text import describe, raised_at
+from ..text.program import describe, raised_at
 from .copies import Copies
 from .director import Director
 from .directors import director_of

@@ -9,9 +9,9 @@ from typing import Any, TypeVar, overload
 from epicycle.actors import Actor, EpicycleError, Process, Tag, did_you_mean, to_nanoseconds
 from epicycle.aspects import Aspect
 
-from ..build import Model
+from ..build.model import Model
 from ..collection import without_collection
-from ..graph import WovenAspect
+from ..graph.woven import WovenAspect
 from ..results import STOP_TIME, EventLog, Record, Results, Signal, Verdict
 from ..tables import Table, Tabled
 from .copies import Copies

@@ -13,7 +13,7 @@ from fractions import Fraction
 from itertools import chain
 from typing import Any
 
-from ..catalogue import Measure
+from ..catalogue.measure import Measure
 
 MOST = sys.float_info.max
 _KEPT = 512  # numbers until they are summed up

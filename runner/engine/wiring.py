@@ -30,9 +30,12 @@ from epicycle.aspects import (
     aspect_stream,
 )
 
-from ..graph import Clock, Hop, ModelGraph, WovenAspect, connection_place
+from ..graph.acts import connection_place
+from ..graph.clock import Clock
+from ..graph.model_graph import Hop, ModelGraph
+from ..graph.woven import WovenAspect
 from ..results import EventLog, Signal
-from ..text import describe
+from ..text.program import describe
 from .aspect_context import EngineContext
 from .director import Director
 from .directors import Directors

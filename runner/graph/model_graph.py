@@ -14,8 +14,9 @@ from typing import Any
 from epicycle.actors import Actor, InputPort, OutputPort
 from epicycle.aspects import Request
 
-from ..catalogue import Dialect
-from ..text import NORMAL, Limits, Position
+from ..catalogue.dialect import Dialect
+from ..text.limits import NORMAL, Limits
+from ..text.problems import Position
 from .acts import connection_place
 from .clock import Clock
 

@@ -7,9 +7,10 @@ from dataclasses import dataclass, field, replace
 from epicycle.actors.expression import Formula
 from epicycle.aspects import Reading
 
-from ..catalogue import Measure
+from ..catalogue.measure import Measure
 from ..temporal import TINY, Property, Requirement
-from ..text import Position, folded
+from ..text.patterns import folded
+from ..text.problems import Position
 from .model_graph import is_within
 
 

@@ -9,7 +9,7 @@ from epicycle.actors import counted
 from epicycle.actors.expression import PortFormula
 from epicycle.aspects import Aspect, ExecutionAspect, FiringTime, Reading, Selection
 
-from ..text import Problems
+from ..text.problems import Problems
 from .acts import connection_place
 from .model_graph import ModelGraph, is_within
 

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ..text import POISON, Node, NodeReader, Position, Text
+from ..text.document import Node
+from ..text.problems import POISON, Position
+from ..text.reading import NodeReader, Text
 from .fields import AT, Construct, Shape, keyed, number, ref
 
 

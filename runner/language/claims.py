@@ -5,7 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 
-from ..text import Position, Problems, Text, did_you_mean
+from epicycle.actors import did_you_mean
+
+from ..text.problems import Position, Problems
+from ..text.reading import Text
 from .dimensions import Factor
 
 LESS, GREATER, RISES, FALLS, ALWAYS = "less", "greater", "rises", "falls", "always"

@@ -13,7 +13,10 @@ from typing import Any, TypeAlias
 
 from epicycle.actors import Quantity, UnitError, parse_unit
 
-from ..text import POISON, Entry, Mapping, Node, NodeReader, Poison, Position, Scalar, Sequence, blame, is_empty, plain
+from ..text.document import Entry, Mapping, Node, Scalar, Sequence, plain
+from ..text.faults import blame
+from ..text.problems import POISON, Poison, Position
+from ..text.reading import NodeReader, is_empty
 from .fields import QUANTITY_SCHEMA, Construct, Key, Schema, Shape, node_as, ref, sound
 from .sampling import (
     HYPERCUBE,

@@ -6,8 +6,10 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from typing import TypeVar
 
-from ..catalogue import find
-from ..text import POISON, Mapping, Node, NodeReader, Problems, read
+from ..catalogue.packaged import find
+from ..text.document import Mapping, Node, read
+from ..text.problems import POISON, Problems
+from ..text.reading import NodeReader
 from .acts import ACTS, ActText, acts
 from .fields import NAMED, Construct, Key, sound
 from .models import ASPECTS, COMPOSITES, DOC, PARAMETERS, CompositeText, ModelText

@@ -14,8 +14,11 @@ from typing import Any, TypeAlias, TypeVar
 
 from epicycle.actors import FaultError, MappingParameter, Parameter, to_nanoseconds
 
-from ..catalogue import as_written, is_part, shown
-from ..text import POISON, Entry, Node, NodeReader, Poison, Position, Scalar, blame, is_empty
+from ..catalogue.reference import as_written, is_part, shown
+from ..text.document import Entry, Node, Scalar
+from ..text.faults import blame
+from ..text.problems import POISON, Poison, Position
+from ..text.reading import NodeReader, is_empty
 
 Schema: TypeAlias = dict[str, Any]
 T = TypeVar("T")

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from epicycle.actors import irregular
+from epicycle.actors import did_you_mean, irregular
 
-from ..catalogue import find, is_path, model_folders, packaged_files, packaged_ones, unreadable
-from ..text import Mapping, Problems, Text, did_you_mean, plain, read
+from ..catalogue.packaged import find, is_path, model_folders, packaged_files, packaged_ones, unreadable
+from ..text.document import Mapping, plain, read
+from ..text.problems import Problems
+from ..text.reading import Text
 from .inheritance import extended
 from .models import CompositeText, ModelText, library_of, model_of
 

@@ -14,9 +14,12 @@ from collections.abc import Collection, Mapping
 from dataclasses import replace
 from typing import Any
 
-from epicycle.actors import UnitError
+from epicycle.actors import UnitError, did_you_mean
 
-from ..text import NORMAL, POISON, RAISE_IT, Entry, Limits, Poison, Position, Problems, Text, did_you_mean
+from ..text.document import Entry
+from ..text.limits import NORMAL, RAISE_IT, Limits
+from ..text.problems import POISON, Poison, Position, Problems
+from ..text.reading import Text
 from .models import CompositeText, ModelText
 from .parts import PartText
 from .places import ConnectionText

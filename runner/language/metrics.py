@@ -7,8 +7,10 @@ from typing import Any
 
 from epicycle.actors import Parameter, declared_parameters
 
-from ..catalogue import TAKES, Measure, take_fault
-from ..text import POISON, Entry, NodeReader, Poison, Position, Text
+from ..catalogue.measure import TAKES, Measure, take_fault
+from ..text.document import Entry
+from ..text.problems import POISON, Poison, Position
+from ..text.reading import NodeReader, Text
 from .fields import AT, TEXTS, Construct, Key, about, named, node_as, one_or_more, ref, schema_of
 from .places import PATTERN_SCHEMA
 

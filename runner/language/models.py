@@ -7,8 +7,11 @@ from typing import Any
 
 from epicycle.actors import Parameter
 
-from ..catalogue import LIKE, dialects
-from ..text import MAX_SEED, POISON, Entry, Mapping, Node, NodeReader, Poison, Position, Problems, Scalar, Text
+from ..catalogue.like import LIKE, dialects
+from ..text.document import Entry, Mapping, Node, Scalar
+from ..text.limits import MAX_SEED
+from ..text.problems import POISON, Poison, Position, Problems
+from ..text.reading import NodeReader, Text
 from .acts import ActText
 from .fields import (
     AT,

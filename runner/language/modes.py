@@ -7,7 +7,9 @@ from typing import Any
 
 from epicycle.actors import declared_parameters
 
-from ..text import POISON, Entry, Mapping, NodeReader, Poison, Position, Text
+from ..text.document import Entry, Mapping
+from ..text.problems import POISON, Poison, Position
+from ..text.reading import NodeReader, Text
 from .fields import AT, Key, Schema, names_of, node_as, one_or_more, ref
 from .parts import PartText
 

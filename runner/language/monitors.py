@@ -8,7 +8,9 @@ from typing import Any
 from epicycle.actors import Parameter, declared_parameters
 
 from ..temporal import Requirement
-from ..text import POISON, Entry, Mapping, NodeReader, Poison, Position
+from ..text.document import Entry, Mapping
+from ..text.problems import POISON, Poison, Position
+from ..text.reading import NodeReader
 from .fields import Construct, Key, about, named, node_as, ref, schema_of
 
 

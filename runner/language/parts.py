@@ -4,26 +4,14 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from epicycle.actors import Actor, Parameter
+from epicycle.actors import Actor, Parameter, nearest
 from epicycle.aspects import Aspect
 
-from ..catalogue import Figure
-from ..text import (
-    NAME,
-    NORMAL,
-    POISON,
-    SURE,
-    Entry,
-    Mapping,
-    Node,
-    NodeReader,
-    Poison,
-    Position,
-    Scalar,
-    Text,
-    is_empty,
-    nearest,
-)
+from ..catalogue.figure import Figure
+from ..text.document import Entry, Mapping, Node, Scalar
+from ..text.limits import NORMAL
+from ..text.problems import POISON, Poison, Position
+from ..text.reading import NAME, SURE, NodeReader, Text, is_empty
 from .fields import AT, TEXTS, Computed, Construct, Shape, computed_as, keyed, named, one_or_more, ref, sound
 from .places import POINTCUTS, PointcutText
 

@@ -8,7 +8,9 @@ from dataclasses import dataclass, replace
 
 from epicycle.aspects import FiringTime, FiringTimeParameter
 
-from ..text import POISON, Mapping, Node, NodeReader, Poison, Position, Scalar, Sequence, Text, inside, is_empty, split
+from ..text.document import Mapping, Node, Scalar, Sequence
+from ..text.problems import POISON, Poison, Position
+from ..text.reading import NodeReader, Text, inside, is_empty, split
 from .fields import (
     AT,
     FLAG,

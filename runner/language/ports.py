@@ -9,20 +9,10 @@ from typing import Any
 from epicycle.actors import Parameter, UnitError, convert, in_si, parse_unit
 from epicycle.actors.expression import CONSTANTS, FUNCTIONS
 
-from ..text import (
-    NAME,
-    POISON,
-    Entry,
-    Mapping,
-    Node,
-    NodeReader,
-    Poison,
-    Position,
-    Scalar,
-    Text,
-    blame,
-    is_empty,
-)
+from ..text.document import Entry, Mapping, Node, Scalar
+from ..text.faults import blame
+from ..text.problems import POISON, Poison, Position
+from ..text.reading import NAME, NodeReader, Text, is_empty
 from .fields import (
     AT,
     LABEL,

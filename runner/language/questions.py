@@ -8,25 +8,14 @@ from dataclasses import replace
 from math import prod
 from pathlib import Path
 
+from epicycle.actors import did_you_mean
 from epicycle.actors.expression import ExpressionError, Formula
 
-from ..text import (
-    POISON,
-    Entry,
-    Node,
-    NodeReader,
-    Poison,
-    Position,
-    Problems,
-    Scalar,
-    Sequence,
-    Text,
-    blame,
-    did_you_mean,
-    inside,
-    parse,
-)
-from ..text import Mapping as MappingNode
+from ..text.document import Entry, Node, Scalar, Sequence, parse
+from ..text.document import Mapping as MappingNode
+from ..text.faults import blame
+from ..text.problems import POISON, Poison, Position, Problems
+from ..text.reading import NodeReader, Text, inside
 from .claims import ALWAYS, FALLS, FORMS, GREATER, LESS, RISES, Claim, Guideline, Questions, Selection, shown_level
 from .dimensions import Dimension, Factor, as_factor
 from .fields import AT, LABEL, TEXT, TEXTS, Construct, Key, Schema, Shape, names_of, node_as, number, ref

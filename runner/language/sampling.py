@@ -12,7 +12,7 @@ from typing import TypeAlias
 
 from epicycle.actors import random_stream
 
-from ..text import MAX_SEED
+from ..text.limits import MAX_SEED
 from .fields import QUANTITY_SCHEMA, Construct, Key, node_as, number
 
 Point: TypeAlias = tuple[float, ...]

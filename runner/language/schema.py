@@ -13,7 +13,8 @@ from collections.abc import Mapping
 from epicycle.actors import Configurable, declared_parameters
 from epicycle.aspects import FiringTimeParameter
 
-from ..catalogue import Catalogue, doc_of, first_sentence, parts_of
+from ..catalogue.reference import doc_of, first_sentence, parts_of
+from ..catalogue.types import Catalogue
 from .acts import ACT
 from .dimensions import RANGE, dimension_schema
 from .disturbance import DISTURBANCE

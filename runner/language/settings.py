@@ -8,34 +8,15 @@ from collections.abc import Mapping as AnyMapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from ..text import (
-    COMMAND_LINE,
-    NAME,
-    NAMES_HAVE,
-    NORMAL,
-    Comparisons,
-    Entry,
-    Limits,
-    Mapping,
-    Node,
-    NodeReader,
-    PatternError,
-    Position,
-    Problems,
-    Scalar,
-    Text,
-    call_site,
-    check_pattern,
-    did_you_mean,
-    is_empty,
-    matches,
-    names_asked,
-    names_of,
-    node_of,
-    parse,
-    read,
-    split,
-)
+from epicycle.actors import did_you_mean
+
+from ..text.document import Entry, Mapping, Node, Scalar, parse, read
+from ..text.files import COMMAND_LINE
+from ..text.limits import NORMAL, Limits
+from ..text.patterns import Comparisons, PatternError, check_pattern, matches, names_asked, names_of
+from ..text.problems import Position, Problems
+from ..text.program import call_site, node_of
+from ..text.reading import NAME, NAMES_HAVE, NodeReader, Text, is_empty, split
 from .fields import Shape
 from .models import ModelText
 from .parts import PartText, beside

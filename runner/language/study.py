@@ -7,24 +7,13 @@ from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from ..catalogue import find, is_path, unreadable
-from ..text import (
-    MAX_SEED,
-    POISON,
-    Entry,
-    Mapping,
-    Node,
-    NodeReader,
-    Poison,
-    Position,
-    Problems,
-    Scalar,
-    Text,
-    did_you_mean,
-    is_empty,
-    parse,
-    read,
-)
+from epicycle.actors import did_you_mean
+
+from ..catalogue.packaged import find, is_path, unreadable
+from ..text.document import Entry, Mapping, Node, Scalar, parse, read
+from ..text.limits import MAX_SEED
+from ..text.problems import POISON, Poison, Position, Problems
+from ..text.reading import NodeReader, Text, is_empty
 from .claims import Questions
 from .dimensions import DIMENSIONS, Dimension, Level, Listed
 from .fields import (

@@ -9,7 +9,9 @@ from types import MappingProxyType
 
 from epicycle.actors.expression import ExpressionError, Formula
 
-from ..text import Position, Problems, Scalar, blame
+from ..text.document import Scalar
+from ..text.faults import blame
+from ..text.problems import Position, Problems
 
 ASPECTS, SIGNALS = "aspects", "signals"
 NUMBERS = ("end", "events", "firings")  # the other results that an expression knows

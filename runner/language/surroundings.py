@@ -20,26 +20,17 @@ from epicycle.actors import (
     MappingParameter,
     Parameter,
     declared_parameters,
+    did_you_mean,
     found_variants,
 )
 
-from ..catalogue import Catalogue, CatalogueError, as_written, figure_types, is_part
-from ..text import (
-    POISON,
-    Entry,
-    Inherited,
-    Node,
-    NodeReader,
-    Poison,
-    Position,
-    Problems,
-    Scalar,
-    Text,
-    did_you_mean,
-    node_of,
-    plain,
-)
-from ..text import Mapping as MappingNode
+from ..catalogue.reference import as_written, is_part
+from ..catalogue.types import Catalogue, CatalogueError, figure_types
+from ..text.document import Entry, Inherited, Node, Scalar, plain
+from ..text.document import Mapping as MappingNode
+from ..text.problems import POISON, Poison, Position, Problems
+from ..text.program import node_of
+from ..text.reading import NodeReader, Text
 from .models import CompositeText, ModelText
 from .parts import PartText
 from .ports import ParameterText

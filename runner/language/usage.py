@@ -5,11 +5,12 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping
 
-from epicycle.actors import Actor, declared_parameters
+from epicycle.actors import Actor, declared_parameters, nearest
 from epicycle.actors.expression import ExpressionError, names_in
 
-from ..catalogue import CatalogueError
-from ..text import POISON, Node, Poison, Problems, Scalar, Sequence, nearest
+from ..catalogue.types import CatalogueError
+from ..text.document import Node, Scalar, Sequence
+from ..text.problems import POISON, Poison, Problems
 from .models import CompositeText, ModelText
 from .parts import PartText
 

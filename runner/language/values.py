@@ -17,19 +17,12 @@ from epicycle.actors import (
 )
 from epicycle.actors.expression import Budget, BudgetError, ExpressionError, check_names, interpolate, names_in
 
-from ..text import (
-    POISON,
-    Node,
-    Poison,
-    Position,
-    Problems,
-    Scalar,
-    Sequence,
-    blame,
-    in_general,
-    inside,
-)
-from ..text import Mapping as MappingNode
+from ..text.document import Mapping as MappingNode
+from ..text.document import Node, Scalar, Sequence
+from ..text.faults import blame
+from ..text.patterns import in_general
+from ..text.problems import POISON, Poison, Position, Problems
+from ..text.reading import inside
 from .fields import Computed
 from .ports import ParameterText
 

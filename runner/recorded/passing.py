@@ -13,9 +13,10 @@ from typing import Any
 from epicycle.actors import Actor, InputPort, OutputPort, texts_parameter
 from epicycle.aspects import FieldError
 
-from ..build import Model, disturb_ports
+from ..build.disturbance import disturb_ports
+from ..build.model import Model
 from ..engine import ActorError, Simulation
-from ..language import Setting
+from ..language.settings import Setting
 from ..results import Results
 from ..shown import finite
 from .files import Message, Recording, RecordingError, check_topics, opened, replaced

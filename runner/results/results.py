@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from epicycle.actors import counted, did_you_mean, to_seconds
 
-from ..graph import Act
+from ..graph.acts import Act
 from ..shown import in_time, short
 from ..tables import Table, Tabled, pandas_module
 from .encoding import cell, leaves

@@ -13,12 +13,15 @@ from typing import TYPE_CHECKING, Any
 
 from epicycle.actors import EpicycleError, read_table, to_nanoseconds, to_seconds
 
-from ..build import Model, load_model
-from ..catalogue import types_of_file
+from ..build.load import load_model
+from ..build.model import Model
+from ..catalogue.types import types_of_file
 from ..engine import Simulation
-from ..language import Setting, number_node
+from ..language.dimensions import number_node
+from ..language.settings import Setting
 from ..student import student_quantile
-from ..text import COMMAND_LINE, ModelError, Position, Problems
+from ..text.files import COMMAND_LINE
+from ..text.problems import ModelError, Position, Problems
 from .proposals import SPREAD, Point, spread
 from .space import Interval, read_space
 from .tried import NUMBER, Tried

@@ -11,9 +11,10 @@ from typing import Any
 
 from epicycle.actors import EpicycleError, did_you_mean, to_seconds
 
-from ..build import Model
+from ..build.model import Model
 from ..engine import Interventions, Simulation
-from ..graph import Act, ActName, ModelGraph
+from ..graph.acts import Act, ActName
+from ..graph.model_graph import ModelGraph
 from ..results import Results, Verdict, canonical, plain
 from .minimal import minimal
 from .monitored import property_of

@@ -10,12 +10,15 @@ from typing import Any
 
 from epicycle.actors import EpicycleError
 
-from ..build import Model, load_model
-from ..catalogue import types_of_file
+from ..build.load import load_model
+from ..build.model import Model
+from ..catalogue.types import types_of_file
 from ..engine import Interventions, Simulation
-from ..language import Level, Setting, study_of_text
+from ..language.dimensions import Level
+from ..language.settings import Setting
+from ..language.study import study_of_text
 from ..study import OK, Search, Trials, available_cores, open_trials
-from ..text import Problems
+from ..text.problems import Problems
 from .faults import FaultSpace
 from .growing import Growing, place_of, text_of
 from .monitored import AD_HOC, monitors_named, property_of

@@ -8,9 +8,13 @@ from itertools import islice
 
 from epicycle.actors import random_stream
 
-from ..graph import ActName
-from ..language import EXACTLY, Dimension, Level, Listed, Setting, as_factor
-from ..text import COMMAND_LINE, Position, node_of
+from ..graph.acts import ActName
+from ..language.dimensions import Dimension, Level, Listed, as_factor
+from ..language.disturbance import EXACTLY
+from ..language.settings import Setting
+from ..text.files import COMMAND_LINE
+from ..text.problems import Position
+from ..text.program import node_of
 from .proposals import BATCH, Point, Proposals, ranks
 from .space import Axis
 

@@ -8,7 +8,8 @@ from typing import Any
 
 import yaml
 
-from ..language import Level, Study
+from ..language.dimensions import Level
+from ..language.study import Study
 from ..study import Plan, Search, Trials
 from .faults import FaultSpace
 from .proposals import Point

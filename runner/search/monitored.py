@@ -6,8 +6,9 @@ from dataclasses import replace
 
 from epicycle.actors import EpicycleError, did_you_mean
 
-from ..build import Model
-from ..text import COMMAND_LINE, ModelError, Position
+from ..build.model import Model
+from ..text.files import COMMAND_LINE
+from ..text.problems import ModelError, Position
 
 AD_HOC = "property"  # the name of a monitor that is made of a text
 

@@ -11,10 +11,14 @@ from typing import Any
 from epicycle.actors import EpicycleError, did_you_mean
 from epicycle.actors.expression import ExpressionError, Formula
 
-from ..catalogue import is_path, packaged_files
-from ..language import Level, asks_for_none, is_study, read_study, study_of_text
+from ..catalogue.packaged import is_path, packaged_files
+from ..language.dimensions import Level
+from ..language.study import is_study, read_study, study_of_text
+from ..language.study_metric import asks_for_none
 from ..study import OK, Estimate, Plan, Search, Trials, available_cores, mean, open_trials
-from ..text import COMMAND_LINE, Position, Problems, parse, plain
+from ..text.document import parse, plain
+from ..text.files import COMMAND_LINE
+from ..text.problems import Position, Problems
 from .growing import Growing, place_of, text_of
 from .proposals import Point, is_guided, proposals
 from .space import Interval, Space, read_space

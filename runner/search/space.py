@@ -10,24 +10,25 @@ from decimal import Decimal
 
 from epicycle.actors import UnitError, counted, declared_parameters, parse_unit
 
-from ..build import Model
-from ..language import (
+from ..build.model import Model
+from ..language.dimensions import (
     RANGE,
-    RESERVED,
     Dimension,
     DimensionReader,
     Factor,
     Level,
     Listed,
-    Setting,
     as_factor,
     in_si,
     kind_of,
     number_node,
-    parse_setting,
     split_number,
 )
-from ..text import POISON, Entry, Mapping, Node, Position, Problems, Scalar, Sequence, matches, plain, select
+from ..language.settings import Setting, parse_setting
+from ..language.study import RESERVED
+from ..text.document import Entry, Mapping, Node, Scalar, Sequence, plain
+from ..text.patterns import matches, select
+from ..text.problems import POISON, Position, Problems
 
 HINT = "write load=0.5..0.9, policy=[fifo, lifo] or 'period={from: 1 s, to: 5 s, step: 1 s}'"
 _RANGE = re.compile(r"(.*?\S)\s*\.\.\s*(\S.*)")

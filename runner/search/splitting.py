@@ -21,7 +21,7 @@ from typing import Any, NamedTuple
 
 from epicycle.actors import EpicycleError, Process, counted, elementary, random_stream
 
-from ..build import Model
+from ..build.model import Model
 from ..engine import Simulation
 from ..provenance import version_of
 from ..shown import finite, short

@@ -13,7 +13,7 @@ import numpy as np
 
 from epicycle.actors import EpicycleError, Parameter, abridged, texts_parameter
 
-from ..catalogue import Figure
+from ..catalogue.figure import Figure
 from ..results import Results
 from ..shown import short
 from .samples import Floats, Numbers, Span, States, envelope, longest_spans, read, spans_of

@@ -14,9 +14,9 @@ from rich.text import Text
 
 from epicycle.actors import EpicycleError, abridged, read_regular, shortened, visible
 
-from ..build import Model
-from ..catalogue import Figure
-from ..graph import extent
+from ..build.model import Model
+from ..catalogue.figure import Figure
+from ..graph.woven import extent
 from ..printing import columns
 from ..provenance import versions
 from ..results import Results, plain, write_signals

@@ -15,9 +15,10 @@ from typing import Any
 
 from epicycle.actors import EpicycleError, readable, visible
 
-from ..catalogue import Figure
+from ..catalogue.figure import Figure
 from ..results import Results
-from ..text import Position, describe, raised_at, told_raised
+from ..text.problems import Position, told_raised
+from ..text.program import describe, raised_at
 
 FORMATS = ("png", "svg")
 _UNWRITABLE = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ufffe\uffff]")  # not allowed in XML files

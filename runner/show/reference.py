@@ -13,12 +13,10 @@ from rich.text import Text
 
 from epicycle.actors import Configurable, bounds_text
 
-from ..build import Model
-from ..catalogue import (
-    TAKES,
-    Catalogue,
-    Figure,
-    Measure,
+from ..build.model import Model
+from ..catalogue.figure import Figure
+from ..catalogue.measure import TAKES, Measure
+from ..catalogue.reference import (
     ParameterReference,
     PortReference,
     TypeReference,
@@ -28,7 +26,8 @@ from ..catalogue import (
     shown,
     topic_order,
 )
-from ..language import CONSTRUCTS
+from ..catalogue.types import Catalogue
+from ..language.schema import CONSTRUCTS
 from ..printing import columns
 from ..temporal import Requirement
 

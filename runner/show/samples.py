@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from epicycle.aspects import STAMP
 
 from ..results import Results, cell, leaves
-from ..text import select
+from ..text.patterns import select
 
 COLUMNS = 700  # approximate width of a panel in pixels
 _DENSE = 4  # samples per column above which they are drawn as an envelope

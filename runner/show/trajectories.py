@@ -11,7 +11,7 @@ import numpy as np
 
 from epicycle.actors import Parameter, array_parameter, texts_parameter
 
-from ..catalogue import Figure, Mark, Shape
+from ..catalogue.figure import Figure, Mark, Shape
 from ..results import Results, Signal
 from .figures import title_of
 from .samples import Floats, selected

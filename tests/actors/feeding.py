@@ -9,7 +9,8 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from epicycle.actors import Actor, OutputPort, Parameter
-from epicycle.runner.build import Model, load_model
+from epicycle.runner.build.load import load_model
+from epicycle.runner.build.model import Model
 from epicycle.runner.engine import Results, Simulation
 
 Events = Sequence[tuple[float, Any]]

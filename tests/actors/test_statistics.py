@@ -12,7 +12,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from epicycle.runner.engine import ActorError, Simulation
-from epicycle.runner.text import ModelError
+from epicycle.runner.text.problems import ModelError
 from tests.actors.feeding import feed, load, model_of, seconds, tokens
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from epicycle.runner.engine import Simulation
-from epicycle.runner.text import ModelError
+from epicycle.runner.text.problems import ModelError
 from tests.actors.feeding import load
 
 MODEL = """

@@ -15,7 +15,8 @@ import epicycle
 from epicycle.actors import EpicycleError
 from epicycle.runner import Model, ModelError, Simulation, load_model
 from epicycle.runner.calls import Comparison
-from epicycle.runner.catalogue import TAKES, Measure, MetricOptions, TakeName, describe
+from epicycle.runner.catalogue.measure import TAKES, Measure, MetricOptions, TakeName
+from epicycle.runner.catalogue.reference import describe
 from epicycle.runner.cli import main
 from epicycle.runner.show import TimeSeries
 from epicycle.runner.study import paired_difference

@@ -16,15 +16,15 @@ from typing import Any
 
 import pytest
 
-from epicycle.runner.build import load_model
-from epicycle.runner.catalogue import CatalogueError, Types, built_in, describe, dialects, figure_types, installed
-from epicycle.runner.catalogue.reference import TOPICS, doc_of
-from epicycle.runner.catalogue.types import _offered
+from epicycle.runner.build.load import load_model
+from epicycle.runner.catalogue.like import dialects
+from epicycle.runner.catalogue.reference import TOPICS, describe, doc_of
+from epicycle.runner.catalogue.types import CatalogueError, Types, _offered, built_in, figure_types, installed
 from epicycle.runner.engine import Simulation
-from epicycle.runner.language import read_study
+from epicycle.runner.language.study import read_study
 from epicycle.runner.show.report import check_figures
 from epicycle.runner.study import Plan
-from epicycle.runner.text import ModelError
+from epicycle.runner.text.problems import ModelError
 
 THIRD_PARTY = Path(__file__).parents[1] / "third_party"
 GOOD = """

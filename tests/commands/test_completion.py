@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from epicycle.runner.catalogue import packaged_disturbances, packaged_models
+from epicycle.runner.catalogue.packaged import packaged_disturbances, packaged_models
 from epicycle.runner.cli import main
 from epicycle.runner.commands import commands
 

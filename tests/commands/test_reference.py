@@ -13,7 +13,8 @@ import pytest
 from rich.console import Console
 
 from epicycle.actors import Actor, InputPort, OutputPort, Parameter, array_parameter
-from epicycle.runner.catalogue import TypeReference, built_in, describe, parts_of
+from epicycle.runner.catalogue.reference import TypeReference, describe, parts_of
+from epicycle.runner.catalogue.types import built_in
 from epicycle.runner.cli import main
 from epicycle.runner.show import detail
 

@@ -10,7 +10,8 @@ from typing import Any, ClassVar
 from simpy.events import Event
 
 from epicycle.actors import Actor, InputPort, OutputPort, Parameter, Process
-from epicycle.runner.build import Model, load_model
+from epicycle.runner.build.load import load_model
+from epicycle.runner.build.model import Model
 from epicycle.runner.engine import Results, Simulation
 
 

@@ -21,7 +21,7 @@ from epicycle.actors import CORE, Actor, InputPort, OutputPort, Parameter, Proce
 from epicycle.actors.expression import Formula
 from epicycle.runner import Simulation, load_model
 from epicycle.runner.engine import ActorError, LoopError, errors
-from epicycle.runner.text import ModelError
+from epicycle.runner.text.problems import ModelError
 from tests.engine.engine_parts import Join, Ticker
 
 

@@ -15,8 +15,8 @@ from hypothesis import strategies as st
 from epicycle.actors import Actor, InputPort, OutputPort, Parameter, Process, Tag
 from epicycle.aspects import JoinPoint, PortAspect
 from epicycle.runner.engine import ActorError
-from epicycle.runner.graph import Clock
-from epicycle.runner.text import ModelError
+from epicycle.runner.graph.clock import Clock
+from epicycle.runner.text.problems import ModelError
 from tests.engine.engine_parts import Plan, Repeat, load, seen, sends, simulate
 
 

@@ -9,11 +9,11 @@ from typing import Any
 import pytest
 
 from epicycle.actors import OutputPort
-from epicycle.runner.build import Model
+from epicycle.runner.build.model import Model
 from epicycle.runner.cli import main
 from epicycle.runner.engine import Simulation
 from epicycle.runner.results import Results
-from epicycle.runner.text import ModelError
+from epicycle.runner.text.problems import ModelError
 from tests.engine.engine_parts import load
 from tests.engine.test_monitors import Steps
 

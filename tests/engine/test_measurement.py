@@ -11,11 +11,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from epicycle.runner.catalogue import TAKES, Measure
+from epicycle.runner.catalogue.measure import TAKES, Measure
 from epicycle.runner.engine.batches import MOST, TimeBatches, TokenBatches, batch_interval, mser
 from epicycle.runner.engine.measurement import Measurement, Outcome
 from epicycle.runner.engine.statistic import Total
-from epicycle.runner.graph import Metric
+from epicycle.runner.graph.watched import Metric
 from epicycle.runner.show import summary_object
 from tests.engine.engine_parts import simulate
 

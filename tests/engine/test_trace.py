@@ -7,7 +7,7 @@ from typing import Any
 
 from epicycle.actors import Tag
 from epicycle.aspects import JoinPoint, PortAspect
-from epicycle.runner.build import load_model
+from epicycle.runner.build.load import load_model
 from epicycle.runner.engine import Firing, Simulation, Tracer
 from tests.engine.engine_parts import Script, load
 

@@ -24,26 +24,21 @@ from epicycle.actors import (
 from epicycle.actors.core.units import quantity
 from epicycle.aspects import Aspect, MeasurementFailure, PacketLoss
 from epicycle.runner.build.connect import indices_of as resolve
-from epicycle.runner.catalogue import Catalogue, built_in, model_folders, own_figures, packaged_models
-from epicycle.runner.language import (
-    acts,
-    dimensions,
-    disturbance,
-    json_schema,
-    models,
-    parts,
-    places,
-    ports,
-    questions,
-    study,
-)
+from epicycle.runner.catalogue.figure import own_figures
+from epicycle.runner.catalogue.packaged import model_folders, packaged_models
+from epicycle.runner.catalogue.types import Catalogue, built_in
+from epicycle.runner.language import acts, dimensions, disturbance, models, parts, places, ports, questions, study
 from epicycle.runner.language.fields import QUANTITY, Construct
 from epicycle.runner.language.fields import schema_of as value_schema
 from epicycle.runner.language.parts import BESIDE
 from epicycle.runner.language.places import _END as ENDPOINT
 from epicycle.runner.language.places import CONNECTION_TEXT, PATTERN
+from epicycle.runner.language.schema import json_schema
 from epicycle.runner.show.report import own_study_figures
-from epicycle.runner.text import NodeReader, PatternError, Problems, compile_pattern, parse, plain
+from epicycle.runner.text.document import parse, plain
+from epicycle.runner.text.patterns import PatternError, compile_pattern
+from epicycle.runner.text.problems import Problems
+from epicycle.runner.text.reading import NodeReader
 from tests.bad_models.test_bad_models import CASES
 from tests.cases import Case
 from tests.model.model_parts import TYPES

@@ -9,8 +9,8 @@ import pytest
 
 from epicycle.actors import Actor, Parameter
 from epicycle.runner import Simulation
-from epicycle.runner.build import load_model
-from epicycle.runner.text import ModelError
+from epicycle.runner.build.load import load_model
+from epicycle.runner.text.problems import ModelError
 
 
 class Reader(Actor):

@@ -12,7 +12,7 @@ import pytest
 from epicycle.actors import InputPort, OutputPort, Process
 from epicycle.runner.engine import Simulation
 from epicycle.runner.engine.errors import ActorError
-from epicycle.runner.text import ModelError
+from epicycle.runner.text.problems import ModelError
 from tests.actors.feeding import load
 from tests.cases import read, write
 

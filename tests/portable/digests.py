@@ -20,7 +20,7 @@ import pytest
 
 from epicycle.actors import random_stream
 from epicycle.runner import Simulation, load_model
-from epicycle.runner.catalogue import packaged_models
+from epicycle.runner.catalogue.packaged import packaged_models
 from tests.actors.core.test_random import CONTINUOUS, DISCRETE
 from tests.test_docs import TUTORIALS, Reader, blocks
 
@@ -120,7 +120,7 @@ def tutorials() -> dict[str, Path]:
 
 def parts() -> dict[str, Callable[[], str]]:
     """What there is to compute, by name."""
-    from epicycle.runner.catalogue import packaged_disturbances
+    from epicycle.runner.catalogue.packaged import packaged_disturbances
 
     found: dict[str, Callable[[], str]] = {"functions": functions, "functions, compiled": lambda: functions(True)}
     found["laws"] = laws

@@ -12,7 +12,8 @@ from epicycle.actors import Actor
 from epicycle.aspects import Aspect
 from epicycle.ptolemy.dialect import Ptolemy
 from epicycle.runner import Simulation, load_model
-from epicycle.runner.catalogue import built_in, describe
+from epicycle.runner.catalogue.reference import describe
+from epicycle.runner.catalogue.types import built_in
 from epicycle.runner.cli import main
 
 README = (Path(__file__).parents[2] / "ptolemy" / "README.md").read_text(encoding="utf-8")

@@ -11,7 +11,7 @@ import pytest
 import epicycle
 from epicycle.actors import EpicycleError
 from epicycle.runner.cli import main
-from epicycle.runner.graph import ActName
+from epicycle.runner.graph.acts import ActName
 from epicycle.runner.search import FaultSpace
 from epicycle.runner.search.faults import _by_sum
 

@@ -12,7 +12,7 @@ import pytest
 import epicycle
 from epicycle.runner.cli import main
 from epicycle.runner.engine import Interventions, Simulation
-from epicycle.runner.graph import ActName
+from epicycle.runner.graph.acts import ActName
 from epicycle.runner.results import Results
 
 PLANTED = Path(__file__).parent / "planted"

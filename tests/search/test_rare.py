@@ -12,7 +12,7 @@ import pytest
 
 import epicycle
 from epicycle.actors import EpicycleError
-from epicycle.runner.build import Model
+from epicycle.runner.build.model import Model
 from epicycle.runner.cli import main
 from epicycle.runner.search import RareEvent, rare
 from tests.engine.engine_parts import load

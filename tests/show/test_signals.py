@@ -17,7 +17,7 @@ import pytest
 
 from epicycle.actors import Tag
 from epicycle.runner import Simulation, load_model
-from epicycle.runner.catalogue import packaged_models
+from epicycle.runner.catalogue.packaged import packaged_models
 from epicycle.runner.engine import Results, Signal, plain
 from epicycle.runner.results import write_signals
 from tests.demo_models import DURATIONS

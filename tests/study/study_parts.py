@@ -87,7 +87,7 @@ def command(*arguments: object) -> list[str]:
 
 def plan_of(path: Path, **changes: Any) -> Any:
     """A study that has been tried."""
-    from epicycle.runner.language import read_study
+    from epicycle.runner.language.study import read_study
     from epicycle.runner.study import Plan
 
     return Plan.made(read_study(path, types=[THIS], **changes))

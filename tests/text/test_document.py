@@ -9,7 +9,9 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from epicycle.runner.text import Mapping, ModelError, Node, Position, Problems, Scalar, document, parse, plain, read
+from epicycle.runner.text import document
+from epicycle.runner.text.document import Mapping, Node, Scalar, parse, plain, read
+from epicycle.runner.text.problems import ModelError, Position, Problems
 
 
 def load(text: str) -> Node:

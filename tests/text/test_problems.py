@@ -5,8 +5,9 @@ import pickle
 
 import pytest
 
+from epicycle.actors import did_you_mean, nearest
 from epicycle.actors.core.errors import EpicycleError
-from epicycle.runner.text import MAX_PROBLEMS, ModelError, Position, Problem, Problems, did_you_mean, nearest
+from epicycle.runner.text.problems import MAX_PROBLEMS, ModelError, Position, Problem, Problems
 
 LINE = "    vehicle: {type: Vehicle, sped: 8 m/s}"
 MISTYPED = Problem(

@@ -12,8 +12,10 @@ from itertools import accumulate, chain
 from epicycle.actors import InputPort, OutputPort, PortParameter, counted
 from epicycle.aspects import Medium, Processor
 
-from ...build import Model
-from ...graph import Clock, Hop, WovenAspect
+from ...build.model import Model
+from ...graph.clock import Clock
+from ...graph.model_graph import Hop
+from ...graph.woven import WovenAspect
 
 MANY = 60  # boxes that a reader can take in; a larger model is folded by default
 

@@ -12,7 +12,8 @@ from typing import Any
 from epicycle.actors import EpicycleError, abridged
 
 from ...study import Replay, StudyResults, plan_of_folder, ranked, repeat, replace_file
-from ...text import ModelError, Problems, describe, raised_at
+from ...text.problems import ModelError, Problems
+from ...text.program import describe, raised_at
 from ..outcome import MAX_NAME
 from ..pen import FORMATS, FigureError, style
 from .data import Data

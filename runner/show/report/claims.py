@@ -8,7 +8,7 @@ from collections.abc import Iterable, Sequence
 from epicycle.actors import counted
 
 from ...html import Content, Html, note, tag, wide_table
-from ...language import ALWAYS
+from ...language.claims import ALWAYS
 from ...shown import rounded
 from ...study import (
     CONFIRMED,

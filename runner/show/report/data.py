@@ -11,7 +11,7 @@ from typing import Any
 
 from epicycle.actors import abridged, visible
 
-from ...language import Factor
+from ...language.dimensions import Factor
 from ...shown import in_words, rounded
 from ...study import OK, Column, Estimate, Plan, StudyResults
 

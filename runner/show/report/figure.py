@@ -9,8 +9,8 @@ from typing import Any, ClassVar, NamedTuple
 
 from epicycle.actors import Configurable, Fault, MappingParameter, Parameter, counted, did_you_mean
 
-from ...build import Model
-from ...language import Dimension, Factor
+from ...build.model import Model
+from ...language.dimensions import Dimension, Factor
 from ...results import Results
 from ...study import Plan
 from ..sheet import DASHES, FEW, MARKERS, MAX_LINES, MAX_PANELS, Sheet, colours

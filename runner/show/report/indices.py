@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable
 
 from ...html import Content, Html, note, tag, wide_table
-from ...language import SOBOL
+from ...language.sampling import SOBOL
 from ...shown import rounded
 from .data import Data, shown
 

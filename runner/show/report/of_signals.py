@@ -24,11 +24,12 @@ from epicycle.actors import (
 )
 from epicycle.actors.expression import PortFormula, PortFormulaParameter
 
-from ...build import Model, figures_of
-from ...catalogue import Figure
+from ...build.figures import figures_of
+from ...build.model import Model
+from ...catalogue.figure import Figure
 from ...results import STOP_TIME, Results
 from ...study import Plan, half_width
-from ...text import Problems
+from ...text.problems import Problems
 from ..pen import FORMATS, draw
 from ..samples import selected
 from ..sheet import colours, set_log, width_of

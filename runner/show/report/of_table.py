@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 from epicycle.actors import EpicycleError, Fault, Parameter, counted, texts_parameter
 
-from ...language import Factor
+from ...language.dimensions import Factor
 from ...study import Estimate, Plan, mean
 from ..sheet import LIMIT, Sheet, set_log
 from .data import Condition, Data, Names, estimated, is_numeric, mean_of

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 from epicycle.actors import counted
 
 from ...html import Content, Html, note, page, tag, wide_table
-from ...language import Factor
+from ...language.dimensions import Factor
 from ...study import (
     REPRODUCED,
     UNDECIDED,
@@ -20,7 +20,7 @@ from ...study import (
     Recommendation,
     mean,
 )
-from ...text import plain
+from ...text.document import plain
 from ..sheet import tips_of
 from .claims import claims, class_of, guideline
 from .data import Condition, Data, estimated, shown

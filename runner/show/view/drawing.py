@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from ...build import Model
+from ...build.model import Model
 from ..graph import Drawing, draw, outline
 
 MOST = 3_000  # boxes laid out one by one; above this, arrays with identical instances are one box

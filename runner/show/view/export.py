@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from epicycle.actors import Tag, to_nanoseconds
 
-from ...catalogue import Mark
+from ...catalogue.figure import Mark
 from ...results import Results
 from ...shown import short
 from ..sheet import LIMIT, PALETTE

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...catalogue import Figure
+from ...catalogue.figure import Figure
 from ...results import Results
 from ..samples import read
 

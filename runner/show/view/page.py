@@ -14,9 +14,9 @@ import numpy as np
 
 from epicycle.actors import shortened, to_nanoseconds
 
-from ...build import Model
-from ...catalogue import Figure
-from ...graph import ModelGraph
+from ...build.model import Model
+from ...catalogue.figure import Figure
+from ...graph.model_graph import ModelGraph
 from ...html import Html, tag
 from ...results import Results, Verdict
 from ...shown import in_words, short

@@ -15,12 +15,12 @@ from typing import Any, NamedTuple
 
 from epicycle.actors import Tag
 
-from ...build import Model
-from ...catalogue import Figure
+from ...build.model import Model
+from ...catalogue.figure import Figure
 from ...engine import Firing, Simulation, Tracer
 from ...results import Record, Results, plain
 from ...shown import json_line
-from ...text import select
+from ...text.patterns import select
 
 MOST = 1_600_000  # firings that are kept: a page of some 15 MB
 STRETCH = 512  # firings in a row that are kept or left out together

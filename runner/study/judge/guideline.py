@@ -15,7 +15,8 @@ import math
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from ...language import Factor, Guideline
+from ...language.claims import Guideline
+from ...language.dimensions import Factor
 from ...shown import finite
 from ..inference import LEVEL, Estimate, mean, paired_difference, resampled_sums
 from .samples import Levels, Place, Samples, has_enough

@@ -11,12 +11,11 @@ from itertools import combinations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from epicycle.actors import EpicycleError, counted, read_regular
+from epicycle.actors import EpicycleError, counted, did_you_mean, read_regular
 
-from ...language import Factor
+from ...language.dimensions import Factor
 from ...shown import in_words
 from ...tables import Table, Tabled, pandas_module
-from ...text import did_you_mean
 from ..inference import LEVEL, holm, mean, paired_difference, with_interval
 from ..plan.plan import Plan
 from ..run.backlog import OK

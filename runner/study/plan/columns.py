@@ -9,11 +9,14 @@ from typing import Any
 from epicycle.actors import EpicycleError, Quantity, declared_parameters, did_you_mean, parse_unit
 from epicycle.actors.expression import operand
 
-from ...build import Model
-from ...catalogue import conversion_fault, unit_before
+from ...build.model import Model
+from ...catalogue.measure import conversion_fault, unit_before
 from ...engine import Results
-from ...language import ASPECTS, NUMBERS, SIGNALS, Dimension, StudyMetric, asks_for_none, split_number
-from ...text import Problems, inside, select
+from ...language.dimensions import Dimension, split_number
+from ...language.study_metric import ASPECTS, NUMBERS, SIGNALS, StudyMetric, asks_for_none
+from ...text.patterns import select
+from ...text.problems import Problems
+from ...text.reading import inside
 
 
 @dataclass(frozen=True)

@@ -12,15 +12,22 @@ from math import prod
 from pathlib import Path
 from typing import Any, TypedDict
 
-from epicycle.actors import EpicycleError
+from epicycle.actors import EpicycleError, did_you_mean
 from epicycle.actors.expression import ExpressionError
 
-from ...build import Model, load_model
-from ...catalogue import code_of, is_path, types_of_file
-from ...language import RESERVED, Dimension, Factor, Level, Study, StudyMetric, study_of_text
+from ...build.load import load_model
+from ...build.model import Model
+from ...catalogue.code import code_of
+from ...catalogue.packaged import is_path
+from ...catalogue.types import types_of_file
+from ...language.dimensions import Dimension, Factor, Level
+from ...language.study import RESERVED, Study, study_of_text
+from ...language.study_metric import StudyMetric
 from ...provenance import version_of
 from ...seal import has_seal, seal
-from ...text import ModelError, Noted, Problems, did_you_mean, noting, plain
+from ...text.document import plain
+from ...text.files import Noted, noting
+from ...text.problems import ModelError, Problems
 from .columns import Column, check_metric, columns_of
 
 _LOGGER = logging.getLogger("epicycle")

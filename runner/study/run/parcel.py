@@ -21,9 +21,10 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from ...catalogue import code_of
+from ...catalogue.code import code_of
 from ...provenance import version_of, versions
-from ...text import ModelError, noting
+from ...text.files import noting
+from ...text.problems import ModelError
 from ..plan.plan import Plan
 from .backlog import Task
 from .processes import Outcome, Processes, UnwantedError, WorkerError

@@ -11,7 +11,7 @@ from typing import Any, Protocol
 
 from epicycle.actors import EpicycleError, readable
 
-from ...build import Model
+from ...build.model import Model
 from ...engine import LogFilter, Results, Simulation
 from ..plan.columns import value_of
 from ..plan.plan import Condition, Plan

@@ -31,7 +31,8 @@ from epicycle.actors import (
 )
 from epicycle.actors.testing import Harness
 from epicycle.runner import Model, Results, Simulation, load_model
-from epicycle.runner.catalogue import packaged_models, types_of_file
+from epicycle.runner.catalogue.packaged import packaged_models
+from epicycle.runner.catalogue.types import types_of_file
 from epicycle.runner.cli import main
 
 OWN = Path(__file__).parent / "own"

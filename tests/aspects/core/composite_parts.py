@@ -8,7 +8,7 @@ from typing import Any
 from epicycle.actors import Actor, InputPort, OutputPort
 from epicycle.aspects import Request
 from epicycle.runner import Simulation
-from epicycle.runner.build import Model
+from epicycle.runner.build.model import Model
 from epicycle.runner.engine import Results
 from tests.engine import engine_parts
 

@@ -11,7 +11,7 @@ from scipy.stats import binom
 
 from epicycle.actors import random_stream
 from epicycle.aspects import CommunicationAspect, JoinPoint, PortAspect
-from epicycle.runner.build import load_model
+from epicycle.runner.build.load import load_model
 from epicycle.runner.engine import ActorError, Results, Simulation
 from tests.engine.engine_parts import load, seen, sends, simulate
 

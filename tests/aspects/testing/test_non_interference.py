@@ -36,7 +36,7 @@ from epicycle.aspects.testing import (
     assert_streams_are_its_own,
 )
 from epicycle.runner import Simulation, Trial, load_model
-from epicycle.runner.catalogue import packaged_models
+from epicycle.runner.catalogue.packaged import packaged_models
 from epicycle.runner.engine import Record
 from tests.aspects.strengths import AT_WORK, AT_ZERO
 from tests.engine.engine_parts import load

@@ -11,7 +11,8 @@ from typing import Any
 
 import pytest
 
-from epicycle.runner.build import Model, load_model
+from epicycle.runner.build.load import load_model
+from epicycle.runner.build.model import Model
 from tests.conformance.conformance_parts import TYPES
 from tests.conformance.test_conformance import (
     CASES,

@@ -7,7 +7,7 @@ from typing import Any
 from xml.sax.saxutils import quoteattr
 
 from epicycle.ptolemy.importing import Imported, import_moml
-from epicycle.runner.build import load_model
+from epicycle.runner.build.load import load_model
 from epicycle.runner.engine import Simulation
 
 HEAD = """<?xml version="1.0" standalone="no"?>

@@ -10,7 +10,7 @@ import pytest
 
 from epicycle.actors import Actor, InputPort, OutputPort
 from epicycle.ptolemy.importing import MomlError, import_moml
-from epicycle.runner.build import load_model
+from epicycle.runner.build.load import load_model
 from epicycle.runner.cli import main
 from tests.ptolemy.importing.moml_parts import (
     COMPOSITE,

@@ -12,8 +12,8 @@ import networkx as nx
 import pytest
 
 from epicycle.runner import load_model
-from epicycle.runner.build import Model
-from epicycle.runner.catalogue import packaged_models
+from epicycle.runner.build.model import Model
+from epicycle.runner.catalogue.packaged import packaged_models
 from epicycle.runner.cli import main
 from epicycle.runner.commands.options import BAD_INPUT
 from epicycle.runner.show.graph import layers, mermaid, outline, write_graph

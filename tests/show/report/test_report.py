@@ -15,7 +15,8 @@ import pytest
 
 from epicycle.runner import Simulation, load_model, open_study
 from epicycle.runner.cli import main
-from epicycle.runner.language import StudyMetric, read_study
+from epicycle.runner.language.study import read_study
+from epicycle.runner.language.study_metric import StudyMetric
 from epicycle.runner.show.pen import style
 from epicycle.runner.show.report import figures_of_study
 from epicycle.runner.show.report.data import Data
@@ -26,7 +27,7 @@ from epicycle.runner.show.sheet import Sheet
 from epicycle.runner.study import Column, Plan, Replay, ReplayError, half_width, repeat
 from epicycle.runner.study.plan.columns import si_unit
 from epicycle.runner.study.run.manifest import manifest_text
-from epicycle.runner.text import Problems
+from epicycle.runner.text.problems import Problems
 from tests.study.study_parts import STUDY, THIS, moved, write
 
 QUEUE = """

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from epicycle.runner.catalogue import packaged_models
+from epicycle.runner.catalogue.packaged import packaged_models
 
 from .conftest import Opened, written
 

@@ -9,11 +9,12 @@ import numpy as np
 import pytest
 
 from epicycle.runner import load_model
-from epicycle.runner.build import Model, figures_of
+from epicycle.runner.build.figures import figures_of
+from epicycle.runner.build.model import Model
 from epicycle.runner.engine import Firing, Simulation, Tracer
 from epicycle.runner.show.view import Recording
 from epicycle.runner.show.view.recording import MISSING, NOTHING, STRETCH
-from epicycle.runner.text import Problems
+from epicycle.runner.text.problems import Problems
 
 
 def recorded(model: Model, until: float | None = None, **given: Any) -> Recording:

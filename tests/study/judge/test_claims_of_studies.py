@@ -9,8 +9,9 @@ from pathlib import Path
 import pytest
 
 from epicycle.runner import open_study
-from epicycle.runner.catalogue import packaged_models
-from epicycle.runner.language import Claim, read_study
+from epicycle.runner.catalogue.packaged import packaged_models
+from epicycle.runner.language.claims import Claim
+from epicycle.runner.language.study import read_study
 from epicycle.runner.show.report.claims import claims
 from epicycle.runner.show.report.data import Data
 from epicycle.runner.study import Plan, run_study
@@ -22,7 +23,7 @@ from epicycle.runner.study.judge.claims import (
     Judgement,
     ranked,
 )
-from epicycle.runner.text import Position
+from epicycle.runner.text.problems import Position
 
 QUEUE = """
 study: queue

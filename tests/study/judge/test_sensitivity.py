@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 import epicycle
-from epicycle.runner.language import Design, Study, study_of_text
+from epicycle.runner.language.sampling import Design
+from epicycle.runner.language.study import Study, study_of_text
 from epicycle.runner.study import open_study
 from epicycle.runner.study.judge.samples import Samples
 from epicycle.runner.study.judge.sensitivity import Index, sensitivity

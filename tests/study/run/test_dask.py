@@ -20,7 +20,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from epicycle.runner.cli import main
-from epicycle.runner.language import read_study
+from epicycle.runner.language.study import read_study
 from epicycle.runner.study import Plan, open_study
 from epicycle.runner.study.run import parcel
 from epicycle.runner.study.run.backlog import Backlog
