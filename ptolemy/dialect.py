@@ -9,8 +9,7 @@ from typing import Any
 
 from epicycle.actors import Actor
 from epicycle.aspects import Aspect
-from epicycle.runner.catalogue import Dialect
-from epicycle.runner.catalogue.types import Catalogue, built_in
+from epicycle.runner.catalogue import Catalogue, Dialect, built_in
 
 
 class Ptolemy(Dialect):

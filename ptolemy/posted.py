@@ -22,9 +22,8 @@ from epicycle.runner.engine import (
     Outer,
     Refinement,
 )  # fmt: skip
-from epicycle.runner.graph.model_graph import ModelGraph, is_within
-from epicycle.runner.graph.ranks import steps
-from epicycle.runner.text.limits import Limits
+from epicycle.runner.graph import ModelGraph, is_within, steps
+from epicycle.runner.text import Limits
 
 M = TypeVar("M", Wake, Moment)
 Place = tuple[tuple[int, int], ...]  # of a rank: its group and its number there, in each director from the outermost in
@@ -47,9 +46,9 @@ def layout(graph: ModelGraph, kind: type) -> Layout:
     """
     if graph in _known:
         return _known[graph]
-    posted = {path for path, dialect in graph.dialects.items() if is_posted(dialect, kind)}
+    posted = {path for path, domain in graph.domains.items() if is_posted(domain.dialect, kind)}
     order = steps(graph)
-    numbers = {director: number for number, director in enumerate(graph.clocks)}
+    numbers = {director: number for number, director in enumerate(graph.domains)}
     found: list[Place] = []
 
     def unfold(director: str, around: Place) -> None:
@@ -135,7 +134,7 @@ class PostedComposites(Directors):
         super().__init__(graph, actors, director)
 
     def _is_ours(self, composite: str) -> bool:
-        return is_posted(self.graph.dialects[composite], type(self.director))
+        return is_posted(self.graph.domains[composite].dialect, type(self.director))
 
     def boundary_port(self, path: str, outside: Director | Refinement) -> BoundaryPort:
         kind = PostedPort if self._is_ours(self.graph.owner(path)) else BoundaryPort
@@ -150,12 +149,12 @@ class PostedComposites(Directors):
             for port in (*inputs, *outputs):
                 port.border = border
             self.borders[composite] = border
-            if composite not in self.graph.modal:  # whose parts are posted one by one
+            if self.graph.modal(composite) is None:  # whose parts are posted one by one
                 self.director.posted[composite] = border
-        if composite in self.graph.modal or self.graph.refinement_of(composite) == composite:
+        if self.graph.modal(composite) or self.graph.refinement_of(composite) == composite:
             for port in (*inputs, *outputs):
                 port.is_refired = True
-            for port in outputs if composite in self.graph.modal else ():
+            for port in outputs if self.graph.modal(composite) else ():
                 port.holds_one = True
 
     def mode_director(self, composite: str, machine: StateMachine) -> ModeDirector:

@@ -9,9 +9,9 @@ from typing import Any
 
 from epicycle.actors import InputPort, accepts, counted, type_name
 
-from ..catalogue.dialect import Dialect
 from ..graph.digraph import find_loop, in_order
-from ..graph.model_graph import Detour, Hop, ModelGraph
+from ..graph.model_graph import ModelGraph
+from ..graph.nodes import Detour, Hop
 from ..graph.ranks import Region, dependencies
 from ..text.limits import RAISE_IT
 from ..text.patterns import in_general
@@ -40,12 +40,12 @@ def check(draft: Draft, problems: Problems, *, whole: bool = True) -> None:
 
 def check_dialects(graph: ModelGraph, problems: Problems) -> None:
     """Check that no two dialects want different directors: a run has one."""
-    wanting = [(path, each) for path, each in graph.dialects.items() if each is not Dialect and each.director()]
+    wanting = [(path, each.dialect) for path, each in graph.domains.items() if each.dialect.director()]
     for path, each in wanting[1:]:
         first = wanting[0][1]
         if each.director() is not first.director():
             message = f"{path} is like {each.name}, but other parts of the model are like {first.name}"
-            problems.add(message, graph.positions.get(path), "a run has one director, and each of these has its own")
+            problems.add(message, graph.position_of(path), "a run has one director, and each of these has its own")
             return
 
 
@@ -80,7 +80,7 @@ def check_passages(graph: ModelGraph, problems: Problems) -> bool:
             wires += sum(onward.get(hop.destination, 1) for hop in graph.outgoing(port.path))
             limit = graph.limits.wires
             if wires > limit:
-                problems.add(f"the model has more than {limit:,} wires", graph.positions.get(actor.path), RAISE_IT)
+                problems.add(f"the model has more than {limit:,} wires", graph.position_of(actor.path), RAISE_IT)
                 return False
     return True
 
@@ -123,9 +123,9 @@ def _who(graph: ModelGraph, port: str) -> str:
     """Whose port it is, and where that is declared."""
     owner = graph.owner(port)
     if owner in graph.actors:
-        what, at = f"{owner} is a {type(graph.actors[owner]).__name__}", graph.positions.get(owner)
+        what, at = f"{owner} is a {type(graph.actors[owner]).__name__}", graph.position_of(owner)
     else:
-        what, at = f"{port} is a port of {graph.composites.get(owner, owner)}", graph.ports[port].declared
+        what, at = f"{port} is a port of {graph.components[owner].kind}", graph.ports[port].declared
     return f"{what}, declared at {at}" if at is not None else ""
 
 
@@ -133,7 +133,7 @@ def check_connections(draft: Draft, problems: Problems) -> None:
     """Check that required inputs are connected, and that single inputs have one writer."""
     graph = draft.graph
     for actor in graph.actors.values():
-        position = graph.positions.get(actor.path)
+        position = graph.position_of(actor.path)
         for port in actor.inputs.values():
             wires = graph.wires_to(port)
             if not wires and port.required and not _may_be_connected(draft, port.path):
@@ -224,11 +224,11 @@ def _add_loop(graph: ModelGraph, ways: list[list[Hop]], problems: Problems) -> N
         # path, the delay belongs to the outermost connection: a composite may be right where it is used elsewhere.
         blamed = min(ways[-1], key=lambda hop: (_scope(graph, hop).count("."), hop.order))
         hints = [
-            f"{path} has a director like {graph.dialects[path].name}: all its outputs depend on all its inputs"
-            if graph.dialects[path].is_strict
+            f"{path} has a director like {graph.domains[path].dialect.name}: all its outputs depend on all its inputs"
+            if graph.domains[path].dialect.is_strict
             else f"{path} has its own director: it fires as one actor, when all inputs that act in the tag have come"
             for path in dict.fromkeys(actors)
-            if path in graph.clocks
+            if path in graph.domains
         ]
         best = _with_delay(graph, blamed)
         hints.append(f"give one of these connections a delay, preferably the one that leads back: {best}")
@@ -299,7 +299,7 @@ def check_reach(graph: ModelGraph, problems: Problems) -> None:
         why = f"only the loop {_some([first, *others])} feeds it" if in_loop else "nothing feeds it"
         problems.warn(
             f"{first} can never fire: it is not a source, and {why}",
-            graph.positions.get(first),
+            graph.position_of(first),
             *((f"nor can the actors that it feeds: {_some(sorted(behind, key=order.__getitem__))}",) if behind else ()),
             about=("idle", in_general(first)),
         )

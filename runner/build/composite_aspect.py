@@ -16,7 +16,8 @@ from epicycle.aspects import Aspect, CompositeAspect, FiringTime, Request
 
 from ..graph.acts import connection_place
 from ..graph.digraph import find_loop
-from ..graph.model_graph import Detour, ModelGraph
+from ..graph.model_graph import ModelGraph
+from ..graph.nodes import Detour
 from ..graph.woven import AspectModel, WovenAspect
 from ..language.parts import PartText, beside
 from ..language.places import PointcutText
@@ -60,7 +61,7 @@ def weave_model(
         draft.leave_open(pointcuts.own)
     if aspect is POISON:
         return POISON
-    woven = bind(view, aspect, places, place_of)
+    woven = bind(view, aspect, places, place_of, position)
     for port in (each for each in plan.requests if each):
         for hop in list(graph.incoming(port)):  # a problem that has been reported
             graph.disconnect(hop)
@@ -182,11 +183,10 @@ def detours(graph: ModelGraph, aspects: Iterable[WovenAspect]) -> list[Detour]:
         return sources
 
     def add(source: str, destination: str, woven: WovenAspect) -> None:
-        position = graph.positions.get(f"aspect {woven.name}")
         order = graph.next_order + len(found)
         key = (source, destination, woven.name)
         waits = woven.model is not None and graph.is_strict(woven.model.path)
-        found.setdefault(key, Detour(source, destination, None, position, order, woven.name, waits))
+        found.setdefault(key, Detour(source, destination, None, woven.position, order, woven.name, waits))
 
     for place in (place for place in at if place in graph.actors):  # what it requests comes in after its turn
         actor = graph.actors[place]
@@ -224,7 +224,7 @@ def check_nesting(aspects: Iterable[WovenAspect], graph: ModelGraph, problems: P
         first, second, *_ = loop
         message = f"aspect {first}: it attaches inside {second}, and {second} inside it"
         hint = f"a token would never leave: attach one of them elsewhere, or exclude it: '!{second}.**'"
-        problems.add(message, graph.positions.get(f"aspect {first}"), hint)
+        problems.add(message, next(woven.position for woven, _ in models if woven.name == first), hint)
     return not loop
 
 

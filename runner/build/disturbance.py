@@ -25,9 +25,9 @@ from ..text.problems import Position, Problems
 from ..text.program import call_site, node_of
 from ..text.reading import Text
 from .acts import acts_of
+from .building import Building
 from .draft import Draft
 from .paths import Paths
-from .scope import Building
 from .settle import Settler
 from .unfold import Known, Unfolding
 from .weave_all import weave_all

@@ -12,7 +12,8 @@ from dataclasses import dataclass, field
 
 from epicycle.actors import Actor, declared_ports, has_own_ports
 
-from ..graph.model_graph import ModelGraph, PortNode
+from ..graph.model_graph import ModelGraph
+from ..graph.nodes import PortNode
 from ..text.patterns import could_be_within
 
 

@@ -118,10 +118,11 @@ def build(text: ModelText, known: Known, settler: Settler, limits: Limits) -> Mo
         woven = weave_all(made)
         settler.check_unused(made.draft)
         check(made.draft, problems)
-        check_processors(woven, made.draft.graph, problems)
+        check_processors(woven, problems)
         if text.exactly is not None:
             model.exactly = acts_of(text.exactly, woven, problems)
-        model.adopt(made.draft, woven, Watching(made.draft, values, problems).read(text, names))
+        model.adopt(made.draft, woven)
+        model.watched = Watching(made.draft, values, problems).read(text, names)
         # Numbers without units are in the units that the model declares.
         model.parameters = {
             name: plain(value) if root.parameters[name].unit else counted_in_si(value) for name, value in names.items()

@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
+from dataclasses import replace
 from html import escape
 from importlib import import_module
 from pathlib import Path
 from typing import Unpack
 
-from epicycle.actors import EpicycleError, Stop, Tag, counted, declared_parameters, visible
+from epicycle.actors import EpicycleError, Stop, counted, declared_parameters, visible
 
+from ..catalogue.dialect import Dialect
 from ..catalogue.measure import Measure, MetricOptions, TakeName, take_fault
-from ..collection import without_collection
-from ..graph.acts import ActName
-from ..graph.model_graph import ModelGraph, is_within
-from ..graph.ranks import firing_order
-from ..graph.watched import Metric, Monitor, Watched
-from ..graph.woven import WovenAspect, check_processors
+from ..graph.woven import WovenAspect
 from ..language.fields import nanoseconds
 from ..language.metrics import MetricText
 from ..language.monitors import MonitorText
@@ -26,17 +23,13 @@ from ..shown import short
 from ..tables import Table, Tabled
 from ..temporal import Requirement, RequirementOptions
 from ..text.document import Mapping as MappingNode
-from ..text.problems import Position, Problem, Problems
+from ..text.problems import Position, Problems
 from ..text.program import call_site
 from ..text.reading import NAME, NAMES_HAVE, Text, within
-from .checks import check
-from .composite_aspect import check_nesting, detours
-from .draft import Draft
+from .building import Building
 from .named import Port, director_of, raising
-from .origin import Origin
-from .scope import Composite, Scope
+from .scope import Scope
 from .watch import Watching, checked_seed
-from .weave_all import arranged
 
 DeclaredFigure = tuple[str, dict[str, object], MappingNode]  # type, values, as written
 
@@ -44,7 +37,7 @@ DeclaredFigure = tuple[str, dict[str, object], MappingNode]  # type, values, as 
 _SHOWN = ("unit", "to", "doc", "label")  # options of a metric that is computed from others
 
 
-class Model(Scope, Tabled):
+class Model(Building, Scope, Tabled):
     """A model graph that can be run, made by ``load_model`` or built in Python.
 
     >>> model = Model("two_clocks", stop=10.0, seed=1)
@@ -73,36 +66,17 @@ class Model(Scope, Tabled):
         parameters: Mapping[str, object] | None = None,
         like: str | None = None,
     ) -> None:
-        super().__init__(self, "")
-        self.name = name
+        Building.__init__(self, name)
+        Scope.__init__(self, self, "")
         self.doc = doc
-        self.draft = Draft()
         with raising() as problems:
             found = director_of(name, {"like": like}, call_site(), problems)
-        self.draft.graph.dialects |= {"": found["like"]} if found else {}
-        self.parameters: dict[str, object] = dict(parameters or {})
+        self.graph.domains[""].dialect = found.get("like", Dialect)
+        self.parameters |= parameters or {}
         self.declared: dict[str, ParameterText] = {}  # what its file declares of the parameters
-        self.aspects: list[WovenAspect] = []
-        self.stop_time: int | None = None  # ns
-        self.stop_ports: list[str] = []
-        self._stop_position: Position | None = None
-        self.seed = checked_seed(seed)
-        self.recorded: list[str] = []
-        self.metrics: list[Metric] = []
-        self.monitors: list[Monitor] = []
-        self.exactly: frozenset[ActName] | None = None  # the only acts of aspects that happen
         self.figures: dict[str, DeclaredFigure] = {}
-        self.warnings: tuple[Problem, ...] = ()  # what is odd but not wrong
-        self.is_checked = False  # since the last change
-        self.origin: Origin | None = None  # what it was made from, if that is all there is to it
-        self._scopes: dict[str, Composite] = {}
-        self._order: dict[str, int] | None = None  # worked out since then
+        self.watched.seed = checked_seed(seed)
         self.stop = stop
-
-    @property
-    def graph(self) -> ModelGraph:
-        """All actors, composites, ports and connections."""
-        return self.draft.graph
 
     @property
     def stop(self) -> float | None:
@@ -110,30 +84,22 @@ class Model(Scope, Tabled):
 
         It can be set as ``"500 ms"``.
         """
-        return None if self.stop_time is None else self.stop_time / 1e9
+        return None if self.watched.stop_time is None else self.watched.stop_time / 1e9
 
     @stop.setter
     def stop(self, stop: float | str | None) -> None:
-        self.stop_time = None if stop is None else nanoseconds(stop)
+        self.watched = replace(self.watched, stop_time=None if stop is None else nanoseconds(stop))
 
     @property
     def endless(self) -> str:
         """Why a run never ends unless it is interrupted, in words; empty if that is unknown."""
-        if self.stop_time is not None or self.stop_ports:
+        if self.watched.stop_time is not None or self.watched.stop_ports:
             return ""
         actors = self.graph.actors.values()
         clock = next((actor.path for actor in actors if actor.is_endless), "")
         if not clock or any(isinstance(actor, Stop) for actor in actors):
             return ""
         return f"{self.name} never ends: {clock} ticks for ever, and the model sets neither stop nor stop_when"
-
-    def local_tag(self, actor: str, tag: Tag) -> Tag:
-        """A tag of the event log, as the actor or composite of that path sees it: in its director's time."""
-        return self.graph.clocks[self.graph.director_of(actor)].tag(tag)
-
-    def position_of(self, path: str) -> Position | None:
-        """Where an actor, a composite, ``aspect NAME`` or ``stop_when`` is declared, if that is known."""
-        return self._stop_position if path == "stop_when" else self.graph.positions.get(path)
 
     # -- what disturbs it -----------------------------------------------------------------------------------------
 
@@ -185,7 +151,7 @@ class Model(Scope, Tabled):
         problems = Problems()
         if not NAME.match(name):
             problems.add(f"{name!r} is not a name", position, NAMES_HAVE)
-        if any(metric.name == name for metric in self.metrics):
+        if any(metric.name == name for metric in self.watched.metrics):
             problems.add(f"there is already a metric {name!r}", position, "give this another name")
         if fault := take_fault(name, take):
             problems.add(fault.message, position, *fault.help)
@@ -199,15 +165,15 @@ class Model(Scope, Tabled):
             problems.add(f"metric {name}: {wrong[0]!r} cannot be used with 'formula'", position)
         problems.raise_if_any()
         with raising() as problems:
-            watching = Watching(self.draft, Values(problems), problems)
+            watching = Watching(self.draft, Values(problems), problems, self.watched)
             texts = (each if isinstance(each, str) else each.path for each in ports)
             of_ports = tuple(Text(each, within(position, each)) for each in texts)
             source = Text(formula, within(position, formula)) if formula else None
             given: dict[str, object] = {"take": take, **options}
             entries = watching.options(Measure, f"metric {name}", given, position)
             watching.metric(MetricText(name, of_ports, source, entries, position), Locals(), given)
-            watching.check_formulas(each.name for each in self.metrics)
-        self._add(watching.found)
+            watching.check_formulas()
+        self.watched = watching.found
 
     def monitor(self, name: str, property: str, **options: Unpack[RequirementOptions]) -> None:
         """A property that every run must have; docs/language.md describes how to write one.
@@ -218,14 +184,15 @@ class Model(Scope, Tabled):
         with raising() as problems:
             if not NAME.match(name):
                 problems.add(f"{name!r} is not a name", position, NAMES_HAVE)
-            watching = Watching(self.draft, Values(problems), problems)
             for metric in (name, f"{name}_robustness"):
-                if any(each.name == metric for each in self.metrics):
+                if any(each.name == metric for each in self.watched.metrics):
                     problems.add(f"there is already a metric {metric!r}", position, "give the monitor another name")
+            problems.raise_if_any()
+            watching = Watching(self.draft, Values(problems), problems, self.watched)
             given: dict[str, object] = {"property": property, **options}
             entries = watching.options(Requirement, f"monitor {name}", given, position)
             watching.monitor(MonitorText(name, entries, position), Locals(), given)
-        self._add(watching.found)
+        self.watched = watching.found
 
     def outputs(self, pattern: str, what: str, position: Position, problems: Problems) -> list[str]:
         """The output ports that a pattern selects; what is wrong with it is added to ``problems`` as ``what``'s."""
@@ -235,85 +202,11 @@ class Model(Scope, Tabled):
         """Add what is to be watched, with the rules of a model file."""
         position = call_site()
         with raising() as problems:
-            watching = Watching(self.draft, Values(problems), problems, self.recorded)
+            watching = Watching(self.draft, Values(problems), problems, self.watched)
             for port in ports:
                 path = port if isinstance(port, str) else port.path
                 ask(watching, Text(path, within(position, path)))
-        self._add(watching.found)
-
-    # -- the whole ------------------------------------------------------------------------------------------------
-
-    def check(self) -> None:
-        """Check the model as a whole; raises ``ModelError`` with everything that is wrong.
-
-        A ``Simulation`` does this first.
-        """
-        if not self.is_checked:
-            problems = Problems()
-            if check_nesting(self.aspects, self.graph, problems):
-                self.edit().graph.detours = detours(self.graph, self.aspects)
-            check(self.draft, problems)
-            check_processors(self.aspects, self.graph, problems)
-            problems.raise_if_any()
-            self.warnings = problems.warnings
-            self.is_checked = True
-        self.graph.freeze()
-
-    def order(self) -> dict[str, int]:
-        """Engine: the firing order of a checked model; the same for all its runs."""
-        if self._order is None:
-            with without_collection():
-                self._order = firing_order(self.graph)
-        return self._order
-
-    # -- changes: their arguments have been checked --------------------------------------------------
-
-    def edit(self) -> Draft:
-        """The draft, for changes: what was checked before may no longer hold."""
-        if self.graph.is_frozen:
-            self.draft = self.draft.copy()
-        self.is_checked = False
-        self.origin = None
-        self._order = None
-        return self.draft
-
-    def adopt(self, draft: Draft, aspects: Iterable[WovenAspect], watched: Watched | None = None) -> None:
-        """Continue with a draft made from the present one, with further aspects."""
-        self.draft = draft
-        self.edit()
-        self.enlist(aspects)
-        if watched is not None:
-            self.stop_time, self.seed = watched.stop_time, watched.seed
-            self._add(watched)
-
-    def enlist(self, aspects: Iterable[WovenAspect]) -> None:
-        """Add these aspects to the model."""
-        self.aspects = arranged([*self.aspects, *aspects], self.graph)
-
-    def _add(self, watched: Watched) -> None:
-        self._stop_position = watched.stop_position or self._stop_position
-        self.recorded = [*self.recorded, *watched.recorded]
-        self.stop_ports = [*self.stop_ports, *watched.stop_ports]
-        self.metrics = [*self.metrics, *watched.metrics]
-        self.monitors = [*self.monitors, *watched.monitors]
-
-    def scope(self, path: str) -> Composite:
-        return self._scopes.setdefault(path, Composite(self, path))
-
-    def forget(self, path: str) -> None:
-        """Remove an actor or composite, and everything that attaches to it or watches it."""
-        self.edit().graph.remove(path)
-        self.aspects = [
-            woven.without(path)
-            for woven in self.aspects
-            if not is_within(woven.name, path) and not (woven.model and is_within(woven.model.path, path))
-        ]
-        self.recorded = [port for port in self.recorded if not is_within(port, path)]
-        self.stop_ports = [port for port in self.stop_ports if not is_within(port, path)]
-        left = [each.without(path) for each in self.monitors]
-        gone = {each.name for each, kept in zip(self.monitors, left, strict=True) if kept is None}
-        self.monitors = [each for each in left if each is not None]
-        self.metrics = [metric.without(path) for metric in self.metrics if metric.monitor not in gone]
+        self.watched = watching.found
 
     # -- for people -----------------------------------------------------------------------------------------------
 

@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from typing import Any, Protocol, TypeAlias, runtime_checkable
+from typing import Any, TypeAlias
 
 from epicycle.actors import Actor, InputPort, OutputPort, ParameterError
 from epicycle.aspects import Aspect, FiringTime, FiringTimeParameter
 
 from ..graph.model_graph import ModelGraph
 from ..language.fields import Computed, nanoseconds
-from ..language.places import ConnectionText, PointcutText, connection, endpoints
+from ..language.places import ConnectionText, Endpoint, PointcutText, connection, endpoint
 from ..text.document import Scalar
 from ..text.faults import blame
 from ..text.problems import POISON, ModelError, Poison, Position, Problem, Problems
@@ -38,13 +38,10 @@ Place: TypeAlias = "str | Port | Actor | Holder"
 Places: TypeAlias = "Place | Iterable[Place]"
 
 
-@runtime_checkable
-class Holder(Protocol):
+class Holder:
     """A composite: it has parts."""
 
     path: str
-
-    def remove(self, name: str) -> None: ...
 
 
 @contextmanager
@@ -108,11 +105,9 @@ class Named:
         self, source: Ends, destination: Ends | None, delay: float | str | None, inside: str
     ) -> ConnectionText | None:
         """A connection as a model file would declare it; ``inside`` is the name of the scope."""
+        made: ConnectionText | Poison = POISON
         if destination is not None:
-            reader = NodeReader(self._problems)
-            sources = endpoints(reader, self._ends(source, inside))
-            destinations = endpoints(reader, self._ends(destination, inside))
-            made: ConnectionText | Poison = POISON
+            sources, destinations = self._ends(source, inside), self._ends(destination, inside)
             if sources is not POISON and destinations is not POISON:
                 made = ConnectionText(self._position, sources, destinations)
         elif isinstance(source, str):
@@ -131,10 +126,11 @@ class Named:
         for request, ends in at.items() if isinstance(at, Mapping) else ((None, at),):
             asked = None if request is None else Text(request, self._position)
             for end in each_of(ends):
-                path = end if isinstance(end, str) else self._place(end, cls)
-                if path is not None:
-                    here = path if path is end else path.removeprefix(self._start)
-                    found.append(replace(PointcutText.of(self._text(here)), request=asked))
+                if isinstance(end, str):
+                    found.append(replace(PointcutText.of(self._text(end)), request=asked))
+                elif (path := self._place(end, cls)) is not None:
+                    here = path.removeprefix(self._start)
+                    found.append(PointcutText(here, within(self._position, here), request=asked))
         return found
 
     def _text(self, name: str) -> Text:
@@ -143,25 +139,29 @@ class Named:
     def _tell(self, message: str, *hints: str) -> None:
         self._problems.add(message, self._position, *hints)
 
-    def _ends(self, ends: Ends, inside: str) -> tuple[Text, ...]:
-        names = [end if isinstance(end, str) else self._seen_from_inside(end, inside) for end in each_of(ends)]
-        return tuple(self._text(name) for name in names if name is not None)
+    def _ends(self, ends: Ends, inside: str) -> tuple[Endpoint, ...] | Poison:
+        reader = NodeReader(self._problems)
+        found = [
+            endpoint(reader, self._text(end)) if isinstance(end, str) else self._seen_from_inside(end, inside)
+            for end in each_of(ends)
+        ]
+        return POISON if POISON in found else tuple(end for end in found if end)
 
-    def _seen_from_inside(self, port: object, inside: str) -> str | None:
-        """The name of a port inside the scope."""
+    def _seen_from_inside(self, port: object, inside: str) -> Endpoint | Poison:
+        """A port as one end of a connection inside the scope."""
         path = self._port(port)
         if path is None:
-            return None
+            return POISON
         owner, _, name = path.rpartition(".")
-        if owner == self._scope:
-            return name
-        scope = owner.rpartition(".")[0]
-        if scope == self._scope:
-            return path[len(self._start) :]
+        scope, _, actor = owner.rpartition(".")
+        if self._scope in (owner, scope):
+            actor, bracket, index = ("" if owner == self._scope else actor).partition("[")
+            text = path.removeprefix(self._start)
+            return Endpoint(text, within(self._position, text), actor, index[:-1] if bracket else None, name)
         there = f"in {scope}" if scope else "at the top of the model"
         hint = f"connect it {there}, where {owner} is; ports of composites lead in and out"
         self._tell(f"{path} cannot be connected in {inside}", hint)
-        return None
+        return POISON
 
     def _place(self, place: object, cls: type[Aspect]) -> str | None:
         """The path of a port, or of an actor or composite if the aspect attaches to these."""

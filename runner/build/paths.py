@@ -46,7 +46,7 @@ class Paths:
     @cached_property
     def kinds(self) -> dict[str, str]:
         """The types of all actors and composites."""
-        return {path: type(actor).__name__ for path, actor in self._graph.actors.items()} | self._graph.composites
+        return {path: each.kind for path, each in self._graph.components.items() if path}
 
 
 @dataclass

@@ -10,7 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import replace
-from typing import Any, Protocol, TypeVar, overload
+from typing import Any, TypeVar, overload
 
 from epicycle.actors import Actor, accepts, did_you_mean, type_name
 from epicycle.aspects import Aspect, CompositeAspect, CompositeExecutionAspect, FiringTime
@@ -21,6 +21,7 @@ from ..language.values import Values
 from ..text.problems import Position, Problems
 from ..text.program import call_site
 from ..text.reading import NAME, NAMES_HAVE
+from .building import Building
 from .composite_aspect import check_nesting, weave_model
 from .composite_class import CompositeInstance
 from .connect import Child, Inside, Link, Wiring, child_of_actors, make
@@ -28,6 +29,7 @@ from .draft import Draft
 from .named import (
     CompositePort,
     Ends,
+    Holder,
     Named,
     Places,
     check_aspect,
@@ -69,24 +71,7 @@ class _Children(Mapping[str, Child]):
         return len(self._parts)
 
 
-class Building(Protocol):
-    """A ``Model`` under construction: what scopes read of it, and how they change it once a change has been checked."""
-
-    name: str
-    draft: Draft
-    aspects: list[WovenAspect]
-    parameters: dict[str, object]
-
-    @property
-    def graph(self) -> ModelGraph: ...
-    def edit(self) -> Draft: ...
-    def adopt(self, draft: Draft, aspects: Iterable[WovenAspect]) -> None: ...
-    def enlist(self, aspects: Iterable[WovenAspect]) -> None: ...
-    def forget(self, path: str) -> None: ...
-    def scope(self, path: str) -> Composite: ...
-
-
-class Scope:
+class Scope(Holder):
     """The inside of a model or a composite, where actors are added and connected."""
 
     def __init__(self, model: Building, path: str) -> None:
@@ -120,12 +105,11 @@ class Scope:
         with raising() as problems:
             full = self._free(part.path, position, problems)
         made, aspects = self._made(part, full, position)
-        if priority:
-            made.graph.priorities[full] = priority
+        made.graph.components[full].priority = priority or made.graph.components[full].priority
         draft = self._model.edit()
         draft.merge(made, draft.graph.director_of(full))
         self._model.enlist(aspects)
-        return part if isinstance(part, Actor) else self._model.scope(full)
+        return part if isinstance(part, Actor) else self._composite(full)
 
     def _made(self, part: Actor | CompositeInstance, full: str, position: Position) -> tuple[Draft, list[WovenAspect]]:
         """A part to be merged, and the aspects that come with it."""
@@ -172,13 +156,12 @@ class Scope:
         for number, (_, port) in enumerate(ports):
             made.check_port(port, [each for _, each in ports[:number]], position)
         graph = self._model.edit().graph
-        graph.add_composite(full, OF_NO_CLASS)
+        graph.add_composite(full, OF_NO_CLASS, position)
         if director:
             graph.add_director(full, **given)
-        graph.positions.setdefault(full, position)
         for direction, port in ports:
-            graph.add_composite_port(f"{full}.{port}", direction, position)
-        return self._model.scope(full)
+            graph.add_composite_port(f"{full}.{port}", direction)
+        return self._composite(full)
 
     def remove(self, name: str) -> None:
         """Remove an actor or a composite with all connections, aspects and recordings at it."""
@@ -194,14 +177,19 @@ class Scope:
                 problems.add(f"{full} is not the last of its array", position, f"only {instances[-1]} can be removed")
         self._model.forget(full)
 
+    def _composite(self, full: str) -> Composite:
+        """The scope of a composite, which is always the same."""
+        found: Composite = self._model.scopes.setdefault(full, Composite(self._model, full))
+        return found
+
     def __getitem__(self, name: str) -> Any:
         """The actor, composite or port at a dotted path within."""
         full = self._full(name)
         graph = self._model.graph
         if full in graph.actors:
             return graph.actors[full]
-        if full in graph.composites:
-            return self._model.scope(full)
+        if graph.is_composite(full):
+            return self._composite(full)
         if full in graph.ports:
             port = graph.ports[full].port
             return CompositePort(full, graph.direction(full)) if port is None else port
@@ -226,7 +214,7 @@ class Scope:
             if index is not None and int(index) != 0:
                 problems.add(f"{full} cannot be the first of its array", position, f"begin with {base}[0]")
         elif full in instances:
-            at = graph.positions.get(full)
+            at = graph.position_of(full)
             where = (f"the first was added at {at.file}:{at.line}",) if at is not None else ()
             problems.add(f"there is already a {full}", position, *where, "give it another name")
         elif (is_array := instances[0].endswith("]")) != (index is not None):
@@ -336,7 +324,7 @@ class Scope:
             with raising() as problems:
                 named = Named(model.graph, self.path, position, problems).pointcuts(at, type(aspect))
                 pointcuts = Pointcuts(model.draft, Paths(model.draft), full, self.path, problems, type(aspect))
-                woven = bind(pointcuts, aspect, pointcuts.resolve(named), lambda _: position)
+                woven = bind(pointcuts, aspect, pointcuts.resolve(named), lambda _: position, position)
             model.enlist([woven])
             return woven
         draft, others = model.draft.copy(), list[WovenAspect]()
@@ -355,7 +343,6 @@ class Scope:
             made_model = weave_model(pointcuts, kind(), named, lambda _: position, position)
             assert made_model
             check_nesting([*model.aspects, made_model], draft.graph, problems)
-        draft.graph.positions.setdefault(f"aspect {full}", position)
         model.adopt(draft, [*others, made_model])
         return made_model
 
@@ -390,7 +377,7 @@ class Composite(Scope):
         position = call_site()
         self.check_port(name, (), position)
         full = self._full(name)
-        self._model.edit().graph.add_composite_port(full, direction, position)
+        self._model.edit().graph.add_composite_port(full, direction)
         return CompositePort(full, direction)
 
     def check_port(self, name: str, others: Collection[str], position: Position) -> None:
@@ -411,7 +398,7 @@ class Composite(Scope):
 
 def _label(graph: ModelGraph, composite: str) -> str:
     """The name of a composite in messages: its class, if it has one."""
-    kind = graph.composites[composite]
+    kind = graph.components[composite].kind
     return composite if kind == OF_NO_CLASS else kind
 
 

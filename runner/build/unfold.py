@@ -17,7 +17,7 @@ from epicycle.actors import Actor, FaultError, Parameter, did_you_mean
 from ..catalogue.dialect import Dialect
 from ..catalogue.port_types import read_type, token_types
 from ..catalogue.types import Catalogue, CatalogueError
-from ..graph.model_graph import Modal
+from ..graph.nodes import Modal
 from ..language.models import CompositeText
 from ..language.parts import PartText
 from ..language.ports import PortText
@@ -142,7 +142,7 @@ class Unfolding:
                 message = f"{full}: {part.type.text} is an actor, but a refinement must be a composite"
                 self._tell(message, part.type.position, path, "write a composite class that contains that actor")
         if made:
-            graph.modal[path] = Modal(machine, made)
+            graph.domains[path].modal = Modal(machine, made)
         connect_modes(path, composite, self.known.composites, self.draft, self.problems)
 
     def instances(
@@ -162,9 +162,7 @@ class Unfolding:
         for index, instance in enumerate(paths):
             self._count_one(path, part)
             scope = {**names, "index": index} if is_array else names
-            self._prioritise(instance, kind, part, scope)
-            if part.tags:
-                self.draft.graph.tags[instance] = tuple(tag.text for tag in part.tags)
+            priority = self._priority(instance, kind, part, scope)
             if isinstance(kind, CompositeText):
                 inside = self.settler.parameters(instance, kind, part.values, scope, part.position)
                 if "index" in scope:
@@ -172,6 +170,8 @@ class Unfolding:
                 self.composite(instance, kind, inside, part.position, within, is_refinement=is_refinement)
             else:
                 self._actor(instance, kind, part, scope)
+            if (component := self.draft.graph.components.get(instance)) is not None:
+                component.priority, component.tags = priority, tuple(tag.text for tag in part.tags)
         if isinstance(kind, CompositeText):
             return Child(kind.name, paths, is_array, count, list(kind.inputs), list(kind.outputs))
         return child_of_actors(kind, paths, is_array, count, self.draft.graph)
@@ -225,7 +225,7 @@ class Unfolding:
 
     def known_at(self, path: str) -> Known:
         """The possible types of a part, under its director."""
-        dialect = self.draft.graph.dialect_at(path)
+        dialect = self.draft.graph.domain_of(path).dialect
         if dialect not in self._like:
             self._like[dialect] = self.known.like(dialect)
         return self._like[dialect]
@@ -265,18 +265,16 @@ class Unfolding:
                 waiting += inner.actors.values()
         return found
 
-    def _prioritise(self, path: str, kind: object, part: PartText, names: Names) -> None:
-        """Note the priority of an actor, or of a composite that fires as one."""
+    def _priority(self, path: str, kind: object, part: PartText, names: Names) -> int:
+        """The priority of an actor, or of a composite that fires as one."""
         if part.priority is None:
-            return
+            return 0
         if isinstance(kind, CompositeText) and kind.director is None:
             message = f"{path}: {kind.name} has no priority, because its actors fire one by one"
             hint = f"give the actors inside a priority, or give {kind.name} its own director: 'director: {{}}'"
             self._tell(message, part.priority.position, path, hint)
-            return
-        found = self.values.value(part.priority, Locals(path, names), f"{path}: priority")
-        if found is not POISON:
-            self.draft.graph.priorities[path] = found or 0
+            return 0
+        return self.values.value(part.priority, Locals(path, names), f"{path}: priority") or 0
 
     def _actor(self, path: str, actor_type: type[Actor], part: PartText, names: Names) -> None:
         local = Locals(path, names)
@@ -307,25 +305,23 @@ class Unfolding:
         """One instance of a composite, its ports and its parts; ``inside`` are its parameters."""
         graph = self.draft.graph
         self.classes.add(composite.name)
-        graph.add_composite(path, composite.name)
+        graph.add_composite(path, composite.name, position)
         for direction in ("input", "output"):
             for name, port in composite.ports(direction).items():
                 kind = self._port_type(composite, port)
-                graph.add_composite_port(f"{path}.{name}", direction, position, kind, port.position)
+                graph.add_composite_port(f"{path}.{name}", direction, kind, port.position)
         if is_refinement:
             graph.add_refinement(path)
         elif composite.director is None and composite.refinements:
             graph.add_director(path)
         elif composite.director is not None:
             graph.add_director(path, **self._director(path, path, composite.director, inside))
-        if path in graph.dialects and position is not None:
-            graph.positions[path] = position
         self.body(path, composite, inside, (*within, composite.name))
 
     def dialect(self, model: CompositeText, names: Names) -> None:
         """The dialect of the model's director."""
         if like := self._director(model.name, "", model.director or {}, names).get("like"):
-            self.draft.graph.dialects[""] = like
+            self.draft.graph.domains[""].dialect = like
 
     def _director(self, what: str, path: str, given: Mapping[str, Entry], names: Names) -> dict[str, Any]:
         """The settings of a director; wrong ones are left out."""
@@ -360,7 +356,7 @@ class Unfolding:
         """Make the composite of an aspect; if it is not enabled, only to check it."""
         full, graph = f"{path}.{part.name}" if path else part.name, self.draft.graph
         is_port = part.name in composite.inputs or part.name in composite.outputs
-        if is_port or part.name in composite.actors or full in graph.actors or full in graph.composites:
+        if is_port or part.name in composite.actors or full in graph.components:
             clash = "a port" if is_port else "an actor"
             self._tell(
                 f"{full!r} is the name of both {clash} and an aspect that is a model", part.position, "", "rename one"

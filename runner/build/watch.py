@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Mapping
 from graphlib import CycleError, TopologicalSorter
 from types import MappingProxyType
 from typing import Any
@@ -29,17 +29,17 @@ from .monitors import monitor_of
 
 
 class Watching:
-    """Finds what is to be watched: ``read`` for what a file declares, the others for what a program asks for."""
+    """Adds to what is watched (``found``): ``read`` what a file declares, the others what a program asks for."""
 
-    def __init__(self, draft: Draft, values: Values, problems: Problems, recorded: Collection[str] = ()) -> None:
-        self.found = Watched()
+    def __init__(self, draft: Draft, values: Values, problems: Problems, found: Watched | None = None) -> None:
+        self.found = Watched() if found is None else found.copy()
         self.draft = draft
         self.graph = draft.graph
         self.values = values
         self.problems = problems
         outputs = (path for path, node in self.graph.ports.items() if node.direction == "output")
         self._outputs = PathIndex(outputs, self.graph.limits)
-        self._recorded = set(recorded)
+        self._recorded = set(self.found.recorded)
         self._watched = 0
         self._formulas: dict[str, Text] = {}  # of metrics that are computed from others
 
@@ -130,13 +130,12 @@ class Watching:
             self._formulas[name] = source
             self.found.metrics.append(Metric(name, [], measure, formula=formula))
 
-    def check_formulas(self, known: Iterable[str] = ()) -> None:
+    def check_formulas(self) -> None:
         """Whether the metrics that others are computed from are there, and lead to none of these."""
-        own = {each.name: each for each in self.found.metrics}
-        names = [*known, *own]
+        names = {each.name: each for each in self.found.metrics}
         sorter: TopologicalSorter[str] = TopologicalSorter()
         for name, source in self._formulas.items():
-            formula = own[name].formula
+            formula = names[name].formula
             assert formula is not None
             sorter.add(name, *formula.names)
             for each in formula.names:

@@ -15,11 +15,11 @@ from epicycle.actors import declared_parameters, did_you_mean, nearest
 from epicycle.aspects import Aspect
 
 from ..graph.acts import connection_place
-from ..graph.model_graph import is_within
+from ..graph.nodes import is_within
 from ..graph.woven import WovenAspect
 from ..language.places import PointcutText
 from ..text.patterns import PathIndex, PatternError, in_general
-from ..text.problems import POISON, Poison
+from ..text.problems import POISON, Poison, Position
 from .looks import Looks, PlaceOf, unknown_inputs
 from .paths import View
 
@@ -50,7 +50,7 @@ class Pointcuts(View):
 
     @property
     def kind(self) -> str:
-        return self.graph.composites[self.own] if self.own else self.cls.__name__
+        return self.graph.components[self.own].kind if self.own else self.cls.__name__
 
     def resolve(self, at: Sequence[PointcutText | Poison]) -> Places:
         """The places; a pointcut that selects nothing is a problem."""
@@ -223,8 +223,8 @@ class Pointcuts(View):
         else:
             assert pointcut.tag is not None
             wanted = pointcut.tag
-            owners = {path for path in inside if wanted.text in graph.tags.get(path, ())}
-            known = {tag for path in inside for tag in graph.tags.get(path, ())}
+            owners = {path for path in inside if wanted.text in graph.components[path].tags}
+            known = {tag for path in inside for tag in graph.components[path].tags}
         if owners:
             return owners
         if self.draft.may_hold(wanted.text, self.scope):
@@ -328,7 +328,7 @@ class Pointcuts(View):
         return self.tell(f"{text!r} matches no actor{index.did_you_mean(text, self.scope)}", pointcut, hint)
 
 
-def bind(view: View, aspect: Aspect, places: Places, place_of: PlaceOf) -> WovenAspect:
+def bind(view: View, aspect: Aspect, places: Places, place_of: PlaceOf, position: Position) -> WovenAspect:
     """The aspect at its places, with everything that it reads.
 
     ``place_of`` returns where something is wrong with its parameters in the model file.
@@ -345,6 +345,7 @@ def bind(view: View, aspect: Aspect, places: Places, place_of: PlaceOf) -> Woven
         selections,
         reads,
         parameters=places.parameters,
+        position=position,
     )
     for fault in unknown_inputs(woven, view.graph):  # of execution times by input port
         looks.tell(fault.message, place_of(fault), *fault.help)

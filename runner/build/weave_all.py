@@ -49,7 +49,8 @@ def weave_all(made: Unfolding) -> list[WovenAspect]:
     decorated = {cls for cls in set(map(type, made.actors)) if class_decorations(cls)}
     for actor in made.actors:
         if type(actor) in decorated:
-            position = graph.positions[actor.path]
+            position = graph.components[actor.path].position
+            assert position is not None, "all that is unfolded is written somewhere"
             found += weave_decorations(actor, made.draft, problems, position, made.settler.set_from_outside)
     found = arranged(found, graph)
     if check_nesting(found, graph, problems):
@@ -80,19 +81,16 @@ class _Weaver:
         if not part.at:
             hint = "add 'at:' with ports or patterns"
             self.problems.add(f"aspect {name} has no 'at'", part.position, hint, scope=scope)
-        self.graph.positions[f"aspect {name}"] = part.position
-        own = name if is_model and name in self.graph.composites else ""
+        own = name if is_model and self.graph.is_composite(name) else ""
         pointcuts = Pointcuts(self.draft, self.paths, name, scope, self.problems, cls, own)
-        is_enabled = (
-            name in self.graph.composites if is_model else self.settler.is_enabled(name, part, Locals(scope, names))
-        )
+        is_enabled = bool(own) if is_model else self.settler.is_enabled(name, part, Locals(scope, names))
         place_of = partial(place_in, Mapping(part.values, part.position))
         if own:
             at = [each and self._timed(each, name, scope, names) for each in part.at]
             woven = weave_model(pointcuts, aspect, at, place_of, part.position)
         else:
             places = pointcuts.resolve(part.at)
-            woven = POISON if aspect is POISON else bind(pointcuts, aspect, places, place_of)
+            woven = POISON if aspect is POISON else bind(pointcuts, aspect, places, place_of, part.position)
         if not woven:
             return
         self.made.places += len(woven.places)
@@ -192,9 +190,7 @@ def _weave(
         actors={} if decoration.ports else {actor.path: actor.path},
         parameters=named.parameters,
     )
-    woven = replace(bind(pointcuts, aspect, places, lambda _: position), comes_with_actor=True)
-    draft.graph.positions.setdefault(f"aspect {name}", position)
-    return woven
+    return replace(bind(pointcuts, aspect, places, lambda _: position, position), comes_with_actor=True)
 
 
 def arranged(aspects: list[WovenAspect], graph: ModelGraph) -> list[WovenAspect]:

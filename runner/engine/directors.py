@@ -7,7 +7,8 @@ from functools import partial
 from typing import TYPE_CHECKING, cast
 
 from ..graph.clock import Clock
-from ..graph.model_graph import ModelGraph, is_within
+from ..graph.model_graph import ModelGraph
+from ..graph.nodes import is_within
 from .director import Director
 from .local_time import BoundaryPort, LocalDirector
 from .refinement import ModeDirector, Outer, Refinement
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 
 def director_of(graph: ModelGraph) -> type[Director]:
     """The class of the director of a run: that of a dialect in the model, if one has its own."""
-    found = (each.director() for each in dict.fromkeys(graph.dialects.values()))
+    found = (each.director() for each in dict.fromkeys(domain.dialect for domain in graph.domains.values()))
     return next((kind for kind in found if kind is not None), Director)
 
 
@@ -41,8 +42,8 @@ class Directors:
         self.mode_directors: dict[str, ModeDirector] = {}
         self.boundary_ports: dict[str, BoundaryPort] = {}
         self.refinements: dict[str, Refinement] = {}
-        for composite, clock in graph.clocks.items():
-            self._add_director(composite, clock)
+        for composite, domain in graph.domains.items():
+            self._add_director(composite, domain.clock)
 
     def over(self, path: str) -> Director | LocalDirector | Refinement:
         """The director of an actor or composite, with its time."""
@@ -55,8 +56,8 @@ class Directors:
             self.boundary_ports.update({path: self.boundary_port(path, outside) for path in paths})
         self.prepare(composite, outside)
         self.of[composite] = self._made_director(composite, clock)
-        if composite in self.graph.modal:
-            machine = cast("StateMachine", self.actors[self.graph.modal[composite].machine])
+        if (modal := self.graph.modal(composite)) is not None:
+            machine = cast("StateMachine", self.actors[modal.machine])
             mode_director = self.mode_directors[composite] = self.mode_director(composite, machine)
             if mode_director.hears_inputs:
                 for path in self.graph.borders(composite)[0]:

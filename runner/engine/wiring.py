@@ -32,7 +32,8 @@ from epicycle.aspects import (
 
 from ..graph.acts import connection_place
 from ..graph.clock import Clock
-from ..graph.model_graph import Hop, ModelGraph
+from ..graph.model_graph import ModelGraph
+from ..graph.nodes import Hop
 from ..graph.woven import WovenAspect
 from ..results import EventLog, Signal
 from ..text.program import describe
@@ -139,7 +140,7 @@ class Wiring:
 
     def _by_clock(self, path: str) -> Director | LocalDirector | Refinement:
         """The director as seen by the clock of an actor, if this is wrong."""
-        clock = before = self.graph.clocks[self.graph.director_of(path)]
+        clock = before = self.graph.domain_of(path).clock
         for woven, aspect in self._wrong_clocks:
             if path in woven.actors:
                 try:

@@ -7,8 +7,7 @@ any composite ports, to an actor's input port.
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from copy import copy
-from dataclasses import dataclass, field
+from dataclasses import replace
 from typing import Any
 
 from epicycle.actors import Actor, InputPort, OutputPort
@@ -17,62 +16,8 @@ from epicycle.aspects import Request
 from ..catalogue.dialect import Dialect
 from ..text.limits import NORMAL, Limits
 from ..text.problems import Position
-from .acts import connection_place
 from .clock import Clock
-
-
-@dataclass(frozen=True, eq=False)
-class Hop:
-    """One edge of the graph: a connection between two ports, as declared."""
-
-    source: str
-    destination: str
-    delay: int | None  # ns; None: within the tag
-    position: Position | None
-    order: int
-    shared: int | None = field(default=None, kw_only=True)  # the same for all hops of a connection that is one channel
-
-    def __str__(self) -> str:
-        return connection_place(self.source, self.destination)
-
-
-@dataclass(frozen=True)
-class Wire:
-    """A path from an output port to an input port."""
-
-    source: OutputPort[Any]
-    destination: InputPort[Any]
-    hops: tuple[Hop, ...]
-
-
-@dataclass(frozen=True, eq=False)
-class Detour(Hop):
-    """A part of the path of tokens through an aspect that is a model, within the tag: it orders firings.
-
-    Tokens go from their sender to the composite's request port, and from its response port to their destination.  If it
-    ``waits`` for the composite's turn, it orders nothing.
-    """
-
-    aspect: str
-    waits: bool = False
-
-
-@dataclass(frozen=True)
-class Modal:
-    """A composite with modes whose machine has refinements: their paths, by the mode."""
-
-    machine: str
-    refinements: Mapping[str, str]
-
-
-@dataclass(slots=True)
-class PortNode:
-    """A port in the graph: an actor's, or one of a composite (``port`` is None) that tokens only pass through."""
-
-    port: InputPort[Any] | OutputPort[Any] | None
-    direction: str  # input or output
-    type: Any = None  # the type of what a composite's port hands on, if it declares one
-    declared: Position | None = None
+from .nodes import Component, Detour, Domain, Hop, Modal, PortNode, Wire, is_within
 
 
 class ModelGraph:
@@ -85,24 +30,16 @@ class ModelGraph:
     def __init__(self, limits: Limits = NORMAL, inside: ModelGraph | None = None, director: str = "") -> None:
         self.ports: dict[str, PortNode] = {}
         self.actors: dict[str, Actor] = {}
-        self.composites: dict[str, str] = {}  # the class of each composite, outer ones first
-        # The composites with their own director, which are actors in the graph around them; "" is the model.
-        self.clocks: dict[str, Clock] = {"": Clock() if inside is None else inside.clocks[director]}
-        # The dialect of each of these directors.
-        self.dialects: dict[str, type[Dialect]] = {"": Dialect if inside is None else inside.dialects[director]}
-        self.members: dict[str, list[str]] = {"": []}  # what each director fires, in the order of declaration
-        self.modal: dict[str, Modal] = {}  # composites with modes, by their path
-        self.priorities: dict[str, int] = {}
-        self.positions: dict[str, Position] = {}  # also of "aspect NAME"
-        self.tags: dict[str, tuple[str, ...]] = {}  # the tags that the model's author gave to actors and composites
+        self.components: dict[str, Component] = {"": Component("")}  # outer ones first; "" is the model
+        # Of the composites with their own director, which are actors in the graph around them, outer ones first.
+        outer = None if inside is None else inside.domains[director]
+        self.domains: dict[str, Domain] = {
+            "": Domain(Clock(), Dialect) if outer is None else Domain(outer.clock, outer.dialect)
+        }
         self.detours: list[Detour] = []  # found when the model is checked, see ``detours``
         self.limits: Limits = limits if inside is None else inside.limits
         self.is_frozen = False
         self._channels: Channels | None = None  # worked out since then
-        self._outgoing: dict[str, list[Hop]] = {}  # of each port, in their order
-        self._incoming: dict[str, list[Hop]] = {}
-        self._borders: dict[str, tuple[list[str], list[str]]] = {}
-        self._parts: dict[str, dict[str, list[str]]] = {}
         self._hops: dict[int, Hop] = {}  # in their order
         self._order: int = 0 if inside is None else inside._order
 
@@ -117,58 +54,70 @@ class ModelGraph:
     def copy(self) -> ModelGraph:
         """A copy that can be changed, with the same actors."""
         made = ModelGraph(self.limits)
-        for name, value in vars(self).items():
-            setattr(made, name, copy(value))
-        made.ports = {path: copy(node) for path, node in self.ports.items()}
-        made.is_frozen, made._channels = False, None
-        made.members = {path: [*each] for path, each in self.members.items()}
-        made._outgoing = {path: [*hops] for path, hops in self._outgoing.items()}
-        made._incoming = {path: [*hops] for path, hops in self._incoming.items()}
-        made._borders = {path: ([*inputs], [*outputs]) for path, (inputs, outputs) in self._borders.items()}
-        made._parts = {path: {name: [*each] for name, each in parts.items()} for path, parts in self._parts.items()}
+        for path, node in self.ports.items():
+            made.ports[path] = replace(node, incoming=[*node.incoming], outgoing=[*node.outgoing])
+        made.actors, made.detours = dict(self.actors), [*self.detours]
+        made.components = {path: each.copy() for path, each in self.components.items()}
+        made.domains = {path: replace(each, members=[*each.members]) for path, each in self.domains.items()}
+        made._hops, made._order = dict(self._hops), self._order
         return made
 
     def merge(self, part: ModelGraph, director: str) -> None:
         """Take in a part that was made for this graph."""
         self._check_open()
+        self.domains[director].members += part.domains.pop("").members
+        for paths in part.components.pop("").parts.values():
+            for path in paths:
+                self._enrol(path)
         self.ports |= part.ports
-        self.members[director] += part.members.pop("")
-        del part.clocks[""], part.dialects[""]
-        parts = part._parts
-        part._parts = {path: each for path, each in parts.items() if path not in self._parts}
-        for known, new in zip(self._by_path(), part._by_path(), strict=True):
-            known |= new
-        for path in parts.keys() - part._parts.keys():  # the one that it is in
-            for name, instances in parts[path].items():
-                self._parts[path].setdefault(name, []).extend(instances)
-        for hop in part._hops.values():
-            self._enter(hop)
+        self.actors |= part.actors
+        self.components |= part.components
+        self.domains |= part.domains
+        self._hops |= part._hops
+        self._order = max(self._order, part._order)
 
     def add_actor(self, actor: Actor, position: Position | None) -> None:
         self._check_open()
         actor.is_part = True
         self.actors[actor.path] = actor
-        self._enrol(actor.path)
-        self.members[self.director_of(actor.path)].append(actor.path)
-        if position is not None:
-            self.positions[actor.path] = position
+        self._add(actor.path, type(actor).__name__, position)
+        self.domains[self.director_of(actor.path)].members.append(actor.path)
         ports: tuple[InputPort[Any] | OutputPort[Any], ...] = (*actor.inputs.values(), *actor.outputs.values())
         for port in ports:
             self.ports[port.path] = PortNode(port, port.direction)
 
-    def add_composite(self, path: str, kind: str) -> None:
+    def add_composite(self, path: str, kind: str, position: Position | None = None) -> None:
         """Add a composite, of that class."""
         self._check_open()
-        self.composites[path] = kind
+        self._add(path, kind, position)
+
+    def _add(self, path: str, kind: str, position: Position | None) -> None:
+        self.components[path] = Component(kind, position)
         self._enrol(path)
 
     def _enrol(self, path: str) -> None:
+        """Make something a part of what it is in; as long as this is a part itself, that may be elsewhere."""
         above, _, name = path.rpartition(".")
-        self._parts.setdefault(above, {}).setdefault(name.partition("[")[0], []).append(path)
+        around = self.components.get(above) or self.components[""]
+        around.parts.setdefault(name.partition("[")[0], []).append(path)
+
+    @property
+    def composites(self) -> dict[str, Component]:
+        """The composites, outer ones first."""
+        return {path: each for path, each in self.components.items() if path and path not in self.actors}
+
+    def is_composite(self, path: str) -> bool:
+        """Whether this is the path of a composite."""
+        return path in self.components and path not in self.actors and path != ""
+
+    def position_of(self, path: str) -> Position | None:
+        """Where an actor or composite is declared, if that is known."""
+        return self.components[path].position if path in self.components else None
 
     def parts(self, composite: str) -> Mapping[str, list[str]]:
         """The actors and composites in a composite, by their names: of an array all instances."""
-        return self._parts.get(composite, {})
+        found = self.components.get(composite)
+        return {} if found is None else found.parts
 
     def add_director(
         self,
@@ -179,21 +128,23 @@ class ModelGraph:
     ) -> None:
         """Give a composite its own director, with this clock (``start`` in ns), and a dialect (default: as outside)."""
         self._check_open()
-        outer = self.director_of(path)
-        self.members[outer].append(path)
-        self.members[path] = []
-        self.clocks[path] = self.clocks[outer].inside(start, drift)
-        self.dialects[path] = like or self.dialects[outer]
+        outer = self.domains[self.director_of(path)]
+        outer.members.append(path)
+        self.domains[path] = Domain(outer.clock.inside(start, drift), like or outer.dialect)
 
-    def dialect_at(self, path: str) -> type[Dialect]:
-        """The dialect of the director of an actor or composite."""
-        return self.dialects[self.director_of(path)]
+    def domain_of(self, path: str) -> Domain:
+        """What the director over an actor or composite orders."""
+        return self.domains[self.director_of(path)]
 
     def is_strict(self, composite: str) -> bool:
         """Whether this is a composite with a director, not a refinement, which counts as one actor in all respects."""
-        if not composite or composite not in self.dialects or self.refinement_of(composite) == composite:
+        if not composite or composite not in self.domains or self.refinement_of(composite) == composite:
             return False
-        return self.dialects[composite].is_strict
+        return self.domains[composite].dialect.is_strict
+
+    def modal(self, composite: str) -> Modal | None:
+        """The machine and refinements of a composite with modes."""
+        return self.domains[composite].modal if composite in self.domains else None
 
     def end_of(self, composite: str) -> str:
         """What has the rank behind everything in a strict composite."""
@@ -202,17 +153,13 @@ class ModelGraph:
     def add_refinement(self, path: str) -> None:
         """Give a composite its own director, whose time advances in only one mode; clocks in it count that time."""
         self.add_director(path)
-        self.clocks[path] = Clock()
+        self.domains[path].clock = Clock()
 
-    def add_composite_port(
-        self, path: str, direction: str, position: Position | None, type: Any = None, declared: Position | None = None
-    ) -> None:
+    def add_composite_port(self, path: str, direction: str, type: Any = None, declared: Position | None = None) -> None:
         """Add a port of a composite; tokens only pass through it, and have the ``type`` if there is one."""
         self._check_open()
         self.ports[path] = PortNode(None, direction, type, declared)
-        self._borders.setdefault(self.owner(path), ([], []))[direction == "output"].append(path)
-        if position is not None:
-            self.positions[path] = position
+        self.components[self.owner(path)].borders[direction == "output"].append(path)
 
     def open_requests(self, path: str) -> None:
         """Make an input of a composite the place where an aspect's requests come in: tokens start there."""
@@ -225,13 +172,10 @@ class ModelGraph:
         self, source: str, destination: str, delay: int | None, position: Position | None, shared: int | None = None
     ) -> None:
         self._check_open()
-        self._enter(Hop(source, destination, delay, position, self._order, shared=shared))
-
-    def _enter(self, hop: Hop) -> None:
-        self._order = hop.order + 1
-        self._hops[hop.order] = hop
-        self._outgoing.setdefault(hop.source, []).append(hop)
-        self._incoming.setdefault(hop.destination, []).append(hop)
+        hop = self._hops[self._order] = Hop(source, destination, delay, position, self._order, shared=shared)
+        self._order += 1
+        self.ports[source].outgoing.append(hop)
+        self.ports[destination].incoming.append(hop)
 
     @property
     def connections(self) -> int:
@@ -240,8 +184,8 @@ class ModelGraph:
     def disconnect(self, hop: Hop) -> None:
         self._check_open()
         del self._hops[hop.order]
-        self._outgoing[hop.source].remove(hop)
-        self._incoming[hop.destination].remove(hop)
+        self.ports[hop.source].outgoing.remove(hop)
+        self.ports[hop.destination].incoming.remove(hop)
 
     @property
     def hops(self) -> Collection[Hop]:
@@ -253,13 +197,6 @@ class ModelGraph:
         """The number of the next connection."""
         return self._order
 
-    def _by_path(self) -> tuple[dict[str, Any], ...]:
-        """The properties of parts, actors first."""
-        return (
-            self.actors, self.composites, self.positions, self.priorities, self.tags, self.clocks, self.members,
-            self._borders, self._parts, self.modal, self.dialects,
-        )  # fmt: skip
-
     def remove(self, path: str) -> None:
         """Remove an actor, or a composite and its contents, with their connections."""
         self._check_open()
@@ -267,18 +204,18 @@ class ModelGraph:
             for hop in {*self.incoming(port), *self.outgoing(port)}:
                 self.disconnect(hop)
             del self.ports[port]
-        for actor in [each for each in self.actors if is_within(each, path)]:
-            self.actors[actor].is_part = False
-        for known in self._by_path():
-            for each in [each for each in known if is_within(each, path)]:
-                del known[each]
-        for members in self.members.values():
-            members[:] = [each for each in members if not is_within(each, path)]
         above, _, name = path.rpartition(".")
-        instances = self._parts[above][name.partition("[")[0]]
-        instances.remove(path)
-        if not instances:
-            del self._parts[above][name.partition("[")[0]]
+        siblings = self.components[above].parts
+        siblings[name.partition("[")[0]].remove(path)
+        if not siblings[name.partition("[")[0]]:
+            del siblings[name.partition("[")[0]]
+        for gone in [each for each in self.components if is_within(each, path)]:
+            del self.components[gone]
+            self.domains.pop(gone, None)
+            if (actor := self.actors.pop(gone, None)) is not None:
+                actor.is_part = False
+        for domain in self.domains.values():
+            domain.members[:] = [each for each in domain.members if not is_within(each, path)]
 
     def direction(self, path: str) -> str:
         """``input`` or ``output``."""
@@ -296,42 +233,43 @@ class ModelGraph:
     def director_of(self, path: str) -> str:
         """The innermost composite with a director that contains an actor or composite; "" is the model itself."""
         around = path.rpartition(".")[0]
-        while around not in self.clocks:
+        while around not in self.domains:
             around = around.rpartition(".")[0]
         return around
 
     def refinement_of(self, path: str) -> str:
         """The innermost refinement that this is in, or is; "" if there is none."""
-        if not self.modal:
-            return ""
-        refinements = {each for modal in self.modal.values() for each in modal.refinements.values()}
-        while path and path not in refinements:
-            path = path.rpartition(".")[0]
+        while path:
+            above, _, mode = path.rpartition(".")
+            if (modal := self.modal(above)) is not None and mode in modal.refinements:
+                break
+            path = above
         return path
 
     def director_over(self, hop: Hop) -> str:
         """The director whose time applies to a connection: that of the composite that declares it."""
         owner = self.owner(hop.source)
         # A connection from a composite's own input is declared inside that composite.
-        inside = owner in self.clocks and self.direction(hop.source) == "input"
+        inside = owner in self.domains and self.direction(hop.source) == "input"
         return owner if inside else self.director_of(owner)
 
     def borders(self, composite: str) -> tuple[list[str], list[str]]:
         """The inputs and outputs of a composite; the model itself has none."""
-        return self._borders.get(composite, ([], []))
+        found = self.components.get(composite)
+        return ([], []) if found is None else found.borders
 
     def is_end(self, path: str) -> bool:
         """Whether a port belongs to something that fires, and tokens do not only pass through it."""
         owner = self.owner(path)
-        return owner in self.clocks or (self.ports[path].port is not None and owner not in self.composites)
+        return owner in self.domains or owner in self.actors
 
     def outgoing(self, path: str) -> Sequence[Hop]:
         """The connections that leave a port, in the order of their declaration."""
-        return self._outgoing.get(path, ())
+        return self.ports[path].outgoing
 
     def incoming(self, path: str) -> Sequence[Hop]:
         """The connections that enter a port, in the order of their declaration."""
-        return self._incoming.get(path, ())
+        return self.ports[path].incoming
 
     def wires_from(self, port: OutputPort[Any]) -> list[Wire]:
         """All wires that begin at an output port."""
@@ -372,10 +310,10 @@ class ModelGraph:
         """
         if hop.shared is not None:
             return hop.shared
-        for place in range(len(hops), 0, -1) if self.modal else ():
+        for place in range(len(hops) - 1, 0, -1):
             far = hops[place - 1].destination
-            owner = self.owner(far)
-            if owner in self.modal and self.direction(far) == "output" and self.dialects[owner].is_strict:
+            domain = self.domains.get(self.owner(far))
+            if domain is not None and domain.modal and domain.dialect.is_strict and self.direction(far) == "output":
                 return hops[place:]
         return hops
 
@@ -455,8 +393,3 @@ class Channels:
         """The wires that leave an output, by channel."""
         found = self._leaving.get(path)
         return [[(hop,)] for hop in self._graph.outgoing(path)] if found is None else found
-
-
-def is_within(path: str, outer: str) -> bool:
-    """Whether a path is that of a part or of something in it."""
-    return path == outer or path.startswith(f"{outer}.")

@@ -14,7 +14,8 @@ from itertools import chain
 from typing import TypeAlias
 
 from .digraph import in_order
-from .model_graph import Hop, ModelGraph
+from .model_graph import ModelGraph
+from .nodes import Hop
 
 # The dependencies within a tag, of one director: the successors of each port.  There is a connection without delay
 # between them (``Hop``), or they are in one actor and the second depends on the first within the tag.
@@ -63,7 +64,7 @@ def steps(graph: ModelGraph) -> dict[str, list[Step]]:
         found[director] = [
             *(Step([port]) for port in inputs),
             # Of a composite with modes, the conductor is first, and the machine last.
-            *([Step([director])] if director in graph.modal else ()),
+            *([Step([director])] if graph.modal(director) else ()),
             *_turns(graph, director, depths(graph, director, region)),
             *(Step([port]) for port in outputs),
             *([Step([graph.end_of(director)])] if graph.is_strict(director) else ()),
@@ -73,7 +74,7 @@ def steps(graph: ModelGraph) -> dict[str, list[Step]]:
 
 def dependencies(graph: ModelGraph) -> dict[str, Region]:
     """The dependencies within a tag under each director."""
-    hops: dict[str, list[Hop]] = {director: [] for director in graph.clocks}
+    hops: dict[str, list[Hop]] = {director: [] for director in graph.domains}
     for hop in graph.hops:
         if hop.delay is None:
             hops[graph.director_over(hop)].append(hop)
@@ -82,20 +83,20 @@ def dependencies(graph: ModelGraph) -> dict[str, Region]:
             continue
         hops[graph.director_over(detour)].append(detour)
     regions: dict[str, Region] = {}
-    for director in reversed(graph.clocks):  # inner ones first: the outer ones need to know what depends on what
+    for director in reversed(graph.domains):  # inner ones first: the outer ones need to know what depends on what
         region = regions[director] = {}
         for hop in sorted(hops[director], key=lambda hop: hop.order, reverse=True):  # of parallel ones, the first
             region.setdefault(hop.source, {})[hop.destination] = hop
             region.setdefault(hop.destination, {})
         for port in chain(*graph.borders(director)):
             region.setdefault(port, {})
-        for member in graph.members[director]:
+        for member in graph.domains[director].members:
             inputs, outputs = ports_of(graph, member)
             for port in (*inputs, *outputs):
                 region.setdefault(port, {})
-            if member in graph.clocks:
+            if member in graph.domains:
                 for port in inputs:
-                    if graph.dialects[member].is_strict or _acts(graph, member, regions[member], port):
+                    if graph.domains[member].dialect.is_strict or _acts(graph, member, regions[member], port):
                         region[port].update(dict.fromkeys(outputs))
                 continue
             for output in graph.actors[member].outputs.values():
@@ -107,7 +108,7 @@ def dependencies(graph: ModelGraph) -> dict[str, Region]:
 
 def ports_of(graph: ModelGraph, member: str) -> tuple[list[str], list[str]]:
     """The paths of the inputs and outputs of an actor, or of a composite that fires as one."""
-    if member in graph.clocks:
+    if member in graph.domains:
         return graph.borders(member)
     actor = graph.actors[member]
     return [port.path for port in actor.inputs.values()], [port.path for port in actor.outputs.values()]
@@ -149,7 +150,7 @@ def depths(graph: ModelGraph, director: str, region: Region) -> dict[str, int]:
         for far in region[path]:
             depth[far] = max(depth.get(far, 0), deep)
     result = dict(depth)
-    for member in graph.members[director]:
+    for member in graph.domains[director].members:
         inputs, outputs = ports_of(graph, member)
         deep = min(depth[port] for port in outputs) if outputs else max((depth[port] for port in inputs), default=0)
         free = max((depth[port] for port in inputs if not region[port]), default=deep)
@@ -165,15 +166,15 @@ def _turns(graph: ModelGraph, director: str, depth: dict[str, int]) -> Iterator[
     If an actor takes the tokens of some inputs later than it answers wake-ups, these inputs are a separate turn.
     """
     turns: list[tuple[tuple[int, int], list[str]]] = []
-    modal = graph.modal.get(director)
-    for member in graph.members[director]:
+    modal = graph.modal(director)
+    for member in graph.domains[director].members:
         if modal is not None and member == modal.machine:
             continue
-        inputs = [] if member in graph.clocks else ports_of(graph, member)[0]
+        inputs = [] if member in graph.domains else ports_of(graph, member)[0]
         found: dict[int, list[str]] = {depth[member]: [member]}
         for port in inputs:
             found.setdefault(depth[port], []).append(port)
-        turns += [((deep, graph.priorities.get(member, 0)), paths) for deep, paths in found.items()]
+        turns += [((deep, graph.components[member].priority), paths) for deep, paths in found.items()]
     # The sort is stable: the order of declaration decides ties.
     for level, paths in sorted(turns, key=lambda turn: turn[0]):
         yield Step(paths, level)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 from epicycle.actors.expression import Formula
 from epicycle.aspects import Reading
@@ -11,7 +12,7 @@ from ..catalogue.measure import Measure
 from ..temporal import TINY, Property, Requirement
 from ..text.patterns import folded
 from ..text.problems import Position
-from .model_graph import is_within
+from .nodes import is_within
 
 
 @dataclass(frozen=True)
@@ -112,3 +113,20 @@ class Watched:
     metrics: list[Metric] = field(default_factory=list)
     monitors: list[Monitor] = field(default_factory=list)
     stop_position: Position | None = None  # where ``stop_ports`` were last declared
+
+    def copy(self) -> Watched:
+        """A copy to which more can be added."""
+        lists: Any = {key: [*each] for key, each in vars(self).items() if isinstance(each, list)}
+        return replace(self, **lists)
+
+    def without(self, path: str) -> Watched:
+        """What is left of it after the removal of a part of the model."""
+        left = [each.without(path) for each in self.monitors]
+        gone = {each.name for each, kept in zip(self.monitors, left, strict=True) if kept is None}
+        return replace(
+            self,
+            recorded=[port for port in self.recorded if not is_within(port, path)],
+            stop_ports=[port for port in self.stop_ports if not is_within(port, path)],
+            metrics=[metric.without(path) for metric in self.metrics if metric.monitor not in gone],
+            monitors=[each for each in left if each is not None],
+        )

@@ -9,9 +9,9 @@ from epicycle.actors import counted
 from epicycle.actors.expression import PortFormula
 from epicycle.aspects import Aspect, ExecutionAspect, FiringTime, Reading, Selection
 
-from ..text.problems import Problems
+from ..text.problems import Position, Problems
 from .acts import connection_place
-from .model_graph import ModelGraph, is_within
+from .nodes import is_within
 
 
 @dataclass(frozen=True)
@@ -56,6 +56,7 @@ class WovenAspect:
     model: AspectModel | None = None
     comes_with_actor: bool = False
     parameters: list[str] = field(default_factory=list)
+    position: Position | None = None
 
     @property
     def kind(self) -> str:
@@ -96,7 +97,7 @@ def extent(aspects: Iterable[WovenAspect]) -> str:
     return " and ".join(said) or "no place"
 
 
-def check_processors(aspects: Iterable[WovenAspect], graph: ModelGraph, problems: Problems) -> None:
+def check_processors(aspects: Iterable[WovenAspect], problems: Problems) -> None:
     """Check that an actor runs on at most one processor."""
     taken: dict[str, str] = {}
     for woven in aspects:
@@ -106,5 +107,5 @@ def check_processors(aspects: Iterable[WovenAspect], graph: ModelGraph, problems
         if twice := [actor for actor in woven.actors if actor in taken]:
             message = f"aspect {woven.name}: {twice[0]} already runs on the processor {taken[twice[0]]!r}"
             hint = f"an actor has one processor: exclude it here, with '!{twice[0]}', or there"
-            problems.add(message, graph.positions.get(f"aspect {woven.name}"), hint)
+            problems.add(message, woven.position, hint)
         taken.update(dict.fromkeys(woven.actors, woven.name))

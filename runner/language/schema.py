@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from typing import Any
 
 from epicycle.actors import Configurable, declared_parameters
 from epicycle.aspects import FiringTimeParameter
@@ -67,6 +68,7 @@ CONSTRUCTS = {
     "A claim": CLAIM,
     "A guideline": GUIDELINE,
 }
+_WIDTH = 120
 _OTHER_TYPE = rf"^({NAME}(\.{NAME})?|\$\{{{NAME}\}})$"  # a composite, a type of another package, or one that is chosen
 
 
@@ -109,8 +111,9 @@ def json_schema(
         "changed_actor": _changed("actor"),
         "changed_aspect": _changed("aspect"),
         "actor": _typed(types["actor"], "actor", open_to=_OTHER_TYPE),
-        "aspect": _typed(types["aspect"], "aspect", ("type", "at"), open_to=_OTHER_TYPE),
+        "aspect": {**ref("added_aspect"), "required": ["at"]},
         "added_aspect": _typed(types["aspect"], "aspect", open_to=_OTHER_TYPE),
+        "whole": {"not": {"required": ["inherit"]}},
         "figure": _typed(figures, "figure"),
         "study_figure": _typed(study_figures, "study_figure"),
     }
@@ -121,6 +124,7 @@ def json_schema(
         definitions[part_name(base)] = _part(base, variants)
         for name, cls in variants.items():
             definitions[f"{part_name(base)}.{name}"] = _type(name, cls, "figure")
+    _share(definitions)
     model_only = [key for key in MODEL.keys if key not in LIBRARY.keys]
     return {
         "$schema": "https://json-schema.org/draft/2020-12/schema",
@@ -144,7 +148,34 @@ def json_schema(
 
 
 def schema_text(schema: Schema) -> str:
-    return json.dumps(schema, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+    return _written(schema) + "\n"
+
+
+def _written(value: Any, indent: int = 0) -> str:
+    """A value as JSON, on one line if it is short."""
+    text = json.dumps(value, ensure_ascii=False, allow_nan=False)
+    if len(text) + indent <= _WIDTH or not isinstance(value, (dict, list)):
+        return text
+    pad = "\n" + " " * (indent + 1)
+    if isinstance(value, list):
+        return f"[{pad}{f',{pad}'.join(_written(each, indent + 1) for each in value)}\n{' ' * indent}]"
+    entries = (f"{json.dumps(key)}: {_written(each, indent + 1)}" for key, each in value.items())
+    return f"{{{pad}{f',{pad}'.join(entries)}\n{' ' * indent}}}"
+
+
+def _share(definitions: Schema) -> None:
+    """Let types that take the same parameter refer to one definition of it."""
+    at: dict[tuple[str, str], list[Schema]] = {}
+    for owner in definitions.values():
+        for key, each in owner.get("properties", {}).items():
+            if isinstance(each, dict) and len(each) > 1:
+                at.setdefault((key, json.dumps(each)), []).append(owner["properties"])
+    for (key, text), places in at.items():
+        if len(places) > 1:
+            number = sum(each.startswith(f"given.{key}.") for each in definitions)
+            definitions[name := f"given.{key}.{number + 1}"] = json.loads(text)
+            for properties in places:
+                properties[key] = ref(name)
 
 
 def _beside(kind: str) -> Schema:
@@ -205,7 +236,7 @@ def _type(name: str, cls: type, kind: str) -> Schema:
     """What may and must be given for one type."""
     declared = declared_parameters(cls)
     required = [key for key, parameter in declared.items() if parameter.required]
-    given: Schema = {"if": {"not": {"required": ["inherit"]}}, "then": {"required": required}} if required else {}
+    given: Schema = {"if": ref("whole"), "then": {"required": required}} if required else {}
     return {
         "description": doc_of(cls),
         "properties": {

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from copy import deepcopy
 from pathlib import Path
 from typing import Any
 
@@ -70,20 +69,23 @@ def folder(tmp_path: Path) -> Path:
 def state(model: Model) -> Any:
     """All that a model consists of."""
     graph = model.graph
-    by_path = (graph.composites, graph.members, graph.priorities, graph.positions, graph.tags)
     scopes = [model, *map(model.__getitem__, graph.composites)]
     return {
         "ports": [(path, str(node)) for path, node in graph.ports.items()],
         "hops": [(str(hop), hop.order, hop.delay) for hop in graph.hops],
         "ways": [[str(hop) for hop in (*graph.incoming(port), *graph.outgoing(port))] for port in graph.ports],
         "actors": [(path, id(actor), actor.path, actor.is_part) for path, actor in graph.actors.items()],
-        "by path": [deepcopy(list(each.items())) for each in by_path],
-        "borders": [deepcopy(graph.borders(path)) for path in graph.composites],
-        "clocks": list(graph.clocks),
+        "components": [(path, str(each)) for path, each in graph.components.items()],
+        "domains": [(path, str(each)) for path, each in graph.domains.items()],
         "gaps": (dict(model.draft.gaps), set(model.draft.fed)),
         "rest": (model.draft.is_wired, graph.next_order, list(map(str, graph.detours)), model.is_checked),
         "aspects": [(woven.name, id(woven), repr(woven)) for woven in model.aspects],
-        "watched": (model.recorded[:], model.stop_ports[:], [repr(metric) for metric in model.metrics], model.stop),
+        "watched": (
+            model.watched.recorded[:],
+            model.watched.stop_ports[:],
+            [repr(metric) for metric in model.watched.metrics],
+            model.stop,
+        ),
         "scopes": [(id(scope), list(scope._inside.children), repr(scope)) for scope in scopes],
     }
 

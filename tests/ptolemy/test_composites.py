@@ -275,7 +275,7 @@ def test_python_names_the_classes_that_it_means() -> None:
     assert type(model.add(actors.TimeDelay("delay"))) is actors.TimeDelay
     model.composite("inside", director=True, like="epicycle")
     model.composite("plain", director=True)
-    named = {path: dialect.name for path, dialect in model.graph.dialects.items()}
+    named = {path: each.dialect.name for path, each in model.graph.domains.items()}
     assert named == {"": "ptolemy", "inside": "epicycle", "plain": "ptolemy"}
 
 

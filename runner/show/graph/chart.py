@@ -66,14 +66,14 @@ def statechart(model: Model, path: str) -> Statechart:
         known = [each.removesuffix(".machine") for each in machines]
         valid = ", ".join(known) or "none"
         raise EpicycleError(f"{path} has no modes{did_you_mean(path, known)}; machines: {valid}")
-    modal = model.graph.modal.get(found.path.rpartition(".")[0])
+    modal = model.graph.modal(found.path.rpartition(".")[0])
     refinements = {} if modal is None else modal.refinements
     states = {}
     for name, mode in found.modes.items():
         lines = [f"{variable}' = {formula.source}" for variable, formula in mode.flow.items()]
         lines += [f"{when} / {_actions(does)}" for when, does in (("entry", mode.entry), ("exit", mode.exit)) if does]
         if name in refinements:
-            lines.append(f"refinement {model.graph.composites[refinements[name]]}")
+            lines.append(f"refinement {model.graph.components[refinements[name]].kind}")
         states[name] = State(name, lines, mode.final)
     arrows: dict[tuple[str, str], Arrow] = {}
     for each in found.transitions:

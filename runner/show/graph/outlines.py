@@ -14,7 +14,7 @@ from epicycle.aspects import Medium, Processor
 
 from ...build.model import Model
 from ...graph.clock import Clock
-from ...graph.model_graph import Hop
+from ...graph.nodes import Hop
 from ...graph.woven import WovenAspect
 
 MANY = 60  # boxes that a reader can take in; a larger model is folded by default
@@ -193,17 +193,16 @@ class _Outliner:
         return [port.path for port in actor.inputs.values()], [port.path for port in actor.outputs.values()]
 
     def _kind(self, path: str) -> str:
-        actor = self.graph.actors.get(path)
-        return self.graph.composites.get(path, "") if actor is None else type(actor).__name__
+        return self.graph.components[path].kind
 
     def box(self, path: str) -> Box:
         name, count = path.rpartition(".")[2], len(self._instances(path))
         if count > 1:
             name = f"{name.partition('[')[0]}[0..{count - 1}]"
         box = Box(path, name, self._kind(path), count=count, is_composite=path not in self.graph.actors)
-        if path in self.graph.clocks:
+        if path in self.graph.domains:
             box.has_director = bool(path)
-            box.kind += _clock(self.graph.clocks[path])
+            box.kind += _clock(self.graph.domains[path].clock)
         for side, paths in zip((box.inputs, box.outputs), self._ports(path), strict=True):
             for port_path in paths:
                 port = self.graph.ports[port_path].port

@@ -41,13 +41,13 @@ def check_metric(metric: StudyMetric, models: Sequence[Model], problems: Problem
         told = f"metric {metric.name}: {message}{did_you_mean(part, known)}"
         problems.add(told, position, f"{caption}: {', '.join(known) or 'none'}")
 
-    units = {each.name: each.unit for model in models for each in model.metrics}
+    units = {each.name: each.unit for model in models for each in model.watched.metrics}
     figures = {
         woven.name: list(dict.fromkeys([*woven.aspect.events, *woven.aspect.reports]))
         for model in models
         for woven in model.aspects
     }
-    recorded = list(dict.fromkeys(name for model in models for name in model.recorded))
+    recorded = list(dict.fromkeys(name for model in models for name in model.watched.recorded))
     for name in metric.formula.names:
         if name not in (*units, ASPECTS, SIGNALS, *NUMBERS):
             complain(f"there is no metric {name!r}", name, units, "the model's metrics")
@@ -114,7 +114,9 @@ def columns_of(dimensions: Iterable[Dimension], metrics: Iterable[StudyMetric], 
                 # In the table, a number with a unit is in SI units, one without in the parameter's unit.
                 unit = si_unit(written[1]) if written is not None and written[1] else declared.unit
                 found[setting.path] = Column(unit, declared.doc)
-    own = {metric.name: Column(metric.unit, metric.measure.doc, metric.measure.label) for metric in model.metrics}
+    own = {
+        metric.name: Column(metric.unit, metric.measure.doc, metric.measure.label) for metric in model.watched.metrics
+    }
     for metric in metrics:
         known = own.get(metric.source.strip(), Column())
         unit = metric.to or known.unit or metric.unit

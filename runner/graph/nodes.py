@@ -1,0 +1,102 @@
+"""What a model graph consists of: components, the domains of directors, ports, and connections."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from epicycle.actors import InputPort, OutputPort
+
+from ..catalogue.dialect import Dialect
+from ..text.problems import Position
+from .acts import connection_place
+from .clock import Clock
+
+
+@dataclass(frozen=True, eq=False)
+class Hop:
+    """One edge of the graph: a connection between two ports, as declared."""
+
+    source: str
+    destination: str
+    delay: int | None  # ns; None: within the tag
+    position: Position | None
+    order: int
+    shared: int | None = field(default=None, kw_only=True)  # the same for all hops of a connection that is one channel
+
+    def __str__(self) -> str:
+        return connection_place(self.source, self.destination)
+
+
+@dataclass(frozen=True)
+class Wire:
+    """A path from an output port to an input port."""
+
+    source: OutputPort[Any]
+    destination: InputPort[Any]
+    hops: tuple[Hop, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Detour(Hop):
+    """A part of the path of tokens through an aspect that is a model, within the tag: it orders firings.
+
+    Tokens go from their sender to the composite's request port, and from its response port to their destination.  If it
+    ``waits`` for the composite's turn, it orders nothing.
+    """
+
+    aspect: str
+    waits: bool = False
+
+
+@dataclass(frozen=True)
+class Modal:
+    """A composite with modes whose machine has refinements: their paths, by the mode."""
+
+    machine: str
+    refinements: Mapping[str, str]
+
+
+@dataclass(slots=True)
+class PortNode:
+    """A port in the graph: an actor's, or one of a composite (``port`` is None) that tokens only pass through."""
+
+    port: InputPort[Any] | OutputPort[Any] | None
+    direction: str  # input or output
+    type: Any = None  # the type of what a composite's port hands on, if it declares one
+    declared: Position | None = None
+    incoming: list[Hop] = field(default_factory=list)  # in their order
+    outgoing: list[Hop] = field(default_factory=list)
+
+
+@dataclass(slots=True)
+class Domain:
+    """What one director orders: its clock, its dialect, and what it fires, in the order of declaration."""
+
+    clock: Clock
+    dialect: type[Dialect]
+    members: list[str] = field(default_factory=list)
+    modal: Modal | None = None  # of a composite with modes
+
+
+@dataclass(slots=True)
+class Component:
+    """An actor, or a composite with its ports and parts; of an array of parts all instances."""
+
+    kind: str  # the name of its type
+    position: Position | None = None
+    priority: int = 0
+    tags: tuple[str, ...] = ()  # that the model's author gave it
+    borders: tuple[list[str], list[str]] = field(default_factory=lambda: ([], []))
+    parts: dict[str, list[str]] = field(default_factory=dict)
+
+    def copy(self) -> Component:
+        inputs, outputs = self.borders
+        parts = {name: [*paths] for name, paths in self.parts.items()}
+        return replace(self, borders=([*inputs], [*outputs]), parts=parts)
+
+
+def is_within(path: str, outer: str) -> bool:
+    """Whether a path is that of a part or of something in it."""
+    return path == outer or path.startswith(f"{outer}.")
