@@ -310,7 +310,7 @@ class ModelGraph:
         """
         if hop.shared is not None:
             return hop.shared
-        for place in range(len(hops) - 1, 0, -1):
+        for place in range(len(hops), 0, -1):
             far = hops[place - 1].destination
             domain = self.domains.get(self.owner(far))
             if domain is not None and domain.modal and domain.dialect.is_strict and self.direction(far) == "output":
