@@ -17,7 +17,6 @@ from ..graph.woven import WovenAspect, check_processors
 from ..text.problems import Position, Problem, Problems
 from .checks import check
 from .composite_aspect import check_nesting, detours
-from .draft import Draft
 from .origin import Origin
 from .weave_all import arranged
 
@@ -27,7 +26,7 @@ class Building:
 
     def __init__(self, name: str) -> None:
         self.name = name
-        self.draft = Draft()
+        self.graph = ModelGraph()  # all actors, composites, ports and connections
         self.parameters: dict[str, object] = {}
         self.aspects: list[WovenAspect] = []
         self.exactly: frozenset[ActName] | None = None  # the only acts of aspects that happen
@@ -37,11 +36,6 @@ class Building:
         self.origin: Origin | None = None  # what it was made from, if that is all there is to it
         self.scopes: dict[str, Any] = {}  # the composites that a program has asked for
         self._order: dict[str, int] | None = None  # worked out since then
-
-    @property
-    def graph(self) -> ModelGraph:
-        """All actors, composites, ports and connections."""
-        return self.draft.graph
 
     def local_tag(self, actor: str, tag: Tag) -> Tag:
         """A tag of the event log, as the actor or composite of that path sees it: in its director's time."""
@@ -63,7 +57,7 @@ class Building:
             problems = Problems()
             if check_nesting(self.aspects, self.graph, problems):
                 self.edit().graph.detours = detours(self.graph, self.aspects)
-            check(self.draft, problems)
+            check(self.graph, problems)
             check_processors(self.aspects, problems)
             problems.raise_if_any()
             self.warnings = problems.warnings
@@ -77,18 +71,18 @@ class Building:
                 self._order = firing_order(self.graph)
         return self._order
 
-    def edit(self) -> Draft:
-        """The draft, for changes: what was checked before may no longer hold."""
+    def edit(self) -> ModelGraph:
+        """The graph, for changes: what was checked before may no longer hold."""
         if self.graph.is_frozen:
-            self.draft = self.draft.copy()
+            self.graph = self.graph.copy()
         self.is_checked = False
         self.origin = None
         self._order = None
-        return self.draft
+        return self.graph
 
-    def adopt(self, draft: Draft, aspects: Iterable[WovenAspect]) -> None:
-        """Continue with a draft made from the present one, with further aspects."""
-        self.draft = draft
+    def adopt(self, graph: ModelGraph, aspects: Iterable[WovenAspect]) -> None:
+        """Continue with a graph made from the present one, with further aspects."""
+        self.graph = graph
         self.edit()
         self.enlist(aspects)
 

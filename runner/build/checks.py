@@ -16,23 +16,21 @@ from ..graph.ranks import Region, dependencies
 from ..text.limits import RAISE_IT
 from ..text.patterns import in_general
 from ..text.problems import Problems
-from .draft import Draft
 
 MAX_PASSAGE = 200  # composite ports in a row
 MAX_SHOWN = 10  # names in one message
 
 
-def check(draft: Draft, problems: Problems, *, whole: bool = True) -> None:
+def check(graph: ModelGraph, problems: Problems, *, whole: bool = True) -> None:
     """Report every wiring problem: types, missing connections, two writers, loops without delay.
 
     If it is the ``whole`` model and nothing is wrong, warn of actors that can never fire.
     """
-    graph = draft.graph
     if not check_passages(graph, problems):
         return
     check_dialects(graph, problems)
     check_types(graph, problems)
-    check_connections(draft, problems)
+    check_connections(graph, problems)
     check_loops(graph, problems)
     if whole and not len(problems):
         check_reach(graph, problems)
@@ -129,14 +127,13 @@ def _who(graph: ModelGraph, port: str) -> str:
     return f"{what}, declared at {at}" if at is not None else ""
 
 
-def check_connections(draft: Draft, problems: Problems) -> None:
+def check_connections(graph: ModelGraph, problems: Problems) -> None:
     """Check that required inputs are connected, and that single inputs have one writer."""
-    graph = draft.graph
     for actor in graph.actors.values():
         position = graph.position_of(actor.path)
         for port in actor.inputs.values():
             wires = graph.wires_to(port)
-            if not wires and port.required and not _may_be_connected(draft, port.path):
+            if not wires and port.required and not _may_be_connected(graph, port.path):
                 problems.add(
                     f"{port.path} is not connected, but {type(actor).__name__} needs it",
                     position,
@@ -161,14 +158,14 @@ def check_connections(draft: Draft, problems: Problems) -> None:
                 )
 
 
-def _may_be_connected(draft: Draft, path: str) -> bool:
+def _may_be_connected(graph: ModelGraph, path: str) -> bool:
     """Whether a missing connection may be due to another problem: a wrong connection, or a missing actor."""
-    known, before = {path}, [path] if draft.fed else []
+    known, before = {path}, [path] if graph.fed else []
     while before:
-        sources = {hop.source for hop in draft.graph.incoming(before.pop())} - known
+        sources = {hop.source for hop in graph.incoming(before.pop())} - known
         known |= sources
         before += sources
-    return draft.may_be_fed(known)
+    return graph.may_be_fed(known)
 
 
 def _open_end(graph: ModelGraph, path: str) -> tuple[str, ...]:

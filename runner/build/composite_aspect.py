@@ -8,7 +8,7 @@ output ``response``, or its only output.  If there are several inputs, a pointcu
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from itertools import chain
 
 from epicycle.actors import OutputPort, accepts, declared_parameters, did_you_mean, type_name
@@ -37,15 +37,6 @@ def as_actor(part: PartText) -> PartText:
     return replace(part, values=values, priority=priority)
 
 
-@dataclass(frozen=True)
-class _Plan:
-    """How tokens of an aspect's places come into its composite, and by which port they leave."""
-
-    requests: list[str | Poison]  # the request ports
-    response: str | Poison
-    model: AspectModel | Poison
-
-
 def weave_model(
     pointcuts: Pointcuts,
     aspect: Aspect | Poison,
@@ -54,25 +45,29 @@ def weave_model(
     position: Position,
 ) -> WovenAspect | Poison:
     """Attach an aspect that is a composite: what comes to its places is handed to it, and goes on when it answers."""
-    view, draft, graph = pointcuts, pointcuts.draft, pointcuts.graph
+    view, graph = pointcuts, pointcuts.graph
     places = pointcuts.resolve(at)
-    plan = _planned(pointcuts, [each for each in at if each and not each.exclude], places, position)
-    if POISON in plan.requests or aspect is POISON:
-        draft.leave_open(pointcuts.own)
+    requests, response, model = _planned(
+        pointcuts, [each for each in at if each and not each.exclude], places, position
+    )
+    if POISON in requests or aspect is POISON:
+        graph.leave_open(pointcuts.own)
     if aspect is POISON:
         return POISON
     woven = bind(view, aspect, places, place_of, position)
-    for port in (each for each in plan.requests if each):
+    for port in (each for each in requests if each):
         for hop in list(graph.incoming(port)):  # a problem that has been reported
             graph.disconnect(hop)
         graph.open_requests(port)
-    if plan.response:
-        graph.ports[plan.response].type = Request
-    return replace(woven, model=plan.model) if plan.model else woven
+    if response:
+        graph.ports[response].type = Request
+    return replace(woven, model=model) if model else woven
 
 
-def _planned(view: Pointcuts, aimed: Sequence[PointcutText], places: Places, position: Position) -> _Plan:
-    """What is to be connected; what cannot be is reported."""
+def _planned(
+    view: Pointcuts, aimed: Sequence[PointcutText], places: Places, position: Position
+) -> tuple[list[str | Poison], str | Poison, AspectModel | Poison]:
+    """By which ports tokens of the places come in, by which they leave, and both with the composite."""
     graph, path = view.graph, view.own
     inputs, outputs = graph.borders(path)
     of_each = [_request(view, inputs, each) for each in aimed or [PointcutText("", position)]]
@@ -98,9 +93,9 @@ def _planned(view: Pointcuts, aimed: Sequence[PointcutText], places: Places, pos
             view.tell(fault.message, where, *fault.help)
     is_placed = _is_under_one_director(view, places, position)
     if not response or not is_placed:
-        return _Plan(requests, response, POISON)
+        return requests, response, POISON
     asked = {place: asked[place] for place in names if place in asked}
-    return _Plan(requests, response, AspectModel(path, view.kind, response, asked, times))
+    return requests, response, AspectModel(path, view.kind, response, asked, times)
 
 
 def _request(view: Pointcuts, inputs: list[str], pointcut: PointcutText) -> str | Poison:

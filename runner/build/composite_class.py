@@ -10,6 +10,7 @@ from pathlib import Path
 from epicycle.actors import did_you_mean
 
 from ..catalogue.types import Catalogue, installed
+from ..graph.model_graph import ModelGraph
 from ..graph.woven import WovenAspect
 from ..language.files import read_library
 from ..language.inheritance import inherit
@@ -20,7 +21,6 @@ from ..language.surroundings import Surroundings
 from ..text.problems import Position, Problems
 from ..text.program import call_site, entries_of
 from ..text.reading import Text
-from .draft import Draft
 from .settle import Settler
 from .unfold import Known, TooLargeError, Unfolding
 from .weave_all import weave_all
@@ -49,14 +49,14 @@ class CompositeInstance:
         self.path = path
         self.parameters = parameters
 
-    def unfold(self, path: str, draft: Draft, position: Position) -> tuple[Draft, list[WovenAspect]]:
-        """Its parts in a draft, with the aspects that come with it; raises ``ModelError``."""
+    def unfold(self, path: str, graph: ModelGraph, position: Position) -> tuple[ModelGraph, list[WovenAspect]]:
+        """Its parts in a graph, with the aspects that come with it; raises ``ModelError``."""
         cls, problems = self.composite, Problems()
         part = PartText(self.path, position, Text(cls.name, position), entries_of(self.parameters, position))
         if "priority" in part.values:  # which is given like a parameter, as in a model file
             part = replace(part, priority=beside("priority", part.values.pop("priority").value))
-        settler = Settler(Settings(limits=draft.graph.limits), problems)
-        inside = draft.inside(draft.graph.director_of(path))
+        settler = Settler(Settings(limits=graph.limits), problems)
+        inside = graph.part(graph.director_of(path))
         made = Unfolding(Known(cls.composites, cls.catalogue), settler, inside)
         _, bracket, index = path.rpartition("[")
         names: dict[str, object] = {"index": int(index.rstrip("]"))} if bracket and path.endswith("]") else {}
@@ -65,7 +65,7 @@ class CompositeInstance:
             made.instances(path, part, names)
             aspects = weave_all(made)
         problems.raise_if_any()
-        return made.draft, aspects
+        return made.graph, aspects
 
     def __repr__(self) -> str:
         return f"<{self.composite.name} {self.path}>"

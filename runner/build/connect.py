@@ -17,7 +17,6 @@ from ..text.document import Scalar
 from ..text.limits import RAISE_IT
 from ..text.problems import POISON, Poison, Position, Problems
 from ..text.reading import split, within
-from .draft import Draft
 
 _NUMBER = re.compile(r"-?\d{1,9}", re.ASCII)
 _EXPRESSION = re.compile(r"\$\{.*\}", re.DOTALL)
@@ -164,15 +163,15 @@ class Link:
     shared: bool = False
 
 
-def make(links: Sequence[Link | Poison], draft: Draft) -> None:
+def make(links: Sequence[Link | Poison], graph: ModelGraph) -> None:
     """Make the links of one connection."""
-    first = draft.graph.next_order  # which distinguishes the connection from all others
+    first = graph.next_order  # which distinguishes the connection from all others
     for link in links:
         if link is POISON:
-            draft.is_wired = False
+            graph.is_wired = False
         else:
             shared = first if link.shared else None
-            draft.graph.connect(link.source, link.destination, link.delay, link.position, shared)
+            graph.connect(link.source, link.destination, link.delay, link.position, shared)
 
 
 class Wiring:

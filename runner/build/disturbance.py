@@ -10,6 +10,7 @@ from epicycle.aspects import ObservationAspect, PortAspect
 
 from ..catalogue.types import Catalogue, installed
 from ..graph.acts import ActName
+from ..graph.model_graph import ModelGraph
 from ..graph.woven import WovenAspect
 from ..language.disturbance import COMPOSITE_THERE, PARAMETER_THERE, Disturbance, joined, load_disturbance
 from ..language.inheritance import inherit
@@ -26,7 +27,6 @@ from ..text.program import call_site, node_of
 from ..text.reading import Text
 from .acts import acts_of
 from .building import Building
-from .draft import Draft
 from .paths import Paths
 from .settle import Settler
 from .unfold import Known, Unfolding
@@ -35,8 +35,8 @@ from .weave_all import weave_all
 
 def disturb(
     model: Building, name: str, values: AnyMapping[str, object], types: Iterable[type], position: Position
-) -> tuple[Draft, list[WovenAspect], frozenset[ActName] | None]:
-    """The model's draft with the aspects of a disturbance, these aspects, and the only acts; raises ``ModelError``."""
+) -> tuple[ModelGraph, list[WovenAspect], frozenset[ActName] | None]:
+    """The model's graph with the aspects of a disturbance, these aspects, and the only acts; raises ``ModelError``."""
     problems = Problems()
     disturbance = _loaded(name, problems)
     for setting in disturbance.settings:
@@ -66,7 +66,7 @@ def disturb_ports(
     left_out: list[str] = []
     for name in names:
         one = _loaded(name, problems)
-        aspects, unused = _of_ports(one, catalogue, at, Paths(model.draft).ports)
+        aspects, unused = _of_ports(one, catalogue, at, Paths(model.graph).ports)
         left_out += unused
         if not aspects:
             message = f"{one.text.name} has no aspect that alters, delays or loses tokens"
@@ -79,8 +79,8 @@ def disturb_ports(
             exactly=whole.exactly if one.exactly is None else (*(whole.exactly or ()), *one.exactly),
         )
     settings = settings_of(values, problems)
-    draft, found, acts = _woven(model, whole, settings, catalogue, position, problems)
-    model.adopt(draft, found)
+    graph, found, acts = _woven(model, whole, settings, catalogue, position, problems)
+    model.adopt(graph, found)
     return left_out, acts
 
 
@@ -136,7 +136,7 @@ def _woven(
     catalogue: Catalogue,
     position: Position,
     problems: Problems,
-) -> tuple[Draft, list[WovenAspect], frozenset[ActName] | None]:
+) -> tuple[ModelGraph, list[WovenAspect], frozenset[ActName] | None]:
     own = {key: ParameterText(key, position, node_of(value, position)) for key, value in model.parameters.items()}
     parameters = joined(own, disturbance.text.parameters, PARAMETER_THERE, problems)
     root = CompositeText(model.name, position, parameters=parameters, aspects=disturbance.text.aspects)
@@ -148,11 +148,11 @@ def _woven(
     settler = Settler(Settings(settings), problems)
     around = Surroundings(inherit(disturbance.composites, catalogue.actors, problems), catalogue, problems)
     root = around.composite(root)
-    made = Unfolding(Known(around.composites, catalogue), settler, model.draft.copy())
+    made = Unfolding(Known(around.composites, catalogue), settler, model.graph.copy())
     made.body("", root, settler.parameters("", root, {}, {}, None))
     found = weave_all(made)
-    settler.check_unused(made.draft)
+    settler.check_unused(made.graph)
     exactly = disturbance.exactly
     acts = None if exactly is None else acts_of(exactly, [*model.aspects, *found], problems)
     problems.raise_if_any()
-    return made.draft, found, acts
+    return made.graph, found, acts

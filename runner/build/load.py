@@ -25,7 +25,6 @@ from ..text.limits import NORMAL, Limits
 from ..text.problems import POISON, Problems
 from .acts import acts_of
 from .checks import check
-from .draft import Draft
 from .figures import figures_of
 from .model import DeclaredFigure, Model
 from .origin import Origin
@@ -108,7 +107,7 @@ def build(text: ModelText, known: Known, settler: Settler, limits: Limits) -> Mo
         problems.warn(f"composite {name!r} hides the actor type with the same name", at, "rename it if you need both")
     values.of_model = root.parameters
     names = settler.parameters("", root, {}, {}, None)
-    made = Unfolding(known, settler, Draft(ModelGraph(limits)))
+    made = Unfolding(known, settler, ModelGraph(limits))
     made.dialect(root, names)
     try:
         made.body("", root, names)
@@ -116,13 +115,13 @@ def build(text: ModelText, known: Known, settler: Settler, limits: Limits) -> Mo
         pass
     else:
         woven = weave_all(made)
-        settler.check_unused(made.draft)
-        check(made.draft, problems)
+        settler.check_unused(made.graph)
+        check(made.graph, problems)
         check_processors(woven, problems)
         if text.exactly is not None:
             model.exactly = acts_of(text.exactly, woven, problems)
-        model.adopt(made.draft, woven)
-        model.watched = Watching(made.draft, values, problems).read(text, names)
+        model.adopt(made.graph, woven)
+        model.watched = Watching(made.graph, values, problems).read(text, names)
         # Numbers without units are in the units that the model declares.
         model.parameters = {
             name: plain(value) if root.parameters[name].unit else counted_in_si(value) for name, value in names.items()

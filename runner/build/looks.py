@@ -72,7 +72,7 @@ class Looks(View):
         position = within(position, pattern)
         if found and not fitting:
             self.tell(f"{name}: {found[0]} is an input port, but an output port is needed", position)
-        elif not found and not self.draft.excuses(self._full(pattern) + ("" if of_ports else ".*")):
+        elif not found and not self.graph.excuses(self._full(pattern) + ("" if of_ports else ".*")):
             near = paths.did_you_mean(pattern, self.scope, lambda path: not of_ports or self._sends(path))
             self.tell(f"{name}: {pattern!r} matches no {parameter.selects}{near}", position)
         elif len(fitting) > 1 and parameter.is_single:
@@ -89,7 +89,7 @@ class Looks(View):
                 fields = tuple(parts[length:])
                 self._check_fields(name, reference, port, fields, position)
                 return port, fields
-        if self.draft.excuses(self._full(reference)):
+        if self.graph.excuses(self._full(reference)):
             return reference, ()  # nothing can send there now, so the condition never holds
         if self._full(reference) in self.ports:
             self.tell(f"{name}: {reference} is an input port, but an output port is needed", position)

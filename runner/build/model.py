@@ -114,8 +114,8 @@ class Model(Building, Scope, Tabled):
         """
         from .disturbance import disturb
 
-        draft, found, acts = disturb(self, str(disturbance), set or {}, types, call_site())
-        self.adopt(draft, found)
+        graph, found, acts = disturb(self, str(disturbance), set or {}, types, call_site())
+        self.adopt(graph, found)
         if acts is not None:
             self.exactly = (self.exactly or frozenset()) | acts
         return found
@@ -165,7 +165,7 @@ class Model(Building, Scope, Tabled):
             problems.add(f"metric {name}: {wrong[0]!r} cannot be used with 'formula'", position)
         problems.raise_if_any()
         with raising() as problems:
-            watching = Watching(self.draft, Values(problems), problems, self.watched)
+            watching = Watching(self.graph, Values(problems), problems, self.watched)
             texts = (each if isinstance(each, str) else each.path for each in ports)
             of_ports = tuple(Text(each, within(position, each)) for each in texts)
             source = Text(formula, within(position, formula)) if formula else None
@@ -188,7 +188,7 @@ class Model(Building, Scope, Tabled):
                 if any(each.name == metric for each in self.watched.metrics):
                     problems.add(f"there is already a metric {metric!r}", position, "give the monitor another name")
             problems.raise_if_any()
-            watching = Watching(self.draft, Values(problems), problems, self.watched)
+            watching = Watching(self.graph, Values(problems), problems, self.watched)
             given: dict[str, object] = {"property": property, **options}
             entries = watching.options(Requirement, f"monitor {name}", given, position)
             watching.monitor(MonitorText(name, entries, position), Locals(), given)
@@ -196,13 +196,13 @@ class Model(Building, Scope, Tabled):
 
     def outputs(self, pattern: str, what: str, position: Position, problems: Problems) -> list[str]:
         """The output ports that a pattern selects; what is wrong with it is added to ``problems`` as ``what``'s."""
-        return Watching(self.draft, Values(problems), problems).select(Text(pattern, position), what)
+        return Watching(self.graph, Values(problems), problems).select(Text(pattern, position), what)
 
     def _watch(self, ports: Iterable[str | Port], ask: Callable[[Watching, Text], None]) -> None:
         """Add what is to be watched, with the rules of a model file."""
         position = call_site()
         with raising() as problems:
-            watching = Watching(self.draft, Values(problems), problems, self.watched)
+            watching = Watching(self.graph, Values(problems), problems, self.watched)
             for port in ports:
                 path = port if isinstance(port, str) else port.path
                 ask(watching, Text(path, within(position, path)))

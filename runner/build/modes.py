@@ -6,13 +6,18 @@ from collections.abc import Mapping
 
 from epicycle.actors import did_you_mean
 
+from ..graph.model_graph import ModelGraph
+from ..graph.nodes import Gap
 from ..language.models import CompositeText
 from ..text.problems import Poison, Problems
-from .draft import Draft, Gap
 
 
 def connect_modes(
-    path: str, composite: CompositeText, classes: Mapping[str, CompositeText | Poison], draft: Draft, problems: Problems
+    path: str,
+    composite: CompositeText,
+    classes: Mapping[str, CompositeText | Poison],
+    graph: ModelGraph,
+    problems: Problems,
 ) -> None:
     """Connect what has the same name, and report what cannot be connected.
 
@@ -22,13 +27,13 @@ def connect_modes(
     """
     from epicycle.actors import StateMachine  # it imports the solvers of differential equations, which takes a while
 
-    graph, name = draft.graph, composite.name
+    name = composite.name
     assert composite.machine is not None
     part = composite.machine
     machine = graph.actors.get(f"{path}.{part.name}")
     if not isinstance(machine, StateMachine):  # which has been reported
-        draft.leave_open(path)
-        draft.gaps[path] = Gap()
+        graph.leave_open(path)
+        graph.gaps[path] = Gap()
         return
 
     at = part.values["transitions"].key.position if "transitions" in part.values else part.position

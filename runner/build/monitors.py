@@ -5,6 +5,7 @@ from __future__ import annotations
 from epicycle.actors import FaultError, Quantity, UnitError, parse_unit
 from epicycle.aspects import Reading
 
+from ..graph.model_graph import ModelGraph
 from ..graph.watched import Monitor, Part
 from ..language.monitors import MonitorText
 from ..temporal import Condition, Property, PropertyError, Requirement, Sends, Spread, leaves, property_of, spread_of
@@ -13,17 +14,16 @@ from ..text.limits import RAISE_IT
 from ..text.patterns import PathIndex, PatternError, TooManyError
 from ..text.problems import POISON, Poison, Position, Problems
 from ..text.reading import within
-from .draft import Draft
 from .looks import Looks
 from .paths import Paths
 
 _MOST = 2_000_000  # characters of a property that is written out for every place of a pattern
 
 
-def monitor_of(draft: Draft, text: MonitorText, requirement: Requirement, problems: Problems) -> Monitor | Poison:
+def monitor_of(graph: ModelGraph, text: MonitorText, requirement: Requirement, problems: Problems) -> Monitor | Poison:
     """The monitor of a requirement."""
     source, place = requirement.property, text.place("property")
-    looks = Looks(draft, Paths(draft), text.name, "", problems, called="monitor")
+    looks = Looks(Paths(graph), text.name, "", problems, called="monitor")
     before = len(problems)
     try:
         spread = spread_of(source)
@@ -63,7 +63,7 @@ def _selected(looks: Looks, spread: Spread, place: Position) -> list[str]:
         return []
     except TooManyError as error:
         looks.problems.stop(f"{what}: {error}", place, RAISE_IT)
-    if not found and not looks.draft.excuses(f"{pattern}.*"):
+    if not found and not looks.graph.excuses(f"{pattern}.*"):
         near = holders.did_you_mean(pattern)
         looks.problems.add(f"{what}: {pattern!r} matches no actor, composite or output port{near}", place)
     return found

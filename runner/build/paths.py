@@ -15,45 +15,38 @@ from ..text.document import Node
 from ..text.patterns import PathIndex
 from ..text.problems import Poison, Position, Problems
 from ..text.reading import Text
-from .draft import Draft
 
 
 class Paths:
     """What the pointcuts of a model's aspects select from, determined once for all of them; of ``ports``, or of all."""
 
-    def __init__(self, draft: Draft, ports: Iterable[str] | None = None) -> None:
-        self._draft, self._graph = draft, draft.graph
-        self.ports = self._index(draft.graph.ports if ports is None else ports)
+    def __init__(self, graph: ModelGraph, ports: Iterable[str] | None = None) -> None:
+        self.graph = graph
+        self.ports = self._index(graph.ports if ports is None else ports)
 
     def _index(self, paths: Iterable[str]) -> PathIndex:
-        return PathIndex(paths, self._graph.limits)
+        return PathIndex(paths, self.graph.limits)
 
     @cached_property
     def actors(self) -> PathIndex:
-        return self._index(self._graph.actors)
+        return self._index(self.graph.actors)
 
     @cached_property
     def holders(self) -> PathIndex:
         """All actors and composites."""
-        return self._index([*self._graph.actors, *self._graph.composites])
+        return self._index([*self.graph.actors, *self.graph.composites])
 
     @cached_property
     def owners(self) -> PathIndex:
         """All composites and actors, including those that could not be made."""
-        unmade = sorted(set(map(self._graph.owner, self._draft.fed)))
-        return self._index(dict.fromkeys((*self._graph.composites, *self._graph.actors, *unmade)))
-
-    @cached_property
-    def kinds(self) -> dict[str, str]:
-        """The types of all actors and composites."""
-        return {path: each.kind for path, each in self._graph.components.items() if path}
+        unmade = sorted(set(map(self.graph.owner, self.graph.fed)))
+        return self._index(dict.fromkeys((*self.graph.composites, *self.graph.actors, *unmade)))
 
 
 @dataclass
 class View:
     """A model as one aspect or monitor sees it: names are relative to ``scope``, the composite that declares it."""
 
-    draft: Draft
     paths: Paths
     name: str
     scope: str
@@ -62,7 +55,7 @@ class View:
 
     @property
     def graph(self) -> ModelGraph:
-        return self.draft.graph
+        return self.paths.graph
 
     @property
     def ports(self) -> PathIndex:

@@ -25,7 +25,6 @@ from .building import Building
 from .composite_aspect import check_nesting, weave_model
 from .composite_class import CompositeInstance
 from .connect import Child, Inside, Link, Wiring, child_of_actors, make
-from .draft import Draft
 from .named import (
     CompositePort,
     Ends,
@@ -106,17 +105,19 @@ class Scope(Holder):
             full = self._free(part.path, position, problems)
         made, aspects = self._made(part, full, position)
         made.graph.components[full].priority = priority or made.graph.components[full].priority
-        draft = self._model.edit()
-        draft.merge(made, draft.graph.director_of(full))
+        graph = self._model.edit()
+        graph.merge(made, graph.director_of(full))
         self._model.enlist(aspects)
         return part if isinstance(part, Actor) else self._composite(full)
 
-    def _made(self, part: Actor | CompositeInstance, full: str, position: Position) -> tuple[Draft, list[WovenAspect]]:
+    def _made(
+        self, part: Actor | CompositeInstance, full: str, position: Position
+    ) -> tuple[ModelGraph, list[WovenAspect]]:
         """A part to be merged, and the aspects that come with it."""
-        draft = self._model.draft
+        graph = self._model.graph
         if not isinstance(part, Actor):
-            return part.unfold(full, draft, position)
-        made, name = draft.inside(draft.graph.director_of(full)), part.path
+            return part.unfold(full, graph, position)
+        made, name = graph.part(graph.director_of(full)), part.path
         part.move(full)
         made.graph.add_actor(part, position)
         try:
@@ -323,27 +324,27 @@ class Scope(Holder):
         if isinstance(aspect, Aspect):
             with raising() as problems:
                 named = Named(model.graph, self.path, position, problems).pointcuts(at, type(aspect))
-                pointcuts = Pointcuts(model.draft, Paths(model.draft), full, self.path, problems, type(aspect))
+                pointcuts = Pointcuts(Paths(model.graph), full, self.path, problems, type(aspect))
                 woven = bind(pointcuts, aspect, pointcuts.resolve(named), lambda _: position, position)
             model.enlist([woven])
             return woven
-        draft, others = model.draft.copy(), list[WovenAspect]()
+        graph, others = model.graph.copy(), list[WovenAspect]()
         if isinstance(aspect, Composite):
             path = aspect.path
         else:
             with raising() as problems:
                 path = self._free(aspect.path, position, problems)
-            made, others = aspect.unfold(path, draft, position)
-            draft.merge(made, draft.graph.director_of(path))
+            made, others = aspect.unfold(path, graph, position)
+            graph.merge(made, graph.director_of(path))
         kind = CompositeAspect if firing_time is None else CompositeExecutionAspect
         with raising() as problems:
-            named = Named(draft.graph, self.path, position, problems).pointcuts(at, kind)
+            named = Named(graph, self.path, position, problems).pointcuts(at, kind)
             named = [replace(each, firing_time=firing_time or 0.0) for each in named]
-            pointcuts = Pointcuts(draft, Paths(draft), full, self.path, problems, kind, path)
+            pointcuts = Pointcuts(Paths(graph), full, self.path, problems, kind, path)
             made_model = weave_model(pointcuts, kind(), named, lambda _: position, position)
             assert made_model
-            check_nesting([*model.aspects, made_model], draft.graph, problems)
-        model.adopt(draft, [*others, made_model])
+            check_nesting([*model.aspects, made_model], graph, problems)
+        model.adopt(graph, [*others, made_model])
         return made_model
 
     def unweave(self, name: str) -> None:

@@ -9,6 +9,7 @@ from typing import Any, TypeVar
 from epicycle.actors import Configurable, Parameter, declared_parameters, did_you_mean, nearest, to_nanoseconds
 
 from ..catalogue.like import LIKE
+from ..graph.model_graph import ModelGraph
 from ..language.models import CompositeText
 from ..language.parts import PartText
 from ..language.settings import Setting, Settings
@@ -18,7 +19,6 @@ from ..text.limits import RAISE_IT
 from ..text.patterns import TooManyError
 from ..text.problems import POISON, Poison, Position, Problems
 from .configure import Chosen, as_meant, configure, tell_missing
-from .draft import Draft
 
 T = TypeVar("T")
 
@@ -116,10 +116,10 @@ class Settler:
         found = self.values.value(part.enabled, local, f"aspect {name}.enabled")
         return found is POISON or bool(found)
 
-    def check_unused(self, draft: Draft) -> None:
+    def check_unused(self, graph: ModelGraph) -> None:
         """Add a problem for every setting that no parameter took, unless it is for an array that is empty now."""
         for setting in self.settings.unused():
-            if not draft.excuses(setting.path):
+            if not graph.excuses(setting.path):
                 self._add_unused(setting)
 
     def _add_unused(self, setting: Setting) -> None:

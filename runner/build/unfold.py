@@ -1,7 +1,7 @@
-"""Unfolding: from declarations to a draft with all actors, composites and ports, connected.
+"""Unfolding: from declarations to a graph with all actors, composites and ports, connected.
 
 Problems are reported and worked around, so that one load reports all of them: a wrong value becomes ``missing``, and
-what is computed from it is not checked; a part that cannot be made is a gap in the draft.
+what is computed from it is not checked; a part that cannot be made is a gap in the graph.
 """
 
 from __future__ import annotations
@@ -17,7 +17,8 @@ from epicycle.actors import Actor, FaultError, Parameter, did_you_mean
 from ..catalogue.dialect import Dialect
 from ..catalogue.port_types import read_type, token_types
 from ..catalogue.types import Catalogue, CatalogueError
-from ..graph.nodes import Modal
+from ..graph.model_graph import ModelGraph
+from ..graph.nodes import Gap, Modal
 from ..language.models import CompositeText
 from ..language.parts import PartText
 from ..language.ports import PortText
@@ -28,7 +29,6 @@ from ..text.limits import RAISE_IT
 from ..text.problems import POISON, Poison, Position
 from .composite_aspect import as_actor
 from .connect import Child, Inside, Wiring, child_of_actors, make
-from .draft import Draft, Gap
 from .modes import connect_modes
 from .settle import OF_DIRECTORS, Settler
 
@@ -72,17 +72,17 @@ class Known:
 
 
 class Unfolding:
-    """What is made from declarations: parts in a draft, and the aspects that are to be woven around them.
+    """What is made from declarations: parts in a graph, and the aspects that are to be woven around them.
 
     ``trial``: parts are made only to find problems in them, up to that number; exceeding it is not reported.
     """
 
-    def __init__(self, known: Known, settler: Settler, draft: Draft, trial: int | None = None) -> None:
+    def __init__(self, known: Known, settler: Settler, graph: ModelGraph, trial: int | None = None) -> None:
         self.known = known
         self.settler = settler
         self.values = settler.values
         self.problems = settler.problems
-        self.draft = draft
+        self.graph = graph
         self.aspects: list[tuple[str, PartText, Names]] = []  # where they are declared, and what their values may use
         self.actors: list[Actor] = []
         self.classes: set[str] = set()  # the composites of which there are instances
@@ -101,7 +101,7 @@ class Unfolding:
             full = f"{path}.{name}" if path else name
             child = self.instances(full, part, names, within)
             if child is None:
-                self.draft.gaps[full] = Gap()
+                self.graph.gaps[full] = Gap()
             else:
                 children[name] = child
         others = [
@@ -117,18 +117,18 @@ class Unfolding:
         inside = Inside(
             path, composite.name, composite.inputs, composite.outputs, composite.actors, children, composite
         )
-        wiring = Wiring(inside, self.draft.graph, self.values, self.problems)
+        wiring = Wiring(inside, self.graph, self.values, self.problems)
         for name, child in others:
             wiring.check_ports(name, child, composite.connections)
         for connection in composite.connections:
-            make(wiring.resolve(connection, names) if connection else [POISON], self.draft)
+            make(wiring.resolve(connection, names) if connection else [POISON], self.graph)
         if composite.machine is not None:
             self._modes(path, composite, names, within)
         self.aspects += ((path, part, names) for part in composite.aspects.values())
 
     def _modes(self, path: str, composite: CompositeText, names: Names, within: tuple[str, ...]) -> None:
         """Make the machine of a composite with modes and their refinements, and connect them."""
-        graph, made = self.draft.graph, dict[str, str]()
+        graph, made = self.graph, dict[str, str]()
         assert composite.machine is not None
         machine = f"{path}.{composite.machine.name}"
         self.instances(machine, composite.machine, names, within)
@@ -143,7 +143,7 @@ class Unfolding:
                 self._tell(message, part.type.position, path, "write a composite class that contains that actor")
         if made:
             graph.domains[path].modal = Modal(machine, made)
-        connect_modes(path, composite, self.known.composites, self.draft, self.problems)
+        connect_modes(path, composite, self.known.composites, self.graph, self.problems)
 
     def instances(
         self, path: str, part: PartText, names: Names, within: tuple[str, ...] = (), *, is_refinement: bool = False
@@ -155,9 +155,9 @@ class Unfolding:
             return None
         count, is_array = self._count(path, part, names), part.count is not None
         if count is POISON:
-            self.draft.gaps[path] = Gap()
+            self.graph.gaps[path] = Gap()
         elif count == 0:
-            self.draft.gaps[path] = Gap(frozenset(self._kinds(part)), is_empty=True)
+            self.graph.gaps[path] = Gap(frozenset(self._kinds(part)), is_empty=True)
         paths = [f"{path}[{index}]" if is_array else path for index in range(count or 0)]
         for index, instance in enumerate(paths):
             self._count_one(path, part)
@@ -170,11 +170,11 @@ class Unfolding:
                 self.composite(instance, kind, inside, part.position, within, is_refinement=is_refinement)
             else:
                 self._actor(instance, kind, part, scope)
-            if (component := self.draft.graph.components.get(instance)) is not None:
+            if (component := self.graph.components.get(instance)) is not None:
                 component.priority, component.tags = priority, tuple(tag.text for tag in part.tags)
         if isinstance(kind, CompositeText):
             return Child(kind.name, paths, is_array, count, list(kind.inputs), list(kind.outputs))
-        return child_of_actors(kind, paths, is_array, count, self.draft.graph)
+        return child_of_actors(kind, paths, is_array, count, self.graph)
 
     def _others(
         self, path: str, composite: CompositeText, part: PartText, names: Names, within: tuple[str, ...]
@@ -186,7 +186,7 @@ class Unfolding:
         trial = copy(self)
         trial.settler = Settler(Settings(), self.problems, Values(self.problems, self.values.budget))
         trial.values = trial.settler.values
-        trial.draft, trial.aspects, trial.actors = self.draft.inside(self.draft.graph.director_of(path)), [], []
+        trial.graph, trial.aspects, trial.actors = self.graph.part(self.graph.director_of(path)), [], []
         chosen = _chosen(part, names)
         others = [each for each in part.choices.values() if each is not chosen]
         try:
@@ -225,7 +225,7 @@ class Unfolding:
 
     def known_at(self, path: str) -> Known:
         """The possible types of a part, under its director."""
-        dialect = self.draft.graph.domain_of(path).dialect
+        dialect = self.graph.domain_of(path).dialect
         if dialect not in self._like:
             self._like[dialect] = self.known.like(dialect)
         return self._like[dialect]
@@ -237,7 +237,7 @@ class Unfolding:
         """The number of instances."""
         if part.count is None:
             return 1
-        count = Parameter(int, min=0, max=self.draft.graph.limits.actors)
+        count = Parameter(int, min=0, max=self.graph.limits.actors)
         local, node = Locals(path, names), part.count.node
         found: int | Poison = self.values.converted(node, local, f"{path}: count", count.convert)
         return found
@@ -245,7 +245,7 @@ class Unfolding:
     def _count_one(self, path: str, part: PartText) -> None:
         """Count one more instance; raises ``TooLargeError`` if there are too many."""
         self.cost += 1
-        most = self.draft.graph.limits.actors if self._trial is None else self._trial
+        most = self.graph.limits.actors if self._trial is None else self._trial
         if self.cost > most:
             if self._trial is None:
                 message = f"{path}: the model has more than {most:,} actors and composites"
@@ -281,12 +281,12 @@ class Unfolding:
 
         def make(**values: object) -> Actor:
             made = actor_type(path, **values)
-            self.draft.graph.add_actor(made, part.position)
+            self.graph.add_actor(made, part.position)
             return made
 
         actor = self.settler.configured(actor_type, part, local, path, make)
         if isinstance(actor, Poison):
-            self.draft.leave_out(path, actor_type)
+            self.graph.leave_out(path, actor_type)
         else:
             self.actors.append(actor)
 
@@ -303,7 +303,7 @@ class Unfolding:
         is_refinement: bool = False,
     ) -> None:
         """One instance of a composite, its ports and its parts; ``inside`` are its parameters."""
-        graph = self.draft.graph
+        graph = self.graph
         self.classes.add(composite.name)
         graph.add_composite(path, composite.name, position)
         for direction in ("input", "output"):
@@ -321,7 +321,7 @@ class Unfolding:
     def dialect(self, model: CompositeText, names: Names) -> None:
         """The dialect of the model's director."""
         if like := self._director(model.name, "", model.director or {}, names).get("like"):
-            self.draft.graph.domains[""].dialect = like
+            self.graph.domains[""].dialect = like
 
     def _director(self, what: str, path: str, given: Mapping[str, Entry], names: Names) -> dict[str, Any]:
         """The settings of a director; wrong ones are left out."""
@@ -354,7 +354,7 @@ class Unfolding:
         self, path: str, composite: CompositeText, part: PartText, names: Names, within: tuple[str, ...]
     ) -> Child | None:
         """Make the composite of an aspect; if it is not enabled, only to check it."""
-        full, graph = f"{path}.{part.name}" if path else part.name, self.draft.graph
+        full, graph = f"{path}.{part.name}" if path else part.name, self.graph
         is_port = part.name in composite.inputs or part.name in composite.outputs
         if is_port or part.name in composite.actors or full in graph.components:
             clash = "a port" if is_port else "an actor"
@@ -365,12 +365,12 @@ class Unfolding:
         if self.settler.is_enabled(full, part, Locals(path, names)):
             return self.instances(full, as_actor(part), names, within)
         trial = copy(self)
-        trial.draft, trial.aspects, trial.actors = self.draft.inside(graph.director_of(full)), [], []
+        trial.graph, trial.aspects, trial.actors = self.graph.part(graph.director_of(full)), [], []
         try:
             trial.instances(full, as_actor(part), names, within)
         finally:
             self.cost = trial.cost
-        self.draft.gaps[full] = Gap()
+        self.graph.gaps[full] = Gap()
         return None
 
 

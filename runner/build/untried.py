@@ -13,7 +13,6 @@ from ..language.values import Locals, Values
 from ..text.limits import RAISE_IT, Limits
 from ..text.problems import POISON, Problems
 from .checks import check
-from .draft import Draft
 from .settle import Settler
 from .unfold import Known, TooLargeError, Unfolding
 from .weave_all import weave_all
@@ -43,9 +42,9 @@ def try_classes(known: Known, used: Collection[str], values: Values, limits: Lim
         is_whole = False
         if left > 0:
             settler = Settler(Settings(), problems, Values(problems, values.budget))
-            made = Unfolding(known, settler, Draft(ModelGraph(limits)), left)
+            made = Unfolding(known, settler, ModelGraph(limits), left)
             is_whole = _try(composites[name], made)
-            left -= _OVERHEAD + made.cost + (made.draft.graph.connections + made.places) // 5
+            left -= _OVERHEAD + made.cost + (made.graph.connections + made.places) // 5
             tried |= made.classes
         if not is_whole:
             untried.append(name)
@@ -60,7 +59,7 @@ def try_classes(known: Known, used: Collection[str], values: Values, limits: Lim
 
 def _try(composite: CompositeText, made: Unfolding) -> bool:
     """Unfold one instance of a class, with its name and nothing around it; returns whether all of it was checked."""
-    path, values, draft = composite.name, made.values, made.draft
+    path, values, graph = composite.name, made.values, made.graph
     names: dict[str, object] = {}
     for name, declared in composite.parameters.items():
         if declared.value is not None:
@@ -73,8 +72,8 @@ def _try(composite: CompositeText, made: Unfolding) -> bool:
         made.composite(path, composite, names, None)
     except TooLargeError:
         return False
-    inputs, outputs = draft.graph.borders(path)
-    draft.fed.update(inputs, outputs)  # anything may be connected to them
+    inputs, outputs = graph.borders(path)
+    graph.fed.update(inputs, outputs)  # anything may be connected to them
     weave_all(made)
-    check(draft, made.problems, whole=False)
+    check(graph, made.problems, whole=False)
     return True

@@ -11,6 +11,7 @@ from epicycle.actors import Parameter, accepts, declared_parameters, did_you_mea
 from epicycle.actors.expression import ExpressionError, Formula
 
 from ..catalogue.measure import Measure
+from ..graph.model_graph import ModelGraph
 from ..graph.watched import Metric, Watched
 from ..language.metrics import MetricText
 from ..language.models import ModelText
@@ -24,17 +25,15 @@ from ..text.problems import POISON, Poison, Position, Problems
 from ..text.program import entries_of
 from ..text.reading import Text, within
 from .configure import configure
-from .draft import Draft
 from .monitors import monitor_of
 
 
 class Watching:
     """Adds to what is watched (``found``): ``read`` what a file declares, the others what a program asks for."""
 
-    def __init__(self, draft: Draft, values: Values, problems: Problems, found: Watched | None = None) -> None:
+    def __init__(self, graph: ModelGraph, values: Values, problems: Problems, found: Watched | None = None) -> None:
         self.found = Watched() if found is None else found.copy()
-        self.draft = draft
-        self.graph = draft.graph
+        self.graph = graph
         self.values = values
         self.problems = problems
         outputs = (path for path, node in self.graph.ports.items() if node.direction == "output")
@@ -157,7 +156,7 @@ class Watching:
         requirement = configure(
             Requirement, text.values, local, what, at, self.values, make=Requirement, evaluated=given
         )
-        found = requirement and monitor_of(self.draft, text, requirement, self.problems)
+        found = requirement and monitor_of(self.graph, text, requirement, self.problems)
         if not found:
             return
         self._watched += len(found.ports)
@@ -184,7 +183,7 @@ class Watching:
             return []
         except TooManyError as error:
             self.problems.stop(f"{what}: {error}", text.position, RAISE_IT)
-        if found or self.draft.excuses(text.text):
+        if found or self.graph.excuses(text.text):
             return found
         guess = self._outputs.did_you_mean(text.text)
         if text.text in self.graph.ports:

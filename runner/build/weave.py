@@ -178,7 +178,7 @@ class Pointcuts(View):
             return self._no_pattern(pointcut, error, "[a.in, b.in]")
         if found:
             return found
-        if self.draft.excuses(full):
+        if self.graph.excuses(full):
             return POISON
         near = self.ports.did_you_mean(pointcut.text, self.scope, self._fits)
         advice = self.ports.advice(pointcut.text, self.scope, self._fits)
@@ -198,7 +198,7 @@ class Pointcuts(View):
         ports = self.ports.in_order(path for path in of_owners if graph.owner(path) in owners)
         if pointcut.port is None:
             found = [path for path in ports if self._fits(path)]
-            if not found and not any(path in self.draft.gaps for path in owners):
+            if not found and not any(path in self.graph.gaps for path in owners):
                 wanting = " or ".join(sorted(self.cls.stands_at))
                 where = pointcut.type or pointcut.tag
                 return self.tell(f"{self.kind} attaches to {wanting} ports, but no {_asked(pointcut)} has one", where)
@@ -213,24 +213,22 @@ class Pointcuts(View):
 
     def _chosen_owners(self, pointcut: PointcutText) -> set[str] | Poison:
         """The actors and composites of a type, or with a tag."""
-        graph, kinds = self.graph, self.paths.kinds
-        inside = self.paths.holders.inside(self.scope)
-        self.paths.holders.spend(len(inside))
-        inside = [path for path in inside if path in kinds]
+        paths = self.paths.holders.inside(self.scope)
+        self.paths.holders.spend(len(paths))
+        inside = {path: self.graph.components[path] for path in paths}
         if pointcut.type is not None:
-            owners = {path for path in inside if kinds[path] == pointcut.type.text}
-            wanted, known = pointcut.type, {kinds[path] for path in inside}
+            wanted, known = pointcut.type, {each.kind for each in inside.values()}
+            owners = {path for path, each in inside.items() if each.kind == wanted.text}
         else:
             assert pointcut.tag is not None
-            wanted = pointcut.tag
-            owners = {path for path in inside if wanted.text in graph.components[path].tags}
-            known = {tag for path in inside for tag in graph.components[path].tags}
+            wanted, known = pointcut.tag, {tag for each in inside.values() for tag in each.tags}
+            owners = {path for path, each in inside.items() if wanted.text in each.tags}
         if owners:
             return owners
-        if self.draft.may_hold(wanted.text, self.scope):
+        if self.graph.may_hold(wanted.text, self.scope):
             return POISON
         what = "types" if pointcut.type is not None else "tags"
-        message = f"there is no {_asked(pointcut)}{did_you_mean(wanted.text, sorted(known | self.draft.kinds))}"
+        message = f"there is no {_asked(pointcut)}{did_you_mean(wanted.text, sorted(known | self.graph.missing_kinds))}"
         return self.tell(message, wanted, f"{what} here: {', '.join(sorted(known)) or 'none'}")
 
     def _connections(self, pointcuts: Sequence[PointcutText]) -> tuple[list[Found], list[Ends]]:
@@ -265,7 +263,7 @@ class Pointcuts(View):
         found = [(hop.source, hop.destination) for hop in hops if hop.destination in ends]
         if found:
             return found
-        if self.draft.excuses(left) or self.draft.excuses(right):
+        if self.graph.excuses(left) or self.graph.excuses(right):
             return POISON
         near = did_you_mean(connection_place(left, right), map(str, self.graph.hops))
         return self.tell(f"{pointcut.text!r} matches no connection{near}", pointcut)
@@ -317,7 +315,7 @@ class Pointcuts(View):
             return self._no_pattern(pointcut, error, "[a, b]")
         if found:
             return found
-        if self.draft.excuses(f"{full}.*"):
+        if self.graph.excuses(f"{full}.*"):
             return POISON
         if ports and "." in text:
             hint = f"write {text.rpartition('.')[0]!r}, without the port"
@@ -333,7 +331,7 @@ def bind(view: View, aspect: Aspect, places: Places, place_of: PlaceOf, position
 
     ``place_of`` returns where something is wrong with its parameters in the model file.
     """
-    looks = Looks(view.draft, view.paths, view.name, view.scope, view.problems)
+    looks = Looks(view.paths, view.name, view.scope, view.problems)
     readings, selections, reads = looks.of(aspect, places.ports, place_of)
     woven = WovenAspect(
         view.name,

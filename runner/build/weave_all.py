@@ -30,7 +30,6 @@ from ..text.patterns import TooManyError
 from ..text.problems import POISON, Position, Problems
 from ..text.reading import Text
 from .composite_aspect import OWN, check_nesting, detours, weave_model
-from .draft import Draft
 from .paths import Paths
 from .unfold import Names, Unfolding
 from .weave import Places, Pointcuts, bind
@@ -38,7 +37,7 @@ from .weave import Places, Pointcuts, bind
 
 def weave_all(made: Unfolding) -> list[WovenAspect]:
     """Attach all aspects, now that all ports exist, in the order in which tokens meet them."""
-    weaver, graph, problems = _Weaver(made), made.draft.graph, made.problems
+    weaver, graph, problems = _Weaver(made), made.graph, made.problems
     for scope, part, names in made.aspects:
         name = f"{scope}.{part.name}" if scope else part.name
         try:
@@ -51,7 +50,7 @@ def weave_all(made: Unfolding) -> list[WovenAspect]:
         if type(actor) in decorated:
             position = graph.components[actor.path].position
             assert position is not None, "all that is unfolded is written somewhere"
-            found += weave_decorations(actor, made.draft, problems, position, made.settler.set_from_outside)
+            found += weave_decorations(actor, made.graph, problems, position, made.settler.set_from_outside)
     found = arranged(found, graph)
     if check_nesting(found, graph, problems):
         graph.detours = detours(graph, found)
@@ -63,11 +62,10 @@ class _Weaver:
 
     def __init__(self, made: Unfolding) -> None:
         self.made = made
-        self.draft = made.draft
-        self.graph = made.draft.graph
+        self.graph = made.graph
         self.settler = made.settler
         self.problems = made.problems
-        self.paths = Paths(made.draft)
+        self.paths = Paths(made.graph)
         self.found: list[WovenAspect] = []
 
     def weave(self, name: str, scope: str, part: PartText, names: Names) -> None:
@@ -82,7 +80,7 @@ class _Weaver:
             hint = "add 'at:' with ports or patterns"
             self.problems.add(f"aspect {name} has no 'at'", part.position, hint, scope=scope)
         own = name if is_model and self.graph.is_composite(name) else ""
-        pointcuts = Pointcuts(self.draft, self.paths, name, scope, self.problems, cls, own)
+        pointcuts = Pointcuts(self.paths, name, scope, self.problems, cls, own)
         is_enabled = bool(own) if is_model else self.settler.is_enabled(name, part, Locals(scope, names))
         place_of = partial(place_in, Mapping(part.values, part.position))
         if own:
@@ -134,7 +132,7 @@ class _Weaver:
             message = f"aspect {name}: it attaches to ports here, but to actors elsewhere"
             hint = "give every place a time, or none: at actors it is the execution time of their firings"
             self.problems.add(message, at_ports[0].position, hint, scope=scope)
-            self.draft.leave_open(name)
+            self.graph.leave_open(name)
             return None
         return CompositeExecutionAspect if aimed and not at_ports else CompositeAspect
 
@@ -149,14 +147,14 @@ Change = Callable[[str, Aspect], AnyMapping[str, object]]
 
 
 def weave_decorations(
-    actor: Actor, draft: Draft, problems: Problems, position: Position, change: Change | None = None
+    actor: Actor, graph: ModelGraph, problems: Problems, position: Position, change: Change | None = None
 ) -> list[WovenAspect]:
     """The aspects that come with an actor; ``change`` returns the parameters that are set from outside."""
     before: list[WovenAspect] = []
     behind: list[WovenAspect] = []
     for each in decorations(actor):
-        woven = _weave(actor, each, draft, problems, position, change)
-        if woven is not None and _is_at_outputs(woven, draft.graph):
+        woven = _weave(actor, each, graph, problems, position, change)
+        if woven is not None and _is_at_outputs(woven, graph):
             before.append(woven)
         elif woven is not None:
             behind.insert(0, woven)
@@ -164,7 +162,12 @@ def weave_decorations(
 
 
 def _weave(
-    actor: Actor, decoration: Decoration, draft: Draft, problems: Problems, position: Position, change: Change | None
+    actor: Actor,
+    decoration: Decoration,
+    graph: ModelGraph,
+    problems: Problems,
+    position: Position,
+    change: Change | None,
 ) -> WovenAspect | None:
     name, aspect = f"{actor.path}.{decoration.name}", decoration.aspect
     own = {**actor.inputs, **actor.outputs}
@@ -182,8 +185,8 @@ def _weave(
         except EpicycleError as error:
             problems.add(f"aspect {name}: {error}", position)
             return None
-    paths = Paths(draft, [port.path for port in own.values()])
-    pointcuts = Pointcuts(draft, paths, name, actor.path, problems, type(aspect))
+    paths = Paths(graph, [port.path for port in own.values()])
+    pointcuts = Pointcuts(paths, name, actor.path, problems, type(aspect))
     named = pointcuts.resolve([PointcutText.of(Text(each, position)) for each in at_parameter])
     places = Places(
         [own[port].path for port in decoration.ports if port in own],

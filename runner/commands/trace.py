@@ -79,7 +79,7 @@ def _actors(patterns: list[str], model: Model) -> dict[str, Actor]:
             found = select(pattern, known)
         except PatternError as error:
             raise EpicycleError(f"--actor {pattern}: {error}") from None
-        if not found and not model.draft.excuses(pattern):
+        if not found and not model.graph.excuses(pattern):
             raise EpicycleError(f"--actor {pattern} matches no actor{did_you_mean(pattern, known)}")
         chosen.update(found)
 

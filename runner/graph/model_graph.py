@@ -6,18 +6,19 @@ any composite ports, to an actor's input port.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from epicycle.actors import Actor, InputPort, OutputPort
+from epicycle.actors import Actor, InputPort, OutputPort, declared_ports, has_own_ports
 from epicycle.aspects import Request
 
 from ..catalogue.dialect import Dialect
 from ..text.limits import NORMAL, Limits
+from ..text.patterns import could_be_within
 from ..text.problems import Position
 from .clock import Clock
-from .nodes import Component, Detour, Domain, Hop, Modal, PortNode, Wire, is_within
+from .nodes import Component, Detour, Domain, Gap, Hop, Modal, PortNode, Wire, is_within
 
 
 class ModelGraph:
@@ -25,6 +26,10 @@ class ModelGraph:
 
     A part of a model is a graph, too, until it is merged; ``inside`` is then the graph that it will join, and
     ``director`` the director that it will be under.
+
+    Each problem of a model is reported once, where it is found.  From then on it is a gap, about which nothing more is
+    reported: a part that could not be made, a port that may be connected to anything, a connection that could not be
+    understood.  The empty array of a valid model is a gap, too: it may be named although it has no instances.
     """
 
     def __init__(self, limits: Limits = NORMAL, inside: ModelGraph | None = None, director: str = "") -> None:
@@ -37,6 +42,9 @@ class ModelGraph:
             "": Domain(Clock(), Dialect) if outer is None else Domain(outer.clock, outer.dialect)
         }
         self.detours: list[Detour] = []  # found when the model is checked, see ``detours``
+        self.gaps: dict[str, Gap] = {}  # by path; in a valid model, all of them are empty arrays
+        self.fed: set[str] = set()  # inputs to which anything may be connected
+        self.is_wired = True  # whether every connection has been made
         self.limits: Limits = limits if inside is None else inside.limits
         self.is_frozen = False
         self._channels: Channels | None = None  # worked out since then
@@ -60,7 +68,12 @@ class ModelGraph:
         made.components = {path: each.copy() for path, each in self.components.items()}
         made.domains = {path: replace(each, members=[*each.members]) for path, each in self.domains.items()}
         made._hops, made._order = dict(self._hops), self._order
+        made.gaps, made.fed, made.is_wired = dict(self.gaps), {*self.fed}, self.is_wired
         return made
+
+    def part(self, director: str) -> ModelGraph:
+        """A part that is to be merged later, under a director of this graph."""
+        return ModelGraph(inside=self, director=director)
 
     def merge(self, part: ModelGraph, director: str) -> None:
         """Take in a part that was made for this graph."""
@@ -75,6 +88,9 @@ class ModelGraph:
         self.domains |= part.domains
         self._hops |= part._hops
         self._order = max(self._order, part._order)
+        self.gaps |= part.gaps
+        self.fed |= part.fed
+        self.is_wired = self.is_wired and part.is_wired
 
     def add_actor(self, actor: Actor, position: Position | None) -> None:
         self._check_open()
@@ -346,6 +362,37 @@ class ModelGraph:
                 waiting += [each for each in reversed(before) if each not in seen]
                 seen.update(before)
         return found
+
+    # -- gaps -----------------------------------------------------------------------------------------------------
+
+    def leave_out(self, path: str, actor_type: type[Actor]) -> None:
+        """Add the ports of an actor that could not be made, so that references to them are not wrong, too."""
+        for name, port in declared_ports(actor_type).items():
+            self.ports[f"{path}.{name}"] = PortNode(None, port.direction)
+            self.fed.add(f"{path}.{name}")
+        self.gaps[path] = Gap(frozenset({actor_type.__name__}), has_own_ports(actor_type))
+
+    def leave_open(self, composite: str) -> None:
+        """Report nothing more about what comes into a composite."""
+        self.fed.update(self.borders(composite)[0])
+
+    @property
+    def missing_kinds(self) -> set[str]:
+        """The types and tags of what is missing."""
+        return set[str]().union(*(gap.kinds for gap in self.gaps.values()))
+
+    def may_hold(self, kind: str, scope: str) -> bool:
+        """Whether there may be a part of that type, or with that tag, in a composite."""
+        inside = (path for path, gap in self.gaps.items() if gap.is_open and not gap.is_empty)
+        return kind in self.missing_kinds or any(not scope or path.startswith(f"{scope}.") for path in inside)
+
+    def excuses(self, pattern: str) -> bool:
+        """Whether a pattern may match nothing: it names an empty array, or something unknown."""
+        return any(could_be_within(pattern, path, array=gap.is_empty) for path, gap in self.gaps.items() if gap.is_open)
+
+    def may_be_fed(self, ports: Iterable[str]) -> bool:
+        """Whether a connection to one of these inputs may be missing because of another problem."""
+        return not self.is_wired or not self.fed.isdisjoint(ports)
 
 
 class Channels:

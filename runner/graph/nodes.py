@@ -97,6 +97,18 @@ class Component:
         return replace(self, borders=([*inputs], [*outputs]), parts=parts)
 
 
+@dataclass(frozen=True)
+class Gap:
+    """A part that is missing: its types and tags, as far as they are known, and those of the parts in it.
+
+    It ``is_open`` if anything may be behind its path, and ``is_empty`` if it is an array without instances.
+    """
+
+    kinds: frozenset[str] = frozenset()
+    is_open: bool = True
+    is_empty: bool = False
+
+
 def is_within(path: str, outer: str) -> bool:
     """Whether a path is that of a part or of something in it."""
     return path == outer or path.startswith(f"{outer}.")

@@ -77,8 +77,8 @@ def state(model: Model) -> Any:
         "actors": [(path, id(actor), actor.path, actor.is_part) for path, actor in graph.actors.items()],
         "components": [(path, str(each)) for path, each in graph.components.items()],
         "domains": [(path, str(each)) for path, each in graph.domains.items()],
-        "gaps": (dict(model.draft.gaps), set(model.draft.fed)),
-        "rest": (model.draft.is_wired, graph.next_order, list(map(str, graph.detours)), model.is_checked),
+        "gaps": (dict(model.graph.gaps), set(model.graph.fed)),
+        "rest": (model.graph.is_wired, graph.next_order, list(map(str, graph.detours)), model.is_checked),
         "aspects": [(woven.name, id(woven), repr(woven)) for woven in model.aspects],
         "watched": (
             model.watched.recorded[:],
