@@ -56,7 +56,7 @@ class Building:
         if not self.is_checked:
             problems = Problems()
             if check_nesting(self.aspects, self.graph, problems):
-                self.edit().graph.detours = detours(self.graph, self.aspects)
+                self.edit().detours = detours(self.graph, self.aspects)
             check(self.graph, problems)
             check_processors(self.aspects, problems)
             problems.raise_if_any()
@@ -92,7 +92,7 @@ class Building:
 
     def forget(self, path: str) -> None:
         """Remove an actor or composite, and everything that attaches to it or watches it."""
-        self.edit().graph.remove(path)
+        self.edit().remove(path)
         self.aspects = [
             woven.without(path)
             for woven in self.aspects

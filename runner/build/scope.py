@@ -104,7 +104,7 @@ class Scope(Holder):
         with raising() as problems:
             full = self._free(part.path, position, problems)
         made, aspects = self._made(part, full, position)
-        made.graph.components[full].priority = priority or made.graph.components[full].priority
+        made.components[full].priority = priority or made.components[full].priority
         graph = self._model.edit()
         graph.merge(made, graph.director_of(full))
         self._model.enlist(aspects)
@@ -119,7 +119,7 @@ class Scope(Holder):
             return part.unfold(full, graph, position)
         made, name = graph.part(graph.director_of(full)), part.path
         part.move(full)
-        made.graph.add_actor(part, position)
+        made.add_actor(part, position)
         try:
             with raising() as problems:
                 return made, weave_decorations(part, made, problems, position)
@@ -156,7 +156,7 @@ class Scope(Holder):
                 problems.add(message, position, "write director=True, or set it for the model")
         for number, (_, port) in enumerate(ports):
             made.check_port(port, [each for _, each in ports[:number]], position)
-        graph = self._model.edit().graph
+        graph = self._model.edit()
         graph.add_composite(full, OF_NO_CLASS, position)
         if director:
             graph.add_director(full, **given)
@@ -259,7 +259,7 @@ class Scope(Holder):
                     problems.add(
                         f"{one} is not connected to {other}", position, f"{one} is connected to: {here or 'nothing'}"
                     )
-        graph = self._model.edit().graph
+        graph = self._model.edit()
         for hop in found:
             graph.disconnect(hop)
 
@@ -378,7 +378,7 @@ class Composite(Scope):
         position = call_site()
         self.check_port(name, (), position)
         full = self._full(name)
-        self._model.edit().graph.add_composite_port(full, direction)
+        self._model.edit().add_composite_port(full, direction)
         return CompositePort(full, direction)
 
     def check_port(self, name: str, others: Collection[str], position: Position) -> None:
