@@ -23,7 +23,7 @@ from typing import Any, NamedTuple
 import pytest
 
 from epicycle.runner import ModelError, Simulation, load_model
-from epicycle.runner.catalogue.measure import TAKES, TIME, TOKENS
+from epicycle.runner.catalogue.metrics import TAKES, TIME, TOKENS
 from epicycle.runner.catalogue.types import built_in
 from epicycle.runner.cli import main
 from epicycle.runner.language.study import read_study

@@ -18,7 +18,7 @@ from pathlib import Path
 import pytest
 
 from epicycle.actors.compiled import LIBRARIES
-from epicycle.runner.catalogue.measure import TAKES
+from epicycle.runner.catalogue.metrics import TAKES
 from tests.plugins import ABSENT, PLUGINS
 
 ROOT = Path(__file__).parents[1]

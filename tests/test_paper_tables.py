@@ -221,7 +221,7 @@ def test_table_3_of_the_scenario() -> None:
     assert [held(actor(name), {"goal": 0, "tolerance": 0}) for name in ("arrival", "arrival_near", "arrival_far")] == [
         {"goal": GOAL, "tolerance": tolerance} for tolerance in (0.5, 0.2, 1.0)
     ]
-    delays = {hop.destination: hop.delay for hop in model().graph.hops if hop.delay is not None}
+    delays = {hop.destination: hop.delay for hop in model().graph.edges if hop.delay is not None}
     # What is planned at t is known to the others, and acts, at t + 1.
     assert delays == dict.fromkeys(
         [f"{robot}.{port}" for robot in (MAIN, *OBSERVERS) for port in ("peer_plan", "vehicle.acceleration")],

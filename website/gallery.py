@@ -114,7 +114,7 @@ def _exhibit(name: str, path: Path, folder: Path) -> Exhibit:
 
 def _numbers(model: Model, results: Results) -> str:
     rows = []
-    for metric in model.watched.metrics:
+    for metric in model.output.metrics:
         unit = "" if metric.unit == "1" else metric.unit
         rows.append((metric.name, results.outcomes[metric.name].shown(shown), unit, metric.measure.doc))
     for name, figures in results.aspects.items():

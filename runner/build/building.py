@@ -11,8 +11,8 @@ from ..collection import without_collection
 from ..graph.acts import ActName
 from ..graph.model_graph import ModelGraph
 from ..graph.nodes import is_within
+from ..graph.outputs import OutputSpec
 from ..graph.ranks import firing_order
-from ..graph.watched import Watched
 from ..graph.woven import WovenAspect, check_processors
 from ..text.problems import Position, Problem, Problems
 from .checks import check
@@ -30,7 +30,7 @@ class Building:
         self.parameters: dict[str, object] = {}
         self.aspects: list[WovenAspect] = []
         self.exactly: frozenset[ActName] | None = None  # the only acts of aspects that happen
-        self.watched = Watched()
+        self.output = OutputSpec()
         self.warnings: tuple[Problem, ...] = ()  # what is odd but not wrong
         self.is_checked = False  # since the last change
         self.origin: Origin | None = None  # what it was made from, if that is all there is to it
@@ -44,7 +44,7 @@ class Building:
     def position_of(self, path: str) -> Position | None:
         """Where an actor, a composite, ``aspect NAME`` or ``stop_when`` is declared, if that is known."""
         if path == "stop_when":
-            return self.watched.stop_position
+            return self.output.stop_position
         woven = next((each for each in self.aspects if path == f"aspect {each.name}"), None)
         return self.graph.position_of(path) if woven is None else woven.position
 
@@ -98,4 +98,4 @@ class Building:
             for woven in self.aspects
             if not is_within(woven.name, path) and not (woven.model and is_within(woven.model.path, path))
         ]
-        self.watched = self.watched.without(path)
+        self.output = self.output.without(path)

@@ -11,7 +11,7 @@ from epicycle.actors import InputPort, accepts, counted, type_name
 
 from ..graph.digraph import find_loop, in_order
 from ..graph.model_graph import ModelGraph
-from ..graph.nodes import Detour, Hop
+from ..graph.nodes import Detour, Edge
 from ..graph.ranks import Region, dependencies
 from ..text.limits import RAISE_IT
 from ..text.patterns import in_general
@@ -51,21 +51,21 @@ def check_passages(graph: ModelGraph, problems: Problems) -> bool:
     """Check that paths through composite ports end, and are few enough to be followed one by one."""
     ports = graph.ports
     between = {
-        path: [hop.destination for hop in graph.outgoing(path) if ports[hop.destination].port is None]
+        path: [edge.destination for edge in graph.outgoing(path) if ports[edge.destination].port is None]
         for path, node in ports.items()
         if node.port is None
     }
     if cycle := find_loop(between):
-        hop = next(hop for hop in graph.outgoing(cycle[-1]) if hop.destination == cycle[0])
+        edge = next(edge for edge in graph.outgoing(cycle[-1]) if edge.destination == cycle[0])
         message = f"a loop of composite ports with no actor in it: {' -> '.join([*cycle, cycle[0]])}"
         hint = "a composite that passes its input straight to its output cannot be connected to itself"
-        problems.add(message, hop.position, hint)
+        problems.add(message, edge.position, hint)
         return False
     # The number of wires that lead on from each port, without following them: there may be very many.
     onward: dict[str, int] = {}
     last: dict[str, tuple[int, str]] = {}  # how many composite ports follow each in a row, and the last of them
     for path in reversed(in_order(between)):
-        onward[path] = sum(onward.get(hop.destination, 1) for hop in graph.outgoing(path))
+        onward[path] = sum(onward.get(edge.destination, 1) for edge in graph.outgoing(path))
         last[path] = max(((last[far][0] + 1, last[far][1]) for far in between[path]), default=(0, path))
     first = max(last, key=last.__getitem__, default="")
     if first and last[first][0] > MAX_PASSAGE:
@@ -75,7 +75,7 @@ def check_passages(graph: ModelGraph, problems: Problems) -> bool:
     wires = 0
     for actor in graph.actors.values():
         for port in actor.outputs.values():
-            wires += sum(onward.get(hop.destination, 1) for hop in graph.outgoing(port.path))
+            wires += sum(onward.get(edge.destination, 1) for edge in graph.outgoing(port.path))
             limit = graph.limits.wires
             if wires > limit:
                 problems.add(f"the model has more than {limit:,} wires", graph.position_of(actor.path), RAISE_IT)
@@ -89,32 +89,32 @@ def check_types(graph: ModelGraph, problems: Problems) -> None:
         given = graph.type_of(path)
         if given is None:
             continue
-        for hops in _stretches(graph, path):
-            far = hops[-1].destination
+        for edges in _stretches(graph, path):
+            far = edges[-1].destination
             wanted = graph.type_of(far)
             if accepts(wanted, given):
                 continue
-            way = " -> ".join([path, *(hop.destination for hop in hops)])
-            first, last = hops[0].position, hops[-1].position
+            way = " -> ".join([path, *(edge.destination for edge in edges)])
+            first, last = edges[0].position, edges[-1].position
             verb = "sends" if graph.ports[path].port is not None else "passes on"
             problems.add(
                 f"{path} {verb} {type_name(given)}, but {far} takes {type_name(wanted)}",
                 first,
                 *(who for who in (_who(graph, path), _who(graph, far)) if who),
-                *((f"the path: {way}",) if len(hops) > 1 else ()),
+                *((f"the path: {way}",) if len(edges) > 1 else ()),
                 *((f"connected onward at {last}",) if first and last and first != last else ()),
                 about=("types", in_general(path), in_general(far)),
             )
 
 
-def _stretches(graph: ModelGraph, path: str) -> Iterator[tuple[Hop, ...]]:
+def _stretches(graph: ModelGraph, path: str) -> Iterator[tuple[Edge, ...]]:
     """The paths from a port to the next ports that have a type."""
-    for hop in graph.outgoing(path):
-        if graph.type_of(hop.destination) is not None:
-            yield (hop,)
+    for edge in graph.outgoing(path):
+        if graph.type_of(edge.destination) is not None:
+            yield (edge,)
         else:
-            for rest in _stretches(graph, hop.destination):
-                yield (hop, *rest)
+            for rest in _stretches(graph, edge.destination):
+                yield (edge, *rest)
 
 
 def _who(graph: ModelGraph, port: str) -> str:
@@ -146,11 +146,11 @@ def check_connections(graph: ModelGraph, problems: Problems) -> None:
                 writers = ", ".join(
                     f"{path} ({number} times)" if number > 1 else path for path, number in times.items()
                 )
-                first = wires[0].hops[-1].position
+                first = wires[0].edges[-1].position
                 what = f"{counted(len(times), 'sender')} write{'s' if len(times) == 1 else ''}"
                 problems.add(
                     f"{port.path} takes one connection, but {what} to it: {writers}",
-                    wires[1].hops[-1].position,
+                    wires[1].edges[-1].position,
                     *((f"the first connection is at {first}",) if first else ()),
                     "connect only one of them, or send through an actor that merges them",
                     "if they form one channel, write {from: [...], to: ..., shared: true}",
@@ -162,7 +162,7 @@ def _may_be_connected(graph: ModelGraph, path: str) -> bool:
     """Whether a missing connection may be due to another problem: a wrong connection, or a missing actor."""
     known, before = {path}, [path] if graph.fed else []
     while before:
-        sources = {hop.source for hop in graph.incoming(before.pop())} - known
+        sources = {edge.source for edge in graph.incoming(before.pop())} - known
         known |= sources
         before += sources
     return graph.may_be_fed(known)
@@ -194,32 +194,32 @@ def check_loops(graph: ModelGraph, problems: Problems) -> None:
                 _add_loop(graph, _shortest_loop(graph, inner, region), problems)
 
 
-def _shortest_loop(graph: ModelGraph, inner: Any, region: Region) -> list[list[Hop]]:
+def _shortest_loop(graph: ModelGraph, inner: Any, region: Region) -> list[list[Edge]]:
     """The paths from actor to actor around a loop, from the first actor of a strongly connected graph back to it."""
     import networkx as nx
 
     start = next(path for path in inner if graph.is_end(path))
     loop = [start, *min((nx.shortest_path(inner, after, start) for after in inner.successors(start)), key=len)]
-    ways: list[list[Hop]] = []
+    ways: list[list[Edge]] = []
     for source, destination in pairwise(loop):
-        hop = region[source][destination]
-        if hop is not None:
-            if graph.is_end(hop.source):
+        edge = region[source][destination]
+        if edge is not None:
+            if graph.is_end(edge.source):
                 ways.append([])
-            ways[-1].append(hop)
+            ways[-1].append(edge)
     return ways
 
 
-def _add_loop(graph: ModelGraph, ways: list[list[Hop]], problems: Problems) -> None:
+def _add_loop(graph: ModelGraph, ways: list[list[Edge]], problems: Problems) -> None:
     actors = [graph.owner(way[0].source) for way in ways]
-    blamed: Hop | None = next((hop for way in ways for hop in way if isinstance(hop, Detour)), None)
+    blamed: Edge | None = next((edge for way in ways for edge in way if isinstance(edge, Detour)), None)
     if isinstance(blamed, Detour):
         fewer = "attach it to fewer of them, or give that model a delay"
         hints = [f"the aspect {blamed.aspect} sends the tokens of all its ports through one model: {fewer}"]
     else:
         # The loop begins with the actor that is declared first, so its last path is the one that leads back.  On that
         # path, the delay belongs to the outermost connection: a composite may be right where it is used elsewhere.
-        blamed = min(ways[-1], key=lambda hop: (_scope(graph, hop).count("."), hop.order))
+        blamed = min(ways[-1], key=lambda edge: (_scope(graph, edge).count("."), edge.order))
         hints = [
             f"{path} has a director like {graph.domains[path].dialect.name}: all its outputs depend on all its inputs"
             if graph.domains[path].dialect.is_strict
@@ -234,23 +234,23 @@ def _add_loop(graph: ModelGraph, ways: list[list[Hop]], problems: Problems) -> N
     problems.add(f"a loop without delay: {loop}", blamed.position, *map(_step, ways), *hints, about=about)
 
 
-def _step(way: list[Hop]) -> str:
-    ports = [way[0].source, *(hop.destination for hop in way)]
-    places = [f"{hop.position.file}:{hop.position.line}" for hop in way if hop.position is not None]
+def _step(way: list[Edge]) -> str:
+    ports = [way[0].source, *(edge.destination for edge in way)]
+    places = [f"{edge.position.file}:{edge.position.line}" for edge in way if edge.position is not None]
     return " -> ".join(ports) + (f" ({', '.join(dict.fromkeys(places))})" if places else "")
 
 
-def _scope(graph: ModelGraph, hop: Hop) -> str:
+def _scope(graph: ModelGraph, edge: Edge) -> str:
     """The path of the composite inside which a connection is made, with a dot after each name."""
-    owner = hop.source.rpartition(".")[0]
+    owner = edge.source.rpartition(".")[0]
     # Tokens from an input come from the composite's own port, others from a port of one of its actors.
-    scope = owner if graph.direction(hop.source) == "input" else owner.rpartition(".")[0]
+    scope = owner if graph.direction(edge.source) == "input" else owner.rpartition(".")[0]
     return f"{scope}." if scope else ""
 
 
-def _with_delay(graph: ModelGraph, hop: Hop) -> str:
-    scope = _scope(graph, hop)
-    ends = [end.removeprefix(scope) for end in (hop.source, hop.destination)]
+def _with_delay(graph: ModelGraph, edge: Edge) -> str:
+    scope = _scope(graph, edge)
+    ends = [end.removeprefix(scope) for end in (edge.source, edge.destination)]
     source, destination = (f'"{end}"' if "[" in end else end for end in ends)
     return f"{{from: {source}, to: {destination}, delay: ...}}"
 
@@ -267,7 +267,7 @@ def check_reach(graph: ModelGraph, problems: Problems) -> None:
         if path in alive:
             continue
         alive.add(path)
-        waiting += [*(hop.destination for hop in graph.outgoing(path)), *detours.get(path, ())]
+        waiting += [*(edge.destination for edge in graph.outgoing(path)), *detours.get(path, ())]
         port = graph.ports[path].port
         if isinstance(port, InputPort):
             waiting += [output.path for output in port.actor.outputs.values()]

@@ -56,8 +56,8 @@ def weave_model(
         return POISON
     woven = bind(view, aspect, places, place_of, position)
     for port in (each for each in requests if each):
-        for hop in list(graph.incoming(port)):  # a problem that has been reported
-            graph.disconnect(hop)
+        for edge in list(graph.incoming(port)):  # a problem that has been reported
+            graph.disconnect(edge)
         graph.open_requests(port)
     if response:
         graph.ports[response].type = Request
@@ -74,9 +74,9 @@ def _planned(
     requests = list(dict.fromkeys(of_each))
     response = _only(view, outputs, "response", "output", position)
     for port in (each for each in requests if each):
-        for hop in graph.incoming(port):
+        for edge in graph.incoming(port):
             message = f"{port} takes the tokens of this aspect, so nothing else can be connected to it"
-            view.tell(message, hop.position, "add another input for other tokens")
+            view.tell(message, edge.position, "add another input for other tokens")
         if isinstance(graph.ports[port].port, OutputPort):
             hint = "attach that aspect here, too, or add another composite"
             view.tell(f"{path} is already the model of another aspect", position, hint)
@@ -141,8 +141,8 @@ def _is_under_one_director(view: Pointcuts, places: Places, position: Position) 
     found = {port: graph.director_of(graph.owner(port)) for port in places.ports}
     found |= {actor: graph.director_of(actor) for actor in places.actors}
     for source, destination in places.connections:
-        hop = next(hop for hop in graph.outgoing(source) if hop.destination == destination)
-        found[connection_place(source, destination)] = graph.director_over(hop)
+        edge = next(edge for edge in graph.outgoing(source) if edge.destination == destination)
+        found[connection_place(source, destination)] = graph.director_over(edge)
     for place, director in found.items():
         if director != own:
             where, hint = f"outside {own}", f"declare it outside {own}"
@@ -192,14 +192,14 @@ def detours(graph: ModelGraph, aspects: Iterable[WovenAspect]) -> list[Detour]:
     for path in graph.ports if at else ():
         if graph.direction(path) == "output" and graph.is_end(path):
             senders[path] = lead([path], path)  # an aspect at an output acts before the send
-    for hop in chain.from_iterable(map(graph.outgoing, graph.ports)) if at else ():
-        sources = senders.get(hop.source, [hop.source]) if hop.delay is None else []
-        sources = lead(sources, connection_place(hop.source, hop.destination))
-        if hop.destination not in senders:
-            sources = lead(sources, hop.destination)
+    for edge in chain.from_iterable(map(graph.outgoing, graph.ports)) if at else ():
+        sources = senders.get(edge.source, [edge.source]) if edge.delay is None else []
+        sources = lead(sources, connection_place(edge.source, edge.destination))
+        if edge.destination not in senders:
+            sources = lead(sources, edge.destination)
         for source in sources:
             if source in responses:
-                add(source, hop.destination, responses[source])
+                add(source, edge.destination, responses[source])
     return list(found.values())
 
 

@@ -21,8 +21,8 @@ from ..language.surroundings import Surroundings
 from ..text.problems import Position, Problems
 from ..text.program import call_site, entries_of
 from ..text.reading import Text
-from .settle import Settler
-from .unfold import Known, TooLargeError, Unfolding
+from .instantiate import Instantiator, PartTypes, TooLargeError
+from .resolve import ParameterResolver
 from .weave_all import weave_all
 
 
@@ -55,9 +55,9 @@ class CompositeInstance:
         part = PartText(self.path, position, Text(cls.name, position), entries_of(self.parameters, position))
         if "priority" in part.values:  # which is given like a parameter, as in a model file
             part = replace(part, priority=beside("priority", part.values.pop("priority").value))
-        settler = Settler(Settings(limits=graph.limits), problems)
+        resolver = ParameterResolver(Settings(limits=graph.limits), problems)
         inside = graph.part(graph.director_of(path))
-        made = Unfolding(Known(cls.composites, cls.catalogue), settler, inside)
+        made = Instantiator(PartTypes(cls.composites, cls.catalogue), resolver, inside)
         _, bracket, index = path.rpartition("[")
         names: dict[str, object] = {"index": int(index.rstrip("]"))} if bracket and path.endswith("]") else {}
         aspects: list[WovenAspect] = []

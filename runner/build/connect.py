@@ -108,7 +108,7 @@ class End:
 
 
 @dataclass
-class Child:
+class Member:
     """A name inside a composite: the instances behind it, and their number."""
 
     kind: str  # the name of its type
@@ -123,24 +123,24 @@ class Child:
         return self.inputs if direction == "input" else self.outputs
 
 
-def child_of_actors(
+def member_of_actors(
     actor_type: type[Actor], paths: list[str], array: bool, count: int | Poison, graph: ModelGraph
-) -> Child:
+) -> Member:
     """Actors of one name, some of which perhaps could not be made."""
-    child = Child(actor_type.__name__, paths, array, count)
+    member = Member(actor_type.__name__, paths, array, count)
     if has_own_ports(actor_type):
         actors = [graph.actors[path] for path in paths if path in graph.actors]
-        child.inputs = list(dict.fromkeys(name for actor in actors for name in actor.inputs))
-        child.outputs = list(dict.fromkeys(name for actor in actors for name in actor.outputs))
-        child.is_known = len(actors) == count != 0
+        member.inputs = list(dict.fromkeys(name for actor in actors for name in actor.inputs))
+        member.outputs = list(dict.fromkeys(name for actor in actors for name in actor.outputs))
+        member.is_known = len(actors) == count != 0
     else:
         for name, port in declared_ports(actor_type).items():
-            child.ports(port.direction).append(name)
-    return child
+            member.ports(port.direction).append(name)
+    return member
 
 
 @dataclass(frozen=True)
-class Inside:
+class Namespace:
     """The inside of a composite as its connections see it."""
 
     path: str
@@ -148,7 +148,7 @@ class Inside:
     inputs: Collection[str]
     outputs: Collection[str]
     names: Collection[str]  # of all actors
-    children: Mapping[str, Child]  # those of which anything is known
+    members: Mapping[str, Member]  # those of which anything is known
     text: CompositeText | None = None  # as a file declares it
 
 
@@ -177,7 +177,7 @@ def make(links: Sequence[Link | Poison], graph: ModelGraph) -> None:
 class Wiring:
     """Finds the ports that a connection inside a composite names."""
 
-    def __init__(self, inside: Inside, graph: ModelGraph, values: Values, problems: Problems) -> None:
+    def __init__(self, inside: Namespace, graph: ModelGraph, values: Values, problems: Problems) -> None:
         self.inside = inside
         self.path = inside.path
         self.graph = graph
@@ -214,14 +214,14 @@ class Wiring:
                     links.append(Link(one, other, delay, source.text.position, connection.shared))
         return links
 
-    def check_ports(self, name: str, child: Child, connections: Iterable[ConnectionText | Poison]) -> None:
+    def check_ports(self, name: str, member: Member, connections: Iterable[ConnectionText | Poison]) -> None:
         """Check that a child of another type that it may have would have the ports that connections name."""
         for each in connections:
             if each:
                 for ends, wanted in ((each.sources, "output"), (each.destinations, "input")):
                     for text in ends:
                         if text.actor == name:
-                            self._has_port(name, child, text.port, wanted, text)
+                            self._has_port(name, member, text.port, wanted, text)
 
     def _label(self, text: Endpoint) -> str:
         return f"{self.path}.{text.text}" if self.path else text.text
@@ -243,23 +243,23 @@ class Wiring:
             own = self._own(port, wanted, text)
             return End(text, own, own=True) if own else POISON
         inside = self.inside
-        child = inside.children.get(name)
-        if child is None:
+        member = inside.members.get(name)
+        if member is None:
             if name not in inside.names:  # otherwise its own problem has been reported
                 gone = None if inside.text is None else inside.text.removed.get(name)
                 message = f"{inside.name} has no actor {name!r}{did_you_mean(name, inside.names)}"
                 hint = f"valid actors: {', '.join(inside.names) or 'none'}"
                 self._problem(message, text, hint, *((f"it is removed at {gone}",) if gone is not None else ()))
             return POISON
-        has_port = self._has_port(name, child, port, wanted, text)
-        found = self._instances(name, index, child, port, text, names)
+        has_port = self._has_port(name, member, port, wanted, text)
+        found = self._instances(name, index, member, port, text, names)
         if not has_port or found is POISON:
             return POISON
         paths, several = found
         ports = [f"{instance}.{port}" for instance in paths]
         if missing := [path for path in ports if path not in self.graph.ports]:
-            if child.is_known:  # instances of one entry may differ in their own ports
-                self._problem(f"{child.kind} has no {wanted} port {missing[0]}, unlike others in its array", text)
+            if member.is_known:  # instances of one entry may differ in their own ports
+                self._problem(f"{member.kind} has no {wanted} port {missing[0]}, unlike others in its array", text)
             return POISON
         return End(text, ports, several)
 
@@ -275,32 +275,32 @@ class Wiring:
         if port in other:
             message = f"{port!r} is an {'output' if kind == 'input' else 'input'} of {where}: inside it, tokens "
             message += "go to it and cannot come from it" if ends == "from" else "come from it and cannot go to it"
-        elif port in self.inside.children:
-            child = self.inside.children[port]
+        elif port in self.inside.members:
+            member = self.inside.members[port]
             message = f"{self._label(text)} is an actor, not a port"
-            index = "[*]" if child.array else ""
-            hints = [f"{wanted} ports: {', '.join(f'{port}{index}.{each}' for each in child.ports(wanted)) or 'none'}"]
+            index = "[*]" if member.array else ""
+            hints = [f"{wanted} ports: {', '.join(f'{port}{index}.{each}' for each in member.ports(wanted)) or 'none'}"]
         else:
             message = f"{where} has no {kind} port {port!r} of its own{did_you_mean(port, list(own))}"
             hints.append("a port of an actor is written 'actor.port'")
         return self._problem(message, text, *hints)
 
     def _instances(
-        self, name: str, index: str | None, child: Child, port: str, text: Endpoint, names: dict[str, object]
+        self, name: str, index: str | None, member: Member, port: str, text: Endpoint, names: dict[str, object]
     ) -> tuple[list[str], bool] | Poison:
         """The paths of the instances that an endpoint names, and whether it may name several."""
         label = f"{self.path}.{name}" if self.path else name
-        if not child.array:
+        if not member.array:
             if index is None:
-                return child.paths, False
+                return member.paths, False
             return self._problem(f"{label} is a single actor, so it has no [{index}]", text, f"write {name}.{port}")
-        if child.count is POISON:
+        if member.count is POISON:
             return POISON
         if index == "*":
-            return child.paths, True
+            return member.paths, True
         if index is None:
             hint = f"write {name}[*].{port} for all, or {name}[0].{port} for the first"
-            return self._problem(f"{label} is an array of {child.count}: give an index", text, hint)
+            return self._problem(f"{label} is an array of {member.count}: give an index", text, hint)
 
         def value(expression: str) -> object:
             at = within(text.position, expression)
@@ -310,30 +310,30 @@ class Wiring:
             return found
 
         try:
-            indices, several = indices_of(index, label, child.count, value)
+            indices, several = indices_of(index, label, member.count, value)
         except FaultError as error:
             for fault in error.faults:
                 self._problem(fault.message, text, *fault.help)
             return POISON
-        return [child.paths[each] for each in indices], several
+        return [member.paths[each] for each in indices], several
 
-    def _has_port(self, name: str, child: Child, port: str, wanted: str, text: Endpoint) -> bool:
+    def _has_port(self, name: str, member: Member, port: str, wanted: str, text: Endpoint) -> bool:
         """Check that the child's type has the port, in the direction that the connection needs."""
         path = f"{self.path}.{name}" if self.path else name
-        valid = child.ports(wanted)
+        valid = member.ports(wanted)
         if port in valid:
             return True
-        if not child.is_known:
-            return child.count == 0  # otherwise the reason why it could not be made is reported
-        if port in child.ports("input" if wanted == "output" else "output"):
+        if not member.is_known:
+            return member.count == 0  # otherwise the reason why it could not be made is reported
+        if port in member.ports("input" if wanted == "output" else "output"):
             direction, ends = ("an input", "come from it") if wanted == "output" else ("an output", "go to it")
-            message = f"{path}.{port} is {direction} of {child.kind}, so nothing can {ends}"
+            message = f"{path}.{port} is {direction} of {member.kind}, so nothing can {ends}"
         else:
-            message = f"{path}: {child.kind} has no {wanted} port {port!r}{did_you_mean(port, valid)}"
+            message = f"{path}: {member.kind} has no {wanted} port {port!r}{did_you_mean(port, valid)}"
         hints = [f"valid {wanted} ports: {', '.join(valid) or 'none'}"]
         if self.inside.text is not None and self.inside.text.extends is not None:
             at = self.inside.text.actors[name].type.position  # which may be far from the connection
-            hints.append(f"{path} is declared as a {child.kind} at {at}")
+            hints.append(f"{path} is declared as a {member.kind} at {at}")
         self._problem(message, text, *hints)
         return False
 

@@ -27,9 +27,9 @@ from ..text.program import call_site, node_of
 from ..text.reading import Text
 from .acts import acts_of
 from .building import Building
+from .instantiate import Instantiator, PartTypes
 from .paths import Paths
-from .settle import Settler
-from .unfold import Known, Unfolding
+from .resolve import ParameterResolver
 from .weave_all import weave_all
 
 
@@ -145,13 +145,13 @@ def _woven(
         if part.name in taken:
             problems.add(f"there is already an aspect {part.name!r}", part.position, "unweave it first")
     problems.raise_if_any()
-    settler = Settler(Settings(settings), problems)
+    resolver = ParameterResolver(Settings(settings), problems)
     around = Surroundings(inherit(disturbance.composites, catalogue.actors, problems), catalogue, problems)
     root = around.composite(root)
-    made = Unfolding(Known(around.composites, catalogue), settler, model.graph.copy())
-    made.body("", root, settler.parameters("", root, {}, {}, None))
+    made = Instantiator(PartTypes(around.composites, catalogue), resolver, model.graph.copy())
+    made.body("", root, resolver.parameters("", root, {}, {}, None))
     found = weave_all(made)
-    settler.check_unused(made.graph)
+    resolver.check_unused(made.graph)
     exactly = disturbance.exactly
     acts = None if exactly is None else acts_of(exactly, [*model.aspects, *found], problems)
     problems.raise_if_any()

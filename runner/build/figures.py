@@ -49,7 +49,7 @@ def figures_of(model: Model, problems: Problems, recorded: Collection[str] | Non
     ``recorded``: the ports of which a run keeps the signals, if not those that the model names.
     """
     # If something else is wrong, that may be why a signal is not recorded.
-    kept = None if len(problems) else model.watched.recorded if recorded is None else recorded
+    kept = None if len(problems) else model.output.recorded if recorded is None else recorded
     known = figure_types()
     found: dict[str, Figure] = {}
     for name, declared in model.figures.items():

@@ -26,12 +26,12 @@ from ..text.problems import POISON, Problems
 from .acts import acts_of
 from .checks import check
 from .figures import figures_of
+from .instantiate import Instantiator, PartTypes, TooLargeError
 from .model import DeclaredFigure, Model
 from .origin import Origin
-from .settle import Settler
-from .unfold import Known, TooLargeError, Unfolding
+from .outputs import OutputReader
+from .resolve import ParameterResolver
 from .untried import try_classes
-from .watch import Watching
 from .weave_all import weave_all
 
 
@@ -83,9 +83,9 @@ def load_model(
             text = change_aspect(text, change, problems)
         text = around.model(text)  # with what has come from outside
         # What results.
-        known = Known(composites, catalogue)
-        settler = Settler(Settings(settings, limits), problems)
-        model = build(text, known, settler, limits)
+        known = PartTypes(composites, catalogue)
+        resolver = ParameterResolver(Settings(settings, limits), problems)
+        model = build(text, known, resolver, limits)
         if model.figures:
             figures_of(model, problems)
         problems.raise_if_any()
@@ -95,9 +95,9 @@ def load_model(
         return model
 
 
-def build(text: ModelText, known: Known, settler: Settler, limits: Limits) -> Model:
+def build(text: ModelText, known: PartTypes, resolver: ParameterResolver, limits: Limits) -> Model:
     """The model that declarations describe, built in passes; it is valid only if there are no problems afterwards."""
-    problems, values, root = settler.problems, settler.values, text.root
+    problems, values, root = resolver.problems, resolver.values, text.root
     model = Model(root.name, doc=root.doc)
     # Without a composite, nothing needs the types of all packages.
     for name in sorted(known.composites.keys() & known.catalogue.actors.keys() if known.composites else ()):
@@ -106,8 +106,8 @@ def build(text: ModelText, known: Known, settler: Settler, limits: Limits) -> Mo
         # Not an error: a model stays valid when a later version adds an actor with that name.
         problems.warn(f"composite {name!r} hides the actor type with the same name", at, "rename it if you need both")
     values.of_model = root.parameters
-    names = settler.parameters("", root, {}, {}, None)
-    made = Unfolding(known, settler, ModelGraph(limits))
+    names = resolver.parameters("", root, {}, {}, None)
+    made = Instantiator(known, resolver, ModelGraph(limits))
     made.dialect(root, names)
     try:
         made.body("", root, names)
@@ -115,13 +115,13 @@ def build(text: ModelText, known: Known, settler: Settler, limits: Limits) -> Mo
         pass
     else:
         woven = weave_all(made)
-        settler.check_unused(made.graph)
+        resolver.check_unused(made.graph)
         check(made.graph, problems)
         check_processors(woven, problems)
         if text.exactly is not None:
             model.exactly = acts_of(text.exactly, woven, problems)
         model.adopt(made.graph, woven)
-        model.watched = Watching(made.graph, values, problems).read(text, names)
+        model.output = OutputReader(made.graph, values, problems).read(text, names)
         # Numbers without units are in the units that the model declares.
         model.parameters = {
             name: plain(value) if root.parameters[name].unit else counted_in_si(value) for name, value in names.items()

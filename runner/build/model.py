@@ -12,7 +12,7 @@ from typing import Unpack
 from epicycle.actors import EpicycleError, Stop, counted, declared_parameters, visible
 
 from ..catalogue.dialect import Dialect
-from ..catalogue.measure import Measure, MetricOptions, TakeName, take_fault
+from ..catalogue.metrics import MetricOptions, MetricSpec, TakeName, take_fault
 from ..graph.woven import WovenAspect
 from ..language.fields import nanoseconds
 from ..language.metrics import MetricText
@@ -28,8 +28,8 @@ from ..text.program import call_site
 from ..text.reading import NAME, NAMES_HAVE, Text, within
 from .building import Building
 from .named import Port, director_of, raising
+from .outputs import OutputReader, checked_seed
 from .scope import Scope
-from .watch import Watching, checked_seed
 
 DeclaredFigure = tuple[str, dict[str, object], MappingNode]  # type, values, as written
 
@@ -75,7 +75,7 @@ class Model(Building, Scope, Tabled):
         self.parameters |= parameters or {}
         self.declared: dict[str, ParameterText] = {}  # what its file declares of the parameters
         self.figures: dict[str, DeclaredFigure] = {}
-        self.watched.seed = checked_seed(seed)
+        self.output.seed = checked_seed(seed)
         self.stop = stop
 
     @property
@@ -84,16 +84,16 @@ class Model(Building, Scope, Tabled):
 
         It can be set as ``"500 ms"``.
         """
-        return None if self.watched.stop_time is None else self.watched.stop_time / 1e9
+        return None if self.output.stop_time is None else self.output.stop_time / 1e9
 
     @stop.setter
     def stop(self, stop: float | str | None) -> None:
-        self.watched = replace(self.watched, stop_time=None if stop is None else nanoseconds(stop))
+        self.output = replace(self.output, stop_time=None if stop is None else nanoseconds(stop))
 
     @property
     def endless(self) -> str:
         """Why a run never ends unless it is interrupted, in words; empty if that is unknown."""
-        if self.watched.stop_time is not None or self.watched.stop_ports:
+        if self.output.stop_time is not None or self.output.stop_ports:
             return ""
         actors = self.graph.actors.values()
         clock = next((actor.path for actor in actors if actor.is_endless), "")
@@ -124,11 +124,11 @@ class Model(Building, Scope, Tabled):
 
     def record(self, *ports: str | Port) -> None:
         """Record what output ports send; give ports, or patterns over the ports that exist now."""
-        self._watch(ports, lambda watching, text: watching.record(text))
+        self._watch(ports, lambda reader, text: reader.record(text))
 
     def stop_when(self, *ports: str | Port) -> None:
         """End the run, after the current tag, when one of these output ports sends something true."""
-        self._watch(ports, lambda watching, text: watching.stop_when(text))
+        self._watch(ports, lambda reader, text: reader.stop_when(text))
 
     def metric(
         self,
@@ -151,7 +151,7 @@ class Model(Building, Scope, Tabled):
         problems = Problems()
         if not NAME.match(name):
             problems.add(f"{name!r} is not a name", position, NAMES_HAVE)
-        if any(metric.name == name for metric in self.watched.metrics):
+        if any(metric.name == name for metric in self.output.metrics):
             problems.add(f"there is already a metric {name!r}", position, "give this another name")
         if fault := take_fault(name, take):
             problems.add(fault.message, position, *fault.help)
@@ -165,15 +165,15 @@ class Model(Building, Scope, Tabled):
             problems.add(f"metric {name}: {wrong[0]!r} cannot be used with 'formula'", position)
         problems.raise_if_any()
         with raising() as problems:
-            watching = Watching(self.graph, Values(problems), problems, self.watched)
+            reader = OutputReader(self.graph, Values(problems), problems, self.output)
             texts = (each if isinstance(each, str) else each.path for each in ports)
             of_ports = tuple(Text(each, within(position, each)) for each in texts)
             source = Text(formula, within(position, formula)) if formula else None
             given: dict[str, object] = {"take": take, **options}
-            entries = watching.options(Measure, f"metric {name}", given, position)
-            watching.metric(MetricText(name, of_ports, source, entries, position), Locals(), given)
-            watching.check_formulas()
-        self.watched = watching.found
+            entries = reader.options(MetricSpec, f"metric {name}", given, position)
+            reader.metric(MetricText(name, of_ports, source, entries, position), Locals(), given)
+            reader.check_formulas()
+        self.output = reader.found
 
     def monitor(self, name: str, property: str, **options: Unpack[RequirementOptions]) -> None:
         """A property that every run must have; docs/language.md describes how to write one.
@@ -185,28 +185,28 @@ class Model(Building, Scope, Tabled):
             if not NAME.match(name):
                 problems.add(f"{name!r} is not a name", position, NAMES_HAVE)
             for metric in (name, f"{name}_robustness"):
-                if any(each.name == metric for each in self.watched.metrics):
+                if any(each.name == metric for each in self.output.metrics):
                     problems.add(f"there is already a metric {metric!r}", position, "give the monitor another name")
             problems.raise_if_any()
-            watching = Watching(self.graph, Values(problems), problems, self.watched)
+            reader = OutputReader(self.graph, Values(problems), problems, self.output)
             given: dict[str, object] = {"property": property, **options}
-            entries = watching.options(Requirement, f"monitor {name}", given, position)
-            watching.monitor(MonitorText(name, entries, position), Locals(), given)
-        self.watched = watching.found
+            entries = reader.options(Requirement, f"monitor {name}", given, position)
+            reader.monitor(MonitorText(name, entries, position), Locals(), given)
+        self.output = reader.found
 
     def outputs(self, pattern: str, what: str, position: Position, problems: Problems) -> list[str]:
         """The output ports that a pattern selects; what is wrong with it is added to ``problems`` as ``what``'s."""
-        return Watching(self.graph, Values(problems), problems).select(Text(pattern, position), what)
+        return OutputReader(self.graph, Values(problems), problems).select(Text(pattern, position), what)
 
-    def _watch(self, ports: Iterable[str | Port], ask: Callable[[Watching, Text], None]) -> None:
+    def _watch(self, ports: Iterable[str | Port], ask: Callable[[OutputReader, Text], None]) -> None:
         """Add what is to be watched, with the rules of a model file."""
         position = call_site()
         with raising() as problems:
-            watching = Watching(self.graph, Values(problems), problems, self.watched)
+            reader = OutputReader(self.graph, Values(problems), problems, self.output)
             for port in ports:
                 path = port if isinstance(port, str) else port.path
-                ask(watching, Text(path, within(position, path)))
-        self.watched = watching.found
+                ask(reader, Text(path, within(position, path)))
+        self.output = reader.found
 
     # -- for people -----------------------------------------------------------------------------------------------
 
@@ -239,8 +239,8 @@ class Model(Building, Scope, Tabled):
             given = (f"{name}={short(value)}" for name, value in values if value is not None)
             actors.append((path, type(actor).__name__, ", ".join(given)))
         connections = [
-            (hop.source, hop.destination, "" if hop.delay is None else f"{hop.delay / 1e9:g} s")
-            for hop in self.graph.hops
+            (edge.source, edge.destination, "" if edge.delay is None else f"{edge.delay / 1e9:g} s")
+            for edge in self.graph.edges
         ]
         aspects = [(woven.name, repr(woven.aspect), ", ".join(woven.places)) for woven in self.aspects]
         parameters = [(name, short(value)) for name, value in self.parameters.items()]

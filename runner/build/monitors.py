@@ -6,7 +6,7 @@ from epicycle.actors import FaultError, Quantity, UnitError, parse_unit
 from epicycle.aspects import Reading
 
 from ..graph.model_graph import ModelGraph
-from ..graph.watched import Monitor, Part
+from ..graph.outputs import Monitor, Part
 from ..language.monitors import MonitorText
 from ..temporal import Condition, Property, PropertyError, Requirement, Sends, Spread, leaves, property_of, spread_of
 from ..text.document import Scalar

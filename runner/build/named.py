@@ -18,7 +18,7 @@ from ..text.faults import blame
 from ..text.problems import POISON, ModelError, Poison, Position, Problem, Problems
 from ..text.program import node_of
 from ..text.reading import NodeReader, Text, within
-from .settle import OF_DIRECTORS
+from .resolve import OF_DIRECTORS
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,7 @@ from ..text.reading import NAME, NAMES_HAVE
 from .building import Building
 from .composite_aspect import check_nesting, weave_model
 from .composite_class import CompositeInstance
-from .connect import Child, Inside, Link, Wiring, child_of_actors, make
+from .connect import Link, Member, Namespace, Wiring, make, member_of_actors
 from .named import (
     CompositePort,
     Ends,
@@ -48,20 +48,20 @@ OF_NO_CLASS = "Composite"  # the class name of a composite that Python builds
 A = TypeVar("A", bound=Actor)
 
 
-class _Children(Mapping[str, Child]):
+class _Members(Mapping[str, Member]):
     """The contents of a composite of a graph, looked up on demand: a program connects in many calls."""
 
     def __init__(self, graph: ModelGraph, path: str) -> None:
         self._graph = graph
         self._parts = graph.parts(path)
 
-    def __getitem__(self, name: str) -> Child:
+    def __getitem__(self, name: str) -> Member:
         graph, paths = self._graph, self._parts[name]
         first, is_array = paths[0], paths[0].endswith("]")
         if first in graph.actors:
-            return child_of_actors(type(graph.actors[first]), paths, is_array, len(paths), graph)
+            return member_of_actors(type(graph.actors[first]), paths, is_array, len(paths), graph)
         inputs, outputs = graph.borders(first)
-        return Child(_label(graph, first), paths, is_array, len(paths), _names(inputs), _names(outputs))
+        return Member(_label(graph, first), paths, is_array, len(paths), _names(inputs), _names(outputs))
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._parts)
@@ -78,12 +78,12 @@ class Scope(Holder):
         self._model = model
 
     @property
-    def _inside(self) -> Inside:
+    def _inside(self) -> Namespace:
         graph = self._model.graph
         inputs, outputs = graph.borders(self.path)
-        children = _Children(graph, self.path)
+        members = _Members(graph, self.path)
         label = _label(graph, self.path) if self.path else self._model.name
-        return Inside(self.path, label, _names(inputs), _names(outputs), children.keys(), children)
+        return Namespace(self.path, label, _names(inputs), _names(outputs), members.keys(), members)
 
     # -- parts ----------------------------------------------------------------------------------------------------
 
@@ -251,17 +251,17 @@ class Scope(Holder):
         with raising() as problems:
             links = self._links(source, destination, None, position, problems)
         pairs = dict.fromkeys((link.source, link.destination) for link in links)
-        found = [hop for one, other in pairs for hop in graph.outgoing(one) if hop.destination == other]
+        found = [edge for one, other in pairs for edge in graph.outgoing(one) if edge.destination == other]
         if not found:
             with raising() as problems:
                 for one, other in pairs:
-                    here = ", ".join(hop.destination for hop in graph.outgoing(one))
+                    here = ", ".join(edge.destination for edge in graph.outgoing(one))
                     problems.add(
                         f"{one} is not connected to {other}", position, f"{one} is connected to: {here or 'nothing'}"
                     )
         graph = self._model.edit()
-        for hop in found:
-            graph.disconnect(hop)
+        for edge in found:
+            graph.disconnect(edge)
 
     def _links(
         self, source: Ends, destination: Ends | None, delay: float | str | None, position: Position, problems: Problems

@@ -13,14 +13,14 @@ from ..language.values import Locals, Values
 from ..text.limits import RAISE_IT, Limits
 from ..text.problems import POISON, Problems
 from .checks import check
-from .settle import Settler
-from .unfold import Known, TooLargeError, Unfolding
+from .instantiate import Instantiator, PartTypes, TooLargeError
+from .resolve import ParameterResolver
 from .weave_all import weave_all
 
 _OVERHEAD = 3  # the cost of a class besides its contents, in actors
 
 
-def try_classes(known: Known, used: Collection[str], values: Values, limits: Limits, problems: Problems) -> None:
+def try_classes(known: PartTypes, used: Collection[str], values: Values, limits: Limits, problems: Problems) -> None:
     """Check what can be checked of every class without an instance in the model.
 
     All trials together may cost as much as a model of half the maximum size; a warning names what remains.
@@ -41,8 +41,8 @@ def try_classes(known: Known, used: Collection[str], values: Values, limits: Lim
             continue
         is_whole = False
         if left > 0:
-            settler = Settler(Settings(), problems, Values(problems, values.budget))
-            made = Unfolding(known, settler, ModelGraph(limits), left)
+            resolver = ParameterResolver(Settings(), problems, Values(problems, values.budget))
+            made = Instantiator(known, resolver, ModelGraph(limits), left)
             is_whole = _try(composites[name], made)
             left -= _OVERHEAD + made.cost + (made.graph.connections + made.places) // 5
             tried |= made.classes
@@ -57,7 +57,7 @@ def try_classes(known: Known, used: Collection[str], values: Values, limits: Lim
         problems.warn(message, composites[untried[0]].position, RAISE_IT)
 
 
-def _try(composite: CompositeText, made: Unfolding) -> bool:
+def _try(composite: CompositeText, made: Instantiator) -> bool:
     """Unfold one instance of a class, with its name and nothing around it; returns whether all of it was checked."""
     path, values, graph = composite.name, made.values, made.graph
     names: dict[str, object] = {}

@@ -257,15 +257,15 @@ class Pointcuts(View):
         left, right = map(self._full, pointcut.ends)
         try:
             ends = set(self.ports.select(right))
-            hops = [hop for source in self.ports.select(left) for hop in self.graph.outgoing(source)]
+            edges = [edge for source in self.ports.select(left) for edge in self.graph.outgoing(source)]
         except PatternError as error:
             return self._no_pattern(pointcut, error, "")
-        found = [(hop.source, hop.destination) for hop in hops if hop.destination in ends]
+        found = [(edge.source, edge.destination) for edge in edges if edge.destination in ends]
         if found:
             return found
         if self.graph.excuses(left) or self.graph.excuses(right):
             return POISON
-        near = did_you_mean(connection_place(left, right), map(str, self.graph.hops))
+        near = did_you_mean(connection_place(left, right), map(str, self.graph.edges))
         return self.tell(f"{pointcut.text!r} matches no connection{near}", pointcut)
 
     def _fits(self, port: str) -> bool:

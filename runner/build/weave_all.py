@@ -30,12 +30,12 @@ from ..text.patterns import TooManyError
 from ..text.problems import POISON, Position, Problems
 from ..text.reading import Text
 from .composite_aspect import OWN, check_nesting, detours, weave_model
+from .instantiate import Instantiator, Names
 from .paths import Paths
-from .unfold import Names, Unfolding
 from .weave import Places, Pointcuts, bind
 
 
-def weave_all(made: Unfolding) -> list[WovenAspect]:
+def weave_all(made: Instantiator) -> list[WovenAspect]:
     """Attach all aspects, now that all ports exist, in the order in which tokens meet them."""
     weaver, graph, problems = _Weaver(made), made.graph, made.problems
     for scope, part, names in made.aspects:
@@ -50,7 +50,7 @@ def weave_all(made: Unfolding) -> list[WovenAspect]:
         if type(actor) in decorated:
             position = graph.components[actor.path].position
             assert position is not None, "all that is unfolded is written somewhere"
-            found += weave_decorations(actor, made.graph, problems, position, made.settler.set_from_outside)
+            found += weave_decorations(actor, made.graph, problems, position, made.resolver.set_from_outside)
     found = arranged(found, graph)
     if check_nesting(found, graph, problems):
         graph.detours = detours(graph, found)
@@ -60,10 +60,10 @@ def weave_all(made: Unfolding) -> list[WovenAspect]:
 class _Weaver:
     """Weaves the declared aspects one after the other."""
 
-    def __init__(self, made: Unfolding) -> None:
+    def __init__(self, made: Instantiator) -> None:
         self.made = made
         self.graph = made.graph
-        self.settler = made.settler
+        self.resolver = made.resolver
         self.problems = made.problems
         self.paths = Paths(made.graph)
         self.found: list[WovenAspect] = []
@@ -75,13 +75,13 @@ class _Weaver:
         is_model = cls in (CompositeAspect, CompositeExecutionAspect)
         given = {key: entry for key, entry in part.values.items() if not is_model or key in OWN}
         local = Locals(name, names)
-        aspect = self.settler.configured(cls, replace(part, values=given), local, f"aspect {name}", cls)
+        aspect = self.resolver.configured(cls, replace(part, values=given), local, f"aspect {name}", cls)
         if not part.at:
             hint = "add 'at:' with ports or patterns"
             self.problems.add(f"aspect {name} has no 'at'", part.position, hint, scope=scope)
         own = name if is_model and self.graph.is_composite(name) else ""
         pointcuts = Pointcuts(self.paths, name, scope, self.problems, cls, own)
-        is_enabled = bool(own) if is_model else self.settler.is_enabled(name, part, Locals(scope, names))
+        is_enabled = bool(own) if is_model else self.resolver.is_enabled(name, part, Locals(scope, names))
         place_of = partial(place_in, Mapping(part.values, part.position))
         if own:
             at = [each and self._timed(each, name, scope, names) for each in part.at]
@@ -104,7 +104,7 @@ class _Weaver:
         try:
             cls = known.catalogue.aspects.get(wanted)
         except CatalogueError as error:
-            self.settler.values.blame(f"aspect {name}", error, part.type.position, Locals(scope))
+            self.resolver.values.blame(f"aspect {name}", error, part.type.position, Locals(scope))
             return None
         if (inner := known.composites.get(wanted)) is not None:
             return None if inner is POISON else self._model_type(name, scope, part, cls)
@@ -139,7 +139,7 @@ class _Weaver:
     def _timed(self, pointcut: PointcutText, name: str, scope: str, names: dict[str, object]) -> PointcutText:
         if pointcut.time is None:
             return pointcut
-        time = self.settler.values.value(pointcut.time, Locals(scope, names), f"aspect {name}: time")
+        time = self.resolver.values.value(pointcut.time, Locals(scope, names), f"aspect {name}: time")
         return replace(pointcut, firing_time=time or 0.0)
 
 

@@ -197,8 +197,8 @@ def compared(
     if len(models) < 2:
         raise EpicycleError("a comparison needs at least two variants")
     first, stop = next(iter(models.values())), seconds("until", until)
-    seeds = range(start := first.watched.seed if seed is None else seed, start + replications)
-    units = {metric.name: metric.unit for each in models.values() for metric in each.watched.metrics}
+    seeds = range(start := first.output.seed if seed is None else seed, start + replications)
+    units = {metric.name: metric.unit for each in models.values() for metric in each.output.metrics}
     found = Comparison(first.name, seeds, units, {name: {} for name in models})
     asked = [(name, number) for number in seeds for name in models]
     outcomes = _made(models, asked, stop) if away is None else _made_away(away, asked, stop)
@@ -255,7 +255,7 @@ class _Bench:
         if name not in self._models:
             changes = self._away.variants[name]
             model = loaded(self._away.model, {**changes, "types": self._types} if self._types else changes)
-            model.watched.recorded = []
+            model.output.recorded = []
             self._models[name] = model
 
     def make(self, asked: _Asked) -> Results | EpicycleError:

@@ -176,7 +176,7 @@ def explain(
     >>> epicycle.explain("collision_avoidance", "always clearance.distance >= 4 m", seed=3, set={"disturbance": 0.5})
     """
     made = loaded(model, changes)
-    seed = made.watched.seed if seed is None else seed
+    seed = made.output.seed if seed is None else seed
     if isinstance(model, Model):
         made, command = copy.copy(made), ["epicycle", "run", made.name, "--seed", str(seed)]
     else:

@@ -65,7 +65,7 @@ class Falsified(Tabled):
         self.command = self.command_of(run)
         model = asked.load(run.level.settings)
         name = run.broken[0]
-        if asked.monitor is not None and name not in {each.name for each in model.watched.monitors}:
+        if asked.monitor is not None and name not in {each.name for each in model.output.monitors}:
             model.monitor(name, asked.monitor)
         results = Simulation(model, seed=run.seed, acts=Interventions(model.exactly)).run()
         if results.digest != run.digest:

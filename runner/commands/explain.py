@@ -46,7 +46,7 @@ def explain(options: argparse.Namespace) -> int:
 
     spec, made, seed, until, _ = open_run(options)
     folder = searching.folder_of(options, made.name, "explanation")
-    seed = made.watched.seed if seed is None else seed
+    seed = made.output.seed if seed is None else seed
     given = (spec if spec.study else replace(spec, seed=seed)).command()
 
     def search() -> Explained:

@@ -39,7 +39,7 @@ def show(options: argparse.Namespace) -> int:
         "disturbances": [{"disturbance": name, "what it is": doc} for name, doc in _disturbances(options)],
     }
     about: dict[str, Any] = {"model": model.name, "doc": model.doc, "extent": model.extent, "stop": model.stop}
-    about |= {"records": model.watched.recorded, "reads": list(noted.files)}
+    about |= {"records": model.output.recorded, "reads": list(noted.files)}
     if options.json:
         tell_json({**about, **found}, indent=2)
         return DONE
@@ -80,7 +80,7 @@ def _parameters(model: Model) -> Iterator[dict[str, str]]:
 
 
 def _metrics(model: Model) -> Iterator[dict[str, str]]:
-    for each in model.watched.metrics:
+    for each in model.output.metrics:
         if each.monitor:
             continue
         takes, unit = each.takes, "" if each.unit == "1" else each.unit
@@ -88,7 +88,7 @@ def _metrics(model: Model) -> Iterator[dict[str, str]]:
 
 
 def _monitors(model: Model) -> Iterator[dict[str, str]]:
-    for each in model.watched.monitors:
+    for each in model.output.monitors:
         said = each.requirement
         yield {"monitor": each.name, "property": said.property, "unit": said.unit, "what it is": said.doc}
 

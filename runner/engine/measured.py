@@ -11,7 +11,7 @@ from graphlib import TopologicalSorter
 
 from epicycle.actors import EpicycleError, Quantity
 
-from ..graph.watched import Metric
+from ..graph.outputs import Metric
 from ..results import Outcome
 from ..shown import short
 from .measurement import Measurement

@@ -12,8 +12,8 @@ from typing import Any
 from epicycle.actors import Quantity, to_nanoseconds, to_seconds
 from epicycle.actors.expression import Formula
 
-from ..catalogue.measure import MSER5, TIME, Measure
-from ..graph.watched import Metric
+from ..catalogue.metrics import MSER5, TIME, MetricSpec
+from ..graph.outputs import Metric
 from ..results import Outcome
 from ..shown import short
 from .batches import BATCHES, LEAST_OF_MSER, OF_MSER, TimeBatches, TokenBatches, batch_interval, mser
@@ -115,7 +115,7 @@ _AS_SENT = ("first", "last", "min", "max")  # for which infinity is a value like
 _AS_THEY_ARE = (*_AS_SENT, "sum", "count", "rate")  # whole numbers stay whole
 
 
-def _measured(measure: Measure, token: Any) -> Any:
+def _measured(measure: MetricSpec, token: Any) -> Any:
     """The value of a token, or ``_Unfit`` with what the port sent."""
     if measure.take in ("first", "last", "count", "rate"):
         return token
@@ -151,7 +151,7 @@ class _Taking:
 
     __slots__ = ("_count", "_measure", "_statistic", "_unfit", "start")
 
-    def __init__(self, measure: Measure, start: int) -> None:
+    def __init__(self, measure: MetricSpec, start: int) -> None:
         self.start = start
         self._measure = measure
         self._count = 0  # tokens
@@ -172,7 +172,7 @@ class _Tokens(_Taking):
 
     __slots__ = ("_batches",)
 
-    def __init__(self, measure: Measure, start: int) -> None:
+    def __init__(self, measure: MetricSpec, start: int) -> None:
         super().__init__(measure, start)
         self._batches = TokenBatches() if measure.interval is not None else None
 
@@ -208,7 +208,9 @@ class _Spells(_Taking):
 
     __slots__ = ("_batches", "_open")
 
-    def __init__(self, measure: Measure, ports: Iterable[str], start: int, batches: TimeBatches | None = None) -> None:
+    def __init__(
+        self, measure: MetricSpec, ports: Iterable[str], start: int, batches: TimeBatches | None = None
+    ) -> None:
         super().__init__(measure, start)
         self._batches = batches
         if batches is None and measure.interval is not None:
@@ -261,7 +263,7 @@ class _Arrivals(_Taking):
 
     __slots__ = ("_batches",)
 
-    def __init__(self, measure: Measure, start: int, batches: TimeBatches | None = None) -> None:
+    def __init__(self, measure: MetricSpec, start: int, batches: TimeBatches | None = None) -> None:
         super().__init__(measure, start)
         self._batches = batches or TimeBatches(start)
 
@@ -286,7 +288,7 @@ class _Arrivals(_Taking):
         return _with_interval(found, (sums, [each / 1e9 for each in covered]), self._measure, self._count, after)
 
 
-def _taking(measure: Measure, ports: Iterable[str], start: int) -> _Taking:
+def _taking(measure: MetricSpec, ports: Iterable[str], start: int) -> _Taking:
     if measure.take == "rate":
         return _Arrivals(measure, start)
     return _Spells(measure, ports, start) if measure.kind.over == TIME else _Tokens(measure, start)
@@ -299,7 +301,7 @@ def _too_short(start: int, end: int) -> str:
 
 
 def _with_interval(
-    value: float, batches: tuple[list[float], list[float]], measure: Measure, count: int, after: float
+    value: float, batches: tuple[list[float], list[float]], measure: MetricSpec, count: int, after: float
 ) -> Outcome:
     assert measure.interval is not None
     found = batch_interval(*batches, value, measure.interval) if count >= BATCHES else None
@@ -331,7 +333,7 @@ class _Kept:
         self._times.append(time)
         self._values.append(0.0 if isinstance(value, str) else float(value))  # for arrivals only the times count
 
-    def settled(self, measure: Measure, ports: list[str], end: int) -> _Taking | str:
+    def settled(self, measure: MetricSpec, ports: list[str], end: int) -> _Taking | str:
         """The collector of everything after the warm-up, or the reason why there is none."""
         count = len(self._times)
         if self._unfit:

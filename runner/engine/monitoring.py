@@ -10,7 +10,7 @@ from epicycle.actors import EpicycleError, Moment, Receiver, to_seconds
 from epicycle.actors.expression import operand, value_at
 from epicycle.aspects import Reading
 
-from ..graph.watched import Monitor, Part
+from ..graph.outputs import Monitor, Part
 from ..results import Past, Verdict
 from ..temporal import (
     LINEAR,

@@ -72,10 +72,10 @@ class Run:
         if isinstance(self.director, Tracing) and tracer is not None:
             self.director.begin_trace(tracer)
         self.log.crowd = self.director.crowd.add
-        self.signals = {name: Signal(name) for name in model.watched.recorded}
-        self._units = {metric.name: metric.unit for metric in model.watched.metrics}
-        self._measurements = {metric.name: Measured(metric) for metric in model.watched.metrics if metric.is_measured}
-        self._monitorings = {monitor.name: Monitoring(monitor) for monitor in model.watched.monitors}
+        self.signals = {name: Signal(name) for name in model.output.recorded}
+        self._units = {metric.name: metric.unit for metric in model.output.metrics}
+        self._measurements = {metric.name: Measured(metric) for metric in model.output.metrics if metric.is_measured}
+        self._monitorings = {monitor.name: Monitoring(monitor) for monitor in model.output.monitors}
         try:
             with without_collection():
                 self.outside: list[object] = [model, model.graph]  # with everything else that leads there
@@ -96,17 +96,17 @@ class Run:
         found: dict[str, list[Deliver | Receiver]] = {}
         for name, signal in self.signals.items():
             found.setdefault(name, []).append(Recording(signal.samples, self.director))
-        for metric in self.model.watched.metrics:
+        for metric in self.model.output.metrics:
             for path in metric.ports if metric.is_measured else ():
                 measuring = Measuring(self._measurements[metric.name].at(path), path, self.director)
                 found.setdefault(path, []).append(measuring)
-        for monitor in self.model.watched.monitors:
+        for monitor in self.model.output.monitors:
             for part in self._monitorings[monitor.name].parts:
                 for path in part.part.ports:
                     found.setdefault(path, []).append(Listening(part, path, self.director))
-        if any(monitor.requirement.stop for monitor in self.model.watched.monitors):
+        if any(monitor.requirement.stop for monitor in self.model.output.monitors):
             self.director.watch = self._stop_if_broken
-        for path in self.model.watched.stop_ports:
+        for path in self.model.output.stop_ports:
             sources = self.model.graph.source_of(path)
             is_event = all(port.name in port.actor.event_outputs for port in sources)
             found.setdefault(path, []).append(partial(self._ask_to_stop, path, is_event))
@@ -242,12 +242,12 @@ class Run:
         end = self._end(stopped)
         verdicts = {name: self.verdict(name, stopped) for name in self._monitorings}
         outcomes = {}  # of copies, because reading a measurement ends it
-        for metric in self.model.watched.metrics:
+        for metric in self.model.output.metrics:
             if metric.is_measured:
                 outcomes[metric.name] = Copies().of(self._measurements[metric.name]).outcome(end)
             elif metric.monitor:
                 outcomes[metric.name] = verdicts[metric.monitor].outcome(metric.name == metric.monitor)
-        outcomes = add_computed(self.model.watched.metrics, outcomes)
+        outcomes = add_computed(self.model.output.metrics, outcomes)
         return Results(
             model=self.model.name,
             seed=self.seed,

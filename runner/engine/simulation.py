@@ -101,7 +101,7 @@ class Simulation(Tabled):
             keep_log = LogFilter({})
         if keep_log:
             keep_log.check(model)
-        seed = model.watched.seed if seed is None else seed
+        seed = model.output.seed if seed is None else seed
         if seed < 0:
             raise ValueError(f"a seed is a whole number of at least 0, not {seed}")
         self.model = model
@@ -135,14 +135,14 @@ class Simulation(Tabled):
         ``pace`` limits the run to the wall clock.
         """
         self._refuse_over()
-        stop = self.model.watched.stop_time if until is None else to_nanoseconds(until)
+        stop = self.model.output.stop_time if until is None else to_nanoseconds(until)
         self._run.advance(stop, progress=progress, pace=pace)
         return self._run.finish()
 
     def advance(self, until: float) -> bool:
         """Run up to and including a time (s); returns whether there is more to come after it."""
         self._refuse_over()
-        stop, last = to_nanoseconds(until), self.model.watched.stop_time
+        stop, last = to_nanoseconds(until), self.model.output.stop_time
         is_last = last is not None and stop >= last
         return self._run.advance(last if is_last else stop) == STOP_TIME and not is_last
 
@@ -155,13 +155,13 @@ class Simulation(Tabled):
         self._refuse_over()
         for name in robustness:
             self._run.monitoring(name)
-        self._run.reach(self.model.watched.stop_time if until is None else to_nanoseconds(until), robustness)
+        self._run.reach(self.model.output.stop_time if until is None else to_nanoseconds(until), robustness)
         return any(self.robustness(name) <= least for name, least in robustness.items())
 
     def step(self) -> bool:
         """Handle the next tag, or SimPy events before it; returns whether there was anything until the stop time."""
         self._refuse_over()
-        return not self._run.advance(self.model.watched.stop_time, most=1)
+        return not self._run.advance(self.model.output.stop_time, most=1)
 
     def finish(self) -> Results:
         """End the run where it is, and return the results."""

@@ -13,7 +13,7 @@ from fractions import Fraction
 from itertools import chain
 from typing import Any
 
-from ..catalogue.measure import Measure
+from ..catalogue.metrics import MetricSpec
 
 MOST = sys.float_info.max
 _KEPT = 512  # numbers until they are summed up
@@ -226,7 +226,7 @@ class TimeQuantile(Statistic):
         return None
 
 
-def statistic_of(measure: Measure) -> Statistic:
+def statistic_of(measure: MetricSpec) -> Statistic:
     """The statistics of metrics by name."""
     take, p = measure.take, measure.p
     if take in ("first", "last"):

@@ -33,7 +33,7 @@ from epicycle.aspects import (
 from ..graph.acts import connection_place
 from ..graph.clock import Clock
 from ..graph.model_graph import ModelGraph
-from ..graph.nodes import Hop
+from ..graph.nodes import Edge
 from ..graph.woven import WovenAspect
 from ..results import EventLog, Signal
 from ..text.program import describe
@@ -215,33 +215,35 @@ class Wiring:
         ways = [self._way(wires[0])] if len(wires) == 1 else self._branches(port.path, (), wires)
         return self._sender(port, channel, ways)
 
-    def _branches(self, path: str, hops: tuple[Hop, ...], wires: list[tuple[Hop, ...]] | None = None) -> list[Receiver]:
+    def _branches(
+        self, path: str, edges: tuple[Edge, ...], wires: list[tuple[Edge, ...]] | None = None
+    ) -> list[Receiver]:
         """The ways onward from a port, one for each connection that leaves it, or that some wires take."""
         ways = []
-        for hop in self.graph.outgoing(path):
-            far, taken = hop.destination, (*hops, hop)
+        for edge in self.graph.outgoing(path):
+            far, taken = edge.destination, (*edges, edge)
             if wires is not None and not any(wire[: len(taken)] == taken for wire in wires):
                 continue
             if self.graph.owner(far) in self.actors:
                 onward = self._put(taken)
             else:
                 onward = all_of(self._heard(far) + self._branches(far, taken, wires))
-            ways.append(self._over(hop, onward, taken))
+            ways.append(self._over(edge, onward, taken))
         return ways
 
-    def _way(self, hops: tuple[Hop, ...]) -> Receiver:
+    def _way(self, edges: tuple[Edge, ...]) -> Receiver:
         """The way along one wire alone, for tokens that are sent to one channel."""
-        onward = self._put(hops)
-        for hop in reversed(hops):
-            onward = self._over(hop, all_of([*self._heard(hop.destination), onward]), hops)
+        onward = self._put(edges)
+        for edge in reversed(edges):
+            onward = self._over(edge, all_of([*self._heard(edge.destination), onward]), edges)
         return onward
 
-    def _over(self, hop: Hop, onward: Receiver, channel: tuple[Hop, ...]) -> Receiver:
+    def _over(self, edge: Edge, onward: Receiver, channel: tuple[Edge, ...]) -> Receiver:
         """One connection: its delay, and the aspects and the boundary port at its far end."""
-        far = hop.destination
-        boundary_port, lane = self.directors.boundary_ports.get(far), self.graph.channel_of(channel, hop)
+        far = edge.destination
+        boundary_port, lane = self.directors.boundary_ports.get(far), self.graph.channel_of(channel, edge)
         is_output = self.graph.direction(far) == "output"
-        source = far if is_output else hop.source
+        source = far if is_output else edge.source
         # Aspects at a port of a composite are outside of it.
         if boundary_port is not None and not is_output:
             onward = self._woven(far, source, boundary_port.lane(lane, onward))
@@ -249,18 +251,18 @@ class Wiring:
             onward = boundary_port.lane(lane, self._woven(far, source, onward))
         else:
             onward = self._woven(far, source, onward)
-        for woven in reversed(self._woven_on.get((hop.source, far), [])):
-            onward = self._through(woven, far, source, onward, connection_place(hop.source, far))
-        if hop.delay is None:
+        for woven in reversed(self._woven_on.get((edge.source, far), [])):
+            onward = self._through(woven, far, source, onward, connection_place(edge.source, far))
+        if edge.delay is None:
             return onward
-        return Delayed(self.directors.of[self.graph.director_over(hop)], hop.delay, onward)
+        return Delayed(self.directors.of[self.graph.director_over(edge)], edge.delay, onward)
 
-    def _put(self, hops: tuple[Hop, ...]) -> Receiver:
+    def _put(self, edges: tuple[Edge, ...]) -> Receiver:
         """The end of a wire, in the port of an actor."""
-        owner, _, name = hops[-1].destination.rpartition(".")
+        owner, _, name = edges[-1].destination.rpartition(".")
         port, execution = self.actors[owner].inputs[name], self._executions.get(owner)
         stand_in = None if execution is None else execution.activation_of(port)
-        return self.director.entry(port, self.graph.channels.of(hops), stand_in)
+        return self.director.entry(port, self.graph.channels.of(edges), stand_in)
 
     def _woven(self, path: str, source: str, onward: Receiver) -> Receiver:
         """``onward`` preceded by the aspects at a port, the first declared outermost."""

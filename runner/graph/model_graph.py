@@ -18,7 +18,7 @@ from ..text.limits import NORMAL, Limits
 from ..text.patterns import could_be_within
 from ..text.problems import Position
 from .clock import Clock
-from .nodes import Component, Detour, Domain, Gap, Hop, Modal, PortNode, Wire, is_within
+from .nodes import Component, Detour, Domain, Edge, Gap, Modal, PortNode, Wire, is_within
 
 
 class ModelGraph:
@@ -48,7 +48,7 @@ class ModelGraph:
         self.limits: Limits = limits if inside is None else inside.limits
         self.is_frozen = False
         self._channels: Channels | None = None  # worked out since then
-        self._hops: dict[int, Hop] = {}  # in their order
+        self._hops: dict[int, Edge] = {}  # in their order
         self._order: int = 0 if inside is None else inside._order
 
     def freeze(self) -> None:
@@ -188,23 +188,23 @@ class ModelGraph:
         self, source: str, destination: str, delay: int | None, position: Position | None, shared: int | None = None
     ) -> None:
         self._check_open()
-        hop = self._hops[self._order] = Hop(source, destination, delay, position, self._order, shared=shared)
+        edge = self._hops[self._order] = Edge(source, destination, delay, position, self._order, shared=shared)
         self._order += 1
-        self.ports[source].outgoing.append(hop)
-        self.ports[destination].incoming.append(hop)
+        self.ports[source].outgoing.append(edge)
+        self.ports[destination].incoming.append(edge)
 
     @property
     def connections(self) -> int:
         return len(self._hops)
 
-    def disconnect(self, hop: Hop) -> None:
+    def disconnect(self, edge: Edge) -> None:
         self._check_open()
-        del self._hops[hop.order]
-        self.ports[hop.source].outgoing.remove(hop)
-        self.ports[hop.destination].incoming.remove(hop)
+        del self._hops[edge.order]
+        self.ports[edge.source].outgoing.remove(edge)
+        self.ports[edge.destination].incoming.remove(edge)
 
     @property
-    def hops(self) -> Collection[Hop]:
+    def edges(self) -> Collection[Edge]:
         """All connections, in the order of their declaration."""
         return self._hops.values()
 
@@ -217,8 +217,8 @@ class ModelGraph:
         """Remove an actor, or a composite and its contents, with their connections."""
         self._check_open()
         for port in [each for each in self.ports if is_within(each, path)]:
-            for hop in {*self.incoming(port), *self.outgoing(port)}:
-                self.disconnect(hop)
+            for edge in {*self.incoming(port), *self.outgoing(port)}:
+                self.disconnect(edge)
             del self.ports[port]
         above, _, name = path.rpartition(".")
         siblings = self.components[above].parts
@@ -262,11 +262,11 @@ class ModelGraph:
             path = above
         return path
 
-    def director_over(self, hop: Hop) -> str:
+    def director_over(self, edge: Edge) -> str:
         """The director whose time applies to a connection: that of the composite that declares it."""
-        owner = self.owner(hop.source)
+        owner = self.owner(edge.source)
         # A connection from a composite's own input is declared inside that composite.
-        inside = owner in self.domains and self.direction(hop.source) == "input"
+        inside = owner in self.domains and self.direction(edge.source) == "input"
         return owner if inside else self.director_of(owner)
 
     def borders(self, composite: str) -> tuple[list[str], list[str]]:
@@ -279,35 +279,35 @@ class ModelGraph:
         owner = self.owner(path)
         return owner in self.domains or owner in self.actors
 
-    def outgoing(self, path: str) -> Sequence[Hop]:
+    def outgoing(self, path: str) -> Sequence[Edge]:
         """The connections that leave a port, in the order of their declaration."""
         return self.ports[path].outgoing
 
-    def incoming(self, path: str) -> Sequence[Hop]:
+    def incoming(self, path: str) -> Sequence[Edge]:
         """The connections that enter a port, in the order of their declaration."""
         return self.ports[path].incoming
 
     def wires_from(self, port: OutputPort[Any]) -> list[Wire]:
         """All wires that begin at an output port."""
         return [
-            Wire(port, end, hops)
-            for hops in self._ways(port.path, forward=True)
-            if isinstance(end := self.ports[hops[-1].destination].port, InputPort)
+            Wire(port, end, edges)
+            for edges in self._ways(port.path, forward=True)
+            if isinstance(end := self.ports[edges[-1].destination].port, InputPort)
         ]
 
     def wires_to(self, port: InputPort[Any]) -> list[Wire]:
         """All wires that end at an input port; their order is that of the port's channels."""
         return [
-            Wire(start, port, hops)
-            for hops in self._ways(port.path, forward=False)
-            if isinstance(start := self.ports[hops[0].source].port, OutputPort)
+            Wire(start, port, edges)
+            for edges in self._ways(port.path, forward=False)
+            if isinstance(start := self.ports[edges[0].source].port, OutputPort)
         ]
 
     def channels_to(self, port: InputPort[Any]) -> list[list[Wire]]:
         """The wires that end at an input port, by the channel."""
         found: dict[object, list[Wire]] = {}
         for wire in self.wires_to(port):
-            found.setdefault(self.channel_of(wire.hops, wire.hops[-1]), []).append(wire)
+            found.setdefault(self.channel_of(wire.edges, wire.edges[-1]), []).append(wire)
         return list(found.values())
 
     @property
@@ -319,29 +319,29 @@ class ModelGraph:
             self._channels = Channels(self)
         return self._channels
 
-    def channel_of(self, hops: tuple[Hop, ...], hop: Hop) -> object:
+    def channel_of(self, edges: tuple[Edge, ...], edge: Edge) -> object:
         """What distinguishes the channels of a port: the wire, or the connection at the port if that is one channel.
 
         What leaves a strict composite with modes is one channel, whichever refinement has sent it.
         """
-        if hop.shared is not None:
-            return hop.shared
-        for place in range(len(hops), 0, -1):
-            far = hops[place - 1].destination
+        if edge.shared is not None:
+            return edge.shared
+        for place in range(len(edges), 0, -1):
+            far = edges[place - 1].destination
             domain = self.domains.get(self.owner(far))
             if domain is not None and domain.modal and domain.dialect.is_strict and self.direction(far) == "output":
-                return hops[place:]
-        return hops
+                return edges[place:]
+        return edges
 
-    def _ways(self, path: str, *, forward: bool) -> Iterator[tuple[Hop, ...]]:
+    def _ways(self, path: str, *, forward: bool) -> Iterator[tuple[Edge, ...]]:
         """The paths from a port to actors' ports; ``check_passages`` has made sure that they end."""
-        for hop in self.outgoing(path) if forward else self.incoming(path):
-            far = hop.destination if forward else hop.source
+        for edge in self.outgoing(path) if forward else self.incoming(path):
+            far = edge.destination if forward else edge.source
             if self.ports[far].port is not None:
-                yield (hop,)
+                yield (edge,)
                 continue
             for rest in self._ways(far, forward=forward):
-                yield (hop, *rest) if forward else (*rest, hop)
+                yield (edge, *rest) if forward else (*rest, edge)
 
     def wires(self) -> Iterator[Wire]:
         """All wires of the model."""
@@ -358,7 +358,7 @@ class ModelGraph:
             if isinstance(port, OutputPort):
                 found.append(port)
             else:
-                before = [hop.source for hop in self.incoming(here)]
+                before = [edge.source for edge in self.incoming(here)]
                 waiting += [each for each in reversed(before) if each not in seen]
                 seen.update(before)
         return found
@@ -405,9 +405,9 @@ class Channels:
     def __init__(self, graph: ModelGraph) -> None:
         self._graph = graph
         self._widths: dict[str, int] = {}  # of inputs
-        self._at: dict[tuple[Hop, ...], int] = {}  # the channel of each wire at its end
-        self._leaving: dict[str, list[list[tuple[Hop, ...]]]] = {}  # the wires of each output by channel
-        leaving: dict[str, list[tuple[Hop, ...]]] = {}
+        self._at: dict[tuple[Edge, ...], int] = {}  # the channel of each wire at its end
+        self._leaving: dict[str, list[list[tuple[Edge, ...]]]] = {}  # the wires of each output by channel
+        leaving: dict[str, list[tuple[Edge, ...]]] = {}
         for actor in graph.actors.values():
             for port in actor.inputs.values():
                 channels = graph.channels_to(port)
@@ -416,27 +416,27 @@ class Channels:
                 for channel, wires in enumerate(channels):
                     for wire in wires:
                         if channel:
-                            self._at[wire.hops] = channel
-                        leaving.setdefault(wire.source.path, []).append(wire.hops)
+                            self._at[wire.edges] = channel
+                        leaving.setdefault(wire.source.path, []).append(wire.edges)
         for path in (port.path for actor in graph.actors.values() for port in actor.outputs.values()):
             ways = leaving.get(path, [])
-            if [(hop,) for hop in graph.outgoing(path)] == ways[:1]:
+            if [(edge,) for edge in graph.outgoing(path)] == ways[:1]:
                 continue
-            ways.sort(key=lambda way: [hop.order for hop in way])
-            found: dict[object, list[tuple[Hop, ...]]] = {}
-            for hops in ways:
-                found.setdefault(graph.channel_of(hops, hops[0]), []).append(hops)
+            ways.sort(key=lambda way: [edge.order for edge in way])
+            found: dict[object, list[tuple[Edge, ...]]] = {}
+            for edges in ways:
+                found.setdefault(graph.channel_of(edges, edges[0]), []).append(edges)
             self._leaving[path] = list(found.values())
 
     def width(self, path: str) -> int:
         """The number of channels of an input."""
         return self._widths.get(path, 1 if self._graph.incoming(path) else 0)
 
-    def of(self, hops: tuple[Hop, ...]) -> int:
+    def of(self, edges: tuple[Edge, ...]) -> int:
         """The channel of a wire at its end."""
-        return self._at.get(hops, 0)
+        return self._at.get(edges, 0)
 
-    def leaving(self, path: str) -> list[list[tuple[Hop, ...]]]:
+    def leaving(self, path: str) -> list[list[tuple[Edge, ...]]]:
         """The wires that leave an output, by channel."""
         found = self._leaving.get(path)
-        return [[(hop,)] for hop in self._graph.outgoing(path)] if found is None else found
+        return [[(edge,)] for edge in self._graph.outgoing(path)] if found is None else found

@@ -15,7 +15,7 @@ from .clock import Clock
 
 
 @dataclass(frozen=True, eq=False)
-class Hop:
+class Edge:
     """One edge of the graph: a connection between two ports, as declared."""
 
     source: str
@@ -35,11 +35,11 @@ class Wire:
 
     source: OutputPort[Any]
     destination: InputPort[Any]
-    hops: tuple[Hop, ...]
+    edges: tuple[Edge, ...]
 
 
 @dataclass(frozen=True, eq=False)
-class Detour(Hop):
+class Detour(Edge):
     """A part of the path of tokens through an aspect that is a model, within the tag: it orders firings.
 
     Tokens go from their sender to the composite's request port, and from its response port to their destination.  If it
@@ -66,8 +66,8 @@ class PortNode:
     direction: str  # input or output
     type: Any = None  # the type of what a composite's port hands on, if it declares one
     declared: Position | None = None
-    incoming: list[Hop] = field(default_factory=list)  # in their order
-    outgoing: list[Hop] = field(default_factory=list)
+    incoming: list[Edge] = field(default_factory=list)  # in their order
+    outgoing: list[Edge] = field(default_factory=list)
 
 
 @dataclass(slots=True)

@@ -15,11 +15,11 @@ from typing import TypeAlias
 
 from .digraph import in_order
 from .model_graph import ModelGraph
-from .nodes import Hop
+from .nodes import Edge
 
 # The dependencies within a tag, of one director: the successors of each port.  There is a connection without delay
-# between them (``Hop``), or they are in one actor and the second depends on the first within the tag.
-Region: TypeAlias = dict[str, dict[str, Hop | None]]
+# between them (``Edge``), or they are in one actor and the second depends on the first within the tag.
+Region: TypeAlias = dict[str, dict[str, Edge | None]]
 
 
 @dataclass(frozen=True)
@@ -74,20 +74,20 @@ def steps(graph: ModelGraph) -> dict[str, list[Step]]:
 
 def dependencies(graph: ModelGraph) -> dict[str, Region]:
     """The dependencies within a tag under each director."""
-    hops: dict[str, list[Hop]] = {director: [] for director in graph.domains}
-    for hop in graph.hops:
-        if hop.delay is None:
-            hops[graph.director_over(hop)].append(hop)
+    edges: dict[str, list[Edge]] = {director: [] for director in graph.domains}
+    for edge in graph.edges:
+        if edge.delay is None:
+            edges[graph.director_over(edge)].append(edge)
     for detour in graph.detours:
         if detour.waits:
             continue
-        hops[graph.director_over(detour)].append(detour)
+        edges[graph.director_over(detour)].append(detour)
     regions: dict[str, Region] = {}
     for director in reversed(graph.domains):  # inner ones first: the outer ones need to know what depends on what
         region = regions[director] = {}
-        for hop in sorted(hops[director], key=lambda hop: hop.order, reverse=True):  # of parallel ones, the first
-            region.setdefault(hop.source, {})[hop.destination] = hop
-            region.setdefault(hop.destination, {})
+        for edge in sorted(edges[director], key=lambda edge: edge.order, reverse=True):  # of parallel ones, the first
+            region.setdefault(edge.source, {})[edge.destination] = edge
+            region.setdefault(edge.destination, {})
         for port in chain(*graph.borders(director)):
             region.setdefault(port, {})
         for member in graph.domains[director].members:

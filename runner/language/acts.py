@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from ..text.document import Node
 from ..text.problems import POISON, Position
 from ..text.reading import NodeReader, Text
-from .fields import AT, Construct, Shape, keyed, number, ref
+from .fields import AT, Reader, Record, keyed, number, ref
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,7 @@ class ActText:
     )
 
 
-ACT = Construct.of(ActText, "A single act of an aspect.", type="object")
+ACT = Record.of(ActText, "A single act of an aspect.", type="object")
 
 
 def acts(reader: NodeReader, node: Node, what: str) -> tuple[ActText, ...]:
@@ -35,4 +35,4 @@ def acts(reader: NodeReader, node: Node, what: str) -> tuple[ActText, ...]:
     return tuple(ActText(**said, position=each.position) for said, each in read if said and POISON not in said.values())
 
 
-ACTS = Shape({"type": ["array", "null"], "items": ref("act")}, acts)
+ACTS = Reader({"type": ["array", "null"], "items": ref("act")}, acts)

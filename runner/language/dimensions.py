@@ -17,7 +17,7 @@ from ..text.document import Entry, Mapping, Node, Scalar, Sequence, plain
 from ..text.faults import blame
 from ..text.problems import POISON, Poison, Position
 from ..text.reading import NodeReader, is_empty
-from .fields import QUANTITY_SCHEMA, Construct, Key, Schema, Shape, node_as, ref, sound
+from .fields import QUANTITY_SCHEMA, Field, Reader, Record, Schema, node_as, ref, sound
 from .sampling import (
     HYPERCUBE,
     LATIN,
@@ -396,17 +396,17 @@ def _level_at(point: Point, box: AnyMapping[str, Bounds]) -> Level:
 
 
 _QUANTITY = node_as(QUANTITY_SCHEMA)
-RANGE = Construct(
+RANGE = Record(
     "Values at equal distances.",
     {
-        "from": Key(_QUANTITY, "The first value."),
-        "to": Key(_QUANTITY, "The last value, if a step falls on it."),
-        "step": Key(_QUANTITY, "The distance between two values."),
+        "from": Field(_QUANTITY, "The first value."),
+        "to": Field(_QUANTITY, "The last value, if a step falls on it."),
+        "step": Field(_QUANTITY, "The distance between two values."),
     },
     type="object",
     required=["from", "to", "step"],
 )
-DIMENSIONS = Shape(
+DIMENSIONS = Reader(
     {"type": ["object", "null"], "additionalProperties": ref("dimension")},
     lambda reader, node, what: DimensionReader(reader.problems).vary(node, what),
 )
@@ -417,13 +417,13 @@ def dimension_schema() -> Schema:
     lists: Schema = {"type": "object", "minProperties": 1, "additionalProperties": {"type": "array", "minItems": 1}}
     sets: Schema = {**lists, "additionalProperties": {"type": ["object", "null"]}}
     forms = {
-        "zip": Key(node_as(lists), "Parameters that vary together: 'path: [value, ...]', all of the same length."),
-        "cases": Key(node_as(sets), "Named sets of values: 'name: {path: value}'."),
-        LATIN: Key(node_as(HYPERCUBE.schema), "Points that fill a box evenly."),
-        SOBOL: Key(node_as(SOBOL_INDICES.schema), "Points for Sobol's sensitivity indices: shares of the variance."),
-        MORRIS: Key(node_as(MORRIS_INDICES.schema), "Points for Morris's elementary effects, to find what matters."),
+        "zip": Field(node_as(lists), "Parameters that vary together: 'path: [value, ...]', all of the same length."),
+        "cases": Field(node_as(sets), "Named sets of values: 'name: {path: value}'."),
+        LATIN: Field(node_as(HYPERCUBE.schema), "Points that fill a box evenly."),
+        SOBOL: Field(node_as(SOBOL_INDICES.schema), "Points for Sobol's sensitivity indices: shares of the variance."),
+        MORRIS: Field(node_as(MORRIS_INDICES.schema), "Points for Morris's elementary effects, to find what matters."),
     }
-    single = (Construct("", {key: each}, type="object", required=[key]).schema for key, each in forms.items())
+    single = (Record("", {key: each}, type="object", required=[key]).schema for key, each in forms.items())
     return {
         "description": "The values of a parameter, or of several that vary together.",
         "anyOf": [{"type": "array", "minItems": 1}, RANGE.schema, *single],

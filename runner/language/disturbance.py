@@ -11,7 +11,7 @@ from ..text.document import Mapping, Node, read
 from ..text.problems import POISON, Problems
 from ..text.reading import NodeReader
 from .acts import ACTS, ActText, acts
-from .fields import NAMED, Construct, Key, sound
+from .fields import NAMED, Field, Record, sound
 from .models import ASPECTS, COMPOSITES, DOC, PARAMETERS, CompositeText, ModelText
 from .parts import parts
 from .ports import ParameterText
@@ -34,10 +34,10 @@ T = TypeVar("T", CompositeText, ParameterText)
 PARAMETER_THERE, COMPOSITE_THERE = "the model already has a parameter {!r}", "there is already a composite {!r}"
 
 # Its aspects may take over the ports of the aspects that they replace.
-DISTURBANCE = Construct(
+DISTURBANCE = Record(
     "Aspects in a separate file, to be added to a model.",
     {
-        "disturbance": Key(
+        "disturbance": Field(
             NAMED,
             "The name of the disturbance.",
             "the disturbance's name",
@@ -45,14 +45,14 @@ DISTURBANCE = Construct(
             name="name",
         ),
         "doc": DOC,
-        "set": Key(
+        "set": Field(
             settings_like("observer[*].sensor.max_range: 5 m"),
             "Values for parameters of the model: 'path: value', as for --set.",
         ),
         "parameters": PARAMETERS,
         "composites": COMPOSITES,
-        "aspects": Key(parts("aspect", "added_aspect"), ASPECTS.doc),
-        EXACTLY: Key(
+        "aspects": Field(parts("aspect", "added_aspect"), ASPECTS.doc),
+        EXACTLY: Field(
             ACTS,
             "The only acts of aspects that happen, these and the model's own: a list of {aspect, at, token}.",
         ),

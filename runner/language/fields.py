@@ -69,7 +69,7 @@ def computed(kind: str, low: float | None = None, high: float | None = None, uni
 
 
 @dataclass(frozen=True)
-class Shape:
+class Reader:
     """What a value may be.
 
     ``read`` takes a reader, a node and its name in messages; it returns the value, ``POISON`` if it is wrong, or None
@@ -79,9 +79,9 @@ class Shape:
     schema: Schema
     read: Callable[[Any, Node, str], Any]
 
-    def described(self, schema: Schema) -> Shape:
+    def described(self, schema: Schema) -> Reader:
         """The same with another schema."""
-        return Shape(schema, self.read)
+        return Reader(schema, self.read)
 
 
 def _flag(reader: NodeReader, node: Node, what: str) -> bool | Poison:
@@ -90,9 +90,9 @@ def _flag(reader: NodeReader, node: Node, what: str) -> bool | Poison:
     return reader.problems.add(f"{what} is neither true nor false", node.position)
 
 
-def node_as(schema: Schema) -> Shape:
+def node_as(schema: Schema) -> Reader:
     """A node as it is: one of the values of a part, which are read when its class is known."""
-    return Shape(schema, lambda reader, node, what: node)
+    return Reader(schema, lambda reader, node, what: node)
 
 
 @dataclass(frozen=True)
@@ -109,10 +109,10 @@ class Computed:
 
 def computed_as(
     parameter: Parameter[Any], convert: Callable[[Any], Any] | None = None, schema: Schema | None = None
-) -> Shape:
+) -> Reader:
     """A value like that of a parameter, which may be computed; ``convert`` makes something else of it."""
     conversion = convert or parameter.convert
-    return Shape(schema or _scalar(parameter), lambda reader, node, what: Computed(node, conversion))
+    return Reader(schema or _scalar(parameter), lambda reader, node, what: Computed(node, conversion))
 
 
 def nanoseconds(duration: object) -> int:
@@ -124,7 +124,7 @@ def nanoseconds(duration: object) -> int:
 TIME = Parameter(float, unit="s", min=0.0)
 
 
-def number(kind: type, low: float | None = None, high: float | None = None) -> Shape:
+def number(kind: type, low: float | None = None, high: float | None = None) -> Reader:
     """A number that is written out."""
     parameter: Parameter[Any] = Parameter(kind, min=low, max=high)
     schema: Schema = {"type": "integer" if kind is int else "number"}
@@ -136,17 +136,17 @@ def number(kind: type, low: float | None = None, high: float | None = None) -> S
         except FaultError as error:
             return blame(reader.problems, what, error, node)
 
-    return Shape(schema, read)
+    return Reader(schema, read)
 
 
-def named(schema: Schema, read: Callable[[Any, str, Entry], Any]) -> Shape:
+def named(schema: Schema, read: Callable[[Any, str, Entry], Any]) -> Reader:
     """A mapping from names to things, each read with its name; those that are wrong are left out."""
 
     def read_all(reader: NodeReader, node: Node, what: str) -> dict[str, Any] | Poison:
         entries = reader.named(node, what)
         return POISON if entries is POISON else sound({name: read(reader, name, entry) for name, entry in entries})
 
-    return Shape(names_of(schema), read_all)
+    return Reader(names_of(schema), read_all)
 
 
 QUANTITY_SCHEMA: Schema = {
@@ -154,11 +154,11 @@ QUANTITY_SCHEMA: Schema = {
     **looks_like(QUANTITY, "expected a number, alone or with its unit"),
 }
 LABEL: Schema = {"type": ["string", "number", "boolean", "null"]}  # any single value, taken as it is written
-TEXT = Shape(ref("text"), NodeReader.text)
-NAMED = Shape(ref("name"), NodeReader.name)
-AT = Shape(ref("text"), NodeReader.placed)
-TEXTS = Shape(one_or_more({"type": "string"}), NodeReader.texts)
-FLAG = Shape({"type": "boolean"}, _flag)
+TEXT = Reader(ref("text"), NodeReader.text)
+NAMED = Reader(ref("name"), NodeReader.name)
+AT = Reader(ref("text"), NodeReader.placed)
+TEXTS = Reader(one_or_more({"type": "string"}), NodeReader.texts)
+FLAG = Reader({"type": "boolean"}, _flag)
 
 
 def sound(found: Mapping[str, T | Poison]) -> dict[str, T]:
@@ -170,7 +170,7 @@ def sound(found: Mapping[str, T | Poison]) -> dict[str, T]:
 
 
 @dataclass(frozen=True)
-class Key:
+class Field:
     """A key of a construct: the shape of its value, and what it means.
 
     ``called`` is the name of the value in messages, and ``missing`` the message and advice if there is none; in both,
@@ -178,7 +178,7 @@ class Key:
     from the key.
     """
 
-    shape: Shape
+    shape: Reader
     doc: str
     called: str = "{key}"
     missing: tuple[str, ...] = ()
@@ -190,24 +190,24 @@ class Key:
 
 
 def keyed(
-    shape: Shape, doc: str, *, key: str = "", called: str = "{key}", missing: tuple[str, ...] = (), **default: Any
+    shape: Reader, doc: str, *, key: str = "", called: str = "{key}", missing: tuple[str, ...] = (), **default: Any
 ) -> Any:
     """A field of a declaration that is a key of the language, with its name unless ``key`` is another."""
-    return field(metadata={"key": (key, Key(shape, doc, called, missing))}, **default)
+    return field(metadata={"key": (key, Field(shape, doc, called, missing))}, **default)
 
 
-class Construct:
+class Record:
     """A mapping with these keys and no others; ``rules`` are further conditions in its schema."""
 
-    def __init__(self, doc: str, keys: Mapping[str, Key], **rules: Any) -> None:
+    def __init__(self, doc: str, keys: Mapping[str, Field], **rules: Any) -> None:
         self.doc = doc
         self.keys = dict(keys)
         self.rules = rules
 
     @classmethod
-    def of(cls, declaration: type, doc: str = "", **rules: Any) -> Construct:
+    def of(cls, declaration: type, doc: str = "", **rules: Any) -> Record:
         """The mapping from which a declaration is read, by the keys that its fields say."""
-        keys: dict[str, Key] = {}
+        keys: dict[str, Field] = {}
         for each in fields(declaration):
             if "key" in each.metadata:
                 name, said = each.metadata["key"]

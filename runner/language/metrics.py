@@ -7,17 +7,17 @@ from typing import Any
 
 from epicycle.actors import Parameter, declared_parameters
 
-from ..catalogue.measure import TAKES, Measure, take_fault
+from ..catalogue.metrics import TAKES, MetricSpec, take_fault
 from ..text.document import Entry
 from ..text.problems import POISON, Poison, Position
 from ..text.reading import NodeReader, Text
-from .fields import AT, TEXTS, Construct, Key, about, named, node_as, one_or_more, ref, schema_of
+from .fields import AT, TEXTS, Field, Record, about, named, node_as, one_or_more, ref, schema_of
 from .places import PATTERN_SCHEMA
 
 
 @dataclass(frozen=True)
 class MetricText:
-    """A number computed from what ports send, or from other metrics; ``values`` are those of a ``Measure``."""
+    """A number computed from what ports send, or from other metrics; ``values`` are those of a ``MetricSpec``."""
 
     name: str
     ports: tuple[Text, ...]
@@ -26,22 +26,22 @@ class MetricText:
     position: Position
 
 
-def _of_metric(key: str, parameter: Parameter[Any]) -> Key:
+def _of_metric(key: str, parameter: Parameter[Any]) -> Field:
     schema = ref("text") if key in ("unit", "to", "doc", "label") else schema_of(parameter)
     if key == "take":
         schema = {"enum": list(TAKES), "enumDescriptions": [f"{each.doc} ({each.over})" for each in TAKES.values()]}
-    return Key(node_as(schema), about(parameter))
+    return Field(node_as(schema), about(parameter))
 
 
-METRIC = Construct(
+METRIC = Record(
     "A number computed from what ports send, or from other metrics.",
     {
-        "of": Key(
+        "of": Field(
             TEXTS.described(one_or_more(PATTERN_SCHEMA)),
             "The output port, a pattern for several, or a list of these.",
         ),
-        "from": Key(AT, "An expression over other metrics of the model, such as 'delivered / sent'."),
-        **{key: _of_metric(key, each) for key, each in declared_parameters(Measure).items()},
+        "from": Field(AT, "An expression over other metrics of the model, such as 'delivered / sent'."),
+        **{key: _of_metric(key, each) for key, each in declared_parameters(MetricSpec).items()},
     },
     type="object",
     anyOf=[{"required": ["of"]}, {"required": ["from"]}],

@@ -20,10 +20,10 @@ from .fields import (
     TEXTS,
     TIME,
     Computed,
-    Construct,
-    Key,
+    Field,
+    Reader,
+    Record,
     Schema,
-    Shape,
     computed,
     computed_as,
     keyed,
@@ -44,30 +44,30 @@ from .ports import PORTS, ParameterText, PortText
 # -- composite classes --------------------------------------------------------------------------------------------
 
 
-def _like(default: str) -> dict[str, Key]:
+def _like(default: str) -> dict[str, Field]:
     """The dialect of a director."""
     doc = f"{LIKE.doc[:1].upper()}{LIKE.doc[1:]} (default: {default})."
-    return {"like": Key(node_as({"type": "string"}), doc)}
+    return {"like": Field(node_as({"type": "string"}), doc)}
 
 
-MODEL_DIRECTOR = Construct(
+MODEL_DIRECTOR = Record(
     "The rules of the model's director, and of the directors inside that do not override them.",
     _like("epicycle"),
 )
-DIRECTOR = Construct(
+DIRECTOR = Record(
     "A separate director, with a local clock.",
     {
-        "start": Key(
+        "start": Field(
             node_as(computed("number", unit="s")), "The local time when the run begins (default: the time outside)."
         ),
-        "drift": Key(
+        "drift": Field(
             node_as(computed("number", unit="1")), "The rate of local time; 1 is as fast as the time outside."
         ),
         **_like("as outside"),
     },
 )
-DOC = Key(TEXT, "What it shows or does.")
-INCLUDE = Key(TEXTS, "Files of composite classes, in or below this folder.")
+DOC = Field(TEXT, "What it shows or does.")
+INCLUDE = Field(TEXTS, "Files of composite classes, in or below this folder.")
 _SAID_OF_PORTS = "a list of names, or 'name: type' or 'name: {type, doc}'."
 
 
@@ -85,7 +85,7 @@ class CompositeText:
     position: Position
     doc: str = keyed(DOC.shape, DOC.doc, default="")
     extends: Text | Poison | None = keyed(
-        Shape(ref("name"), _base),
+        Reader(ref("name"), _base),
         "The composite class that this one inherits from and changes.",
         called="the class to extend",
         default=None,
@@ -98,7 +98,7 @@ class CompositeText:
     inputs: dict[str, PortText] = keyed(PORTS, f"The input ports: {_SAID_OF_PORTS}", default_factory=dict)
     outputs: dict[str, PortText] = keyed(PORTS, f"The output ports: {_SAID_OF_PORTS}", default_factory=dict)
     director: dict[str, Entry] | None = keyed(
-        Shape(ref("director"), DIRECTOR.entries),
+        Reader(ref("director"), DIRECTOR.entries),
         "Its own director: the composite fires as one actor, in local time.",
         called="the director of {what}",
         default=None,
@@ -127,18 +127,18 @@ class CompositeText:
         return self.inputs if direction == "input" else self.outputs
 
 
-COMPOSITE = Construct.of(CompositeText, "A composite class: a graph with its own ports.")
+COMPOSITE = Record.of(CompositeText, "A composite class: a graph with its own ports.")
 COMPOSITE.keys |= OF_MODES
 PARAMETERS, ACTORS, ASPECTS = (COMPOSITE.keys[name] for name in ("parameters", "actors", "aspects"))
 # Where a class extends another, its actors and aspects may be changes to inherited ones.
 _CHANGES = {
-    "actors": Key(parts("actor", "changed_actor", derived=True), ACTORS.doc),
-    "aspects": Key(parts("aspect", "changed_aspect", derived=True), ASPECTS.doc),
+    "actors": Field(parts("actor", "changed_actor", derived=True), ACTORS.doc),
+    "aspects": Field(parts("aspect", "changed_aspect", derived=True), ASPECTS.doc),
 }
-HEIR = Construct(COMPOSITE.doc, {**COMPOSITE.keys, **_CHANGES})
+HEIR = Record(COMPOSITE.doc, {**COMPOSITE.keys, **_CHANGES})
 
 
-def composite_schema(construct: Construct = COMPOSITE) -> Schema:
+def composite_schema(construct: Record = COMPOSITE) -> Schema:
     """The schema of a composite class, or of a model, which may extend another."""
     found = construct.schema
     for key, changes in _CHANGES.items():
@@ -190,7 +190,7 @@ def composite(
     return CompositeText(name, position, **said, connections=kept, written=(*written, *wrong))
 
 
-COMPOSITES = Key(named(ref("composite"), _composite), "Composite classes, for the types of actors.")
+COMPOSITES = Field(named(ref("composite"), _composite), "Composite classes, for the types of actors.")
 
 # -- whole files --------------------------------------------------------------------------------------------------
 
@@ -215,7 +215,7 @@ class RunText:
     )
 
 
-RUN = Construct.of(RunText, "When a run ends, and what it records.")
+RUN = Record.of(RunText, "When a run ends, and what it records.")
 
 
 def _run(reader: NodeReader, node: Node, what: str) -> RunText | Poison:
@@ -257,11 +257,11 @@ def _all(found: dict[str, Any] | Poison) -> tuple[Any, ...]:
     return tuple((found or {}).values())
 
 
-LIBRARY = Construct("", {"doc": DOC, "include": INCLUDE, "composites": COMPOSITES})
-MODEL = Construct(
+LIBRARY = Record("", {"doc": DOC, "include": INCLUDE, "composites": COMPOSITES})
+MODEL = Record(
     "",
     {
-        "model": Key(
+        "model": Field(
             NAMED,
             "The name of the model.",
             "the model's name",
@@ -269,28 +269,28 @@ MODEL = Construct(
             name="name",
         ),
         "doc": COMPOSITE.keys["doc"],
-        "extends": Key(AT, "The model that this one changes: packaged, or a file in or below this folder."),
+        "extends": Field(AT, "The model that this one changes: packaged, or a file in or below this folder."),
         "include": INCLUDE,
         "parameters": PARAMETERS,
         "composites": COMPOSITES,
-        "director": Key(Shape(ref("model_director"), _model_director), MODEL_DIRECTOR.doc, "the director of {what}"),
+        "director": Field(Reader(ref("model_director"), _model_director), MODEL_DIRECTOR.doc, "the director of {what}"),
         "actors": ACTORS,
         "connections": COMPOSITE.keys["connections"],
         "aspects": ASPECTS,
-        "run": Key(Shape(ref("run"), _run), RUN.doc),
-        "metrics": Key(
-            Shape(METRICS.schema, lambda reader, node, what: _all(METRICS.read(reader, node, what))),
+        "run": Field(Reader(ref("run"), _run), RUN.doc),
+        "metrics": Field(
+            Reader(METRICS.schema, lambda reader, node, what: _all(METRICS.read(reader, node, what))),
             "Numbers computed from what ports send: 'name: {of, take, after, unit, ...}'.",
         ),
-        "monitors": Key(
-            Shape(MONITORS.schema, lambda reader, node, what: _all(MONITORS.read(reader, node, what))),
+        "monitors": Field(
+            Reader(MONITORS.schema, lambda reader, node, what: _all(MONITORS.read(reader, node, what))),
             "Properties that a run must have: 'name: always port >= 2 m', or 'name: {property, between, stop, ...}'.",
         ),
-        "figures": Key(parts("figure"), "Figures of a run: 'name: {type, ...}'."),
+        "figures": Field(parts("figure"), "Figures of a run: 'name: {type, ...}'."),
     },
 )
 _OF_ROOT = {key for key, each in MODEL.keys.items() if COMPOSITE.keys.get(key) is each}  # as in other composites
-_OF_FILE = Construct("", {key: each for key, each in MODEL.keys.items() if key not in _OF_ROOT})
+_OF_FILE = Record("", {key: each for key, each in MODEL.keys.items() if key not in _OF_ROOT})
 
 
 def model_of(node: Node, problems: Problems) -> ModelText | Poison:

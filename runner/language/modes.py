@@ -10,27 +10,29 @@ from epicycle.actors import declared_parameters
 from ..text.document import Entry, Mapping
 from ..text.problems import POISON, Poison, Position
 from ..text.reading import NodeReader, Text
-from .fields import AT, Key, Schema, names_of, node_as, one_or_more, ref
+from .fields import AT, Field, Schema, names_of, node_as, one_or_more, ref
 from .parts import PartText
 
 _VALUES: Schema = {"type": ["object", "string"]}
 _MODE: Schema = {"type": ["object", "null"], "properties": {"refinement": {"type": ["string", "object"]}}}
 # What a composite class declares about its machine, if it has one: parameters of StateMachine, and refinements.
 OF_MODES = {
-    "modes": Key(
+    "modes": Field(
         node_as({"anyOf": [one_or_more(ref("name")), names_of(_MODE)]}),
         "The modes of a composite without other actors: a list of names, or 'name: {refinement, flow, entry, "
         "exit, final}'.",
     ),
-    "transitions": Key(
+    "transitions": Field(
         node_as({"type": "array", "items": {"type": ["string", "object"]}}),
         "Its transitions, such as 'a -> b on port after 3 s when x > 2 do y = x; n = n + 1', or {from, to, when, ...}.",
     ),
-    "initial": Key(node_as({"type": "string"}), "The initial mode (default: the first)."),
-    "variables": Key(
+    "initial": Field(node_as({"type": "string"}), "The initial mode (default: the first)."),
+    "variables": Field(
         node_as({"type": ["object", "string"]}), "Variables of its guards and actions: 'name: initial value'."
     ),
-    "held": Key(node_as({"type": ["object", "string"]}), "Inputs that keep their latest token: 'name: initial value'."),
+    "held": Field(
+        node_as({"type": ["object", "string"]}), "Inputs that keep their latest token: 'name: initial value'."
+    ),
 }
 
 

@@ -11,7 +11,7 @@ from ..temporal import Requirement
 from ..text.document import Entry, Mapping
 from ..text.problems import POISON, Poison, Position
 from ..text.reading import NodeReader
-from .fields import Construct, Key, about, named, node_as, ref, schema_of
+from .fields import Field, Record, about, named, node_as, ref, schema_of
 
 
 @dataclass(frozen=True)
@@ -30,13 +30,13 @@ class MonitorText:
 _WRITTEN = ("property", "unit", "doc", "label")  # texts, in which numbers need no quotes
 
 
-def _of_monitor(key: str, parameter: Parameter[Any]) -> Key:
+def _of_monitor(key: str, parameter: Parameter[Any]) -> Field:
     schema = ref("text") if key in _WRITTEN else schema_of(parameter)
     missing = ("{what} has no property", "add 'property: always ...'") if parameter.required else ()
-    return Key(node_as(schema), about(parameter), missing=missing)
+    return Field(node_as(schema), about(parameter), missing=missing)
 
 
-MONITOR = Construct(
+MONITOR = Record(
     "A property that a run must have: its text, or this.",
     {key: _of_monitor(key, each) for key, each in declared_parameters(Requirement).items()},
     type=["object", "string"],

@@ -12,7 +12,7 @@ from ..text.document import Entry, Mapping, Node, Scalar
 from ..text.limits import NORMAL
 from ..text.problems import POISON, Poison, Position
 from ..text.reading import NAME, SURE, NodeReader, Text, is_empty
-from .fields import AT, TEXTS, Computed, Construct, Shape, computed_as, keyed, named, one_or_more, ref, sound
+from .fields import AT, TEXTS, Computed, Reader, Record, computed_as, keyed, named, one_or_more, ref, sound
 from .places import POINTCUTS, PointcutText
 
 
@@ -60,7 +60,7 @@ class PartText:
     choices: dict[str, PartText] = field(default_factory=dict)  # what it may be, if a parameter chooses its type
 
 
-BESIDE = Construct.of(PartText)  # the keys besides the parameters of an actor or aspect
+BESIDE = Record.of(PartText)  # the keys besides the parameters of an actor or aspect
 RESERVED = {
     "actor": Actor.reserved,
     "aspect": Aspect.reserved,
@@ -105,7 +105,7 @@ def part(
     return PartText(name, entry.key.position, type_name, values, **sound(read))
 
 
-def parts(kind: str, definition: str = "", *, derived: bool = False) -> Shape:
+def parts(kind: str, definition: str = "", *, derived: bool = False) -> Reader:
     """Actors, aspects or figures by name."""
     reserved = RESERVED.get(definition, RESERVED[kind])
 

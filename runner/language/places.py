@@ -17,10 +17,10 @@ from .fields import (
     NAME,
     TIME,
     Computed,
-    Construct,
-    Key,
+    Field,
+    Reader,
+    Record,
     Schema,
-    Shape,
     computed_as,
     keyed,
     looks_like,
@@ -95,7 +95,7 @@ def endpoints(reader: NodeReader, texts: Iterable[Text] | Poison) -> tuple[Endpo
     return POISON if texts is POISON or len(sound) < len(found) else sound
 
 
-_ENDS = Shape(ref("ports"), lambda reader, node, what: endpoints(reader, reader.texts(node, what)))
+_ENDS = Reader(ref("ports"), lambda reader, node, what: endpoints(reader, reader.texts(node, what)))
 
 
 @dataclass(frozen=True)
@@ -129,7 +129,7 @@ class ConnectionText:
     removes: Position | None = None  # where the file removes these from the inherited ones
 
 
-CONNECTION = Construct.of(ConnectionText, "From ports, to ports.")
+CONNECTION = Record.of(ConnectionText, "From ports, to ports.")
 
 
 def connection(reader: NodeReader, node: Node, what: str = "") -> ConnectionText | Poison:
@@ -263,8 +263,8 @@ class PointcutText:
 
 
 _AT = AT.described(_POINTCUT_SCHEMA)
-POINTCUT = Construct.of(PointcutText, type="object")
-POINTCUT.keys = {"at": Key(_AT, "Ports or actors, as a pattern, or a connection.", _OF_POINTCUT), **POINTCUT.keys}
+POINTCUT = Record.of(PointcutText, type="object")
+POINTCUT.keys = {"at": Field(_AT, "Ports or actors, as a pattern, or a connection.", _OF_POINTCUT), **POINTCUT.keys}
 
 
 def pointcuts(reader: NodeReader, node: Node, what: str) -> tuple[PointcutText | Poison, ...]:
@@ -292,7 +292,7 @@ def _pointcut(reader: NodeReader, item: Mapping) -> PointcutText | Poison:
 
 
 POINTCUTS_SCHEMA = one_or_more({"anyOf": [_POINTCUT_SCHEMA, POINTCUT.schema]})
-PATTERNS = Shape(
+PATTERNS = Reader(
     ref("patterns"),
     lambda reader, node, what: tuple(
         reader.placed(item, what)
@@ -300,8 +300,8 @@ PATTERNS = Shape(
         if not is_empty(item)
     ),
 )
-POINTCUTS = Shape(ref("pointcuts"), pointcuts)
-CONNECTIONS = Shape(
+POINTCUTS = Reader(ref("pointcuts"), pointcuts)
+CONNECTIONS = Reader(
     {"type": ["array", "null"], "items": ref("connection")},
     lambda reader, node, what: (
         POISON if (items := reader.items(node, what)) is POISON else tuple(connection(reader, each) for each in items)

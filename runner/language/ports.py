@@ -18,8 +18,8 @@ from .fields import (
     LABEL,
     QUANTITY_SCHEMA,
     TEXT,
-    Construct,
-    Shape,
+    Reader,
+    Record,
     keyed,
     named,
     names_of,
@@ -47,7 +47,7 @@ class PortText:
     doc: str = keyed(TEXT, "What it is.", default="")
 
 
-PORT = Construct.of(PortText, "A port of a composite: its type, or {type, doc}.", type=["object", "string", "null"])
+PORT = Record.of(PortText, "A port of a composite: its type, or {type, doc}.", type=["object", "string", "null"])
 
 
 def _ports(reader: NodeReader, node: Node, what: str) -> dict[str, PortText]:
@@ -122,29 +122,32 @@ class ParameterText:
     position: Position
     value: Node | Poison | None = keyed(node_as({}), "The default; without one, a value must be given.", default=None)
     unit: str = keyed(
-        Shape(ref("text"), _unit), "The unit of numbers, such as m/s; 1 for a pure number.", called="{what}", default=""
+        Reader(ref("text"), _unit),
+        "The unit of numbers, such as m/s; 1 for a pure number.",
+        called="{what}",
+        default="",
     )
     # As written: a text has a unit of its own.
     min: float | str | None = keyed(
-        Shape(QUANTITY_SCHEMA, _bound),
+        Reader(QUANTITY_SCHEMA, _bound),
         "The smallest value, in its unit or with one of its own.",
         called="{key} of {what}",
         default=None,
     )
     max: float | str | None = keyed(
-        Shape(QUANTITY_SCHEMA, _bound),
+        Reader(QUANTITY_SCHEMA, _bound),
         "The largest value, in its unit or with one of its own.",
         called="{key} of {what}",
         default=None,
     )
     above: float | str | None = keyed(
-        Shape(QUANTITY_SCHEMA, _bound),
+        Reader(QUANTITY_SCHEMA, _bound),
         "What every value is greater than, in its unit or with one of its own.",
         called="{key} of {what}",
         default=None,
     )
     choices: dict[str, Text] = keyed(
-        Shape({"anyOf": [one_or_more(LABEL), names_of(ref("text"))]}, _choices),
+        Reader({"anyOf": [one_or_more(LABEL), names_of(ref("text"))]}, _choices),
         "The texts to choose from; where one chooses the type of an actor, those of types, or {text: type}.",
         called="{what}",
         default_factory=dict,
@@ -166,7 +169,7 @@ class ParameterText:
         return low, above, high
 
 
-PARAMETER = Construct.of(ParameterText, type=["object", "array", "string", "number", "boolean", "null"])
+PARAMETER = Record.of(ParameterText, type=["object", "array", "string", "number", "boolean", "null"])
 _NO_PARAMETERS = {"index", *CONSTANTS, *FUNCTIONS}
 
 
@@ -194,11 +197,11 @@ def _parameter(reader: NodeReader, name: str, entry: Entry) -> ParameterText:
     return found
 
 
-PARAMETERS = Shape(
+PARAMETERS = Reader(
     {
         **names_of(ref("parameter")),
         "propertyNames": {"pattern": f"^{NAME_PATTERN}$", "not": {"enum": sorted({*_NO_PARAMETERS, *kwlist})}},
     },
     named({}, _parameter).read,
 )
-PORTS = Shape({"anyOf": [one_or_more(ref("name")), names_of(ref("port_declaration"))]}, _ports)
+PORTS = Reader({"anyOf": [one_or_more(ref("name")), names_of(ref("port_declaration"))]}, _ports)

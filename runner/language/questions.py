@@ -18,7 +18,7 @@ from ..text.problems import POISON, Poison, Position, Problems
 from ..text.reading import NodeReader, Text, inside
 from .claims import ALWAYS, FALLS, FORMS, GREATER, LESS, RISES, Claim, Guideline, Questions, Selection, shown_level
 from .dimensions import Dimension, Factor, as_factor
-from .fields import AT, LABEL, TEXT, TEXTS, Construct, Key, Schema, Shape, names_of, node_as, number, ref
+from .fields import AT, LABEL, TEXT, TEXTS, Field, Reader, Record, Schema, names_of, node_as, number, ref
 from .files import named_file
 
 MAX_CONDITIONS = 10_000  # of a study with claims or a guideline, which evaluate all of them
@@ -285,32 +285,32 @@ _LEVELS: Schema = {
 _TEXT: Schema = {"type": "string"}
 
 
-def _levels(key: str, doc: str) -> Key:
-    return Key(Shape(_LEVELS, lambda reader, node, what: reader.selection(node, what, key)), doc, "{what}")
+def _levels(key: str, doc: str) -> Field:
+    return Field(Reader(_LEVELS, lambda reader, node, what: reader.selection(node, what, key)), doc, "{what}")
 
 
-def _trend(key: str, doc: str) -> Key:
-    return Key(Shape(_TEXT, lambda reader, node, what: reader.trend(node, what, key)), doc, "{what}")
+def _trend(key: str, doc: str) -> Field:
+    return Field(Reader(_TEXT, lambda reader, node, what: reader.trend(node, what, key)), doc, "{what}")
 
 
 _TREND = "Metrics whose mean, or slope per unit of another factor, {} over the levels of a factor."
-CLAIM = Construct(
+CLAIM = Record(
     "A hypothesis on the results.",
     {
-        "doc": Key(TEXT, "The claim in words."),
-        LESS: Key(_METRICS, "Metrics whose mean is less at some levels than at others.", "{what}"),
-        GREATER: Key(_METRICS, "Metrics whose mean is greater at some levels than at others.", "{what}"),
-        RISES: Key(_METRICS, _TREND.format(RISES), "{what}"),
-        FALLS: Key(_METRICS, _TREND.format(FALLS), "{what}"),
-        ALWAYS: Key(
-            Shape(_TEXT, QuestionReader.condition), "A condition on the metrics that holds in every run.", "{what}"
+        "doc": Field(TEXT, "The claim in words."),
+        LESS: Field(_METRICS, "Metrics whose mean is less at some levels than at others.", "{what}"),
+        GREATER: Field(_METRICS, "Metrics whose mean is greater at some levels than at others.", "{what}"),
+        RISES: Field(_METRICS, _TREND.format(RISES), "{what}"),
+        FALLS: Field(_METRICS, _TREND.format(FALLS), "{what}"),
+        ALWAYS: Field(
+            Reader(_TEXT, QuestionReader.condition), "A condition on the metrics that holds in every run.", "{what}"
         ),
         "at": _levels("at", "Where they are less, or greater: 'factor: level' or 'factor: [level, ...]'."),
         "than": _levels("than", "What they are compared with (default: all other levels, so that these are the best)."),
         "over": _trend("over", "The factor over which something rises or falls."),
         "per": _trend("per", "What rises or falls is the slope over this factor."),
         "where": _levels("where", "The levels to which the claim is restricted (default: all)."),
-        "share": Key(
+        "share": Field(
             number(float, 0.5, 1.0),
             "The share of the comparisons, or runs, in which it must hold (default: 1, all).",
             "{what}: share",
@@ -319,16 +319,16 @@ CLAIM = Construct(
     type="object",
     oneOf=[{"required": [form, *(key for key in takes if key in ("at", "over"))]} for form, takes in FORMS.items()],
 )
-GUIDELINE = Construct(
+GUIDELINE = Record(
     "",
     {
-        "choose": Key(
+        "choose": Field(
             TEXT.described(_TEXT),
             "The factor whose best level is to be found, for every combination of the others.",
         ),
-        "least": Key(AT.described(ref("name")), "The metric to minimise."),
-        "greatest": Key(AT.described(ref("name")), "The metric to maximise."),
-        "tolerance": Key(
+        "least": Field(AT.described(ref("name")), "The metric to minimise."),
+        "greatest": Field(AT.described(ref("name")), "The metric to maximise."),
+        "tolerance": Field(
             number(float, 0.0),
             "How much worse than the best is still good enough (default: 0).",
             "guideline: tolerance",

@@ -13,7 +13,7 @@ from typing import TypeAlias
 from epicycle.actors import random_stream
 
 from ..text.limits import MAX_SEED
-from .fields import QUANTITY_SCHEMA, Construct, Key, node_as, number
+from .fields import QUANTITY_SCHEMA, Field, Record, node_as, number
 
 Point: TypeAlias = tuple[float, ...]
 
@@ -93,9 +93,9 @@ def morris_blocks(
 
 
 _SAMPLING = {
-    "size": Key(number(int, 1, MAX_SAMPLES), "The number of points."),
-    "seed": Key(number(int, 0, MAX_SEED), "The seed that the points are drawn with (default: 0)."),
-    "ranges": Key(
+    "size": Field(number(int, 1, MAX_SAMPLES), "The number of points."),
+    "seed": Field(number(int, 0, MAX_SEED), "The seed that the points are drawn with (default: 0)."),
+    "ranges": Field(
         node_as(
             {
                 "type": "object",
@@ -105,22 +105,22 @@ _SAMPLING = {
         "'path: [low, high]' for each parameter.",
     ),
 }
-HYPERCUBE = Construct("", _SAMPLING, required=["size", "ranges"])
+HYPERCUBE = Record("", _SAMPLING, required=["size", "ranges"])
 _BLOCKS = number(int, 2, MAX_SAMPLES)
-SOBOL_INDICES = Construct(
+SOBOL_INDICES = Record(
     "",
     {
         **_SAMPLING,
-        "size": Key(_BLOCKS, "A power of 2: the number of blocks, of two points more than there are ranges."),
+        "size": Field(_BLOCKS, "A power of 2: the number of blocks, of two points more than there are ranges."),
     },
     required=["size", "ranges"],
 )
-MORRIS_INDICES = Construct(
+MORRIS_INDICES = Record(
     "",
     {
         **_SAMPLING,
-        "size": Key(_BLOCKS, "The number of trajectories; each has a point per range, and one more."),
-        "levels": Key(number(int, 2, 1_000), "The values of the grid in each range, an even number (default: 4)."),
+        "size": Field(_BLOCKS, "The number of trajectories; each has a point per range, and one more."),
+        "levels": Field(number(int, 2, 1_000), "The values of the grid in each range, an even number (default: 4)."),
     },
     required=["size", "ranges"],
 )

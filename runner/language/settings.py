@@ -17,7 +17,7 @@ from ..text.patterns import Comparisons, PatternError, check_pattern, matches, n
 from ..text.problems import Position, Problems
 from ..text.program import call_site, node_of
 from ..text.reading import NAME, NAMES_HAVE, NodeReader, Text, is_empty, split
-from .fields import Shape
+from .fields import Reader
 from .models import ModelText
 from .parts import PartText, beside
 from .places import PointcutText
@@ -84,7 +84,7 @@ def read_overrides(path: Path, problems: Problems) -> list[Setting]:
     return settings_in(node, problems)
 
 
-def settings_like(example: str) -> Shape:
+def settings_like(example: str) -> Reader:
     """A mapping from paths or patterns to values; for anything else, ``example`` is the advice."""
 
     def read_settings(reader: NodeReader, node: Node, what: str) -> tuple[Setting, ...]:
@@ -95,7 +95,7 @@ def settings_like(example: str) -> Shape:
             reader.problems.add(message, node.position, f"write lines like {example!r}")
         return ()
 
-    return Shape({"type": ["object", "null"]}, read_settings)
+    return Reader({"type": ["object", "null"]}, read_settings)
 
 
 def settings_in(node: Mapping, problems: Problems) -> list[Setting]:

@@ -21,9 +21,9 @@ from .fields import (
     LABEL,
     NAMED,
     TEXT,
-    Construct,
-    Key,
-    Shape,
+    Field,
+    Reader,
+    Record,
     keyed,
     named,
     names_of,
@@ -45,18 +45,18 @@ MAX_STUDY_SEED = MAX_SEED - MAX_REPLICATIONS
 RESERVED = ("run", "condition", "replication", "seed", "status", "events", "digest", "error", "wall_time", "replay")
 
 
-METRIC = Construct(
+METRIC = Record(
     "A number that is kept for each run.",
     {
-        "value": Key(
+        "value": Field(
             node_as(LABEL),
             "The expression, over metrics of the model and other results of a run.",
             missing=("{what} has no value", "add 'value: ...', an expression"),
         ),
-        "unit": Key(TEXT, "Its unit; a metric of the model has its own."),
-        "to": Key(TEXT, "Its unit in the table (default: the same)."),
-        "doc": Key(TEXT, "What it is."),
-        "label": Key(TEXT, "Its label in figures and reports (default: the model's label, or its name)."),
+        "unit": Field(TEXT, "Its unit; a metric of the model has its own."),
+        "to": Field(TEXT, "Its unit in the table (default: the same)."),
+        "doc": Field(TEXT, "What it is."),
+        "label": Field(TEXT, "Its label in figures and reports (default: the model's label, or its name)."),
     },
     type="object",
     required=["value"],
@@ -85,7 +85,7 @@ class Until:
     )
 
 
-UNTIL = Construct.of(Until, type="object", required=["metric", "half_width"])
+UNTIL = Record.of(Until, type="object", required=["metric", "half_width"])
 
 
 @dataclass(frozen=True)
@@ -104,7 +104,7 @@ class Study:
     )
     doc: str = keyed(TEXT, "The question that it answers.", default="")
     model: str = keyed(
-        Shape({"type": "string"}, lambda reader, node, what: reader.model(node, what)),
+        Reader({"type": "string"}, lambda reader, node, what: reader.model(node, what)),
         "A packaged model, or the path of a file relative to this one.",
         called="the model",
         missing=("the study has no model", "add a line like 'model: mm1'"),
@@ -120,7 +120,7 @@ class Study:
         DIMENSIONS, "What is varied; every value is combined with every value of the others.", key="vary", default=()
     )
     disturb: tuple[Dimension, ...] = keyed(
-        Shape(_DISTURB, lambda reader, node, what: reader.disturb(node, what)),
+        Reader(_DISTURB, lambda reader, node, what: reader.disturb(node, what)),
         "Disturbances as another dimension: 'name: [disturbance, ...]', or a list of single ones.",
         default=(),
     )
@@ -132,7 +132,7 @@ class Study:
         FLAG, "Whether a replication has the same seed in all conditions (default: true).", default=True
     )
     until: Until | None = keyed(
-        Shape(UNTIL.schema, lambda reader, node, what: reader.until(node, what)),
+        Reader(UNTIL.schema, lambda reader, node, what: reader.until(node, what)),
         "When the replications of each condition stop, instead of a fixed number of them.",
         default=None,
     )
@@ -142,7 +142,7 @@ class Study:
         default_factory=dict,
     )
     metrics: tuple[StudyMetric, ...] | None = keyed(  # None: all of the model
-        Shape(_METRICS, lambda reader, node, what: reader.metrics(node, what)),
+        Reader(_METRICS, lambda reader, node, what: reader.metrics(node, what)),
         "What is kept for each run: names of the model's metrics, or 'name: expression', or "
         "'name: {value, unit, ...}'.",
         default=None,
@@ -173,7 +173,7 @@ class Study:
         return {name: kind for dimension in self.dimensions for name, kind in dimension.columns.items()}
 
 
-STUDY = Construct.of(Study, "A model under many conditions.", required=["model"])
+STUDY = Record.of(Study, "A model under many conditions.", required=["model"])
 
 
 def is_study(path: Path) -> bool:

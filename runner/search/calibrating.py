@@ -200,7 +200,7 @@ class _Runs:
             raise EpicycleError("there is nothing to match\n   help: add --match server.size=measured.csv")
         self.measured = [value for _, _, values in self.signals for value in values]
         self.scales = [_deviation(values) for _, _, values in self.signals for _ in values]
-        self.seed = model.watched.seed if task.seed is None else task.seed
+        self.seed = model.output.seed if task.seed is None else task.seed
         self.name, self.number = model.name, 0
         digest = self._results(model).digest
         about = {"model": model.name, "seed": self.seed, "digest": digest, "match": list(task.match)}

@@ -240,7 +240,7 @@ def explain(
     there |= {name: acts[name] for name in runs.order if name in best and name not in there}
     steps = []
     if there and not ended:
-        ports = next(each.ports for each in model.watched.monitors if each.name == monitor)
+        ports = next(each.ports for each in model.output.monitors if each.name == monitor)
         rest = runs.results(best - {next(iter(there))}, keep_log=True)
         steps = _steps(model.graph, ports, with_set, rest)
     return Explanation(

@@ -35,17 +35,17 @@ def monitors_named(model: Model, text: str | None, flag: str = "") -> list[str]:
     """The names of the monitors that are asked for: without a text, all of the model's; raises ``EpicycleError``."""
     if text is not None:
         return [monitor_named(model, text, flag=flag)]
-    if not model.watched.monitors:
+    if not model.output.monitors:
         raise EpicycleError(
             f"{model.name} has no monitor\n   help: say what is to hold, such as "
             f"{flag or 'monitor='}{' ' if flag else ''}'always server.size < 40'"
         )
-    return [each.name for each in model.watched.monitors]
+    return [each.name for each in model.output.monitors]
 
 
 def property_of(model: Model, monitor: str) -> str:
     """The property that a monitor of a model states; raises ``EpicycleError`` if there is no such monitor."""
-    known = {each.name: each.requirement.property for each in model.watched.monitors}
+    known = {each.name: each.requirement.property for each in model.output.monitors}
     if monitor not in known:
         near = did_you_mean(monitor, known)
         raise EpicycleError(

@@ -270,8 +270,8 @@ def rare(
     made, and how many repetitions are done.
     """
     guide = guide or monitor
-    known = {each.name: each.requirement.property for each in model.watched.monitors}
-    seed = model.watched.seed if seed is None else seed
+    known = {each.name: each.requirement.property for each in model.output.monitors}
+    seed = model.output.seed if seed is None else seed
     first = Simulation(model, seed=seed)
     for name in (monitor, guide):
         first.robustness(name)  # which there must be

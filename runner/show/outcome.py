@@ -56,7 +56,7 @@ def summary_table(model: Model, results: Results) -> Group:
         f"  seed {results.seed}, {in_time(results.until)} of model time, ended by {visible(results.stopped)}",
     )
     rows = []
-    for metric in model.watched.metrics:
+    for metric in model.output.metrics:
         found = results.outcomes[metric.name]
         said = "; ".join([metric.measure.doc, *found.remarks] if metric.measure.doc else found.remarks)
         unit = "" if metric.unit == "1" else metric.unit

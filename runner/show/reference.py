@@ -15,7 +15,7 @@ from epicycle.actors import Configurable, bounds_text
 
 from ..build.model import Model
 from ..catalogue.figure import Figure
-from ..catalogue.measure import TAKES, Measure
+from ..catalogue.metrics import TAKES, MetricSpec
 from ..catalogue.reference import (
     ParameterReference,
     PortReference,
@@ -173,7 +173,7 @@ def _metrics() -> list[str]:
         [name, each.over, each.doc, ", ".join(f"`{option}`" for option in each.options), each.unit]
         for name, each in TAKES.items()
     ]
-    options = [_parameter_row(each) for each in describe("metric", Measure).parameters if each.name != "take"]
+    options = [_parameter_row(each) for each in describe("metric", MetricSpec).parameters if each.name != "take"]
     return [
         METRICS,
         _rows(("take", "counts", "what it is", "options", "unit"), takes),

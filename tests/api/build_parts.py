@@ -134,15 +134,15 @@ def structure(model: Model) -> dict[str, Any]:
     return {
         "actors": {path: (type(actor), repr(actor)) for path, actor in graph.actors.items()},
         "ports": {path: (graph.direction(path), repr(node.port)) for path, node in graph.ports.items()},
-        "connections": [(hop.source, hop.destination, hop.delay) for hop in graph.hops],
+        "connections": [(edge.source, edge.destination, edge.delay) for edge in graph.edges],
         "composites": list(graph.composites),
         "members": {path: each.members for path, each in graph.domains.items()},
         "priorities": {path: each.priority for path, each in graph.components.items() if each.priority},
         "aspects": {woven.name: (repr(woven.aspect), woven.ports) for woven in model.aspects},
         "watched": (
-            model.watched.recorded,
-            model.watched.stop_ports,
-            [(each.name, each.ports, vars(each.measure)) for each in model.watched.metrics],
+            model.output.recorded,
+            model.output.stop_ports,
+            [(each.name, each.ports, vars(each.measure)) for each in model.output.metrics],
         ),
-        "run": (model.name, model.stop, model.watched.seed, model.parameters),
+        "run": (model.name, model.stop, model.output.seed, model.parameters),
     }

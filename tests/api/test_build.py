@@ -113,8 +113,8 @@ def test_what_is_removed_is_gone_everywhere() -> None:
     with pytest.raises(ModelError):
         model.remove("robot[1]")
     model.remove("sum")
-    assert model.watched.metrics[0].ports == []
-    assert model.watched.recorded == ["robot[0].position"]
+    assert model.output.metrics[0].ports == []
+    assert model.output.recorded == ["robot[0].position"]
     assert run(model, until=1).metrics == {"total": None}
 
 

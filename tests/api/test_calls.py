@@ -15,7 +15,7 @@ import epicycle
 from epicycle.actors import EpicycleError
 from epicycle.runner import Model, ModelError, Simulation, load_model
 from epicycle.runner.calls import Comparison
-from epicycle.runner.catalogue.measure import TAKES, Measure, MetricOptions, TakeName
+from epicycle.runner.catalogue.metrics import TAKES, MetricOptions, MetricSpec, TakeName
 from epicycle.runner.catalogue.reference import describe
 from epicycle.runner.cli import main
 from epicycle.runner.show import TimeSeries
@@ -48,7 +48,7 @@ def test_the_package_is_the_command() -> None:
 
 def test_types_say_what_declarations_say() -> None:
     assert list(get_args(TakeName)) == list(TAKES)
-    options = [each.name for each in describe("metric", Measure).parameters if each.name != "take"]
+    options = [each.name for each in describe("metric", MetricSpec).parameters if each.name != "take"]
     assert list(MetricOptions.__annotations__) == options
 
 

@@ -72,8 +72,8 @@ def state(model: Model) -> Any:
     scopes = [model, *map(model.__getitem__, graph.composites)]
     return {
         "ports": [(path, str(node)) for path, node in graph.ports.items()],
-        "hops": [(str(hop), hop.order, hop.delay) for hop in graph.hops],
-        "ways": [[str(hop) for hop in (*graph.incoming(port), *graph.outgoing(port))] for port in graph.ports],
+        "hops": [(str(edge), edge.order, edge.delay) for edge in graph.edges],
+        "ways": [[str(edge) for edge in (*graph.incoming(port), *graph.outgoing(port))] for port in graph.ports],
         "actors": [(path, id(actor), actor.path, actor.is_part) for path, actor in graph.actors.items()],
         "components": [(path, str(each)) for path, each in graph.components.items()],
         "domains": [(path, str(each)) for path, each in graph.domains.items()],
@@ -81,12 +81,12 @@ def state(model: Model) -> Any:
         "rest": (model.graph.is_wired, graph.next_order, list(map(str, graph.detours)), model.is_checked),
         "aspects": [(woven.name, id(woven), repr(woven)) for woven in model.aspects],
         "watched": (
-            model.watched.recorded[:],
-            model.watched.stop_ports[:],
-            [repr(metric) for metric in model.watched.metrics],
+            model.output.recorded[:],
+            model.output.stop_ports[:],
+            [repr(metric) for metric in model.output.metrics],
             model.stop,
         ),
-        "scopes": [(id(scope), list(scope._inside.children), repr(scope)) for scope in scopes],
+        "scopes": [(id(scope), list(scope._inside.members), repr(scope)) for scope in scopes],
     }
 
 
@@ -262,7 +262,7 @@ def test_a_graph_that_is_run_is_frozen() -> None:
         lambda: graph.remove("scale"),
         lambda: graph.add_actor(Clock("other", period=1), None),
         lambda: graph.add_composite("c", "C"),
-        lambda: graph.disconnect(next(iter(graph.hops))),
+        lambda: graph.disconnect(next(iter(graph.edges))),
     ):
         with pytest.raises(RuntimeError) as caught:
             change()

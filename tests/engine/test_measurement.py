@@ -11,11 +11,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from epicycle.runner.catalogue.measure import TAKES, Measure
+from epicycle.runner.catalogue.metrics import TAKES, MetricSpec
 from epicycle.runner.engine.batches import MOST, TimeBatches, TokenBatches, batch_interval, mser
 from epicycle.runner.engine.measurement import Measurement, Outcome
 from epicycle.runner.engine.statistic import Total
-from epicycle.runner.graph.watched import Metric
+from epicycle.runner.graph.outputs import Metric
 from epicycle.runner.show import summary_object
 from tests.engine.engine_parts import simulate
 
@@ -27,7 +27,7 @@ SEQUENCES = st.lists(st.tuples(GAPS, NUMBERS), min_size=1, max_size=40)
 
 def measured(tokens: list[tuple[str, int, Any]], end: int, ports: tuple[str, ...] = ("a.out",), **said: Any) -> Outcome:
     """The value of a metric over tokens of ports at times in ns."""
-    measurement = Measurement(Metric("m", list(ports), Measure(**said)))
+    measurement = Measurement(Metric("m", list(ports), MetricSpec(**said)))
     for port, time, token in tokens:
         measurement.add(port, time, token)
     return measurement.outcome(end)
@@ -333,7 +333,7 @@ def test_intervals_cover_the_mean_of_what_hangs_together() -> None:
         series[place] = 0.9 * series[place - 1] + shocks[place]
     hits = 0
     for column in series.T.tolist():
-        measurement = Measurement(Metric("m", ["a"], Measure(take="mean", interval=0.95)))
+        measurement = Measurement(Metric("m", ["a"], MetricSpec(take="mean", interval=0.95)))
         for place, value in enumerate(column):
             measurement.add("a", place, value)
         hits += is_covered(measurement.outcome(length), 0.0)
@@ -353,10 +353,12 @@ def test_intervals_over_time_cover_the_mean_number_in_a_queue() -> None:
             last = leaves[place] = max(arrivals[place], last) + services[place]
         events = sorted([(int(each * 1e9), 1) for each in arrivals] + [(int(each * 1e9), -1) for each in leaves])
         measurements = {
-            take: Measurement(Metric("m", ["a"], Measure(take=take, initial=0, after=50.0, interval=0.95, when=when)))
+            take: Measurement(
+                Metric("m", ["a"], MetricSpec(take=take, initial=0, after=50.0, interval=0.95, when=when))
+            )
             for take, when in (("time_mean", None), ("share", "value > 0"))
         }
-        coming = Measurement(Metric("m", ["a"], Measure(take="rate", after=50.0, interval=0.95)))
+        coming = Measurement(Metric("m", ["a"], MetricSpec(take="rate", after=50.0, interval=0.95)))
         number = 0
         for time, change in events:
             number += change
@@ -379,7 +381,7 @@ def test_every_take_is_measured_somehow() -> None:
         options = needs.get(kind.needs, {})
         found = measured(tokens, 60 * SECOND, take=take, **options)
         assert found.value is not None, take
-        assert list(Measure(take=take, **options).misfits()) == []
+        assert list(MetricSpec(take=take, **options).misfits()) == []
         if kind.settles:
             assert measured(tokens, 60 * SECOND, take=take, after="mser5", **options).value is not None, take
 

@@ -295,7 +295,7 @@ def test_monitors_of_a_model_built_in_python() -> None:
     with pytest.raises(ModelError, match=r"monitor high: property: 'a\.input' names no output port"):
         built.monitor("high", "always a.input < 4")
     built.forget(steps.path)
-    assert (built.watched.monitors, built.watched.metrics) == ([], [])
+    assert (built.output.monitors, built.output.metrics) == ([], [])
 
 
 def test_a_broken_monitor_is_an_exit_code_on_request(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

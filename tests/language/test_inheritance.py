@@ -108,7 +108,7 @@ def content(model: Model) -> dict[str, object]:
     return {
         "actors": sorted(f"{path} {actor!r}" for path, actor in graph.actors.items()),
         "ports": sorted(graph.ports),
-        "hops": sorted((hop.source, hop.destination, hop.delay or 0) for hop in graph.hops),
+        "hops": sorted((edge.source, edge.destination, edge.delay or 0) for edge in graph.edges),
         "aspects": [(woven.name, repr(woven.aspect), sorted(woven.ports)) for woven in model.aspects],
         "channels": [
             [wire.source.path for wire in graph.wires_to(graph.actors[f"x[{i}].sum"].inputs["input"])] for i in (0, 1)

@@ -28,7 +28,7 @@ from epicycle.runner.catalogue.figure import own_figures
 from epicycle.runner.catalogue.packaged import model_folders, packaged_models
 from epicycle.runner.catalogue.types import Catalogue, built_in
 from epicycle.runner.language import acts, dimensions, disturbance, models, parts, places, ports, questions, study
-from epicycle.runner.language.fields import QUANTITY, Construct
+from epicycle.runner.language.fields import QUANTITY, Record
 from epicycle.runner.language.fields import schema_of as value_schema
 from epicycle.runner.language.parts import BESIDE
 from epicycle.runner.language.places import _END as ENDPOINT
@@ -166,7 +166,7 @@ def breaks_shape(problem: str, file: str) -> bool:
 
 def test_every_key_of_the_language_says_what_it_is() -> None:
     modules = (acts, disturbance, models, parts, places, ports, questions, study, dimensions)
-    constructs = {id(each): each for module in modules for each in vars(module).values() if isinstance(each, Construct)}
+    constructs = {id(each): each for module in modules for each in vars(module).values() if isinstance(each, Record)}
     assert len(constructs) > 15
     for construct in constructs.values():
         for key, declared in construct.schema["properties"].items():

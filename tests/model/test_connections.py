@@ -14,12 +14,12 @@ from epicycle.runner.build.load import load_model
 from tests.model.model_parts import TYPES
 
 
-def hops(text: str, tmp_path: Path, *settings: str) -> list[str]:
+def edges(text: str, tmp_path: Path, *settings: str) -> list[str]:
     """The connections of a model, in their order, as 'source -> destination'."""
     path = tmp_path / "m.yaml"
     path.write_text("model: m\n" + text, encoding="utf-8")
     graph = load_model(path, types=[*TYPES, Cell], set=settings).graph
-    return [str(hop).replace(".output", "").replace(".input", "") for hop in graph.hops]
+    return [str(edge).replace(".output", "").replace(".input", "") for edge in graph.edges]
 
 
 class Cell(Actor):
@@ -48,13 +48,13 @@ CASES = [
 
 @pytest.mark.parametrize(("connection", "expected"), CASES)
 def test_three_of_each(connection: str, expected: str, tmp_path: Path) -> None:
-    found = hops(f"{CELLS}connections:\n  - {connection}\n", tmp_path)
-    assert " ".join(hop.replace("[", "").replace("]", "").replace(" -> ", "-") for hop in found) == expected
+    found = edges(f"{CELLS}connections:\n  - {connection}\n", tmp_path)
+    assert " ".join(edge.replace("[", "").replace("]", "").replace(" -> ", "-") for edge in found) == expected
 
 
 def test_all_to_all_in_a_mapping(tmp_path: Path) -> None:
     form = '{from: "c[*].output", to: ["c[*].input", "s[0].input"], all: true, delay: "${n * 10} ms"}'
-    assert hops(f"{CELLS}connections: [{form}]\n", tmp_path) == [
+    assert edges(f"{CELLS}connections: [{form}]\n", tmp_path) == [
         "c[0] -> c[1]", "c[0] -> c[2]", "c[1] -> c[0]", "c[1] -> c[2]", "c[2] -> c[0]", "c[2] -> c[1]",
         "c[0] -> s[0]", "c[1] -> s[0]", "c[2] -> s[0]",
     ]  # fmt: skip
@@ -72,7 +72,7 @@ def test_every_form_stands_at_every_count(n: int, tmp_path: Path) -> None:
     ]
     text = CELLS + "connections:\n" + "".join(f"  - {line}\n" for line in lines)
     expected = n + n * (n - 1) + 2 * max(n - 1, 0) + n + (1 + n if n else 0)
-    assert len(hops(text, tmp_path, f"n={n}")) == expected
+    assert len(edges(text, tmp_path, f"n={n}")) == expected
 
 
 def test_own_ports_and_the_order_of_channels(tmp_path: Path) -> None:

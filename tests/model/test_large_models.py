@@ -18,7 +18,7 @@ def test_two_thousand_actors_in_ten_thousand_lines(tmp_path: Path) -> None:
     (tmp_path / "m.yaml").write_text(text)
     model = load_model(tmp_path / "m.yaml")
     assert (len(model.graph.actors), sum(1 for _ in model.graph.wires())) == (2_000, 2_000)
-    assert (len(model.aspects), len(model.watched.metrics), len(model.watched.recorded)) == (400, 400, 1_200)
+    assert (len(model.aspects), len(model.output.metrics), len(model.output.recorded)) == (400, 400, 1_200)
     assert model.aspects[399].ports == ["gap_399.a", "gap_399.b"]
 
 
@@ -26,7 +26,7 @@ def test_many_instances(tmp_path: Path) -> None:
     (tmp_path / "m.yaml").write_text(validation.replicated(1_000))
     model = load_model(tmp_path / "m.yaml")
     assert len(model.graph.actors) == 2_001
-    assert model.watched.recorded == [f"robot[{index}].distance" for index in range(1_000)]
+    assert model.output.recorded == [f"robot[{index}].distance" for index in range(1_000)]
     assert model.aspects[0].ports == [f"robot[{index}].arrival.state" for index in range(1_000)]
 
 

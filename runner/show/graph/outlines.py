@@ -14,7 +14,7 @@ from epicycle.aspects import Medium, Processor
 
 from ...build.model import Model
 from ...graph.clock import Clock
-from ...graph.nodes import Hop
+from ...graph.nodes import Edge
 from ...graph.woven import WovenAspect
 
 MANY = 60  # boxes that a reader can take in; a larger model is folded by default
@@ -127,14 +127,14 @@ class _Outliner:
         for woven in model.aspects:
             for path in dict.fromkeys((*woven.ports, *woven.actors, *map(_owner, woven.parameters))):
                 self.standing.setdefault(path, []).append(woven.name)
-        self.hops: dict[str, list[Hop]] = {}  # by the composite that contains them
-        self.outside: dict[str, list[Hop]] = {}  # by the box where they end
-        for hop in chain.from_iterable(map(self.graph.outgoing, self.graph.ports)):
-            owner = _owner(hop.source)
-            scope = owner if self.graph.direction(hop.source) == "input" else _owner(owner)
-            self.hops.setdefault(scope, []).append(hop)
-            for end in {_owner(hop.source), _owner(hop.destination)} - {scope}:
-                self.outside.setdefault(end, []).append(hop)
+        self.edges: dict[str, list[Edge]] = {}  # by the composite that contains them
+        self.outside: dict[str, list[Edge]] = {}  # by the box where they end
+        for edge in chain.from_iterable(map(self.graph.outgoing, self.graph.ports)):
+            owner = _owner(edge.source)
+            scope = owner if self.graph.direction(edge.source) == "input" else _owner(owner)
+            self.edges.setdefault(scope, []).append(edge)
+            for end in {_owner(edge.source), _owner(edge.destination)} - {scope}:
+                self.outside.setdefault(end, []).append(edge)
         # The arrays whose instances look identical in the drawing.  At first, all are assumed identical.  An array that
         # is not is drawn instance by instance, which may reveal differences between the instances of another array; so
         # the search continues until nothing changes.
@@ -175,11 +175,13 @@ class _Outliner:
             for place in (path, *chain(*self._ports(path))):
                 names = [inside(n) if n.startswith(f"{instance}.") else n for n in self.standing.get(place, ())]
                 seen.add((inside(place), *names))
-            seen.update((inside(hop.source), inside(hop.destination), hop.delay) for hop in self.hops.get(path, ()))
+            seen.update(
+                (inside(edge.source), inside(edge.destination), edge.delay) for edge in self.edges.get(path, ())
+            )
             waiting += children
-        for hop in self.outside.get(instance, ()):
-            ends = [inside(end) if _owner(end) == instance else beside(end) for end in (hop.source, hop.destination)]
-            seen.add((*ends, hop.delay, "outside"))
+        for edge in self.outside.get(instance, ()):
+            ends = [inside(end) if _owner(end) == instance else beside(end) for end in (edge.source, edge.destination)]
+            seen.add((*ends, edge.delay, "outside"))
         return frozenset(seen)
 
     def _children(self, path: str) -> list[str]:
@@ -234,19 +236,19 @@ class _Outliner:
 
     def _links(self, path: str) -> list[Link]:
         """The connections inside a composite; those between instances in one box are one link."""
-        links: dict[tuple[str, str, int | None], list[Hop]] = {}
-        for hop in self.hops.get(path, ()):
-            links.setdefault((self._shown(hop.source), self._shown(hop.destination), hop.delay), []).append(hop)
-        return [Link(*key, self._how_many(path, *key[:2], hops)) for key, hops in links.items()]
+        links: dict[tuple[str, str, int | None], list[Edge]] = {}
+        for edge in self.edges.get(path, ()):
+            links.setdefault((self._shown(edge.source), self._shown(edge.destination), edge.delay), []).append(edge)
+        return [Link(*key, self._how_many(path, *key[:2], edges)) for key, edges in links.items()]
 
-    def _how_many(self, path: str, source: str, target: str, hops: list[Hop]) -> str:
+    def _how_many(self, path: str, source: str, target: str, edges: list[Edge]) -> str:
         """The label for the connections that one link inside a composite represents."""
         one, other = [1 if _owner(port) == path else len(self._instances(_owner(port))) for port in (source, target)]
-        count = len(hops)
+        count = len(edges)
         if count == max(one, other):
             if min(one, other) == 1:
                 return ""
-            is_same = all(self._index(hop.source) == self._index(hop.destination) for hop in hops)
+            is_same = all(self._index(edge.source) == self._index(edge.destination) for edge in edges)
             if _owner(source) == _owner(target):
                 return "each to itself" if is_same else "each to another"
             return "in pairs" if is_same else f"×{count}"

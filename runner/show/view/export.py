@@ -97,7 +97,7 @@ def about(recording: Recording) -> dict[str, str]:
         "digest": results.digest,
         **({"left out": f"{left_out:,} of {recording.firings:,} firings"} if left_out else {}),
         **{f"setting {name}": short(value) for name, value in results.parameters.items()},
-        **{f"metric {each.name}": results.outcomes[each.name].shown(short) for each in recording.model.watched.metrics},
+        **{f"metric {each.name}": results.outcomes[each.name].shown(short) for each in recording.model.output.metrics},
     }
     return {name: encodable(text) for name, text in said.items()}
 

@@ -136,13 +136,13 @@ def _metrics(recording: Recording) -> list[list[str]]:
     assert results is not None
     return [
         [each.name, results.outcomes[each.name].shown(_four), "" if each.unit == "1" else each.unit, each.measure.doc]
-        for each in model.watched.metrics
+        for each in model.output.metrics
     ]
 
 
 def _monitor(recording: Recording, name: str, verdict: Verdict) -> dict[str, Any]:
     """What a monitor says of the run, and when (ns) it was broken first."""
-    required = next(each.requirement for each in recording.model.watched.monitors if each.name == name)
+    required = next(each.requirement for each in recording.model.output.monitors if each.name == name)
     unit = f" {required.unit}" if required.unit else ""
     margin = f", robustness {_four(verdict.robustness)}{unit}"
     said = f"cannot be judged: {verdict.missing}" if verdict.missing else "holds" if verdict.holds else verdict.remark

@@ -106,12 +106,12 @@ class Recording:
         self._passing: list[tuple[tuple[int, int, int], int, int]] = []  # acts at outputs before their token is sent
         patterns = [pattern for figure in figures.values() for pattern in figure.mark_patterns()]
         outputs = [path for path in model.graph.ports if model.graph.direction(path) == "output"]
-        recorded = model.watched.recorded
-        model.watched.recorded = list(
+        recorded = model.output.recorded
+        model.output.recorded = list(
             dict.fromkeys((*recorded, *(path for each in patterns for path in select(each, outputs))))
         )
         self._simulation = Simulation(model, seed=seed, tracer=Tracer(model.graph.actors, self._fired, self._seen))
-        model.watched.recorded = recorded
+        model.output.recorded = recorded
 
     def run(self, *, until: float | None = None, progress: Callable[[float], None] | None = None) -> Results:
         """Run to the end; an exception in an actor is raised as ``ActorError``; everything before it is recorded."""

@@ -96,7 +96,7 @@ class _Writer:
             for name, figure in figures
             if getattr(figure, "style", "") and (shown := selected(figure.signal_patterns(), results))
         ]
-        recorded = [self._below(name) for name in results.signals if name in self._recording.model.watched.recorded]
+        recorded = [self._below(name) for name in results.signals if name in self._recording.model.output.recorded]
         words = [
             views.StateTimelineView(name="states", origin="/signals", contents=recorded),
             views.TextLogView(name="aspects", origin="/aspects"),

@@ -10,7 +10,7 @@ from epicycle.actors import EpicycleError, Quantity, declared_parameters, did_yo
 from epicycle.actors.expression import operand
 
 from ...build.model import Model
-from ...catalogue.measure import conversion_fault, unit_before
+from ...catalogue.metrics import conversion_fault, unit_before
 from ...engine import Results
 from ...language.dimensions import Dimension, split_number
 from ...language.study_metric import ASPECTS, NUMBERS, SIGNALS, StudyMetric, asks_for_none
@@ -41,13 +41,13 @@ def check_metric(metric: StudyMetric, models: Sequence[Model], problems: Problem
         told = f"metric {metric.name}: {message}{did_you_mean(part, known)}"
         problems.add(told, position, f"{caption}: {', '.join(known) or 'none'}")
 
-    units = {each.name: each.unit for model in models for each in model.watched.metrics}
+    units = {each.name: each.unit for model in models for each in model.output.metrics}
     figures = {
         woven.name: list(dict.fromkeys([*woven.aspect.events, *woven.aspect.reports]))
         for model in models
         for woven in model.aspects
     }
-    recorded = list(dict.fromkeys(name for model in models for name in model.watched.recorded))
+    recorded = list(dict.fromkeys(name for model in models for name in model.output.recorded))
     for name in metric.formula.names:
         if name not in (*units, ASPECTS, SIGNALS, *NUMBERS):
             complain(f"there is no metric {name!r}", name, units, "the model's metrics")
@@ -115,7 +115,7 @@ def columns_of(dimensions: Iterable[Dimension], metrics: Iterable[StudyMetric], 
                 unit = si_unit(written[1]) if written is not None and written[1] else declared.unit
                 found[setting.path] = Column(unit, declared.doc)
     own = {
-        metric.name: Column(metric.unit, metric.measure.doc, metric.measure.label) for metric in model.watched.metrics
+        metric.name: Column(metric.unit, metric.measure.doc, metric.measure.label) for metric in model.output.metrics
     }
     for metric in metrics:
         known = own.get(metric.source.strip(), Column())

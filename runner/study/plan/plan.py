@@ -109,7 +109,7 @@ class Plan:
         problems.raise_if_any()
         metrics = list(study.metrics or ())
         if study.metrics is None:
-            metrics = [StudyMetric(metric.name, metric.name) for metric in read.models[0].watched.metrics]
+            metrics = [StudyMetric(metric.name, metric.name) for metric in read.models[0].output.metrics]
         for metric in metrics:
             check_metric(metric, read.models, problems)
             if study.metrics is None and (metric.name in RESERVED or metric.name in study.factors):

@@ -69,7 +69,7 @@ class Runner:
             return condition, str(error)
         # Recording costs time and memory, and most studies need none of it.
         wanted = {signal for metric in self.plan.metrics for signal in metric.signals}
-        model.watched.recorded = [name for name in model.watched.recorded if name in wanted]
+        model.output.recorded = [name for name in model.output.recorded if name in wanted]
         return condition, model
 
 
@@ -157,7 +157,7 @@ class _Repeater:
     def make(self, replay: Replay) -> dict[str, Any]:
         """The extracts of the readers from the run."""
         model = self._model(replay.condition)
-        model.watched.recorded = []
+        model.output.recorded = []
         for _, reader in replay.readers:
             model.record(*reader.ports(model))
         results = Simulation(model, seed=replay.seed).run()

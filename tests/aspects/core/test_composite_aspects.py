@@ -52,16 +52,16 @@ def test_an_aspect_is_as_good_as_actors_in_the_connections(seed: int) -> None:
     """In random networks: all fires at the same tags with the same values, if each place has an aspect of its own."""
     random = np.random.default_rng(seed)
     names = [f"n{i}" for i in range(8)]
-    hops: list[tuple[str, int]] = []
+    edges: list[tuple[str, int]] = []
     for i in range(8):
         known = ["t", *names[:i]]
-        hops += [(known[k], i) for k in random.permutation(len(known))[: random.integers(1, 4)]]
-    chosen = [hops[k] for k in random.permutation(len(hops))[:4]]
+        edges += [(known[k], i) for k in random.permutation(len(known))[: random.integers(1, 4)]]
+    chosen = [edges[k] for k in random.permutation(len(edges))[:4]]
     actors = "".join(f"  {name}: {{type: AddSubtract}}\n" for name in names)
 
     def text(through: list[tuple[str, int]], aspects: str, more: str) -> str:
         ways = []
-        for k, (source, i) in enumerate(hops):
+        for k, (source, i) in enumerate(edges):
             if (source, i) in through:
                 ways += [f"{source}.output -> i{k}.input", f"i{k}.output -> n{i}.plus"]
             else:
@@ -72,7 +72,7 @@ def test_an_aspect_is_as_good_as_actors_in_the_connections(seed: int) -> None:
         )
 
     woven = ", ".join(f"w{k}: {{type: Line, at: {a}.output -> n{i}.plus}}" for k, (a, i) in enumerate(chosen))
-    inserted = "".join(f"  i{k}: {{type: Scale, factor: -1}}\n" for k, hop in enumerate(hops) if hop in chosen)
+    inserted = "".join(f"  i{k}: {{type: Scale, factor: -1}}\n" for k, edge in enumerate(edges) if edge in chosen)
     results = [run(load(text([], woven, ""))), run(load(text(chosen, "", inserted)))]
     found, expected = ([send for send in sends(each) if send[1][0] in "tn"] for each in results)
     assert sorted(found) == sorted(expected)

@@ -139,9 +139,9 @@ def test_a_long_run_is_thinned_to_stretches_that_are_whole() -> None:
 
 def test_signals_that_figures_show_in_space_are_recorded_for_the_page_alone() -> None:
     model = load_model("collision_avoidance")
-    before = list(model.watched.recorded)
+    before = list(model.output.recorded)
     recording = recorded(model)
     assert recording.results is not None
     assert {"main.plan", "observer[2].measurement"} <= recording.results.signals.keys()
-    assert model.watched.recorded == before
+    assert model.output.recorded == before
     assert "main.plan" not in before

@@ -10,9 +10,9 @@ from typing import Any
 from epicycle.actors import Parameter, accepts, declared_parameters, did_you_mean, type_name
 from epicycle.actors.expression import ExpressionError, Formula
 
-from ..catalogue.measure import Measure
+from ..catalogue.metrics import MetricSpec
 from ..graph.model_graph import ModelGraph
-from ..graph.watched import Metric, Watched
+from ..graph.outputs import Metric, OutputSpec
 from ..language.metrics import MetricText
 from ..language.models import ModelText
 from ..language.monitors import MonitorText
@@ -28,11 +28,11 @@ from .configure import configure
 from .monitors import monitor_of
 
 
-class Watching:
+class OutputReader:
     """Adds to what is watched (``found``): ``read`` what a file declares, the others what a program asks for."""
 
-    def __init__(self, graph: ModelGraph, values: Values, problems: Problems, found: Watched | None = None) -> None:
-        self.found = Watched() if found is None else found.copy()
+    def __init__(self, graph: ModelGraph, values: Values, problems: Problems, found: OutputSpec | None = None) -> None:
+        self.found = OutputSpec() if found is None else found.copy()
         self.graph = graph
         self.values = values
         self.problems = problems
@@ -42,7 +42,7 @@ class Watching:
         self._watched = 0
         self._formulas: dict[str, Text] = {}  # of metrics that are computed from others
 
-    def read(self, text: ModelText, names: dict[str, object]) -> Watched:
+    def read(self, text: ModelText, names: dict[str, object]) -> OutputSpec:
         """Everything that the model file declares about it."""
         run, local = text.run, Locals("", names)
         for watch, patterns in ((self.record, run.record), (self.stop_when, run.stop_when)):
@@ -87,8 +87,8 @@ class Watching:
         what = f"metric {text.name}"
         if given is None:  # text for people holds no expressions
             given = {key: _words(text.values[key].value) for key in _WORDS if key in text.values}
-        make, at = Measure.fitting, text.position
-        measure = configure(Measure, text.values, local, what, at, self.values, make=make, evaluated=given)
+        make, at = MetricSpec.fitting, text.position
+        measure = configure(MetricSpec, text.values, local, what, at, self.values, make=make, evaluated=given)
         if text.formula is not None:
             self._compute(text, text.formula, measure)
             return
@@ -113,7 +113,7 @@ class Watching:
                     self.problems.add(message, chosen[path].position, "name a port that sends numbers, or take 'count'")
                     return
 
-    def _compute(self, text: MetricText, source: Text, measure: Measure | Poison) -> None:
+    def _compute(self, text: MetricText, source: Text, measure: MetricSpec | Poison) -> None:
         """Compute a number from other metrics; ``check_formulas`` says whether there are such."""
         name, what = text.name, f"metric {text.name}"
         try:

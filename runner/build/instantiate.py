@@ -1,4 +1,4 @@
-"""Unfolding: from declarations to a graph with all actors, composites and ports, connected.
+"""The Instantiator: from declarations to a graph with all actors, composites and ports, connected.
 
 Problems are reported and worked around, so that one load reports all of them: a wrong value becomes ``missing``, and
 what is computed from it is not checked; a part that cannot be made is a gap in the graph.
@@ -28,9 +28,9 @@ from ..text.document import Entry
 from ..text.limits import RAISE_IT
 from ..text.problems import POISON, Poison, Position
 from .composite_aspect import as_actor
-from .connect import Child, Inside, Wiring, child_of_actors, make
+from .connect import Member, Namespace, Wiring, make, member_of_actors
 from .modes import connect_modes
-from .settle import OF_DIRECTORS, Settler
+from .resolve import OF_DIRECTORS, ParameterResolver
 
 MAX_DEPTH = 50
 MAX_SHOWN = 12  # types in one message
@@ -44,13 +44,13 @@ class TooLargeError(Exception):
 
 
 @dataclass(frozen=True)
-class Known:
+class PartTypes:
     """The possible types of parts: the composite classes of a model, and the installed types."""
 
     composites: Mapping[str, CompositeText | Poison]  # poison if the base is missing
     catalogue: Catalogue
 
-    def like(self, dialect: type[Dialect]) -> Known:
+    def like(self, dialect: type[Dialect]) -> PartTypes:
         """The possible types under a dialect."""
         return replace(self, catalogue=self.catalogue.like(dialect))
 
@@ -71,17 +71,19 @@ class Known:
         return f"valid types: {valid}", OF_YOUR_OWN
 
 
-class Unfolding:
+class Instantiator:
     """What is made from declarations: parts in a graph, and the aspects that are to be woven around them.
 
     ``trial``: parts are made only to find problems in them, up to that number; exceeding it is not reported.
     """
 
-    def __init__(self, known: Known, settler: Settler, graph: ModelGraph, trial: int | None = None) -> None:
+    def __init__(
+        self, known: PartTypes, resolver: ParameterResolver, graph: ModelGraph, trial: int | None = None
+    ) -> None:
         self.known = known
-        self.settler = settler
-        self.values = settler.values
-        self.problems = settler.problems
+        self.resolver = resolver
+        self.values = resolver.values
+        self.problems = resolver.problems
         self.graph = graph
         self.aspects: list[tuple[str, PartText, Names]] = []  # where they are declared, and what their values may use
         self.actors: list[Actor] = []
@@ -96,30 +98,30 @@ class Unfolding:
 
     def body(self, path: str, composite: CompositeText, names: Names, within: tuple[str, ...] = ()) -> None:
         """Make the actors of a composite, or of the model, and connect them; its aspects are noted."""
-        children: dict[str, Child] = {}
+        members: dict[str, Member] = {}
         for name, part in composite.actors.items():
             full = f"{path}.{name}" if path else name
-            child = self.instances(full, part, names, within)
-            if child is None:
+            member = self.instances(full, part, names, within)
+            if member is None:
                 self.graph.gaps[full] = Gap()
             else:
-                children[name] = child
+                members[name] = member
         others = [
-            (name, child)
+            (name, member)
             for name, part in composite.actors.items()
-            for child in self._others(f"{path}.{name}" if path else name, composite, part, names, within)
+            for member in self._others(f"{path}.{name}" if path else name, composite, part, names, within)
         ]
         for name, part in composite.aspects.items():
             if part.type.text in self.known.composites and (
                 model := self._aspect_model(path, composite, part, names, within)
             ):
-                children[name] = model
-        inside = Inside(
-            path, composite.name, composite.inputs, composite.outputs, composite.actors, children, composite
+                members[name] = model
+        inside = Namespace(
+            path, composite.name, composite.inputs, composite.outputs, composite.actors, members, composite
         )
         wiring = Wiring(inside, self.graph, self.values, self.problems)
-        for name, child in others:
-            wiring.check_ports(name, child, composite.connections)
+        for name, member in others:
+            wiring.check_ports(name, member, composite.connections)
         for connection in composite.connections:
             make(wiring.resolve(connection, names) if connection else [POISON], self.graph)
         if composite.machine is not None:
@@ -147,7 +149,7 @@ class Unfolding:
 
     def instances(
         self, path: str, part: PartText, names: Names, within: tuple[str, ...] = (), *, is_refinement: bool = False
-    ) -> Child | None:
+    ) -> Member | None:
         """Make the instances of one entry of ``actors``; None if there is no such type."""
         part = _chosen(part, names)
         kind = self._type(path, part, within)
@@ -164,7 +166,7 @@ class Unfolding:
             scope = {**names, "index": index} if is_array else names
             priority = self._priority(instance, kind, part, scope)
             if isinstance(kind, CompositeText):
-                inside = self.settler.parameters(instance, kind, part.values, scope, part.position)
+                inside = self.resolver.parameters(instance, kind, part.values, scope, part.position)
                 if "index" in scope:
                     inside.setdefault("index", scope["index"])
                 self.composite(instance, kind, inside, part.position, within, is_refinement=is_refinement)
@@ -173,24 +175,24 @@ class Unfolding:
             if (component := self.graph.components.get(instance)) is not None:
                 component.priority, component.tags = priority, tuple(tag.text for tag in part.tags)
         if isinstance(kind, CompositeText):
-            return Child(kind.name, paths, is_array, count, list(kind.inputs), list(kind.outputs))
-        return child_of_actors(kind, paths, is_array, count, self.graph)
+            return Member(kind.name, paths, is_array, count, list(kind.inputs), list(kind.outputs))
+        return member_of_actors(kind, paths, is_array, count, self.graph)
 
     def _others(
         self, path: str, composite: CompositeText, part: PartText, names: Names, within: tuple[str, ...]
-    ) -> list[Child]:
+    ) -> list[Member]:
         """What a part would be with the other types that it may have, made once of each class to check them."""
         if not part.choices or (composite.name, part.name) in self._tried:
             return []
         self._tried.add((composite.name, part.name))
         trial = copy(self)
-        trial.settler = Settler(Settings(), self.problems, Values(self.problems, self.values.budget))
-        trial.values = trial.settler.values
+        trial.resolver = ParameterResolver(Settings(), self.problems, Values(self.problems, self.values.budget))
+        trial.values = trial.resolver.values
         trial.graph, trial.aspects, trial.actors = self.graph.part(self.graph.director_of(path)), [], []
         chosen = _chosen(part, names)
         others = [each for each in part.choices.values() if each is not chosen]
         try:
-            return [child for each in others if (child := trial.instances(path, each, names, within))]
+            return [member for each in others if (member := trial.instances(path, each, names, within))]
         finally:
             self.cost = trial.cost
 
@@ -223,7 +225,7 @@ class Unfolding:
             return found
         return None
 
-    def known_at(self, path: str) -> Known:
+    def known_at(self, path: str) -> PartTypes:
         """The possible types of a part, under its director."""
         dialect = self.graph.domain_of(path).dialect
         if dialect not in self._like:
@@ -284,7 +286,7 @@ class Unfolding:
             self.graph.add_actor(made, part.position)
             return made
 
-        actor = self.settler.configured(actor_type, part, local, path, make)
+        actor = self.resolver.configured(actor_type, part, local, path, make)
         if isinstance(actor, Poison):
             self.graph.leave_out(path, actor_type)
         else:
@@ -352,7 +354,7 @@ class Unfolding:
 
     def _aspect_model(
         self, path: str, composite: CompositeText, part: PartText, names: Names, within: tuple[str, ...]
-    ) -> Child | None:
+    ) -> Member | None:
         """Make the composite of an aspect; if it is not enabled, only to check it."""
         full, graph = f"{path}.{part.name}" if path else part.name, self.graph
         is_port = part.name in composite.inputs or part.name in composite.outputs
@@ -362,7 +364,7 @@ class Unfolding:
                 f"{full!r} is the name of both {clash} and an aspect that is a model", part.position, "", "rename one"
             )
             return None
-        if self.settler.is_enabled(full, part, Locals(path, names)):
+        if self.resolver.is_enabled(full, part, Locals(path, names)):
             return self.instances(full, as_actor(part), names, within)
         trial = copy(self)
         trial.graph, trial.aspects, trial.actors = self.graph.part(graph.director_of(full)), [], []

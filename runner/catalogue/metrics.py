@@ -24,7 +24,7 @@ TOKENS, TIME = "tokens", "time"  # over what something is taken
 
 
 @dataclass(frozen=True)
-class Take:
+class Reduction:
     """A kind of metric: whether it counts tokens or the time that each lasts, and its options.
 
     ``unit`` is its unit, if that does not depend on the tokens.
@@ -39,7 +39,7 @@ class Take:
     settles: bool = True  # whether MSER-5 can detect when it has settled
 
 
-# The keys of TAKES, and what a Measure declares besides 'take', as type checkers know them.
+# The keys of TAKES, and what a MetricSpec declares besides 'take', as type checkers know them.
 TakeName: TypeAlias = Literal[
     "last", "first", "count", "min", "max", "sum", "mean", "std", "quantile", "rate", "time_mean", "time_std",
     "time_quantile", "share",
@@ -62,32 +62,34 @@ class MetricOptions(TypedDict, total=False):
 
 
 TAKES = {
-    "last": Take(TOKENS, "the last one", of="single", settles=False),
-    "first": Take(TOKENS, "the first one", of="single", settles=False),
-    "count": Take(TOKENS, "how many there are", of="any", settles=False),
-    "min": Take(TOKENS, "the least"),
-    "max": Take(TOKENS, "the greatest"),
-    "sum": Take(TOKENS, "their sum"),
-    "mean": Take(TOKENS, "their mean: each token counts the same, however long it lasts", options=("interval",)),
-    "std": Take(TOKENS, "their standard deviation, sqrt(sum((x - mean)^2) / (n - 1))"),
-    "quantile": Take(
+    "last": Reduction(TOKENS, "the last one", of="single", settles=False),
+    "first": Reduction(TOKENS, "the first one", of="single", settles=False),
+    "count": Reduction(TOKENS, "how many there are", of="any", settles=False),
+    "min": Reduction(TOKENS, "the least"),
+    "max": Reduction(TOKENS, "the greatest"),
+    "sum": Reduction(TOKENS, "their sum"),
+    "mean": Reduction(TOKENS, "their mean: each token counts the same, however long it lasts", options=("interval",)),
+    "std": Reduction(TOKENS, "their standard deviation, sqrt(sum((x - mean)^2) / (n - 1))"),
+    "quantile": Reduction(
         TOKENS,
         "the number below which a share p of them lies, interpolated: type 7 of Hyndman and Fan, NumPy's default",
         options=("p",),
         needs="p",
     ),
-    "rate": Take(TIME, "how many there are per second of model time", of="any", options=("interval",), unit="1/s"),
-    "time_mean": Take(
+    "rate": Reduction(TIME, "how many there are per second of model time", of="any", options=("interval",), unit="1/s"),
+    "time_mean": Reduction(
         TIME, "the mean over time: each value counts for as long as it lasts", options=("initial", "interval")
     ),
-    "time_std": Take(TIME, "the standard deviation over time, sqrt(mean of (x - time_mean)^2)", options=("initial",)),
-    "time_quantile": Take(
+    "time_std": Reduction(
+        TIME, "the standard deviation over time, sqrt(mean of (x - time_mean)^2)", options=("initial",)
+    ),
+    "time_quantile": Reduction(
         TIME,
         "the least value such that the signal is no greater for a share p of the time",
         options=("p", "initial"),
         needs="p",
     ),
-    "share": Take(
+    "share": Reduction(
         TIME,
         "the share of the time in which 'when' holds",
         of="any",
@@ -119,7 +121,7 @@ class WarmUpParameter(Parameter[float | str]):
             raise
 
 
-class Measure(Configurable):
+class MetricSpec(Configurable):
     """The options of a metric, besides its name and ports."""
 
     take = Parameter(str, "last", choices=tuple(TAKES), doc="what is taken from the tokens")
@@ -148,7 +150,7 @@ class Measure(Configurable):
     label = Parameter(str, "", doc="its label in figures and reports (default: its name)")
 
     @property
-    def kind(self) -> Take:
+    def kind(self) -> Reduction:
         return TAKES[self.take]
 
     @property
@@ -157,7 +159,7 @@ class Measure(Configurable):
         return self.kind.unit or unit_before(self.unit, self.to)
 
     @classmethod
-    def fitting(cls, **values: object) -> Measure:
+    def fitting(cls, **values: object) -> MetricSpec:
         """A measure whose options fit together; raises ``ParameterError``."""
         made = cls(**values)
         if faults := list(made.misfits()):

@@ -34,7 +34,7 @@ _NO_PARAMETERS = {
 }
 
 
-class Settler:
+class ParameterResolver:
     """Finds the values of all parameters of a model, and reports wrong ones."""
 
     def __init__(self, settings: Settings, problems: Problems, values: Values | None = None) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 from epicycle.actors.expression import Formula
 from epicycle.aspects import Reading
 
-from ..catalogue.measure import Measure
+from ..catalogue.metrics import MetricSpec
 from ..temporal import TINY, Property, Requirement
 from ..text.patterns import folded
 from ..text.problems import Position
@@ -21,7 +21,7 @@ class Metric:
 
     name: str
     ports: list[str]
-    measure: Measure
+    measure: MetricSpec
     monitor: str = ""  # the monitor whose verdict or robustness it is
     formula: Formula | None = None  # over other metrics, if it is computed from these
 
@@ -94,8 +94,8 @@ class Monitor:
         """Its results among the metrics of a run: whether the property holds, and its robustness."""
         said = self.requirement
         label = said.label or self.name
-        verdict = Measure(doc=said.doc or said.property, label=said.label, unit="1")
-        margin = Measure(doc=f"robustness of {self.name}", label=f"robustness of {label}", unit=said.unit)
+        verdict = MetricSpec(doc=said.doc or said.property, label=said.label, unit="1")
+        margin = MetricSpec(doc=f"robustness of {self.name}", label=f"robustness of {label}", unit=said.unit)
         return [
             Metric(self.name, self.ports, verdict, self.name),
             Metric(f"{self.name}_robustness", self.ports, margin, self.name),
@@ -103,7 +103,7 @@ class Monitor:
 
 
 @dataclass
-class Watched:
+class OutputSpec:
     """What a model declares about a run: when it ends, and what is kept of it."""
 
     stop_time: int | None = None  # ns
@@ -114,12 +114,12 @@ class Watched:
     monitors: list[Monitor] = field(default_factory=list)
     stop_position: Position | None = None  # where ``stop_ports`` were last declared
 
-    def copy(self) -> Watched:
+    def copy(self) -> OutputSpec:
         """A copy to which more can be added."""
         lists: Any = {key: [*each] for key, each in vars(self).items() if isinstance(each, list)}
         return replace(self, **lists)
 
-    def without(self, path: str) -> Watched:
+    def without(self, path: str) -> OutputSpec:
         """What is left of it after the removal of a part of the model."""
         left = [each.without(path) for each in self.monitors]
         gone = {each.name for each, kept in zip(self.monitors, left, strict=True) if kept is None}
