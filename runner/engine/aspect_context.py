@@ -12,7 +12,7 @@ from epicycle.actors import Streams, Tag
 from epicycle.aspects import Place
 
 from ..results import EventLog, Signal
-from ..text import describe
+from ..text.program import describe
 from .director import Director
 from .errors import ActorError, CrowdError, LoopError
 from .interventions import Handling

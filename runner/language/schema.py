@@ -172,7 +172,7 @@ def _share(definitions: Schema) -> None:
                 at.setdefault((key, json.dumps(each)), []).append(owner["properties"])
     for (key, text), places in at.items():
         if len(places) > 1:
-            number = sum(each.startswith(f"given.{key}.") for each in definitions)
+            number = len([each for each in definitions if each.startswith(f"given.{key}.")])
             definitions[name := f"given.{key}.{number + 1}"] = json.loads(text)
             for properties in places:
                 properties[key] = ref(name)
