@@ -95,16 +95,13 @@ class Place:
     is_actor: bool = False
     readings: Mapping[PortFormula, Sequence[Reading]] = field(default_factory=dict)
     selections: Mapping[str, Selection] = field(default_factory=dict)
+    owner: str = field(init=False)  # the actor, or the actor or composite whose port this is
+    name: str = field(init=False)  # of the port; empty for an actor
 
-    @property
-    def owner(self) -> str:
-        """The path of the actor, or of the actor or composite whose port this is."""
-        return self.port if self.is_actor else self.port.rpartition(".")[0]
-
-    @property
-    def name(self) -> str:
-        """The name of the port; empty for an actor."""
-        return "" if self.is_actor else self.port.rpartition(".")[2]
+    def __post_init__(self) -> None:
+        owner, _, name = (self.port, "", "") if self.is_actor else self.port.rpartition(".")
+        object.__setattr__(self, "owner", owner)
+        object.__setattr__(self, "name", name)
 
 
 @dataclass(eq=False, slots=True)
