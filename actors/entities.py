@@ -9,7 +9,6 @@ from typing import Any
 
 from .core import (
     Actor,
-    Changing,
     EpicycleError,
     InputPort,
     MappingParameter,
@@ -17,6 +16,7 @@ from .core import (
     Parameter,
     ParameterError,
     Queues,
+    Tally,
     Wake,
     brief,
     texts_parameter,
@@ -159,7 +159,7 @@ class Batch(Actor):
         if self.number is None and self.size is None and self.after is None and not self.trigger.width:
             raise ParameterError(f"{self.path} never sends: give 'number', 'size' or 'after', or connect 'trigger'")
         self._batches: dict[Any, _Open] = {}
-        self._count = Changing(self.waiting)
+        self._count = Tally(self.waiting)
 
     def fire(self) -> None:
         for key in [key for key, batch in self._batches.items() if batch.wake is not None and batch.wake.due]:
@@ -280,7 +280,7 @@ class Match(Actor):
 
     def initialize(self) -> None:
         self._parts: dict[Any, list[deque[Any]]] = {}
-        self._count = Changing(self.waiting)
+        self._count = Tally(self.waiting)
 
     def fire(self) -> None:
         count = self._count.number

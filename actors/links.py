@@ -10,13 +10,13 @@ from typing import Any
 
 from .core import (
     Actor,
-    Changing,
     EpicycleError,
     InputPort,
     OutputPort,
     Parameter,
     Pending,
     PortParameter,
+    Tally,
     Wake,
     below_nanoseconds,
     brief,
@@ -58,7 +58,7 @@ class _Transmitting(Actor):
     def initialize(self) -> None:
         self._transmitters = [_Transmitter() for _ in range(max(self.outputs["output"].width, 1))]
         self._came = 0
-        self._count = Changing(self.outputs["waiting"])
+        self._count = Tally(self.outputs["waiting"])
 
     def _finish(self) -> list[tuple[int, Any]]:
         """The frames that have been sent, each with its channel."""
@@ -255,7 +255,7 @@ class ArqSender(Actor):
         self._is_told = True  # whether the receiver was told of all that was abandoned
         self._free = 0  # when (ns) the next may be sent
         self._wake: Wake | None = None
-        self._count = Changing(self.waiting)
+        self._count = Tally(self.waiting)
 
     def fire(self) -> None:
         self._find_late()

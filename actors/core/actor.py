@@ -264,7 +264,10 @@ def declared_ports(cls: type) -> Mapping[str, InputPort[Any] | OutputPort[Any]]:
                 found[name] = value.port
     inputs = [name for name, port in found.items() if isinstance(port, InputPort)]
     for name, port in found.items():
-        if isinstance(port, OutputPort) and port.terms.independent_of:
+        apart = port.terms.independent_of
+        if apart:
+            if unknown := [each for each in apart if each not in inputs]:
+                raise TypeError(f"{cls.__name__}.{name} is independent of {unknown[0]!r}, which is no input")
             found[name] = port.twin(None)
-            found[name].change("depends_on", tuple(each for each in inputs if each not in port.terms.independent_of))
+            found[name].change("depends_on", tuple(each for each in inputs if each not in apart))
     return _declared.setdefault(cls, MappingProxyType(found))

@@ -85,7 +85,7 @@ class Latest:
                 yield dict(self._tokens)
 
 
-class Changing:
+class Tally:
     """A number that an output tells whenever it changes; 0 at first."""
 
     __slots__ = ("_output", "number")

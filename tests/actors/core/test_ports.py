@@ -59,6 +59,13 @@ def test_an_output_depends_on_all_inputs_but_some() -> None:
     assert WiderLoop("loop").apart.depends_on == ("one", "level", "more")
     assert declared_ports(Loop)["apart"].depends_on == ("one", "level")  # type: ignore[union-attr]
 
+    class Wrong(Hub):
+        apart = OutputPort(float, independent_of=("ome",))
+
+    with pytest.raises(TypeError) as raised:
+        Wrong("wrong")
+    assert str(raised.value) == "Wrong.apart is independent of 'ome', which is no input"
+
 
 def test_a_port_may_differ_from_its_declaration() -> None:
     hub, other = Hub("hub"), Hub("other")
