@@ -271,6 +271,15 @@ def test_scipy_finds_the_plan_of_the_barrier_method(objective: Any, folder: Path
         assert theirs.controls[:8] == pytest.approx(ours.controls[:8], abs=0.1)
 
 
+def test_a_flying_body_without_a_height_to_stay_above() -> None:
+    harness = Harness(RobustController("main.a", objective=Inform(), dimensions=3, lowest=None))
+    own = BodyState((30.0, 0.0, 5.0), np.zeros(3), 0.0)
+    harness.fire(0.0, trigger=0, state=own, estimate=Estimate(np.zeros(4), np.eye(4), 0.0))
+    numbers, _ = harness.actor._problem(own)
+    assert numbers.lowest == -np.inf
+    assert np.isfinite(harness.last("control")).all()
+
+
 # --- the protocols and the kernels ----------------------------------------------------------------------
 
 
