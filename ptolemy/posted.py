@@ -149,12 +149,12 @@ class PostedComposites(Directors):
             for port in (*inputs, *outputs):
                 port.border = border
             self.borders[composite] = border
-            if self.graph.modal(composite) is None:  # whose parts are posted one by one
+            if not self.graph.domains[composite].machine:  # whose parts are posted one by one
                 self.director.posted[composite] = border
-        if self.graph.modal(composite) or self.graph.refinement_of(composite) == composite:
+        if self.graph.domains[composite].machine or self.graph.refinement_of(composite) == composite:
             for port in (*inputs, *outputs):
                 port.is_refired = True
-            for port in outputs if self.graph.modal(composite) else ():
+            for port in outputs if self.graph.domains[composite].machine else ():
                 port.holds_one = True
 
     def mode_director(self, composite: str, machine: StateMachine) -> ModeDirector:

@@ -10,12 +10,13 @@ from itertools import product
 from epicycle.actors import Actor, FaultError, counted, declared_ports, did_you_mean, has_own_ports
 
 from ..graph.model_graph import ModelGraph
+from ..graph.nodes import Edge
 from ..language.models import CompositeText
 from ..language.places import ConnectionText, Endpoint
 from ..language.values import Locals, Values
 from ..text.document import Scalar
 from ..text.limits import RAISE_IT
-from ..text.problems import POISON, Poison, Position, Problems
+from ..text.problems import POISON, Poison, Problems
 from ..text.reading import split, within
 
 _NUMBER = re.compile(r"-?\d{1,9}", re.ASCII)
@@ -152,26 +153,15 @@ class Namespace:
     text: CompositeText | None = None  # as a file declares it
 
 
-@dataclass(frozen=True)
-class Link:
-    """A connection that has not been made yet."""
-
-    source: str
-    destination: str
-    delay: int | None  # ns
-    position: Position
-    shared: bool = False
-
-
-def make(links: Sequence[Link | Poison], graph: ModelGraph) -> None:
-    """Make the links of one connection."""
+def make(edges: Sequence[Edge | Poison], graph: ModelGraph) -> None:
+    """Add the edges of one connection to the graph."""
     first = graph.next_order  # which distinguishes the connection from all others
-    for link in links:
-        if link is POISON:
+    for edge in edges:
+        if edge is POISON:
             graph.is_wired = False
         else:
-            shared = first if link.shared else None
-            graph.connect(link.source, link.destination, link.delay, link.position, shared)
+            shared = None if edge.shared is None else first
+            graph.connect(edge.source, edge.destination, edge.delay, edge.position, shared)
 
 
 class Wiring:
@@ -184,18 +174,18 @@ class Wiring:
         self.values = values
         self.problems = problems
 
-    def resolve(self, connection: ConnectionText, names: dict[str, object]) -> list[Link | Poison]:
-        """Every source to every destination; if both select several, the first to the first and so on."""
+    def resolve(self, connection: ConnectionText, names: dict[str, object]) -> list[Edge | Poison]:
+        """Its edges: every source to every destination; if both select several, the first to the first and so on."""
         delay = self._delay(connection, names)
         sources = [self._endpoint(text, "output", names) for text in connection.sources]
         targets = [self._endpoint(text, "input", names) for text in connection.destinations]
-        links: list[Link | Poison] = [POISON] if POISON in (*sources, *targets) else []
-        limit = self.graph.limits.connections
+        edges: list[Edge | Poison] = [POISON] if POISON in (*sources, *targets) else []
+        limit, shared = self.graph.limits.connections, 0 if connection.shared else None
         for source, target in product((each for each in sources if each), (each for each in targets if each)):
             in_pairs = source.several and target.several and not connection.to_all
             count = len(source.ports) * (1 if in_pairs else len(target.ports))
-            if self.graph.connections + len(links) + count > limit:
-                return [*links, self._problem(f"the model has more than {limit:,} connections", source.text, RAISE_IT)]
+            if self.graph.connections + len(edges) + count > limit:
+                return [*edges, self._problem(f"the model has more than {limit:,} connections", source.text, RAISE_IT)]
             if in_pairs and len(source.ports) != len(target.ports):
                 one, other = self._label(source.text), self._label(target.text)
                 wrong = self._problem(
@@ -204,15 +194,15 @@ class Wiring:
                     "'->' connects the first port to the first and so on, so both sides need the same number of ports",
                     "to connect all to all, write '=>'",
                 )
-                links.append(wrong)
+                edges.append(wrong)
                 continue
             pairs = zip(source.ports, target.ports, strict=True) if in_pairs else product(source.ports, target.ports)
             # '=>' within a group does not connect an actor to itself; '->' still does.
             spare_self = connection.to_all and not source.own and not target.own
             for one, other in pairs:
                 if not (spare_self and one.rpartition(".")[0] == other.rpartition(".")[0]):
-                    links.append(Link(one, other, delay, source.text.position, connection.shared))
-        return links
+                    edges.append(Edge(one, other, delay, source.text.position, 0, shared=shared))
+        return edges
 
     def check_ports(self, name: str, member: Member, connections: Iterable[ConnectionText | Poison]) -> None:
         """Check that a child of another type that it may have would have the ports that connections name."""

@@ -18,7 +18,7 @@ from ..catalogue.dialect import Dialect
 from ..catalogue.port_types import read_type, token_types
 from ..catalogue.types import Catalogue, CatalogueError
 from ..graph.model_graph import ModelGraph
-from ..graph.nodes import Gap, Modal
+from ..graph.nodes import Gap
 from ..language.models import CompositeText
 from ..language.parts import PartText
 from ..language.ports import PortText
@@ -144,7 +144,7 @@ class Instantiator:
                 message = f"{full}: {part.type.text} is an actor, but a refinement must be a composite"
                 self._tell(message, part.type.position, path, "write a composite class that contains that actor")
         if made:
-            graph.domains[path].modal = Modal(machine, made)
+            graph.domains[path].machine, graph.domains[path].refinements = machine, made
         connect_modes(path, composite, self.known.composites, self.graph, self.problems)
 
     def instances(

@@ -16,6 +16,7 @@ from epicycle.actors import Actor, accepts, did_you_mean, type_name
 from epicycle.aspects import Aspect, CompositeAspect, CompositeExecutionAspect, FiringTime
 
 from ..graph.model_graph import ModelGraph
+from ..graph.nodes import Edge
 from ..graph.woven import WovenAspect
 from ..language.values import Values
 from ..text.problems import Position, Problems
@@ -24,7 +25,7 @@ from ..text.reading import NAME, NAMES_HAVE
 from .building import Building
 from .composite_aspect import check_nesting, weave_model
 from .composite_class import CompositeInstance
-from .connect import Link, Member, Namespace, Wiring, make, member_of_actors
+from .connect import Member, Namespace, Wiring, make, member_of_actors
 from .named import (
     CompositePort,
     Ends,
@@ -241,16 +242,16 @@ class Scope(Holder):
         """
         position = call_site()
         with raising() as problems:
-            links = self._links(source, destination, delay, position, problems)
-            self._judge(links, problems)
-        make(links, self._model.edit())
+            edges = self._edges(source, destination, delay, position, problems)
+            self._judge(edges, problems)
+        make(edges, self._model.edit())
 
     def disconnect(self, source: Ends, destination: Ends | None = None) -> None:
         """Remove the connections between ports, given as for ``connect``; there must be at least one."""
         position, graph = call_site(), self._model.graph
         with raising() as problems:
-            links = self._links(source, destination, None, position, problems)
-        pairs = dict.fromkeys((link.source, link.destination) for link in links)
+            edges = self._edges(source, destination, None, position, problems)
+        pairs = dict.fromkeys((edge.source, edge.destination) for edge in edges)
         found = [edge for one, other in pairs for edge in graph.outgoing(one) if edge.destination == other]
         if not found:
             with raising() as problems:
@@ -263,9 +264,9 @@ class Scope(Holder):
         for edge in found:
             graph.disconnect(edge)
 
-    def _links(
+    def _edges(
         self, source: Ends, destination: Ends | None, delay: float | str | None, position: Position, problems: Problems
-    ) -> list[Link]:
+    ) -> list[Edge]:
         inside = self._inside
         connection = Named(self._model.graph, self.path, position, problems).connection(
             source, destination, delay, inside.name
@@ -273,25 +274,25 @@ class Scope(Holder):
         if connection is None:
             return []
         found = Wiring(inside, self._model.graph, Values(problems), problems).resolve(connection, {})
-        return [link for link in found if link]
+        return [edge for edge in found if edge]
 
-    def _judge(self, links: list[Link], problems: Problems) -> None:
+    def _judge(self, edges: list[Edge], problems: Problems) -> None:
         """Check what can be checked of new connections now; the rest is checked when the model is complete."""
-        graph, new = self._model.graph, dict[str, Link]()
-        for link in links:
-            source, target = (graph.ports[path].port for path in (link.source, link.destination))
+        graph, new = self._model.graph, dict[str, Edge]()
+        for edge in edges:
+            source, target = (graph.ports[path].port for path in (edge.source, edge.destination))
             if source is not None and target is not None and not accepts(target.type, source.type):
                 taken = f"{target.path} takes {type_name(target.type)}"
-                problems.add(f"{source.path} sends {type_name(source.type)}, but {taken}", link.position)
+                problems.add(f"{source.path} sends {type_name(source.type)}, but {taken}", edge.position)
             if target is None or target.multi:
                 continue
-            before = next(iter(graph.incoming(link.destination)), None) or new.get(link.destination)
+            before = next(iter(graph.incoming(edge.destination)), None) or new.get(edge.destination)
             if before is not None:
                 at = before.position
                 where = f", at {at.file}:{at.line}" if at is not None else ""
                 message = f"{target.path} takes one connection, and {before.source} is already connected to it{where}"
-                problems.add(message, link.position, "disconnect that one, or send through an actor that merges them")
-            new.setdefault(link.destination, link)
+                problems.add(message, edge.position, "disconnect that one, or send through an actor that merges them")
+            new.setdefault(edge.destination, edge)
 
     # -- aspects --------------------------------------------------------------------------------------------------
 

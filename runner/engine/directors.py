@@ -56,8 +56,8 @@ class Directors:
             self.boundary_ports.update({path: self.boundary_port(path, outside) for path in paths})
         self.prepare(composite, outside)
         self.of[composite] = self._made_director(composite, clock)
-        if (modal := self.graph.modal(composite)) is not None:
-            machine = cast("StateMachine", self.actors[modal.machine])
+        if path := self.graph.domains[composite].machine:
+            machine = cast("StateMachine", self.actors[path])
             mode_director = self.mode_directors[composite] = self.mode_director(composite, machine)
             if mode_director.hears_inputs:
                 for path in self.graph.borders(composite)[0]:

@@ -18,7 +18,7 @@ from ..text.limits import NORMAL, Limits
 from ..text.patterns import could_be_within
 from ..text.problems import Position
 from .clock import Clock
-from .nodes import Component, Detour, Domain, Edge, Gap, Modal, PortNode, Wire, is_within
+from .nodes import Component, Detour, Domain, Edge, Gap, PortNode, Wire, is_within
 
 
 class ModelGraph:
@@ -158,10 +158,6 @@ class ModelGraph:
             return False
         return self.domains[composite].dialect.is_strict
 
-    def modal(self, composite: str) -> Modal | None:
-        """The machine and refinements of a composite with modes."""
-        return self.domains[composite].modal if composite in self.domains else None
-
     def end_of(self, composite: str) -> str:
         """What has the rank behind everything in a strict composite."""
         return f"{composite}.(end)"
@@ -257,7 +253,7 @@ class ModelGraph:
         """The innermost refinement that this is in, or is; "" if there is none."""
         while path:
             above, _, mode = path.rpartition(".")
-            if (modal := self.modal(above)) is not None and mode in modal.refinements:
+            if above in self.domains and mode in self.domains[above].refinements:
                 break
             path = above
         return path
@@ -329,7 +325,7 @@ class ModelGraph:
         for place in range(len(edges), 0, -1):
             far = edges[place - 1].destination
             domain = self.domains.get(self.owner(far))
-            if domain is not None and domain.modal and domain.dialect.is_strict and self.direction(far) == "output":
+            if domain is not None and domain.machine and domain.dialect.is_strict and self.direction(far) == "output":
                 return edges[place:]
         return edges
 

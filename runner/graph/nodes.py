@@ -50,14 +50,6 @@ class Detour(Edge):
     waits: bool = False
 
 
-@dataclass(frozen=True)
-class Modal:
-    """A composite with modes whose machine has refinements: their paths, by the mode."""
-
-    machine: str
-    refinements: Mapping[str, str]
-
-
 @dataclass(slots=True)
 class PortNode:
     """A port in the graph: an actor's, or one of a composite (``port`` is None) that tokens only pass through."""
@@ -77,7 +69,8 @@ class Domain:
     clock: Clock
     dialect: type[Dialect]
     members: list[str] = field(default_factory=list)
-    modal: Modal | None = None  # of a composite with modes
+    machine: str = ""  # of a composite with modes
+    refinements: Mapping[str, str] = field(default_factory=dict)  # their paths, by the mode
 
 
 @dataclass(slots=True)

@@ -64,7 +64,7 @@ def steps(graph: ModelGraph) -> dict[str, list[Step]]:
         found[director] = [
             *(Step([port]) for port in inputs),
             # Of a composite with modes, the conductor is first, and the machine last.
-            *([Step([director])] if graph.modal(director) else ()),
+            *([Step([director])] if graph.domains[director].machine else ()),
             *_turns(graph, director, depths(graph, director, region)),
             *(Step([port]) for port in outputs),
             *([Step([graph.end_of(director)])] if graph.is_strict(director) else ()),
@@ -166,9 +166,9 @@ def _turns(graph: ModelGraph, director: str, depth: dict[str, int]) -> Iterator[
     If an actor takes the tokens of some inputs later than it answers wake-ups, these inputs are a separate turn.
     """
     turns: list[tuple[tuple[int, int], list[str]]] = []
-    modal = graph.modal(director)
+    machine = graph.domains[director].machine
     for member in graph.domains[director].members:
-        if modal is not None and member == modal.machine:
+        if member == machine:
             continue
         inputs = [] if member in graph.domains else ports_of(graph, member)[0]
         found: dict[int, list[str]] = {depth[member]: [member]}
@@ -178,5 +178,5 @@ def _turns(graph: ModelGraph, director: str, depth: dict[str, int]) -> Iterator[
     # The sort is stable: the order of declaration decides ties.
     for level, paths in sorted(turns, key=lambda turn: turn[0]):
         yield Step(paths, level)
-    if modal is not None:
-        yield Step([modal.machine, *ports_of(graph, modal.machine)[0]])
+    if machine:
+        yield Step([machine, *ports_of(graph, machine)[0]])

@@ -1,1 +1,1 @@
-"""What files declare: models, composites, disturbances, studies and settings from outside, as constructs."""
+"""What files declare: models, composites, disturbances, studies and settings from outside, as frozen declarations."""

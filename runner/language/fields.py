@@ -1,4 +1,4 @@
-"""How the language is declared: shapes, keys and constructs.
+"""How the language is declared: readers of values, fields, and records of these.
 
 A key of the language is declared once.  The reading of its value, the messages about a wrong, unknown or missing one,
 and the JSON Schema follow from that.
@@ -65,7 +65,7 @@ def computed(kind: str, low: float | None = None, high: float | None = None, uni
     return found
 
 
-# -- shapes -------------------------------------------------------------------------------------------------------
+# -- readers ------------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -166,15 +166,15 @@ def sound(found: Mapping[str, T | Poison]) -> dict[str, T]:
     return {name: each for name, each in found.items() if each is not POISON}
 
 
-# -- constructs ---------------------------------------------------------------------------------------------------
+# -- records ------------------------------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
 class Field:
-    """A key of a construct: the shape of its value, and what it means.
+    """A key of a record: the reader of its value, and what it means.
 
     ``called`` is the name of the value in messages, and ``missing`` the message and advice if there is none; in both,
-    ``{what}`` is the construct and ``{key}`` the key.  ``name`` is the attribute of the resulting object, if it differs
+    ``{what}`` is the record and ``{key}`` the key.  ``name`` is the attribute of the resulting object, if it differs
     from the key.
     """
 
@@ -190,7 +190,7 @@ class Field:
 
 
 def keyed(
-    shape: Reader, doc: str, *, key: str = "", called: str = "{key}", missing: tuple[str, ...] = (), **default: Any
+    shape: Reader, doc: str, *, key: str = "", called: str = "", missing: tuple[str, ...] = (), **default: Any
 ) -> Any:
     """A field of a declaration that is a key of the language, with its name unless ``key`` is another."""
     return field(metadata={"key": (key, Field(shape, doc, called, missing))}, **default)
@@ -205,13 +205,16 @@ class Record:
         self.rules = rules
 
     @classmethod
-    def of(cls, declaration: type, doc: str = "", **rules: Any) -> Record:
-        """The mapping from which a declaration is read, by the keys that its fields say."""
+    def of(cls, declaration: type, doc: str = "", called: str = "{key}", **rules: Any) -> Record:
+        """The mapping from which a declaration is read, by the keys that its fields say.
+
+        ``called`` is what values are called that have no name of their own in messages.
+        """
         keys: dict[str, Field] = {}
         for each in fields(declaration):
             if "key" in each.metadata:
                 name, said = each.metadata["key"]
-                keys[name or each.name] = replace(said, name=each.name)
+                keys[name or each.name] = replace(said, name=each.name, called=said.called or called)
         return cls(doc, keys, **rules)
 
     @property

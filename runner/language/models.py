@@ -138,9 +138,9 @@ _CHANGES = {
 HEIR = Record(COMPOSITE.doc, {**COMPOSITE.keys, **_CHANGES})
 
 
-def composite_schema(construct: Record = COMPOSITE) -> Schema:
+def composite_schema(record: Record = COMPOSITE) -> Schema:
     """The schema of a composite class, or of a model, which may extend another."""
-    found = construct.schema
+    found = record.schema
     for key, changes in _CHANGES.items():
         found["properties"][key] = {"description": changes.doc}
     return {

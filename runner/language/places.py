@@ -216,28 +216,22 @@ class PointcutText:
     type: Text | None = keyed(
         AT,
         "The type of the actors and composites that it attaches to, directly or at their ports.",
-        called=_OF_POINTCUT,
         default=None,
     )
     tag: Text | None = keyed(
         AT,
         "A tag of the actors and composites that it attaches to, directly or at their ports.",
-        called=_OF_POINTCUT,
         default=None,
     )
-    port: Text | None = keyed(
-        AT, "The name of the port (default: all ports that it can attach to).", called=_OF_POINTCUT, default=None
-    )
+    port: Text | None = keyed(AT, "The name of the port (default: all ports that it can attach to).", default=None)
     parameter: Text | None = keyed(
         AT,
         "The name of a parameter of the actors, for an aspect that alters numbers.",
-        called=_OF_POINTCUT,
         default=None,
     )
     request: Text | None = keyed(
         AT,
         "For an aspect that is a composite: the input that receives these tokens.",
-        called=_OF_POINTCUT,
         default=None,
     )
     time: Computed | None = keyed(
@@ -263,7 +257,7 @@ class PointcutText:
 
 
 _AT = AT.described(_POINTCUT_SCHEMA)
-POINTCUT = Record.of(PointcutText, type="object")
+POINTCUT = Record.of(PointcutText, called=_OF_POINTCUT, type="object")
 POINTCUT.keys = {"at": Field(_AT, "Ports or actors, as a pattern, or a connection.", _OF_POINTCUT), **POINTCUT.keys}
 
 

@@ -131,19 +131,16 @@ class ParameterText:
     min: float | str | None = keyed(
         Reader(QUANTITY_SCHEMA, _bound),
         "The smallest value, in its unit or with one of its own.",
-        called="{key} of {what}",
         default=None,
     )
     max: float | str | None = keyed(
         Reader(QUANTITY_SCHEMA, _bound),
         "The largest value, in its unit or with one of its own.",
-        called="{key} of {what}",
         default=None,
     )
     above: float | str | None = keyed(
         Reader(QUANTITY_SCHEMA, _bound),
         "What every value is greater than, in its unit or with one of its own.",
-        called="{key} of {what}",
         default=None,
     )
     choices: dict[str, Text] = keyed(
@@ -152,7 +149,7 @@ class ParameterText:
         called="{what}",
         default_factory=dict,
     )
-    doc: str = keyed(TEXT, "What it is.", called="{key} of {what}", default="")
+    doc: str = keyed(TEXT, "What it is.", default="")
     given: tuple[str, ...] = ("value",)  # the keys of the declaration, which change those of an inherited one
     # Of a part's parameter that it stands for: that parameter, its type and name, and why it gives no default.
     of: Parameter[Any] | None = None
@@ -169,7 +166,9 @@ class ParameterText:
         return low, above, high
 
 
-PARAMETER = Record.of(ParameterText, type=["object", "array", "string", "number", "boolean", "null"])
+PARAMETER = Record.of(
+    ParameterText, called="{key} of {what}", type=["object", "array", "string", "number", "boolean", "null"]
+)
 _NO_PARAMETERS = {"index", *CONSTANTS, *FUNCTIONS}
 
 

@@ -42,8 +42,8 @@ from .sampling import HYPERCUBE, MORRIS_INDICES, SOBOL_INDICES
 from .study import METRIC as METRIC_OF_STUDY
 from .study import STUDY, UNTIL
 
-# The constructs with keys of their own, for a reference.
-CONSTRUCTS = {
+# The records with keys of their own, for a reference.
+RECORDS = {
     "A model": MODEL,
     "A file of composite classes": LIBRARY,
     "A composite class": COMPOSITE,

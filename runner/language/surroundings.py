@@ -26,7 +26,7 @@ from epicycle.actors import (
 
 from ..catalogue.reference import as_written, is_part
 from ..catalogue.types import Catalogue, CatalogueError, figure_types
-from ..text.document import Entry, Inherited, Node, Scalar, plain
+from ..text.document import Entry, Node, Scalar, plain
 from ..text.document import Mapping as MappingNode
 from ..text.problems import POISON, Poison, Position, Problems
 from ..text.program import node_of
@@ -119,7 +119,7 @@ class Surroundings:
         for name, at in self._names(owner, asked):
             if name not in values:
                 text = f"${{{name}}}"
-                node = Inherited(text, text, True, at, f"{owner.name}.{name}")
+                node = Scalar(text, text, True, at, f"{owner.name}.{name}")
                 values[name] = Entry(Scalar(name, name, True, at), node)
                 taken.append(node)
         for name in [name for name in values if name in asked.known]:

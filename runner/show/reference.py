@@ -27,7 +27,7 @@ from ..catalogue.reference import (
     topic_order,
 )
 from ..catalogue.types import Catalogue
-from ..language.schema import CONSTRUCTS
+from ..language.schema import RECORDS
 from ..printing import columns
 from ..temporal import Requirement
 
@@ -161,7 +161,7 @@ def markdown(
         lines.append(f"## {title}\n")
         lines += [block for each in described(types) for block in _markdown(each)]
     lines.append("## Keys\n")
-    for title, construct in CONSTRUCTS.items():
+    for title, construct in RECORDS.items():
         rows = [[key, each.doc.replace("<", "\\<")] for key, each in construct.keys.items()]
         lines += [f"### {title}\n", _rows(("key", "what it is"), rows)]
     return "\n".join(lines).rstrip("\n") + "\n"

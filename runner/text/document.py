@@ -42,13 +42,7 @@ class Scalar:
     text: str
     plain: bool
     position: Position
-
-
-@dataclass(frozen=True, slots=True)
-class Inherited(Scalar):
-    """The value of a parameter around a part, at the place where the part says that it takes it."""
-
-    giver: str  # that parameter
+    giver: str = ""  # a parameter around a part, whose value it is; its place is where the part says so
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,7 +6,7 @@ from typing import Any
 
 from epicycle.actors import EpicycleError, Fault, FaultError
 
-from .document import Inherited, Mapping, Node, Scalar, Sequence
+from .document import Mapping, Node, Scalar, Sequence
 from .patterns import in_general
 from .problems import POISON, Poison, Position, Problems
 from .program import describe, raised_at
@@ -50,7 +50,7 @@ def blame(
     once.
     """
     at = where if isinstance(where, Position) else where.position
-    if isinstance(where, Inherited):
+    if isinstance(where, Scalar) and where.giver:
         more = (f"given by {where.giver}", *more)
 
     def tell(message: str, place: Position, *hints: str, number: int = 0, **of_user: Any) -> None:

@@ -66,8 +66,8 @@ def statechart(model: Model, path: str) -> Statechart:
         known = [each.removesuffix(".machine") for each in machines]
         valid = ", ".join(known) or "none"
         raise EpicycleError(f"{path} has no modes{did_you_mean(path, known)}; machines: {valid}")
-    modal = model.graph.modal(found.path.rpartition(".")[0])
-    refinements = {} if modal is None else modal.refinements
+    domain = model.graph.domains.get(found.path.rpartition(".")[0])
+    refinements = {} if domain is None else domain.refinements
     states = {}
     for name, mode in found.modes.items():
         lines = [f"{variable}' = {formula.source}" for variable, formula in mode.flow.items()]
