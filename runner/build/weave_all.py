@@ -37,14 +37,14 @@ from .weave import Places, Pointcuts, bind
 
 def weave_all(made: Instantiator) -> list[WovenAspect]:
     """Attach all aspects, now that all ports exist, in the order in which tokens meet them."""
-    weaver, graph, problems = _Weaver(made), made.graph, made.problems
+    graph, problems, paths, found = made.graph, made.problems, Paths(made.graph), list[WovenAspect]()
     for scope, part, names in made.aspects:
         name = f"{scope}.{part.name}" if scope else part.name
         try:
-            weaver.weave(name, scope, part, names)
+            if (woven := _declared(made, paths, name, scope, part, names)) is not None:
+                found.append(woven)
         except TooManyError as error:
             problems.stop(f"aspect {name}: {error}", part.position, RAISE_IT)
-    found = weaver.found
     decorated = {cls for cls in set(map(type, made.actors)) if class_decorations(cls)}
     for actor in made.actors:
         if type(actor) in decorated:
@@ -57,90 +57,84 @@ def weave_all(made: Instantiator) -> list[WovenAspect]:
     return found
 
 
-class _Weaver:
-    """Weaves the declared aspects one after the other."""
+def _declared(
+    made: Instantiator, paths: Paths, name: str, scope: str, part: PartText, names: Names
+) -> WovenAspect | None:
+    """A declared aspect, attached; None if that is wrong or it is not enabled."""
+    if (cls := _type(made, name, scope, part)) is None:
+        return None
+    graph, resolver, problems = made.graph, made.resolver, made.problems
+    is_model = cls in (CompositeAspect, CompositeExecutionAspect)
+    given = {key: entry for key, entry in part.values.items() if not is_model or key in OWN}
+    aspect = resolver.configured(cls, replace(part, values=given), Locals(name, names), f"aspect {name}", cls)
+    if not part.at:
+        problems.add(f"aspect {name} has no 'at'", part.position, "add 'at:' with ports or patterns", scope=scope)
+    own = name if is_model and graph.is_composite(name) else ""
+    pointcuts = Pointcuts(paths, name, scope, problems, cls, own)
+    is_enabled = bool(own) if is_model else resolver.is_enabled(name, part, Locals(scope, names))
+    place_of = partial(place_in, Mapping(part.values, part.position))
+    if own:
+        at = [each and _timed(made, each, name, scope, names) for each in part.at]
+        woven = weave_model(pointcuts, aspect, at, place_of, part.position)
+    else:
+        places = pointcuts.resolve(part.at)
+        woven = POISON if aspect is POISON else bind(pointcuts, aspect, places, place_of, part.position)
+    if not woven:
+        return None
+    made.places += len(woven.places)
+    limit = graph.limits.places
+    if made.places > limit:
+        problems.stop(f"aspect {name}: aspects attach to more than {limit:,} places", part.position, RAISE_IT)
+    return woven if is_enabled else None
 
-    def __init__(self, made: Instantiator) -> None:
-        self.made = made
-        self.graph = made.graph
-        self.resolver = made.resolver
-        self.problems = made.problems
-        self.paths = Paths(made.graph)
-        self.found: list[WovenAspect] = []
 
-    def weave(self, name: str, scope: str, part: PartText, names: Names) -> None:
-        cls = self._type(name, scope, part)
-        if cls is None:
-            return
-        is_model = cls in (CompositeAspect, CompositeExecutionAspect)
-        given = {key: entry for key, entry in part.values.items() if not is_model or key in OWN}
-        local = Locals(name, names)
-        aspect = self.resolver.configured(cls, replace(part, values=given), local, f"aspect {name}", cls)
-        if not part.at:
-            hint = "add 'at:' with ports or patterns"
-            self.problems.add(f"aspect {name} has no 'at'", part.position, hint, scope=scope)
-        own = name if is_model and self.graph.is_composite(name) else ""
-        pointcuts = Pointcuts(self.paths, name, scope, self.problems, cls, own)
-        is_enabled = bool(own) if is_model else self.resolver.is_enabled(name, part, Locals(scope, names))
-        place_of = partial(place_in, Mapping(part.values, part.position))
-        if own:
-            at = [each and self._timed(each, name, scope, names) for each in part.at]
-            woven = weave_model(pointcuts, aspect, at, place_of, part.position)
-        else:
-            places = pointcuts.resolve(part.at)
-            woven = POISON if aspect is POISON else bind(pointcuts, aspect, places, place_of, part.position)
-        if not woven:
-            return
-        self.made.places += len(woven.places)
-        limit = self.graph.limits.places
-        if self.made.places > limit:
-            self.problems.stop(f"aspect {name}: aspects attach to more than {limit:,} places", part.position, RAISE_IT)
-        if is_enabled:
-            self.found.append(woven)
+def _type(made: Instantiator, name: str, scope: str, part: PartText) -> type[Aspect] | None:
+    """The type of an aspect; None, and a problem, if it cannot have that type."""
+    known, wanted = made.known_at(name), part.type.text
+    try:
+        cls = known.catalogue.aspects.get(wanted)
+    except CatalogueError as error:
+        made.resolver.values.blame(f"aspect {name}", error, part.type.position, Locals(scope))
+        return None
+    if (inner := known.composites.get(wanted)) is not None:
+        return None if inner is POISON else _model_type(made, name, scope, part, cls)
+    if cls is None:
+        near = did_you_mean(wanted, [*known.catalogue.aspects, *known.composites])
+        message = f"aspect {name}: there is no aspect type {wanted!r}{near}"
+        made.problems.add(message, part.type.position, *known.valid_types("aspect", wanted), scope=scope)
+        return None
+    for pointcut in (each for each in part.at if each):
+        for key, said in (("request", pointcut.request), ("time", pointcut.time)):
+            if said is not None:
+                message = f"aspect {name}: {wanted} is not a composite, so its pointcuts have no {key!r}"
+                made.problems.add(message, said.position, scope=scope)
+    return cls
 
-    def _type(self, name: str, scope: str, part: PartText) -> type[Aspect] | None:
-        """The type of an aspect; None, and a problem, if it cannot have that type."""
-        known, wanted = self.made.known_at(name), part.type.text
-        try:
-            cls = known.catalogue.aspects.get(wanted)
-        except CatalogueError as error:
-            self.resolver.values.blame(f"aspect {name}", error, part.type.position, Locals(scope))
-            return None
-        if (inner := known.composites.get(wanted)) is not None:
-            return None if inner is POISON else self._model_type(name, scope, part, cls)
-        if cls is None:
-            near = did_you_mean(wanted, [*known.catalogue.aspects, *known.composites])
-            message = f"aspect {name}: there is no aspect type {wanted!r}{near}"
-            self.problems.add(message, part.type.position, *known.valid_types("aspect", wanted), scope=scope)
-            return None
-        for pointcut in (each for each in part.at if each):
-            for key, said in (("request", pointcut.request), ("time", pointcut.time)):
-                if said is not None:
-                    message = f"aspect {name}: {wanted} is not a composite, so its pointcuts have no {key!r}"
-                    self.problems.add(message, said.position, scope=scope)
-        return cls
 
-    def _model_type(self, name: str, scope: str, part: PartText, namesake: type[Aspect] | None) -> type[Aspect] | None:
-        """Whether an aspect that is a composite attaches to ports or to actors."""
-        if namesake is not None:
-            message = f"aspect {name}: {part.type.text} is both an aspect type and a composite"
-            self.problems.add(message, part.type.position, "give the composite another name", scope=scope)
-            return None
-        aimed = [pointcut for pointcut in part.at if pointcut and not pointcut.exclude]
-        at_ports = [pointcut for pointcut in aimed if pointcut.time is None]
-        if at_ports and len(at_ports) < len(aimed):
-            message = f"aspect {name}: it attaches to ports here, but to actors elsewhere"
-            hint = "give every place a time, or none: at actors it is the execution time of their firings"
-            self.problems.add(message, at_ports[0].position, hint, scope=scope)
-            self.graph.leave_open(name)
-            return None
-        return CompositeExecutionAspect if aimed and not at_ports else CompositeAspect
+def _model_type(
+    made: Instantiator, name: str, scope: str, part: PartText, namesake: type[Aspect] | None
+) -> type[Aspect] | None:
+    """Whether an aspect that is a composite attaches to ports or to actors."""
+    if namesake is not None:
+        message = f"aspect {name}: {part.type.text} is both an aspect type and a composite"
+        made.problems.add(message, part.type.position, "give the composite another name", scope=scope)
+        return None
+    aimed = [pointcut for pointcut in part.at if pointcut and not pointcut.exclude]
+    at_ports = [pointcut for pointcut in aimed if pointcut.time is None]
+    if at_ports and len(at_ports) < len(aimed):
+        message = f"aspect {name}: it attaches to ports here, but to actors elsewhere"
+        hint = "give every place a time, or none: at actors it is the execution time of their firings"
+        made.problems.add(message, at_ports[0].position, hint, scope=scope)
+        made.graph.leave_open(name)
+        return None
+    return CompositeExecutionAspect if aimed and not at_ports else CompositeAspect
 
-    def _timed(self, pointcut: PointcutText, name: str, scope: str, names: dict[str, object]) -> PointcutText:
-        if pointcut.time is None:
-            return pointcut
-        time = self.resolver.values.value(pointcut.time, Locals(scope, names), f"aspect {name}: time")
-        return replace(pointcut, firing_time=time or 0.0)
+
+def _timed(made: Instantiator, pointcut: PointcutText, name: str, scope: str, names: dict[str, object]) -> PointcutText:
+    if pointcut.time is None:
+        return pointcut
+    time = made.resolver.values.value(pointcut.time, Locals(scope, names), f"aspect {name}: time")
+    return replace(pointcut, firing_time=time or 0.0)
 
 
 Change = Callable[[str, Aspect], AnyMapping[str, object]]
