@@ -72,7 +72,7 @@ def load_model(
             declared = joined(declared, disturbance.composites, COMPOSITE_THERE, problems)
         around = Surroundings(inherit(declared, catalogue.actors, problems, limits), catalogue, problems)
         composites = around.composites
-        text = around.model(text)
+        text = settled = around.model(text)
         check_usage(text, declared, composites, catalogue.actors, problems)
         # What is changed from outside; settings of disturbances come first, because the last one wins.
         text, set_by_them = add_disturbances(text, disturbances, problems)
@@ -81,7 +81,8 @@ def load_model(
             text = without(text, change, problems)
         for change in aspects:
             text = change_aspect(text, change, problems)
-        text = around.model(text)  # with what has come from outside
+        if text is not settled:  # something has come from outside
+            text = around.model(text)
         # What results.
         known = PartTypes(composites, catalogue)
         resolver = ParameterResolver(Settings(settings, limits), problems)

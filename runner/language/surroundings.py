@@ -64,6 +64,7 @@ class Surroundings:
         self.composites = dict(composites)
         self.problems = problems
         self._catalogue = catalogue
+        self._classes: dict[tuple[str, str], type | None] = {}  # by the key of a model, and the name
         for name in _inner_first(self.composites):
             if composite := self.composites[name]:
                 self.composites[name] = self.composite(composite)
@@ -109,7 +110,10 @@ class Surroundings:
         given = {name: entry for name, entry in part.values.items() if name in known or name not in part.kept}
         unused = getattr(self._class(key, part.type.text), "unused", ())
         asked = _Asked(part.name, part.type.text, known, part.inherit, unused)
-        return replace(part, values=self._values(owner, asked, given, taken), inherit=(), kept=frozenset())
+        values = self._values(owner, asked, given, taken)
+        if values == part.values and not part.inherit and not part.kept:
+            return part
+        return replace(part, values=values, inherit=(), kept=frozenset())
 
     def _values(
         self, owner: CompositeText, asked: _Asked, given: Mapping[str, Entry], taken: list[Node]
@@ -123,8 +127,9 @@ class Surroundings:
                 values[name] = Entry(Scalar(name, name, True, at), node)
                 taken.append(node)
         for name in [name for name in values if name in asked.known]:
-            inner = self._value(owner, f"{asked.name}.{name}", asked.known[name], values[name].value, taken)
-            values[name] = replace(values[name], value=inner)
+            if isinstance(mapping := values[name].value, MappingNode):
+                inner = self._value(owner, f"{asked.name}.{name}", asked.known[name], mapping, taken)
+                values[name] = replace(values[name], value=inner)
         return values
 
     def _value(self, owner: CompositeText, name: str, known: Known, node: Node, taken: list[Node]) -> Node:
@@ -188,13 +193,15 @@ class Surroundings:
 
     def _class(self, key: str, kind: str) -> type | None:
         """The class of an actor, aspect or figure type; None if it is not known."""
-        types: Mapping[str, type[Configurable]] = self._catalogue.actors
-        if key in ("aspects", "figures"):
-            types = self._catalogue.aspects if key == "aspects" else figure_types()
-        try:
-            return types.get(kind)
-        except CatalogueError:
-            return None
+        if (key, kind) not in self._classes:
+            types: Mapping[str, type[Configurable]] = self._catalogue.actors
+            if key in ("aspects", "figures"):
+                types = self._catalogue.aspects if key == "aspects" else figure_types()
+            try:
+                self._classes[key, kind] = types.get(kind)
+            except CatalogueError:
+                self._classes[key, kind] = None
+        return self._classes[key, kind]
 
     # -- what parameters take -----------------------------------------------------------------------------------------
 
