@@ -19,7 +19,7 @@ from typing import Any
 
 from epicycle.runner import StudyResults, open_study
 from epicycle.runner.language import ALWAYS
-from epicycle.runner.study import (
+from epicycle.runner.study.judge.claims import (
     CONFIRMED,
     NOT_REPRODUCED,
     REPRODUCED,
@@ -27,9 +27,9 @@ from epicycle.runner.study import (
     UNDECIDED,
     Finding,
     Judgement,
-    Recommendation,
     ranked,
 )
+from epicycle.runner.study.judge.guideline import Recommendation
 
 SHORT = {REPRODUCED: "**yes**", NOT_REPRODUCED: "no", UNDECIDED: "open"}
 

@@ -9,7 +9,7 @@ if TYPE_CHECKING:
     from .build import Composite, Model, load_composite, load_model
     from .engine import ActorError, Simulation
     from .results import Results, Signal
-    from .study import StudyResults, open_study
+    from .study.judge.study_results import StudyResults, open_study
     from .text import ModelError
     from .trial import Trial
 
@@ -39,8 +39,8 @@ _HOMES = {
     "ModelError": "text",
     "load_composite": "build",
     "load_model": "build",
-    "StudyResults": "study",
-    "open_study": "study",
+    "StudyResults": "study.judge.study_results",
+    "open_study": "study.judge.study_results",
 }
 
 

@@ -26,7 +26,7 @@ from epicycle.runner import ModelError, Simulation, load_model
 from epicycle.runner.catalogue import TAKES, TIME, TOKENS, built_in
 from epicycle.runner.cli import main
 from epicycle.runner.language import read_study
-from epicycle.runner.study import Plan
+from epicycle.runner.study.plan.plan import Plan
 from tests.plugins import ABSENT
 
 ROOT = Path(__file__).parent.parent

@@ -21,6 +21,7 @@ class Origin:
     settings: Sequence[Setting]
     changes: Sequence[str]
     types: Sequence[type]
+    spec: Any = None  # how it was named, if that is known
 
     def facts(self) -> dict[str, Any]:
         """Everything that a run depends on beside its seed and Epicycle, as plain data without names of folders."""

@@ -175,7 +175,7 @@ README = """\
 Actors and aspects for Epicycle.
 
     pip install --editable '.[dev]'
-    epicycle actors Smoother
+    epicycle describe Smoother
     epicycle run $name.yaml
     python -m pytest
 """

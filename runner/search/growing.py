@@ -9,7 +9,8 @@ from typing import Any
 import yaml
 
 from ..language import Level, Study
-from ..study import Plan, Search, Trials
+from ..study.plan.plan import Plan, Search
+from ..study.trials import Trials
 from .faults import FaultSpace
 from .proposals import Point
 from .space import Space, said

@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -26,8 +26,10 @@ from ..engine import Simulation
 from ..provenance import version_of
 from ..shown import finite, short
 from ..student import student_quantile
-from ..tables import Table, Tabled
-from .tried import NUMBER, Tried
+from ..tables import Table
+from .answer import Answer
+from .cache import NUMBER, EvaluationCache
+from .evaluator import Evaluator, Recipe, jobs_for
 
 SHARE = 0.2  # of the runs that should get from one level to the next: few levels, and yet many runs at each
 ENOUGH = 0.1  # of the runs from a level that break the property: it needs no further level
@@ -35,14 +37,16 @@ MOST = 100  # levels
 CONFIDENCE = 0.95
 
 
-@dataclass(frozen=True)
-class RareEvent(Tabled):
+@dataclass(repr=False)
+class RareEvent(Answer):
     """The probability that a run of a model breaks a monitor, and what its estimate is made of.
 
     ``levels`` are what the robustness of ``guide`` falls to, and ``shares``, in each repetition, how many of the
     ``runs`` from one level get to the next, and from the last to the break; it ends where none does.  ``runs_made`` and
     ``tags``, of which there are ``tags_of_run`` in a whole run, count the search for levels, too.
     """
+
+    NAME = "rare"
 
     model: str
     seed: int
@@ -104,43 +108,37 @@ class RareEvent(Tabled):
             return math.nan
         return (1.0 - self.probability) / self.probability / (self.error * self.error)
 
-    @property
-    def sentence(self) -> str:
-        """What is to be known, in words."""
+    def _sentences(self) -> Iterator[str]:
         number = len(self.shares)
         done = (
             f"{number} repetitions with {self.runs:,} runs from each of {counted(len(self.levels) + 1, 'level')}, the "
             f"beginning included; {self.runs_made:,} runs in all"
         )
         if self.interval is None:
-            return f"No run broke {self.monitor} ({self.source}): {done}. That does not bound the probability."
+            yield f"No run broke {self.monitor} ({self.source}): {done}. That does not bound the probability."
+            return
         low, high = self.interval
-        said = (
+        yield (
             f"A run of {self.model} breaks {self.monitor} ({self.source}) with a probability of {self.probability:.2g} "
             f"(95 % interval: {low:.2g} to {high:.2g}): {done}."
         )
         if not math.isnan(self.plain_runs):
             events = self.plain_runs * self.tags_of_run / self.tags
-            said += (
-                f" Plain sampling needs {self.plain_runs / self.runs_made:.2g} times as many runs, and {events:.2g} "
+            yield (
+                f"Plain sampling needs {self.plain_runs / self.runs_made:.2g} times as many runs, and {events:.2g} "
                 "times as many tags, for the same standard error."
             )
         if empty := self.estimates.count(0.0):
-            said += f" {counted(empty, 'repetition')} broke nothing, so the interval is too narrow: use more runs."
+            yield f"{counted(empty, 'repetition')} broke nothing, so the interval is too narrow: use more runs."
         if not self.levels:
-            said += " There was no level on the way, so this is plain sampling."
-        return said
+            yield "There was no level on the way, so this is plain sampling."
 
     def facts(self) -> dict[str, Any]:
-        """Everything that was found, for programs."""
         own = {"probability": self.probability, "interval": self.interval, "error": self.error}
         more = {"estimates": self.estimates, "plain_runs": self.plain_runs, "sentence": self.sentence}
         found = finite({**own, **more, **asdict(self), "version": version_of("epicycle")})
         assert isinstance(found, dict)
         return found
-
-    def _caption(self) -> str:
-        return self.sentence
 
     def _tables(self) -> list[Table]:
         rows = []
@@ -250,6 +248,20 @@ class _Trials:
                 break
         return shares
 
+    def prepare(self, request: object) -> None:
+        """There is nothing to load."""
+
+    def make(self, request: tuple[str, Sequence[float] | None]) -> list[Any]:
+        """A repetition over these levels, or the levels; and the runs and tags that it took."""
+        key, levels = request
+        found = self.levels() if levels is None else (self.shares(levels, key), 0)
+        return [*found, *self.spent()]
+
+
+def _trials_of(recipe: Recipe, *others: Any) -> _Trials:
+    """The same in another process."""
+    return _Trials(recipe.model(), *others)
+
 
 def rare(
     model: Model,
@@ -261,13 +273,14 @@ def rare(
     seed: int | None = None,
     until: float | None = None,
     folder: Path | None = None,
+    jobs: int | None = None,
     tell: Callable[[int, int], None] | None = None,
 ) -> RareEvent:
     """Estimate the probability that a run of a model breaks a monitor.
 
     ``guide`` is the monitor whose robustness says how far a run has come: by default this one.  In a ``folder``, each
-    repetition is noted, and an estimate that was killed continues there.  ``tell`` is called with how many runs were
-    made, and how many repetitions are done.
+    repetition is noted, and an estimate that was killed continues there.  ``jobs`` processes make them.  ``tell`` is
+    called with how many runs were made, and how many repetitions are done.
     """
     guide = guide or monitor
     known = {each.name: each.requirement.property for each in model.monitors}
@@ -282,20 +295,24 @@ def rare(
         "runs": runs,
         "digest": "" if folder is None else first.run(until=until).digest,
     }  # fmt: skip
-    tried = Tried(model, about, [[NUMBER], NUMBER, (int,), (int,)], folder)
-    trials = _Trials(model, monitor, guide, seed, until, runs)
-    levels, tags_of_run, made, tags = tried.outcome("levels", lambda: [*trials.levels(), *trials.spent()])
-
-    def repetition(key: str) -> tuple[list[float], int, int]:
-        shares, _, made, tags = tried.outcome(key, lambda: [trials.shares(levels, key), 0, *trials.spent()])
-        return shares, made, tags
-
+    cache = EvaluationCache(model, about, [[NUMBER], NUMBER, (int,), (int,)], folder)
+    others = (monitor, guide, seed, until, runs)
     found: list[list[float]] = []
-    for number in range(repetitions):
-        if tell is not None:
-            tell(made, number)
-        shares, more, tags_more = repetition(f"repetition {number}")
-        found.append(shares)
-        made, tags = made + more, tags + tags_more
+    here = _Trials(model, *others)
+    with Evaluator(here, jobs_for(model, jobs), _trials_of, Recipe.of(model), *others) as evaluator:
+
+        def outcome(key: str, levels: Sequence[float] | None) -> list[Any]:
+            made: list[Any] = cache.outcome(key, lambda: evaluator.make(key, (key, levels)))
+            return made
+
+        levels, tags_of_run, made, tags = outcome("levels", None)
+        keys = [f"repetition {number}" for number in range(repetitions)]
+        evaluator.expect((key, (key, levels)) for key in keys if key not in cache)
+        for key in keys:
+            if tell is not None:
+                tell(made, len(found))
+            shares, _, more, tags_more = outcome(key, levels)
+            found.append(shares)
+            made, tags = made + more, tags + tags_more
     source = known[monitor]
     return RareEvent(model.name, seed, until, monitor, source, guide, levels, runs, found, made, tags, tags_of_run)

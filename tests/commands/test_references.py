@@ -56,7 +56,7 @@ def references(capsys: pytest.CaptureFixture[str]) -> dict[str, str]:
     Path("lines.yaml").write_text(STUDY, encoding="utf-8")
     assert main(["study", "lines.yaml", "--jobs", "1", "--out", "results/lines"]) == 0
     row = epicycle.open_study("results/lines").table().to_pylist()[3]
-    assert main(["replay", "results/lines", row["run"][:10]]) == 0
+    assert main(["run", f"results/lines/{row['run'][:10]}"]) == 0
     capsys.readouterr()
     found = {each: manifest(each)["digest"] for each in ("by_command", "by_program")}
     name = f"results/lines/{row['run'][:10]}"
@@ -69,7 +69,7 @@ def test_every_command_opens_every_run(references: dict[str, str], capsys: pytes
     for name, digest in references.items():
         assert said(capsys, "view", name, "-o", "page.html") == "wrote page.html\n"
         assert json.loads(said(capsys, "run", name, "--json"))["digest"] == digest
-        traced = said(capsys, "trace", name, "--actor", "noise")
+        traced = said(capsys, "run", name, "--trace", "noise")
         explained = json.loads(
             said(capsys, "explain", name, "--monitor", "always noise.output <= 0.001", "--json", "--no-page")
         )

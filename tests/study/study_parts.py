@@ -88,7 +88,7 @@ def command(*arguments: object) -> list[str]:
 def plan_of(path: Path, **changes: Any) -> Any:
     """A study that has been tried."""
     from epicycle.runner.language import read_study
-    from epicycle.runner.study import Plan
+    from epicycle.runner.study.plan.plan import Plan
 
     return Plan.made(read_study(path, types=[THIS], **changes))
 

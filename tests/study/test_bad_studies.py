@@ -19,7 +19,7 @@ from epicycle.runner.catalogue import built_in, own_figures
 from epicycle.runner.cli import main
 from epicycle.runner.language import json_schema
 from epicycle.runner.show.report import check_figures, own_study_figures
-from epicycle.runner.study import open_study
+from epicycle.runner.study.judge.study_results import open_study
 from epicycle.runner.text import Problems, parse, plain
 from tests import cases
 from tests.cases import Case

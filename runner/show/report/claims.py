@@ -10,17 +10,8 @@ from epicycle.actors import counted
 from ...html import Content, Html, note, tag, wide_table
 from ...language import ALWAYS
 from ...shown import rounded
-from ...study import (
-    CONFIRMED,
-    NOT_REPRODUCED,
-    REPRODUCED,
-    REVERSED,
-    UNDECIDED,
-    Finding,
-    Judgement,
-    Recommendation,
-    ranked,
-)
+from ...study.judge.claims import CONFIRMED, NOT_REPRODUCED, REPRODUCED, REVERSED, UNDECIDED, Finding, Judgement, ranked
+from ...study.judge.guideline import Recommendation
 from .data import Data, Names, estimated, mean_of, shown
 
 

@@ -10,7 +10,7 @@ from epicycle.actors import Fault, UnitError, variants
 from ...build import made_figure, tell_of_figure
 from ...catalogue import with_offered
 from ...language import in_si, split_number
-from ...study import Plan
+from ...study.plan.plan import Plan
 from ...text import Mapping, Node, Problems, Sequence, place_in, plain
 from . import of_signals  # noqa: F401  whose types are known by that
 from .figure import SignalFigure, StudyFigure

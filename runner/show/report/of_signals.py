@@ -27,7 +27,8 @@ from epicycle.actors.expression import PortFormula, PortFormulaParameter
 from ...build import Model, figures_of
 from ...catalogue import Figure
 from ...results import STOP_TIME, Results
-from ...study import Plan, half_width
+from ...study.inference import half_width
+from ...study.plan.plan import Plan
 from ...text import Problems
 from ..pen import FORMATS, draw
 from ..samples import selected

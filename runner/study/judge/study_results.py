@@ -154,7 +154,7 @@ class StudyResults(Tabled):
     def failures(self) -> list[dict[str, Any]]:
         """The rows that are not ``ok``, each with the command that repeats its run."""
         return [
-            {**row, "replay": f"epicycle replay {self.folder} {row['run'][:12]}"}
+            {**row, "replay": f"epicycle run {self.folder / row['run'][:12]}"}
             for row in self.table().to_pylist()
             if row["status"] != OK
         ]

@@ -166,7 +166,7 @@ class Cluster:
     def _lost(self) -> WorkerError:
         return WorkerError(
             f"the scheduler{'' if self._scheduler is None else f' {self._scheduler}'} no longer answers\n"
-            f"   help: finished runs are kept; 'epicycle resume {self._keeper.store.folder}' continues"
+            f"   help: finished runs are kept; 'epicycle study {self._keeper.store.folder}' continues"
         )
 
     # -- runs -----------------------------------------------------------------------------------------------------

@@ -13,7 +13,6 @@ from epicycle.runner.catalogue import packaged_models
 from epicycle.runner.language import Claim, read_study
 from epicycle.runner.show.report.claims import claims
 from epicycle.runner.show.report.data import Data
-from epicycle.runner.study import Plan, run_study
 from epicycle.runner.study.judge.claims import (
     NOT_REPRODUCED,
     REPRODUCED,
@@ -22,6 +21,8 @@ from epicycle.runner.study.judge.claims import (
     Judgement,
     ranked,
 )
+from epicycle.runner.study.plan.plan import Plan
+from epicycle.runner.study.session import run_study
 from epicycle.runner.text import Position
 
 QUEUE = """
