@@ -288,6 +288,7 @@ class Model(Scope, Tabled):
 
     def enlist(self, aspects: Iterable[WovenAspect]) -> None:
         """Add these aspects to the model."""
+        self.origin = None
         self.aspects = arranged([*self.aspects, *aspects], self.graph)
 
     def _add(self, watched: Watched) -> None:

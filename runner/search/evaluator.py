@@ -91,24 +91,21 @@ class Evaluator:
 
 @dataclass(frozen=True)
 class Recipe:
-    """How another process makes the same model: as it was named, with the monitors and the stop time it has now."""
+    """How another process makes the same model: as it was named, with the monitors that it has now."""
 
     spec: RunSpec
     monitors: Mapping[str, str]
-    stop: float | None
 
     @classmethod
     def of(cls, model: Model) -> Recipe | None:
         """That of a model; None for one that only this program knows."""
         if (spec := spec_of(model, None, None)) is None:
             return None
-        return cls(spec, {each.name: each.requirement.property for each in model.monitors}, model.stop)
+        return cls(spec, {each.name: each.requirement.property for each in model.monitors})
 
     def model(self) -> Model:
         """The model."""
-        made = with_monitors(opened(self.spec).model, self.monitors)
-        made.stop = self.stop
-        return made
+        return with_monitors(opened(self.spec).model, self.monitors)
 
 
 def jobs_for(model: Model, jobs: int | None, what: str = "") -> int:

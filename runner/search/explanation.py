@@ -67,7 +67,7 @@ class Step:
 
 @dataclass(repr=False)
 class Explanation(Answer):
-    """A smallest set of acts that breaks a property in a run.
+    """A smallest set of faults that breaks a property in a run.
 
     With these acts and no others it is broken, and without any single one of them it holds: ``effects``, in the order
     in which they happen.  There are none if it is broken without any act.  ``steps`` lead from the first act to a port

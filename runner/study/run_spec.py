@@ -140,8 +140,10 @@ class OpenedRun(NamedTuple):
 
 def spec_of(model: Model, seed: int | None, until: float | None) -> RunSpec | None:
     """How a run of a model is made; None for one that a program has made or changed."""
-    spec: RunSpec | None = None if model.origin is None else model.origin.spec
-    if spec is None or spec.study:
+    if model.origin is None or model.origin.spec is None or model.origin.state != _state(model):
+        return None
+    spec: RunSpec = model.origin.spec
+    if spec.study:
         return spec
     has_moved = until is not None and until != seconds("until", spec.until)
     return replace(spec, seed=spec.seed if seed is None else seed, until=until if has_moved else spec.until)
@@ -150,8 +152,12 @@ def spec_of(model: Model, seed: int | None, until: float | None) -> RunSpec | No
 def named(model: Model, spec: RunSpec) -> Model:
     """A model that is known to be made like this."""
     assert model.origin is not None
-    model.origin = replace(model.origin, spec=spec)
+    model.origin = replace(model.origin, spec=spec, state=_state(model))
     return model
+
+
+def _state(model: Model) -> tuple[object, ...]:
+    return model.stop, model.seed, model.exactly
 
 
 def is_reference(name: str | Path) -> bool:
