@@ -367,7 +367,7 @@ class Scope:
         if woven.model is not None:  # its composite has no other use
             model.forget(woven.model.path)
         model.aspects = [each for each in model.aspects if each.name != full]
-        model.origin = None
+        model.enlist(())  # which is a change, too
 
 
 class Composite(Scope):

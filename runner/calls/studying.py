@@ -77,7 +77,7 @@ def study(
     from contextlib import nullcontext
 
     from ..study.judge.study_results import open_study
-    from ..study.run.pulse import progress
+    from ..study.run.progress import progress
     from ..study.session import run_study
 
     plan, folder = plan_of(study, set=set, replications=replications, seed=seed, out=out, types=types)

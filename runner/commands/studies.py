@@ -62,7 +62,7 @@ def _session(plan: Plan, folder: Path, options: argparse.Namespace, session: dic
 
     from ..study.judge.study_results import open_study
     from ..study.run.processes import WorkerError
-    from ..study.run.pulse import progress
+    from ..study.run.progress import progress
     from ..study.run.runner import again
     from ..study.run.store import WriteError
     from ..study.session import run_study

@@ -52,7 +52,7 @@ def calibrate(
     """
     task = _Task(spec, goal)
     cache = EvaluationCache(task.model, task.about(), [NUMBER], folder)
-    with Evaluator(_Bench(task), jobs or available_cores(), _bench_of, spec, goal) as evaluator:
+    with Evaluator(_Worker(task), jobs or available_cores(), _worker_of, spec, goal) as evaluator:
         return _fitted(_Runs(task, evaluator, cache, tell))
 
 
@@ -203,7 +203,7 @@ class _Task:
         ]
 
 
-class _Bench:
+class _Worker:
     """Makes runs with given parameters."""
 
     def __init__(self, task: _Task) -> None:
@@ -226,9 +226,9 @@ class _Bench:
         ]
 
 
-def _bench_of(spec: SearchSpec, goal: Match) -> _Bench:
+def _worker_of(spec: SearchSpec, goal: Match) -> _Worker:
     """The same in another process."""
-    return _Bench(_Task(spec, goal))
+    return _Worker(_Task(spec, goal))
 
 
 class _Runs:

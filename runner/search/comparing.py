@@ -158,7 +158,7 @@ def compare(
     units = {metric.name: metric.unit for each in models.values() for metric in each.metrics}
     found = Comparison(first.name, seeds, units, {name: {} for name in models})
     asked = [(name, number) for number in seeds for name in models]
-    here, shown = _Bench(models, until), bar(first.name, after=SOON) if progress else nullcontext()
+    here, shown = _Worker(models, until), bar(first.name, after=SOON) if progress else nullcontext()
     with shown as show, Evaluator(here, jobs, _Away, recipes, until, patience=0.0) as evaluator:
         evaluator.expect((each, each) for each in asked)
         for done, (name, number) in enumerate(asked):
@@ -172,7 +172,7 @@ def compare(
     return found
 
 
-class _Bench:
+class _Worker:
     """Makes runs of the variants."""
 
     def __init__(self, models: Mapping[str, Model], until: float | None) -> None:
@@ -191,7 +191,7 @@ class _Bench:
             return error
 
 
-class _Away(_Bench):
+class _Away(_Worker):
     """The same in another process, without what may be large, or cannot leave it."""
 
     def __init__(self, recipes: Mapping[str, Recipe], until: float | None) -> None:

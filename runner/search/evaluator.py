@@ -16,7 +16,7 @@ from typing import Any
 from epicycle.actors import EpicycleError
 
 from ..build import Model
-from ..study.run.processes import DONE, Bench, Outcome, Processes, WorkerError
+from ..study.run.processes import DONE, Outcome, Processes, Worker, WorkerError
 from ..study.run_spec import RunSpec, opened, spec_of
 from ..study.session import available_cores
 from .monitored import with_monitors
@@ -25,13 +25,13 @@ PATIENCE = 1.0  # s of work before processes are started, which takes as long
 
 
 class Evaluator:
-    """Makes things with a bench, which each of ``jobs`` processes makes for itself by ``begin(*arguments)``."""
+    """Makes things with a worker, which each of ``jobs`` processes makes for itself by ``begin(*arguments)``."""
 
     def __init__(
-        self, bench: Bench, jobs: int, begin: Callable[..., Bench], *arguments: object, patience: float = PATIENCE
+        self, worker: Worker, jobs: int, begin: Callable[..., Worker], *arguments: object, patience: float = PATIENCE
     ) -> None:
         self._patience = patience
-        self._bench = bench
+        self._worker = worker
         self._jobs = jobs
         self._begin, self._arguments = begin, arguments
         self._open = ExitStack()
@@ -53,11 +53,11 @@ class Evaluator:
         self._go_ahead()
 
     def make(self, key: Hashable, request: object) -> Any:
-        """What the bench makes of a request; raises what it raises, and ``WorkerError``."""
+        """What the worker makes of a request; raises what it raises, and ``WorkerError``."""
         if self._threads is None and (self._jobs == 1 or self._spent < self._patience):
             since = time.monotonic()
-            self._bench.prepare(request)
-            made = self._bench.make(request)
+            self._worker.prepare(request)
+            made = self._worker.make(request)
             self._spent += time.monotonic() - since
             return made
         if self._threads is None:

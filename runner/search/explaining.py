@@ -29,7 +29,7 @@ class _LimitError(Exception):
     """There are as many runs as a search may make."""
 
 
-class _Bench:
+class _Worker:
     """Makes runs of a model in which some acts happen and, of those that are looked at, no others."""
 
     def __init__(
@@ -64,9 +64,9 @@ class _Bench:
         return [verdict.holds, verdict.robustness, idle]
 
 
-def _bench_of(recipe: Recipe, *others: Any) -> _Bench:
+def _worker_of(recipe: Recipe, *others: Any) -> _Worker:
     """The same in another process."""
-    return _Bench(recipe.model(), *others)
+    return _Worker(recipe.model(), *others)
 
 
 def _up_to(verdict: Verdict, acts: Iterable[Act], looks_ahead: bool) -> list[Act]:
@@ -152,7 +152,7 @@ def explain(
     """
     sources = {monitor: property_of(model, monitor) for monitor in monitors}
     chosen = _chosen(model, only)
-    whole = _Bench(model, "", seed, until).results(model.exactly)
+    whole = _Worker(model, "", seed, until).results(model.exactly)
     monitor, *also = _broken(model.name, {each: whole.monitors[each] for each in monitors})
     verdict, source = whole.monitors[monitor], sources[monitor]
     about = {
@@ -167,11 +167,11 @@ def explain(
     mine = [name for name in acts if not chosen or name.aspect in chosen]
     order, others = sorted(mine), frozenset(acts).difference(mine)
     given = (monitor, seed, until, order, others)
-    bench, cache = _Bench(model, *given), EvaluationCache(model, about, _SHAPE, folder)
+    worker, cache = _Worker(model, *given), EvaluationCache(model, about, _SHAPE, folder)
     none: frozenset[ActName] = frozenset()
     before = [act.name for act in _up_to(verdict, whole.acts, False) if act.name not in others]
     candidates, ended, effects = mine, "", dict[ActName, tuple[float | None, float | None]]()
-    with Evaluator(bench, jobs_for(model, jobs), _bench_of, Recipe.of(model), *given) as evaluator:
+    with Evaluator(worker, jobs_for(model, jobs), _worker_of, Recipe.of(model), *given) as evaluator:
         sets = _Sets(evaluator, cache, order, limit)
 
         def breaks(names: frozenset[ActName]) -> bool:
@@ -196,11 +196,11 @@ def explain(
         except (_LimitError, KeyboardInterrupt) as end:
             ended = LIMIT if isinstance(end, _LimitError) else INTERRUPT
     best = frozenset(mine) if sets.best is None else sets.best
-    with_set, with_none = bench.results(best, keep_log=True), bench.results(none)
+    with_set, with_none = worker.results(best, keep_log=True), worker.results(none)
     if ended:  # perhaps before the acts were left out that are not to blame
         last = _up_to(with_set.monitors[monitor], with_set.acts, sets.looks_ahead)
         acting = best.intersection(act.name for act in last)
-        fewer = bench.results(acting, keep_log=True)
+        fewer = worker.results(acting, keep_log=True)
         if fewer.monitors[monitor].holds is False:
             best, with_set = acting, fewer
     there = {act.name: act for act in with_set.acts if act.name in best}
@@ -209,7 +209,7 @@ def explain(
     steps = []
     if there and not ended:
         ports = next(each.ports for each in model.monitors if each.name == monitor)
-        rest = bench.results(best - {next(iter(there))}, keep_log=True)
+        rest = worker.results(best - {next(iter(there))}, keep_log=True)
         steps = _steps(model.graph, ports, with_set, rest)
     return Explanation(
         model.name,

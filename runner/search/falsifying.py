@@ -14,8 +14,8 @@ from ..build import Model
 from ..engine import Interventions, Simulation
 from ..language import study_of_text
 from ..study.plan.plan import Search
+from ..study.search_runs import SearchRuns, open_search_runs
 from ..study.session import available_cores
-from ..study.trials import Trials, open_trials
 from ..text import Problems
 from .falsification import Falsification, Run
 from .faults import FaultSpace
@@ -47,7 +47,7 @@ def falsify(
     found, growing = searching.found, searching.growing
     points = searching.next()
     growing.add(points)
-    with open_trials(growing.whole(), folder, jobs or available_cores(), timeout) as made:
+    with open_search_runs(growing.whole(), folder, jobs or available_cores(), timeout) as made:
         try:
             while points:
                 searching.make(points, made, lambda: tell(len(found.runs), found.least))
@@ -122,7 +122,7 @@ class _Searching:
             return []
         return points[:left]
 
-    def make(self, points: Sequence[Point], made: Trials, tell: Callable[[], None]) -> None:
+    def make(self, points: Sequence[Point], made: SearchRuns, tell: Callable[[], None]) -> None:
         """Make the runs of a batch."""
         found = self.found
         levels, distinct = self.growing.add(points)

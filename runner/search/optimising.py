@@ -16,8 +16,8 @@ from ..language import asks_for_none, is_study, read_study, study_of_text
 from ..study.inference import mean
 from ..study.plan.plan import Plan, Search
 from ..study.run.backlog import OK
+from ..study.search_runs import SearchRuns, open_search_runs
 from ..study.session import available_cores
-from ..study.trials import Trials, open_trials
 from ..text import COMMAND_LINE, Position, Problems, parse, plain
 from .growing import Growing, place_of, text_of
 from .optimum import Optimum, Outcome, Tested
@@ -49,7 +49,7 @@ def optimise(
     chosen = proposals(len(found.space.axes), work.seed, found.guided, _TOGETHER)
     points = next(chosen)[: goal.points]
     work.growing.add(points)
-    with open_trials(work.growing.whole(), folder, jobs or available_cores(), timeout) as made:
+    with open_search_runs(work.growing.whole(), folder, jobs or available_cores(), timeout) as made:
         try:
             while True:
                 tested = work.test(points, made)
@@ -98,7 +98,7 @@ class _Optimising:
         """The seed of the study, which is that of the search."""
         return self.growing.study.seed
 
-    def test(self, points: Sequence[Point], made: Trials) -> list[Tested]:
+    def test(self, points: Sequence[Point], made: SearchRuns) -> list[Tested]:
         """Make the runs of some points, and judge them."""
         levels, distinct = self.growing.add(points)
         self.growing.tell(made)
@@ -114,7 +114,7 @@ class _Optimising:
             self.found.tested.append(tested[-1])
         return tested
 
-    def check(self, best: Tested, made: Trials) -> Outcome:
+    def check(self, best: Tested, made: SearchRuns) -> Outcome:
         """What comes of a point with as many seeds again, which had no part in its choice."""
         count = self.growing.study.replications
         numbers = [(index, count + each) for index in range(self._others) for each in range(count)]

@@ -149,7 +149,7 @@ class RareEvent(Answer):
         return [Table((f"robustness of {self.guide}", "share that gets there", "repetitions that tried"), rows)]
 
 
-class _Trial(NamedTuple):
+class _Branch(NamedTuple):
     """A run from a level on: the least robustness that it came to, and itself if it can go on from there."""
 
     reached: float  # -infinity once the property is broken
@@ -157,8 +157,8 @@ class _Trial(NamedTuple):
     tags: int
 
 
-class _Trials:
-    """Trials of a model, from level to level."""
+class _Branches:
+    """Branches of a model, from level to level."""
 
     def __init__(self, model: Model, monitor: str, guide: str, seed: int, until: float | None, runs: int) -> None:
         self.model = model
@@ -170,25 +170,25 @@ class _Trials:
         self.made = self.tags = 0
         self._has_processes = any(isinstance(actor, Process) for actor in model.graph.actors.values())
 
-    def from_level(self, before: Sequence[_Trial] | None, level: float | None, key: str) -> list[_Trial]:
-        """Trials that begin where others got to, or with None at the beginning, and go on to a level or to the end.
+    def from_level(self, before: Sequence[_Branch] | None, level: float | None, key: str) -> list[_Branch]:
+        """Branches that begin where others got to, or with None at the beginning, and go on to a level or to the end.
 
-        Those with the same ``key`` are the same trials.
+        Those with the same ``key`` are the same branches.
         """
         if before is None:
-            return [self._trial(None, level, f"{key} {number}") for number in range(self.runs)]
+            return [self._branch(None, level, f"{key} {number}") for number in range(self.runs)]
         each, more = divmod(self.runs, len(before))
         chosen = random_stream(self.seed, key).permutation(len(before))[:more].tolist()
-        origins = [trial for trial in before for _ in range(each)] + [before[place] for place in chosen]
-        return [self._trial(origin, level, f"{key} {number}") for number, origin in enumerate(origins)]
+        origins = [branch for branch in before for _ in range(each)] + [before[place] for place in chosen]
+        return [self._branch(origin, level, f"{key} {number}") for number, origin in enumerate(origins)]
 
-    def _trial(self, origin: _Trial | None, level: float | None, key: str) -> _Trial:
+    def _branch(self, origin: _Branch | None, level: float | None, key: str) -> _Branch:
         seed = int.from_bytes(hashlib.sha256(f"{self.seed} {key}".encode()).digest()[:7], "little")
         before = 0
         if origin is None:
             simulation = Simulation(self.model, seed=seed)
         elif origin.simulation is None:
-            return _Trial(-math.inf, None, 0)
+            return _Branch(-math.inf, None, 0)
         else:
             simulation = origin.simulation.fork(reseed=seed)
             # Where there are processes, the fork has come there from the beginning.
@@ -201,33 +201,33 @@ class _Trials:
         self.made += 1
         self.tags += tags
         if simulation.robustness(self.monitor) <= 0.0:
-            return _Trial(-math.inf, None, tags)
+            return _Branch(-math.inf, None, tags)
         if is_there:
-            return _Trial(simulation.robustness(self.guide), simulation, tags)
+            return _Branch(simulation.robustness(self.guide), simulation, tags)
         verdict = simulation.verdict(self.monitor)
         if verdict.holds is None:
             raise EpicycleError(
                 f"monitor {self.monitor} cannot be judged in a run of {self.model.name}, because {verdict.missing}"
             )
-        return _Trial(simulation.robustness(self.guide) if verdict.holds else -math.inf, None, tags)
+        return _Branch(simulation.robustness(self.guide) if verdict.holds else -math.inf, None, tags)
 
     def levels(self) -> tuple[list[float], float]:
-        """Levels of which each is reached by about a fifth of the trials from the one before; the tags of a run."""
+        """Levels of which each is reached by about a fifth of the branches from the one before; the tags of a run."""
         levels: list[float] = []
         origins, tags = None, 0.0
         while len(levels) < MOST:
             key = f"levels {len(levels)}"
-            trials = self.from_level(origins, None, key)
+            branches = self.from_level(origins, None, key)
             if origins is None:
                 tags = self.tags / self.runs
-            reached = sorted(trial.reached for trial in trials)
+            reached = sorted(branch.reached for branch in branches)
             level = reached[math.ceil(SHARE * self.runs) - 1]
             if level == reached[-1]:  # which all of them reach: the next one that some do
                 level = max((each for each in reached if each < level), default=-math.inf)
             if level == -math.inf or reached.count(-math.inf) >= ENOUGH * self.runs:
                 break
             levels.append(level)
-            origins = [trial for trial in self.from_level(origins, level, key) if trial.reached <= level]
+            origins = [branch for branch in self.from_level(origins, level, key) if branch.reached <= level]
         return levels, tags
 
     def spent(self) -> tuple[int, int]:
@@ -241,8 +241,8 @@ class _Trials:
         shares: list[float] = []
         origins = None
         for place, level in enumerate([*levels, None]):
-            trials = self.from_level(origins, level, f"{key} {place}")
-            origins = [trial for trial in trials if trial.reached <= (-math.inf if level is None else level)]
+            branches = self.from_level(origins, level, f"{key} {place}")
+            origins = [branch for branch in branches if branch.reached <= (-math.inf if level is None else level)]
             shares.append(len(origins) / self.runs)
             if not origins:
                 break
@@ -258,9 +258,9 @@ class _Trials:
         return [*found, *self.spent()]
 
 
-def _trials_of(recipe: Recipe, *others: Any) -> _Trials:
+def _branches_of(recipe: Recipe, *others: Any) -> _Branches:
     """The same in another process."""
-    return _Trials(recipe.model(), *others)
+    return _Branches(recipe.model(), *others)
 
 
 def rare(
@@ -298,8 +298,8 @@ def rare(
     cache = EvaluationCache(model, about, [[NUMBER], NUMBER, (int,), (int,)], folder)
     others = (monitor, guide, seed, until, runs)
     found: list[list[float]] = []
-    here = _Trials(model, *others)
-    with Evaluator(here, jobs_for(model, jobs), _trials_of, Recipe.of(model), *others) as evaluator:
+    here = _Branches(model, *others)
+    with Evaluator(here, jobs_for(model, jobs), _branches_of, Recipe.of(model), *others) as evaluator:
 
         def outcome(key: str, levels: Sequence[float] | None) -> list[Any]:
             made: list[Any] = cache.outcome(key, lambda: evaluator.make(key, (key, levels)))

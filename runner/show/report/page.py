@@ -14,7 +14,7 @@ from epicycle.actors import counted
 from ...html import Content, Html, note, page, tag, wide_table
 from ...language import Factor
 from ...study.inference import mean
-from ...study.judge.claims import REPRODUCED, UNDECIDED, Judgement
+from ...study.judge.claims import REPRODUCED, UNDECIDED, ClaimVerdict
 from ...study.judge.guideline import Recommendation
 from ...text import plain
 from ..sheet import tips_of
@@ -40,7 +40,7 @@ class Picture(NamedTuple):
 def report_page(
     data: Data,
     pictures: Sequence[Picture],
-    judgements: Sequence[Judgement],
+    judgements: Sequence[ClaimVerdict],
     recommendations: Sequence[Recommendation],
 ) -> str:
     study = data.plan.study
@@ -75,7 +75,7 @@ def _beside(ending: str) -> str:
     return Path(__file__).with_suffix(f".{ending}").read_text(encoding="utf-8")
 
 
-def _in_short(data: Data, judgements: Sequence[Judgement]) -> Iterable[Html]:
+def _in_short(data: Data, judgements: Sequence[ClaimVerdict]) -> Iterable[Html]:
     """What a reader should know first: the verdicts of the claims, and what is missing or failed."""
     verdicts = Counter(each.verdict for each in judgements)
     if verdicts:

@@ -25,7 +25,7 @@ from epicycle.runner.study.judge.study_results import open_study
 from epicycle.runner.study.plan.plan import Plan
 from epicycle.runner.study.run import parcel
 from epicycle.runner.study.run.backlog import Backlog
-from epicycle.runner.study.run.parcel import fitness, pack
+from epicycle.runner.study.run.parcel import environment, pack
 from epicycle.runner.study.run.runner import Runner
 from tests.study.dask_cluster import Cluster, a_cluster, without_epicycle
 from tests.study.study_commands import study
@@ -266,12 +266,12 @@ def test_what_cannot_be(
             )
     monkeypatch.setattr(cluster_module, "CONNECT", 10.0)
     for name, unlike in (
-        ("numpy", f"numpy {fitness()['numpy']} there, 1.0 here"),
-        ("casadi", f"casadi {fitness()['casadi'] or 'is missing'} there, 1.0 here"),
+        ("numpy", f"numpy {environment()['numpy']} there, 1.0 here"),
+        ("casadi", f"casadi {environment()['casadi'] or 'is missing'} there, 1.0 here"),
         ("code", "the code of Epicycle differs"),
     ):
         with monkeypatch.context() as context:
-            context.setitem(fitness(), name, "1.0")
+            context.setitem(environment(), name, "1.0")
             said = error_of(tmp_path, capsys, "--scheduler", cluster.address)
         assert re.sub(r"127.0.0.1:[0-9]+", "WORKER", said) == (
             f"1: error: the Dask worker tcp://WORKER differs from this machine: {unlike}\n"

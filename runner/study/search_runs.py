@@ -10,7 +10,7 @@ from pathlib import Path
 from .judge.study_results import StudyResults
 from .plan.plan import Plan
 from .run.backlog import Backlog, Task
-from .run.making import Keeper, keeping, make_in
+from .run.making import Recorder, make_in, recording
 from .run.manifest import manifest_text
 from .run.processes import Processes
 from .run.runner import Runner
@@ -19,44 +19,44 @@ from .session import manifest_of
 
 
 @dataclass(kw_only=True)
-class _Trial(Task):
+class _SearchTask(Task):
     """A run of a plan that the process which makes it may not know yet."""
 
     batch: int
     plan: Plan
 
 
-class _Bench:
+class _Worker:
     """Makes the trials of one plan after the other."""
 
     def __init__(self) -> None:
         self._batch = 0
         self._runner: Runner | None = None
 
-    def prepare(self, trial: _Trial) -> None:
+    def prepare(self, trial: _SearchTask) -> None:
         """Load the model of the trial's condition, unless it is there."""
         self._of(trial).prepare(trial)
 
-    def make(self, trial: _Trial) -> Row:
+    def make(self, trial: _SearchTask) -> Row:
         """The row of a run."""
         return self._of(trial).make(trial)
 
-    def _of(self, trial: _Trial) -> Runner:
+    def _of(self, trial: _SearchTask) -> Runner:
         if self._runner is None or trial.batch != self._batch:
             self._runner, self._batch = Runner(trial.plan), trial.batch
         return self._runner
 
 
-class Trials:
-    """A results folder that a search writes to; ``open_trials`` opens one."""
+class SearchRuns:
+    """A results folder that a search writes to; ``open_search_runs`` opens one."""
 
-    def __init__(self, keeper: Keeper, processes: Processes, jobs: int, known: dict[str, Row]) -> None:
-        self._keeper = keeper
+    def __init__(self, recorder: Recorder, processes: Processes, jobs: int, known: dict[str, Row]) -> None:
+        self._recorder = recorder
         self._processes = processes
         self._jobs = jobs
         self._known = known
         self._batches = 0
-        keeper.tell = self._keep
+        recorder.tell = self._keep
 
     def made(self, plan: Plan, numbers: Sequence[tuple[int, int]], tell: Callable[[], None]) -> list[Row]:
         """The rows of these runs, each a condition of the plan and a replication; those that are not there are made."""
@@ -66,14 +66,14 @@ class Trials:
         for (index, replication), key in zip(numbers, keys, strict=True):
             if key not in self._known:
                 seed = plan.seed(plan.condition(index), replication)
-                tasks.append(_Trial(index, replication, seed, key, batch=self._batches, plan=sent))
-        self._keeper.backlog = Backlog(plan, {}, tasks)
-        make_in(self._processes, self._keeper, self._jobs, tell)
+                tasks.append(_SearchTask(index, replication, seed, key, batch=self._batches, plan=sent))
+        self._recorder.backlog = Backlog(plan, {}, tasks)
+        make_in(self._processes, self._recorder, self._jobs, tell)
         return [self._known[key] for key in keys]
 
     def describe(self, plan: Plan) -> None:
         """Say in the folder's manifest which runs it has: those of a plan."""
-        store = self._keeper.store
+        store = self._recorder.store
         replace_file(store.folder / "manifest.json", manifest_text({**store.manifest, **plan.manifest()}).encode())
 
     def _keep(self, row: Row) -> None:
@@ -81,7 +81,7 @@ class Trials:
 
 
 @contextmanager
-def open_trials(plan: Plan, folder: Path, jobs: int, timeout: float | None) -> Iterator[Trials]:
+def open_search_runs(plan: Plan, folder: Path, jobs: int, timeout: float | None) -> Iterator[SearchRuns]:
     """Open a folder for a search whose first conditions are those of a plan; raises ``StoreError``.
 
     At the end, the table of the runs is written that were described last.
@@ -94,6 +94,6 @@ def open_trials(plan: Plan, folder: Path, jobs: int, timeout: float | None) -> I
                 before = known.get(row["run"])
                 if before is None or BEST_FIRST.index(row["status"]) < BEST_FIRST.index(before["status"]):
                     known[row["run"]] = row
-        with keeping(store, Backlog(plan, {}, ()), timeout) as keeper, Processes(_Bench) as processes:
-            yield Trials(keeper, processes, jobs, known)
+        with recording(store, Backlog(plan, {}, ()), timeout) as recorder, Processes(_Worker) as processes:
+            yield SearchRuns(recorder, processes, jobs, known)
         StudyResults(folder).write_table()

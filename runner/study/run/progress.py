@@ -14,7 +14,7 @@ from .backlog import Backlog
 EVERY = 60.0  # s between two lines where there is no bar
 
 
-class Pulse:
+class Rate:
     """The rate of a session, and the work left."""
 
     def __init__(self) -> None:
@@ -33,19 +33,19 @@ class Pulse:
 @contextmanager
 def progress(name: str) -> Iterator[Callable[[Backlog], None]]:
     """A function for a session to call now and then."""
-    pulse = Pulse()
+    rate = Rate()
     with bar(name) as show:
-        last = pulse.started
+        last = rate.started
         if show is not None:
             show(0.0, None, "")
 
         def tell(backlog: Backlog) -> None:
             nonlocal last
             if show is not None:
-                show(backlog.over, backlog.total, pulse.line(backlog))
+                show(backlog.over, backlog.total, rate.line(backlog))
             elif time.monotonic() - last >= EVERY:
                 last = time.monotonic()
-                complain(f"{time.strftime('%H:%M:%S')} {name}: {pulse.line(backlog)}")
+                complain(f"{time.strftime('%H:%M:%S')} {name}: {rate.line(backlog)}")
 
         yield tell
 
