@@ -31,7 +31,7 @@ def __getattr__(name: str) -> Any:
     if name in _FOLDERS:  # `epicycle.actors.Clock` without a separate import
         return import_module(f"{__name__}.{name}")
     if name == "__version__":
-        return import_module(f"{__name__}.runner.provenance").version_of("epicycle")
+        return import_module(f"{__name__}.runner.study.provenance").version_of("epicycle")
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 

@@ -10,8 +10,8 @@ from typing import Any
 
 from .collection import importing, seldom_collecting
 from .commands import FORMER, commands, grouped
+from .commands.leaving import leave
 from .commands.options import BAD_INPUT, FAILED, INTERRUPTED
-from .leaving import leave
 from .printing import complain, complain_traceback, open_streams
 
 
@@ -77,7 +77,7 @@ class _Version(argparse.Action):
             from epicycle.actors import CORE, CORE_REASON
         except ImportError as error:
             parser.error(str(error))
-        from .provenance import versions
+        from .study.provenance import versions
 
         found, why = versions(), f" ({CORE_REASON})" if CORE_REASON else ""
         print(f"epicycle {found['epicycle']}, {CORE} core{why}, Python {found['python']}")

@@ -13,7 +13,7 @@ from typing import Any
 from epicycle.actors import counted, read_regular
 
 from ..build import Model
-from ..provenance import version_of
+from ..study.provenance import version_of
 
 _LOGGER = logging.getLogger("epicycle")
 NUMBER = (int, float)

@@ -15,8 +15,8 @@ from typing import Any
 from epicycle.actors import counted, to_seconds
 
 from ..language import number_node
-from ..provenance import version_of
 from ..shown import finite, rounded
+from ..study.provenance import version_of
 from ..tables import Table
 from ..text import call_site
 from .answer import Answer

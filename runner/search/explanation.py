@@ -15,9 +15,9 @@ from epicycle.actors import counted, to_seconds
 
 from ..build import Model
 from ..graph import Act, ActName
-from ..provenance import version_of
 from ..results import Verdict
 from ..shown import finite, short
+from ..study.provenance import version_of
 from ..tables import Table
 from .answer import Answer
 

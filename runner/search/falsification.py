@@ -18,10 +18,10 @@ from ..build import Model
 from ..engine import Interventions, Simulation
 from ..graph import ActName
 from ..language import EXACTLY, Level, Setting, split_number
-from ..provenance import version_of
 from ..results import Verdict
 from ..shown import finite, short
 from ..study.judge.study_results import StudyResults, open_study
+from ..study.provenance import version_of
 from ..study.run.backlog import OK
 from ..study.run_spec import RunSpec
 from ..tables import Table

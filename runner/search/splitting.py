@@ -23,9 +23,9 @@ from epicycle.actors import EpicycleError, Process, counted, elementary, random_
 
 from ..build import Model
 from ..engine import Simulation
-from ..provenance import version_of
 from ..shown import finite, short
 from ..student import student_quantile
+from ..study.provenance import version_of
 from ..tables import Table
 from .answer import Answer
 from .cache import NUMBER, EvaluationCache

@@ -13,9 +13,9 @@ from typing import Any
 from epicycle.actors import EpicycleError, counted
 
 from ..engine import Simulation
-from ..provenance import git_revision, machine, versions
 from .judge.study_results import StudyResults
 from .plan.plan import Plan, epicycle_version
+from .provenance import git_revision, machine, versions
 from .run.backlog import RETRIED, Backlog
 from .run.making import Recorder, make_here, recording
 from .run.manifest import FORMAT, StoreError, read_manifest

@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from epicycle.actors import Actor, OutputPort, Parameter
-from epicycle.runner.seal import seal
 from epicycle.runner.study.plan.plan import sealed
+from epicycle.runner.study.plan.seal import seal
 
 THIS = Path(__file__)
 

@@ -18,10 +18,10 @@ from epicycle.actors.expression import ExpressionError
 from ...build import Model, load_model
 from ...catalogue import code_of, is_path, types_of_file
 from ...language import RESERVED, Dimension, Factor, Level, Study, StudyMetric, study_of_text
-from ...provenance import version_of
-from ...seal import has_seal, seal
 from ...text import ModelError, Noted, Problems, did_you_mean, noting, plain
+from ..provenance import version_of
 from .columns import Column, check_metric, columns_of
+from .seal import has_seal, seal
 
 _LOGGER = logging.getLogger("epicycle")
 

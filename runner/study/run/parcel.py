@@ -22,9 +22,9 @@ from pathlib import Path
 from typing import Any
 
 from ...catalogue import code_of
-from ...provenance import version_of, versions
 from ...text import ModelError, noting
 from ..plan.plan import Plan
+from ..provenance import version_of, versions
 from .backlog import Task
 from .processes import Outcome, Processes, UnwantedError, WorkerError
 from .runner import Runner
