@@ -153,7 +153,8 @@ _VARIED = {"set", "overrides", "aspects", "without_aspects", "max_actors", "type
         metavar="PATH=VALUE,...",
         help="add a variant with this parameter, such as load=0.9, or several: load=0.9,servers=2; may be repeated",
     ),
-    taken(studying.compare, without={"model"}),
+    taken(studying.compare, without={"model", "jobs"}),
+    taken(studying.study, only={"jobs"}),
     JSON,
     option(
         "-o",

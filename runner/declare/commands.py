@@ -70,7 +70,8 @@ def add_options(
         if name in without or (only and name not in only):
             continue
         kept = (dest or {}).get(name, name)
-        shown = "" if default in (None, (), "", False, inspect.Parameter.empty) else f" (default: {default})"
+        is_shown = option.once and default not in (None, (), "", inspect.Parameter.empty) and default is not False
+        shown = f" (default: {default})" if is_shown else ""
         given: dict[str, Any] = {"help": option.help + shown}
         if option.is_argument:
             parser.add_argument(name, metavar=option.metavar, nargs=option.count, **given)
