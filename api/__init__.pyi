@@ -1,0 +1,36 @@
+from epicycle.actors import EpicycleError as EpicycleError
+from epicycle.runner import Model as Model
+from epicycle.runner import ModelError as ModelError
+from epicycle.runner import Results as Results
+from epicycle.runner import Simulation as Simulation
+from epicycle.runner import StudyResults as StudyResults
+from epicycle.runner import open_study as open_study
+from epicycle.runner.calls.picturing import draw as draw
+from epicycle.runner.calls.recording import disturb as disturb
+from epicycle.runner.calls.recording import fit as fit
+from epicycle.runner.calls.running import load as load
+from epicycle.runner.calls.running import run as run
+from epicycle.runner.calls.running import view as view
+from epicycle.runner.calls.searching import explain as explain
+from epicycle.runner.calls.searching import rare as rare
+from epicycle.runner.calls.searching import search as search
+from epicycle.runner.calls.studying import compare as compare
+from epicycle.runner.calls.studying import study as study
+from epicycle.runner.recorded.channel import Fit as Fit
+from epicycle.runner.recorded.disturbed import Disturbed as Disturbed
+from epicycle.runner.search.calibration import Calibration as Calibration
+from epicycle.runner.search.comparing import Comparison as Comparison
+from epicycle.runner.search.explanation import Explanation as Explanation
+from epicycle.runner.search.falsification import Falsification as Falsification
+from epicycle.runner.search.optimum import Optimum as Optimum
+from epicycle.runner.search.spec import Break as Break
+from epicycle.runner.search.spec import Match as Match
+from epicycle.runner.search.spec import Maximise as Maximise
+from epicycle.runner.search.spec import Minimise as Minimise
+from epicycle.runner.search.splitting import RareEvent as RareEvent
+from epicycle.runner.show.pictures import Picture as Picture
+from epicycle.runner.show.pictures import plot as plot
+from epicycle.runner.show.pictures import save as save
+from epicycle.runner.show.view.pages import Page as Page
+
+__version__: str
