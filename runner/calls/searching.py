@@ -46,6 +46,15 @@ def folder_of(name: str, kind: str) -> Path:
     return Path("results") / abridged(name, 60) / kind
 
 
+def folder_for(models: Sequence[Model], out: str | Path | None, kind: str) -> Path | None:
+    """Where runs of models are noted: by default only if they can be told from those of others."""
+    if out is not None:
+        return Path(out)
+    if not models or any(model.origin is None for model in models):
+        return None
+    return folder_of(models[0].name, kind)
+
+
 class SearchOptions(TypedDict, total=False):
     """What a search is given besides its goal."""
 
@@ -174,7 +183,7 @@ def explain(
     found = opened(model, seed, until, changes)
     made, seed = copy.copy(found.model), found.model.output.seed if found.seed is None else found.seed
     spec = spec_of(made, seed, found.until)
-    folder = _folder(made, out, "explanation")
+    folder = folder_for([made], out, "explanation")
     with bar(made.name) as show:
 
         def tell(tried: int, faults: int) -> None:
@@ -235,7 +244,7 @@ def rare(
 
     found = opened(model, seed, until, changes)
     made = copy.copy(found.model)
-    monitor, folder = monitor_named(made, monitor), _folder(made, out, "rare")
+    monitor, folder = monitor_named(made, monitor), folder_for([made], out, "rare")
     with bar(made.name) as show:
 
         def tell(tried: int, done: int) -> None:
@@ -258,13 +267,6 @@ def rare(
         )
     answer.folder = folder
     return answer
-
-
-def _folder(model: Model, out: str | Path | None, kind: str) -> Path | None:
-    """Where runs are noted: by default only those of a model whose runs can be told from others."""
-    if out is None and model.origin is None:
-        return None
-    return folder_of(model.name, kind) if out is None else Path(out)
 
 
 def _at_least_one(what: str, number: int) -> int:

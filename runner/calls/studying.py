@@ -148,22 +148,27 @@ def compare(
     replications: Annotated[int, option("runs of each variant", "N", COUNT)] = 10,
     seed: Annotated[int | None, SEED] = None,
     until: Annotated[float | str | None, UNTIL] = None,
-    jobs: Annotated[int, JOBS] = 1,
+    out: Annotated[
+        str | Path | None, option("folder for what is found (default: results/MODEL/comparison)", "DIR", Path)
+    ] = None,
+    jobs: Annotated[int | None, JOBS] = None,
     progress: bool = True,
 ) -> Comparison:
     """Run variants of a model with the same seeds, and compare their metrics in pairs of runs.
 
     A variant is a set of changes as ``load`` takes them, or another model; a list names disturbances, where ``none`` is
     the unchanged model.  Seeds count up from ``seed`` (default: the model's).  Runs that fail are reported and left
-    out.  With several ``jobs``, that many processes make runs, and ``runs`` have neither signals nor figures; the
-    numbers are the same.
+    out.  Each other run is noted in a folder, so that a comparison that was interrupted, or gets more runs or variants,
+    continues.
 
     >>> epicycle.compare("collision_avoidance", ["none", "wifi_burst"], replications=20)
     >>> epicycle.compare("mm1", {"slow": {}, "fast": {"set": {"mean_service": 0.8}}})
     """
+    from ..bars import SOON, bar
     from ..search.comparing import compare as compare_models
     from ..study.run_spec import seconds
     from .running import opened
+    from .searching import folder_for
 
     if not isinstance(variants, Mapping):
         variants = {name: {} if name == "none" else {"disturb": name} for name in variants}
@@ -171,11 +176,21 @@ def compare(
         name: each if not isinstance(each, Mapping) else opened(model, None, None, each).model
         for name, each in variants.items()
     }
-    return compare_models(
-        models,
-        replications=replications,
-        seed=seed,
-        until=seconds("until", until),
-        jobs=jobs,
-        progress=progress,
-    )
+    folder = folder_for([*models.values()], out, "comparison")
+    with bar("compare", after=SOON) as show:
+
+        def tell(done: int, runs: int, what: str) -> None:
+            if show is not None and progress:
+                show(done, runs, what)
+
+        answer = compare_models(
+            models,
+            replications=replications,
+            seed=seed,
+            until=seconds("until", until),
+            folder=folder,
+            jobs=jobs,
+            tell=tell,
+        )
+    answer.folder = folder
+    return answer

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Iterator
-from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..calls import running, searching, studying
 from ..declare.commands import add_options, arguments, declared
@@ -17,7 +16,6 @@ from .options import (
     FAILED,
     INTERRUPTED,
     JSON,
-    check_path,
     command,
     of_call,
     open_run,
@@ -25,6 +23,9 @@ from .options import (
     several,
     taken,
 )
+
+if TYPE_CHECKING:
+    from ..search.comparing import Comparison
 
 # -- search -----------------------------------------------------------------------------------------------------------
 
@@ -153,16 +154,9 @@ _VARIED = {"set", "overrides", "aspects", "without_aspects", "max_actors", "type
         metavar="PATH=VALUE,...",
         help="add a variant with this parameter, such as load=0.9, or several: load=0.9,servers=2; may be repeated",
     ),
-    taken(studying.compare, without={"model", "jobs"}),
-    taken(studying.study, only={"jobs"}),
+    taken(studying.compare, without={"model"}),
+    option("--page", action="store_true", help="write a page with the first runs of the first two variants"),
     JSON,
-    option(
-        "-o",
-        "--out",
-        metavar="FILE",
-        type=Path,
-        help="write a page that shows the first runs of the first two variants side by side",
-    ),
     imports=("search.comparing",),
 )
 def compare(options: argparse.Namespace) -> int:
@@ -170,9 +164,6 @@ def compare(options: argparse.Namespace) -> int:
     difference over pairs of runs, its 95 % interval, and the p-value of Student's paired test, corrected by Holm's
     method.  A single variant is compared with the unchanged model."""
     from ..language.settings import parse_settings
-    from ..show.view.pages import recorded
-    from ..study.run_spec import seconds
-    from ..study.session import available_cores
     from ..text.problems import Problems
 
     common = {name: value for name, value in arguments(running.load, options).items() if name in _VARIED}
@@ -184,26 +175,12 @@ def compare(options: argparse.Namespace) -> int:
     variants |= {each: {**common, "set": [*own, *settings]} for each, settings in varied.items()}
     if len(variants) == 1:
         variants = {"none": common, **variants}
-    check_path("--out", options.out)
     given = arguments(studying.compare, options)
     models = {name: running.load(options.model, **changes) for name, changes in variants.items()}
-    runs = len(models) * given.get("replications", 10)
-    given["jobs"] = min(given.get("jobs") or available_cores(), max(runs, 1))
-    given.pop("model", None)
-    found = studying.compare(options.model, models, **given)
-    if options.json:
-        tell_json(found.facts())
-    else:
-        tell(str(found))
-    if options.out is not None:
-        until, names = seconds("--until", given.get("until")), list(models)[:2]
-        page = recorded([models[name] for name in names], seed=found.seeds[0], until=until, names=names)
-        page.save(options.out)
-        if not options.json:
-            tell(f"wrote {options.out}")
-        for error in page.errors:
-            if isinstance(error, KeyboardInterrupt):  # failures are reported below
-                raise error
-    for (name, seed), error in found.failures.items():
-        complain(f"error: {name}, seed {seed}: {error}")
-    return FAILED if found.failures else DONE
+
+    def code(found: Comparison) -> int:
+        for (name, seed), error in found.failures.items():
+            complain(f"error: {name}, seed {seed}: {error}")
+        return FAILED if found.failures else DONE
+
+    return answer(options, lambda: studying.compare(**given, variants=models), code, page=options.page)

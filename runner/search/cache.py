@@ -24,7 +24,8 @@ class EvaluationCache:
 
     They are kept in a file of the ``folder`` whose name depends on all that the outcomes depend on; without a folder,
     in memory alone.  Of a model that a program made or changed, nobody can say whether it is the same: then everything
-    is tried again.  ``shape`` is that of an outcome: a tuple of types, a list of shapes, or of one for all items.
+    is tried again.  ``shape`` is that of an outcome: a tuple of types, a list of shapes or of one for
+    all items, or a dictionary of one for all values.
     """
 
     def __init__(self, model: Model, about: Mapping[str, Any], shape: Any, folder: Path | None = None) -> None:
@@ -92,6 +93,8 @@ def _digest(text: str) -> str:
 def _fits(value: Any, shape: Any) -> bool:
     if isinstance(shape, tuple):
         return type(value) in shape
+    if isinstance(shape, dict):
+        return isinstance(value, dict) and all(_fits(each, shape[""]) for each in value.values())
     if not isinstance(value, list) or len(shape) not in (1, len(value)):
         return False
     return all(map(_fits, value, shape if len(shape) > 1 else shape * len(value)))

@@ -4,25 +4,27 @@ from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Mapping
-from contextlib import nullcontext
-from dataclasses import asdict, dataclass, field, replace
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import asdict, dataclass, field
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 from epicycle.actors import EpicycleError, counted, did_you_mean
 
-from ..bars import SOON, bar
 from ..build.model import Model
 from ..engine import ActorError, LoopError, Simulation
-from ..results import EventLog, Results
 from ..shown import finite
 from ..study.inference import Estimate, holm, mean, paired_difference, with_interval
-from ..tables import Table, Tabled, pandas_module
+from ..tables import Table, pandas_module
+from .answer import Answer
+from .cache import EvaluationCache
 from .evaluator import Evaluator, Recipe, jobs_for
 
 if TYPE_CHECKING:
     import pandas
+
+    from ..show.view.pages import Page
 
 
 @dataclass(frozen=True)
@@ -40,18 +42,36 @@ class Difference:
     p: float
 
 
+@dataclass(frozen=True)
+class ComparedRun:
+    """What is kept of a run: its metrics, what its aspects counted, the records in its event log, and their digest."""
+
+    metrics: dict[str, Any]
+    aspects: dict[str, dict[str, float | None]]
+    events: int
+    digest: str
+
+
+_VALUE = (int, float, bool, str, type(None))
+_SHAPE = [{"": _VALUE}, {"": {"": _VALUE}}, (int,), (str,)]  # of a run in a folder
+
+
 @dataclass(repr=False)
-class Comparison(Tabled):
+class Comparison(Answer):
     """Runs of variants of a model with the same seeds; the others are compared with the first variant.
 
-    ``runs`` has the results of each variant by seed, ``failures`` the errors of failed runs.
+    ``runs`` has what is kept of each run by variant and seed, ``failures`` the errors of failed runs.
     """
+
+    NAME: ClassVar[str] = "comparison"
 
     model: str
     seeds: range
     units: dict[str, str]  # of the metrics
-    runs: dict[str, dict[int, Results]]
+    runs: dict[str, dict[int, ComparedRun]]
     failures: dict[tuple[str, int], EpicycleError] = field(default_factory=dict)
+    models: Mapping[str, Model] = field(default_factory=dict)
+    until: float | None = None  # s
 
     @property
     def metrics(self) -> list[str]:
@@ -96,14 +116,32 @@ class Comparison(Tabled):
         frame: pandas.DataFrame = pandas_module().DataFrame(self.rows())
         return frame
 
-    def save(self, path: str | Path) -> list[Path]:
-        """Write the metrics of every run to a file (.csv)."""
+    def page(self, progress: bool = True) -> Page:
+        """The first runs of the first two variants side by side."""
+        from ..show.view.pages import recorded
+
+        names = [*self.models][:2]
+        models = [self.models[name] for name in names]
+        return recorded(models, seed=self.seeds[0], until=self.until, names=names, progress=progress)
+
+    def save(self, folder: str | Path | None = None, *, page: bool = False) -> list[Path]:
+        """Write the facts as JSON, the metrics of every run as CSV and, if asked for, ``page`` as HTML.
+
+        To a file (.csv), the metrics alone.
+        """
+        if folder is not None and Path(folder).suffix == ".csv":
+            return [self._save_rows(Path(folder))]
+        [facts] = super().save(folder)
+        written = [facts, self._save_rows(facts.with_suffix(".csv"))]
+        return [*written, *([self.page().save(facts.with_suffix(".html"))] if page else [])]
+
+    def _save_rows(self, path: Path) -> Path:
         rows = self.rows()
-        with Path(path).open("w", encoding="utf-8", newline="") as file:
+        with path.open("w", encoding="utf-8", newline="") as file:
             writer = csv.DictWriter(file, list(rows[0]) if rows else ["variant", "seed"])
             writer.writeheader()
             writer.writerows(rows)
-        return [Path(path)]
+        return path
 
     def facts(self) -> dict[str, Any]:
         """Everything that was found, for programs."""
@@ -113,12 +151,12 @@ class Comparison(Tabled):
         return found
 
     def __repr__(self) -> str:
-        return f"<Comparison of {self._caption()}>"
+        return f"<Comparison of {self.sentence}>"
 
-    def _caption(self) -> str:
+    def _sentences(self) -> Iterable[str]:
         failed = f"; {counted(len(self.failures), 'run')} failed" if self.failures else ""
         seeds = f"seed {self.seeds[0]}" if len(self.seeds) == 1 else f"seeds {self.seeds[0]} to {self.seeds[-1]}"
-        return f"{self.model}: {', '.join(self.runs)}; {seeds}{failed}"
+        yield f"{self.model}: {', '.join(self.runs)}; {seeds}{failed}"
 
     def _tables(self) -> list[Table]:
         rows = []
@@ -141,34 +179,49 @@ def compare(
     replications: int,
     seed: int | None,
     until: float | None,
-    jobs: int = 1,
-    progress: bool = True,
+    folder: Path | None = None,
+    jobs: int | None = None,
+    tell: Callable[[int, int, str], None] = lambda done, runs, what: None,
 ) -> Comparison:
-    """Run models with the same seeds, one after the other or in so many processes.  Raises ``EpicycleError``."""
+    """Run models with the same seeds, and compare their metrics.
+
+    In a ``folder``, each run that did not fail is noted: a comparison that was interrupted continues there, and one
+    with more runs or variants makes those that are missing.  ``tell`` is called before each run.  Raises
+    ``EpicycleError``.
+    """
     if len(models) < 2:
         raise EpicycleError("a comparison needs at least two variants")
     if replications < 1:
         raise EpicycleError(f"replications: {replications} is not a whole number of at least 1")
-    first, recipes = next(iter(models.values())), {}
-    for name, model in models.items():
-        if jobs_for(model, jobs, f"variant {name}") > 1:
-            recipes[name] = Recipe.of(model)
+    first, recipes = next(iter(models.values())), {name: Recipe.of(model) for name, model in models.items()}
+    jobs = min(jobs_for(model, jobs, f"variant {name}") for name, model in models.items())
     seeds = range(start := first.output.seed if seed is None else seed, start + replications)
     units = {metric.name: metric.unit for each in models.values() for metric in each.output.metrics}
-    found = Comparison(first.name, seeds, units, {name: {} for name in models})
+    found = Comparison(first.name, seeds, units, {name: {} for name in models}, models=models, until=until)
+    caches = {
+        name: EvaluationCache(model, {"variant": name, "until": until}, _SHAPE, folder)
+        for name, model in models.items()
+    }
     asked = [(name, number) for number in seeds for name in models]
-    here, shown = _Worker(models, until), bar(first.name, after=SOON) if progress else nullcontext()
-    with shown as show, Evaluator(here, jobs, _Away, recipes, until, patience=0.0) as evaluator:
-        evaluator.expect((each, each) for each in asked)
+    with Evaluator(_Worker(models, until), jobs, _Away, recipes, until) as evaluator:
+        evaluator.expect((each, each) for each in asked if str(each[1]) not in caches[each[0]])
         for done, (name, number) in enumerate(asked):
-            if show is not None:
-                show(done, len(asked), f"seed {number}, {name}")
-            outcome = evaluator.make((name, number), (name, number))
-            if isinstance(outcome, Results):
-                found.runs[name][number] = outcome
+            tell(done, len(asked), f"seed {number}, {name}")
+            try:
+                kept = caches[name].outcome(str(number), partial(_made, evaluator, (name, number)))
+            except (ActorError, LoopError) as error:
+                found.failures[name, number] = error
             else:
-                found.failures[name, number] = outcome
+                found.runs[name][number] = ComparedRun(*kept)
     return found
+
+
+def _made(evaluator: Evaluator, run: tuple[str, int]) -> list[Any]:
+    """What is kept of a run; raises what it raises."""
+    made: list[Any] | EpicycleError = evaluator.make(run, run)
+    if isinstance(made, EpicycleError):
+        raise made
+    return made
 
 
 class _Worker:
@@ -181,17 +234,18 @@ class _Worker:
     def prepare(self, asked: tuple[str, int]) -> None:
         """There is nothing to load."""
 
-    def make(self, asked: tuple[str, int]) -> Results | EpicycleError:
-        """The outcome of a run of a variant with a seed."""
+    def make(self, asked: tuple[str, int]) -> list[Any] | EpicycleError:
+        """What is kept of a run of a variant with a seed, or the error that it ends with."""
         name, seed = asked
         try:
-            return Simulation(self._models[name], seed=seed).run(until=self._until)
+            results = Simulation(self._models[name], seed=seed).run(until=self._until)
         except (ActorError, LoopError) as error:
             return error
+        return [results.metrics, results.aspects, results.events, results.digest]
 
 
 class _Away(_Worker):
-    """The same in another process, without what may be large, or cannot leave it."""
+    """The same in another process."""
 
     def __init__(self, recipes: Mapping[str, Recipe], until: float | None) -> None:
         self._recipes = recipes
@@ -204,32 +258,3 @@ class _Away(_Worker):
             model = self._recipes[name].model()
             model.output.recorded = []
             self._models = {**self._models, name: model}
-
-    def make(self, asked: tuple[str, int]) -> Results | EpicycleError:
-        """The outcome of a run."""
-        outcome = super().make(asked)
-        if isinstance(outcome, EpicycleError):
-            return outcome
-        log = _Summary(outcome.events, outcome.digest)
-        return replace(outcome, log=log, signals={}, figures={}, parameters=dict(outcome.parameters))
-
-
-class _Summary(EventLog):
-    """What is known of the event log of a run in another process."""
-
-    def __init__(self, count: int, digest: str) -> None:
-        super().__init__()
-        self._known = count, digest
-
-    def __reduce__(self) -> tuple[type[_Summary], tuple[int, str]]:
-        return _Summary, self._known
-
-    @property
-    def count(self) -> int:
-        """The number of records."""
-        return self._known[0]
-
-    @property
-    def digest(self) -> str:
-        """SHA-256 over all records."""
-        return self._known[1]

@@ -7,7 +7,7 @@ import json
 import subprocess
 import sys
 from pathlib import Path
-from typing import get_args
+from typing import Any, get_args
 
 import pytest
 
@@ -310,6 +310,22 @@ def test_a_page_of_none_or_three() -> None:
 
 
 def test_compare_writes_a_page_of_the_first_two(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["compare", "mm1", "--vary", "load=0.9", "--until", "50", "--replications", "2", "-o", "two.html"]) == 0
-    assert capsys.readouterr().out.endswith("\nwrote two.html\n")
-    assert Path("two.html").stat().st_size > 30_000
+    assert main(["compare", "mm1", "--vary", "load=0.9", "--until", "50", "--replications", "2", "--page"]) == 0
+    names = [f"results/mm1/comparison/comparison.{kind}" for kind in ("json", "csv", "html")]
+    assert capsys.readouterr().out.endswith("".join(f"\nwrote {name}" for name in names) + "\n")
+    assert Path(names[2]).stat().st_size > 30_000
+
+
+def test_a_comparison_continues() -> None:
+    changes: dict[str, Any] = {"a": {}, "b": {"set": {"load": 0.5}}}
+    first = epicycle.compare("mm1", changes, replications=2, until=100, jobs=1)
+    kept = {path: path.read_text() for path in Path("results/mm1/comparison").glob("tried-*.jsonl")}
+    assert len(kept) == 2
+    more = epicycle.compare("mm1", {**changes, "c": {"set": {"load": 0.7}}}, replications=3, until=100, jobs=1)
+    assert [more.runs[name][seed] for name in "ab" for seed in (1, 2)] == [
+        first.runs[name][seed] for name in "ab" for seed in (1, 2)
+    ]
+    for path, text in kept.items():
+        now = path.read_text()
+        assert now.startswith(text)
+        assert now.count("\n") == text.count("\n") + 1

@@ -93,6 +93,8 @@ m: none, period=1 s; seeds 5 to 6
 metric  variant     mean  unit  difference from none  p (Holm)  runs
 ticks   none        9                                           2
 ticks   period=1 s  5           -4                    0.5       2
+wrote results/m/comparison/comparison.json
+wrote results/m/comparison/comparison.csv
 """
     )
     found = json.loads(printed(capsys, *words, "--json"))
@@ -133,8 +135,10 @@ def test_the_same_in_several_processes(capsys: pytest.CaptureFixture[str]) -> No
     for name, runs in here.runs.items():
         for seed, results in runs.items():
             assert (results.digest, results.events) == (there.runs[name][seed].digest, there.runs[name][seed].events)
+    made = epicycle.load("mm1")
+    made.stop = 100.0  # which no other process knows
     with pytest.raises(EpicycleError, match="variant a cannot be made in other processes"):
-        epicycle.compare("mm1", {"a": epicycle.load("mm1"), "b": {}}, jobs=2)
+        epicycle.compare("mm1", {"a": made, "b": {}}, jobs=2)
     with pytest.raises(EpicycleError, match="jobs: 0 is not a whole number of at least 1"):
         epicycle.compare("mm1", changes, jobs=0)
 
