@@ -215,9 +215,9 @@ def test_from_python_and_from_the_command_line(tmp_path: Path, capsys: pytest.Ca
 def test_one_in_a_million_is_within_the_interval() -> None:
     model, probability = chain(10, 7)
     assert probability == pytest.approx(9e-7)
-    found = [rare(model, "full", runs=100, repetitions=10, seed=seed) for seed in range(100)]
+    found = [rare(model, "full", runs=100, repetitions=10, seed=seed) for seed in range(20)]
     within = sum(each.interval is not None and each.interval[0] < probability < each.interval[1] for each in found)
-    assert within >= 95
+    assert within >= 17  # of 20: 95 % intervals
     estimates = [estimate / probability for each in found for estimate in each.estimates]
     assert abs(statistics.fmean(estimates) - 1.0) < 3.0 * statistics.stdev(estimates) / math.sqrt(len(estimates))
     # Plain sampling needs so many more runs for the standard error that these estimates have in fact.

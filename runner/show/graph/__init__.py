@@ -22,10 +22,11 @@ from .chart import Statechart, chart_text, statechart, write_statechart
 from .layout import Drawing, draw
 from .outlines import Outline, outline
 
-MOST_BOXES = 2000  # in a picture; Mermaid text has no limit
+MOST_BOXES = 2000  # in a picture, and on a page; Mermaid text has no limit
 PICTURES, TEXTS = (".svg", ".png", ".pdf"), (".mmd", ".md")
 
 __all__ = [
+    "MOST_BOXES",
     "Drawing",
     "GraphError",
     "Outline",
@@ -68,8 +69,7 @@ def write_graph(drawn: Outline | Statechart, path: Path) -> None:
         elif isinstance(drawn, Outline):
             from .picture import write_picture
 
-            boxes = sum(1 for _ in drawn.root.walk())
-            if boxes > MOST_BOXES:
+            if (boxes := drawn.size) > MOST_BOXES:
                 raise GraphError(
                     f"{boxes:,} boxes are too many for a picture (at most {MOST_BOXES:,})\n"
                     "   help: --depth 0 draws the outermost level only, without --expand what is alike is one box, and "

@@ -5,6 +5,7 @@ A replicated array with identical instances becomes one box; a composite below t
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from itertools import accumulate, chain
@@ -87,6 +88,11 @@ class Outline:
     levels: int
 
     @property
+    def size(self) -> int:
+        """The number of boxes, the outermost included."""
+        return sum(1 for _ in self.root.walk())
+
+    @property
     def note(self) -> str:
         """A note for the reader if not everything is shown; otherwise empty."""
         closed = sum(1 for box in self.root.walk() if box.is_closed)
@@ -96,13 +102,13 @@ class Outline:
         return f"{counted(closed, 'composite')} {are} drawn closed; --depth {self.levels} opens everything"
 
 
-def outline(model: Model, depth: int | None = None, expand: bool = False) -> Outline:
+def outline(model: Model, depth: int | None = None, expand: bool = False, *, most: int = MANY, few: int = 1) -> Outline:
     """The boxes and links of a model.
 
-    Composites down to ``depth`` levels are opened; the default keeps the drawing readable.  Without ``expand``, arrays
-    with identical instances are one box.
+    Composites down to ``depth`` levels are opened, by default as long as there are at most ``most`` boxes.  Without
+    ``expand``, arrays with more than a ``few`` instances are one box if these are identical.
     """
-    outliner = _Outliner(model, expand)
+    outliner = _Outliner(model, sys.maxsize if expand else few)
     root = outliner.box("")
     rows = [[root]]  # the boxes at each depth
     while rows[-1]:
@@ -110,7 +116,7 @@ def outline(model: Model, depth: int | None = None, expand: bool = False) -> Out
     levels = max(level for level, row in enumerate(rows) if any(box.is_composite for box in row))
     if depth is None:
         sizes = accumulate(map(len, rows[1:]))
-        depth = max((deep for deep, size in enumerate(sizes) if deep <= levels and size <= MANY), default=0)
+        depth = max((deep for deep, size in enumerate(sizes) if deep <= levels and size <= most), default=0)
     for box in (box for row in rows[depth + 1 : depth + 2] for box in row if box.is_composite):
         box.is_closed, box.children, box.links = True, [], []
         box.aspects = outliner.aspects_within(box.path)
@@ -120,7 +126,7 @@ def outline(model: Model, depth: int | None = None, expand: bool = False) -> Out
 class _Outliner:
     """Makes boxes and links from a model graph."""
 
-    def __init__(self, model: Model, expand: bool) -> None:
+    def __init__(self, model: Model, few: int) -> None:
         self.model = model
         self.graph = model.graph
         self.standing: dict[str, list[str]] = {}
@@ -138,8 +144,8 @@ class _Outliner:
         # The arrays whose instances look identical in the drawing.  At first, all are assumed identical.  An array that
         # is not is drawn instance by instance, which may reveal differences between the instances of another array; so
         # the search continues until nothing changes.
-        composites = () if expand else ("", *self.graph.composites)
-        arrays = [array for each in composites for array in self.graph.parts(each).values() if len(array) > 1]
+        composites = ("", *self.graph.composites)
+        arrays = [array for each in composites for array in self.graph.parts(each).values() if len(array) > few]
         before = -1
         while len(arrays) != before:
             before = len(arrays)

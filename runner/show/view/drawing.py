@@ -5,17 +5,16 @@ from __future__ import annotations
 from typing import Any
 
 from ...build.model import Model
-from ..graph import Drawing, draw, outline
+from ..graph import MOST_BOXES, Drawing, draw, outline
 
-MOST = 3_000  # boxes laid out one by one; above this, arrays with identical instances are one box
+FEW = 8  # instances of an array that are drawn one by one
 
 
 def drawn(model: Model) -> dict[str, Any]:
     """Boxes with their ports, wires as trees of lines, and badges, all with positions in points."""
-    graph = model.graph
-    everything = len(graph.actors) + len(graph.composites)
-    drawing: Drawing = draw(outline(model, depth=len(graph.composites) + 1, expand=everything <= MOST))
+    drawing, note = _drawing(model)
     return {
+        "note": note,
         "width": round(drawing.width, 1),
         "height": round(drawing.height, 1),
         "boxes": [
@@ -50,6 +49,18 @@ def drawn(model: Model) -> dict[str, Any]:
             [pill.text, pill.aspect, *_rounded(pill.x, pill.y, pill.width), pill.place] for pill in drawing.pills
         ],
     }
+
+
+def _drawing(model: Model) -> tuple[Drawing, str]:
+    """The drawing that a page has room for, and what it leaves out: identical instances first, then what is inside."""
+    everything = len(model.graph.actors) + len(model.graph.composites)
+    found = outline(model, most=MOST_BOXES, few=FEW)
+    note = (
+        "" if found.depth >= found.levels else f"{everything:,} boxes are too many to draw: composites are drawn closed"
+    )
+    if found.size > MOST_BOXES:
+        found.root.children, found.root.links, note = [], [], f"{found.size:,} boxes are too many to draw"
+    return draw(found), note
 
 
 def _rounded(*values: float) -> list[float]:

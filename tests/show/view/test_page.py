@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from epicycle.runner.catalogue.packaged import packaged_models
+from epicycle.runner.show.view import drawing
 
 from .conftest import Opened, written
 
@@ -284,6 +285,37 @@ def lines(path: Path, *, count: int, length: int) -> Path:
     text += [f"  - clock{line}.output -> line{line}.input" for line in range(count)]
     path.write_text("\n".join([*text, "run: {stop: 3 s}"]))
     return path
+
+
+INSIDE = """
+model: inside
+composites:
+  Line:
+    actors: {clock: {type: Clock, period: 1 s}, scale: {type: Scale, factor: 2}, sink: {type: Recorder}}
+    connections: [clock.output -> scale.input, scale.output -> sink.input]
+actors: {first: {type: Line}, second: {type: Line}}
+run: {stop: 2 s}
+"""
+
+
+@pytest.mark.parametrize(
+    ("most", "note", "boxes"),
+    [
+        (8, "", ["first", "first.clock", "first.scale", "first.sink"]),  # alike: the second is folded into it
+        (7, "8 boxes are too many to draw: composites are drawn closed", ["first"]),
+        (1, "2 boxes are too many to draw", []),
+    ],
+)
+def test_what_is_too_much_to_draw_is_told(
+    most: int, note: str, boxes: list[str], tmp_path: Path, opened: Open, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "inside.yaml").write_text(INSIDE)
+    monkeypatch.setattr(drawing, "MOST_BOXES", most)
+    page = opened(written(tmp_path / "page.html", (str(tmp_path / "inside.yaml"), {})))
+    assert page.do("return [...views.graphs[0].boxes.keys()].filter((each) => each.startsWith('first'))") == boxes
+    assert page.tab.locator(".graph > .note").all_inner_texts() == ([note] if note else [])
+    lit = page.do("const found = views.graphs[0].boxOf('first.scale'); return found ? found.path : ''")
+    assert lit == ("first.scale" if not note else "first" if boxes else "")
 
 
 @pytest.mark.slow

@@ -1,6 +1,8 @@
 // Sequence chart: a lane for each actor, firings as dots, tokens as arrows from sender to receiver.
 
 const ROW = 19, ARROWS = 2500;
+const AT_FIRST = 600; // arrows that are in sight when a page opens, at most
+const BIN = 4; // px in which firings of an actor are counted where they are dense
 
 class Chart extends Timeline {
   constructor(state) {
@@ -8,6 +10,8 @@ class Chart extends Timeline {
     this.canvas.dataset.view = "chart";
     this.isConeOnly = false;
     state.listeners.push(() => this.follow());
+    const ends = state.runs.map((run) => run.times[run.firing_tag[run.arrival_firing[AT_FIRST] ?? NOTHING]] ?? state.end);
+    state.show(0, Math.min(...ends));
   }
 
   // Scrolls to the selected actor.
@@ -105,17 +109,28 @@ class Chart extends Timeline {
     paper.fill();
   }
 
-  // Of firings that would overlap, only one is drawn.
+  // A firing that stands alone is a dot; where they are dense, bars say how many there are, the darker, the more.
   dots(from, to, first, last) {
     const { state } = this, { run, cone, selection, active } = state, isCone = cone && selection.run === active, { shown } = this.rows();
+    const bins = [];
     for (let row = first; row < last; row++) {
       const rows = run.firingsOf.of(shown[row]), y = this.y(row), place = (i) => state.place(run, run.firing_tag[rows[i]]);
-      let i = search(rows.length, (each) => run.firing_tag[rows[each]] >= from);
+      let i = search(rows.length, (each) => run.firing_tag[rows[each]] >= from), before = null;
       while (i < rows.length && run.firing_tag[rows[i]] <= to) {
-        const x = this.x(place(i)), next = this.at(x + 0.8);
-        this.dot(x, y, 3, isCone ? faded(PALETTE[0], 0.35) : PALETTE[0]);
-        this.hits.push([x, y, { firing: rows[i], record: NOTHING }]);
-        i = Math.max(i + 1, i + 1 >= rows.length || place(i + 1) >= next ? i + 1 : search(rows.length, (each) => place(each) >= next));
+        const x = this.x(place(i)), next = this.at(x + BIN), begin = i;
+        i = i + 1 >= rows.length || place(i + 1) >= next ? i + 1 : search(rows.length, (each) => place(each) >= next);
+        const bin = { x, y, count: i - begin, isDense: place(i - 1) > place(begin) };
+        if (before?.y === y && x - before.x < 6) before.isDense = bin.isDense = true;
+        bins.push((before = bin));
+        this.hits.push([x, y, { firing: rows[begin], record: NOTHING }]);
+      }
+    }
+    const most = Math.max(1, ...bins.map((bin) => bin.count));
+    for (const { x, y, count, isDense } of bins) {
+      if (!isDense) this.dot(x, y, 3, isCone ? faded(PALETTE[0], 0.35) : PALETTE[0]);
+      else {
+        this.paper.fillStyle = faded(PALETTE[0], (isCone ? 0.35 : 1) * (0.2 + 0.7 * Math.sqrt(count / most)));
+        this.paper.fillRect(x - BIN / 2, y - 4, BIN, 8);
       }
     }
     const marked = isCone ? [...cone.back.keys(), ...cone.ahead.keys()] : [];

@@ -8,6 +8,7 @@ class Graph extends View {
     this.number = number;
     this.run = state.runs[number];
     this.drawing = this.run.drawing;
+    this.note = this.drawing.note;
     this.canvas.dataset.view = "graph";
     this.camera = { scale: 0, x: 0, y: 0 };
     this.shut = new Map(); // composites that were closed (true) or opened (false) by hand
@@ -70,10 +71,13 @@ class Graph extends View {
     return null;
   }
 
-  // The visible box for a path; arrays that are one box use that of their first instance.
+  // The visible box for a path; arrays that are one box use that of their first instance, what is not drawn that around it.
   boxOf(path) {
-    const box = this.boxes.get(path) ?? this.boxes.get(path.replace(/\[\d+\]/g, "[0]"));
-    return box ? this.cover(box.path) ?? box : null;
+    for (let at = path; at; at = at.slice(0, Math.max(at.lastIndexOf("."), 0))) {
+      const box = this.boxes.get(at) ?? this.boxes.get(at.replace(/\[\d+\]/g, "[0]"));
+      if (box) return this.cover(box.path) ?? box;
+    }
+    return null;
   }
 
   draw(paper) {

@@ -135,10 +135,6 @@ class Lanes extends Timeline {
       }
     if (low > high) return;
     const size = high - low || Math.abs(high) || 1, up = (value) => y + LANE - 5 - ((value - low) / size) * (LANE - 12);
-    if (high > low) {
-      this.text(numberText(high), this.width - 6, y + 10, { size: 9, align: "right", colour: theme.soft });
-      this.text(numberText(low), this.width - 6, y + LANE - 3, { size: 9, align: "right", colour: theme.soft });
-    }
     this.paper.save();
     this.paper.beginPath();
     this.paper.rect(this.margin, y, this.span + 8, LANE);
@@ -155,6 +151,9 @@ class Lanes extends Timeline {
       this.line(points, PALETTE[number === this.state.active ? 0 : 5], 1.4, number === this.state.active ? [] : [4, 3]);
     });
     this.paper.restore();
+    if (high > low)
+      for (const [value, at] of [[high, y + 10], [low, y + LANE - 3]])
+        this.text(numberText(value), this.width - 6, at, { size: 9, align: "right", colour: theme.soft, isApart: true });
   }
 
   strip(lane, number, y, tall) {

@@ -25,7 +25,8 @@ async function main() {
     made.dataset.pane = name;
     return made;
   };
-  const named = (views, what) => views.map((view, i) => pane(`${what} of${i}`, data.runs.length > 1 ? `${what}: ${data.runs[i].name}` : what, view.canvas));
+  const named = (views, what) => views.map((view, i) => pane(`${what} of${i}`, data.runs.length > 1 ? `${what}: ${data.runs[i].name}` : what,
+    ...(view.note ? [element("p", { className: "note", text: view.note })] : []), view.canvas));
   const panes = element("div", { id: "panes", className: `runs${data.runs.length}${hasSpace ? "" : " flat"}` },
     ...named(spaces, "space"), ...named(graphs, "graph"),
     pane("chart", "sequence", coneOnly(state, chart), chart.canvas), pane("lanes", "signals", picker(state, lanes), lanes.canvas),
@@ -102,7 +103,7 @@ function coneOnly(state, chart) {
     chart.isConeOnly = box.checked;
     state.changed();
   });
-  return element("label", { className: "option" }, box, " actors of the cone only");
+  return element("label", { className: "option", title: "show only actors of the cone" }, box, " cone only");
 }
 
 function picker(state, lanes) {

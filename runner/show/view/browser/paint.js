@@ -55,7 +55,7 @@ class View {
     this.draw(this.paper);
   }
 
-  text(words, x, y, { colour = theme.ink, size = 11, align = "left", bold = false, width = Infinity } = {}) {
+  text(words, x, y, { colour = theme.ink, size = 11, align = "left", bold = false, width = Infinity, isApart = false } = {}) {
     const { paper } = this;
     paper.font = `${bold ? "600 " : ""}${size}px system-ui, sans-serif`;
     paper.fillStyle = colour;
@@ -65,6 +65,11 @@ class View {
       if (width < 12) return;
       const fits = search(words.length, (count) => paper.measureText(`${words.slice(0, count + 1)}…`).width > width);
       words = `${words.slice(0, fits)}…`;
+    }
+    if (isApart) { // from what is drawn behind it
+      Object.assign(paper, { strokeStyle: theme.panel, lineWidth: 4 });
+      paper.setLineDash([]);
+      paper.strokeText(words, x, y);
     }
     paper.fillText(words, x, y);
   }
