@@ -138,6 +138,11 @@ class Director:
         time: int = self.events.first
         return time
 
+    @property
+    def next_time(self) -> int:
+        """The time of the next tag (ns); ``NEVER`` if there is none."""
+        return self._times.first()
+
     def put_event(self, event: Event, priority: EventPriority, delay: int) -> None:
         """Let an event of SimPy's happen after ``delay`` ns."""
         self.events.put(self._time + delay, priority, event)

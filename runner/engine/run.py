@@ -228,6 +228,15 @@ class Run:
                 first = first or error
         return first
 
+    def live_in(self, environment: Any) -> None:
+        """Let processes live in an environment from outside; before the run begins."""
+        self._ways.live_in(environment)
+
+    def failed(self, error: ActorError) -> ActorError:
+        """End the run because of an error; the error with its places."""
+        self.end()
+        return self._placed(error)
+
     def finish(self) -> Results:
         """End the run; its results."""
         late = self.end()
