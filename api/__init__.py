@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from epicycle.actors import EpicycleError
+    from epicycle.bridges import gym, zoo
     from epicycle.runner import Model, ModelError, Results, Simulation, StudyResults, open_study
     from epicycle.runner.calls import (
         Calibrated,
@@ -67,6 +68,7 @@ __all__ = [
     "explain",
     "falsify",
     "fit",
+    "gym",
     "load",
     "open_study",
     "optimise",
@@ -76,12 +78,14 @@ __all__ = [
     "save",
     "study",
     "view",
+    "zoo",
 ]
 
 # Where to find each name on first use: `import epicycle` must not wait for NumPy and networkx. A new call needs a line
 # here and above.
 _HOMES = {
     "EpicycleError": "actors",
+    **dict.fromkeys(("gym", "zoo"), "bridges"),
     **dict.fromkeys(("Model", "ModelError", "Results", "Simulation", "StudyResults", "open_study"), "runner"),
     **dict.fromkeys(
         (
@@ -114,7 +118,7 @@ _HOMES = {
         "runner.calls",
     ),
 }
-_FOLDERS = ("actors", "aspects", "runner")
+_FOLDERS = ("actors", "aspects", "bridges", "runner")
 
 
 def __getattr__(name: str) -> Any:

@@ -163,6 +163,14 @@ class Simulation(Tabled):
         self._run.reach(self.model.output.stop_time if until is None else to_nanoseconds(until), robustness)
         return any(self.robustness(name) <= least for name, least in robustness.items())
 
+    def advance_until(self, condition: Callable[[], bool]) -> bool:
+        """Run until a condition holds, or to the stop time; returns whether it holds.
+
+        The condition is asked whenever the time is about to advance: everything at the present time is done.
+        """
+        self._refuse_over()
+        return self._run.advance_until(self.model.output.stop_time, condition)
+
     def step(self) -> bool:
         """Handle the next tag, or SimPy events before it; returns whether there was anything until the stop time."""
         self._refuse_over()
