@@ -7,127 +7,31 @@
 
 from __future__ import annotations
 
+import ast
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
-if TYPE_CHECKING:
-    from epicycle.actors import EpicycleError
-    from epicycle.bridges import gym, zoo
-    from epicycle.runner import Model, ModelError, Results, Simulation, StudyResults, open_study
-    from epicycle.runner.calls import (
-        Calibrated,
-        Comparison,
-        Disturbed,
-        Explained,
-        Falsified,
-        Fit,
-        Optimised,
-        Page,
-        Picture,
-        RareEvent,
-        calibrate,
-        compare,
-        disturb,
-        draw,
-        explain,
-        falsify,
-        fit,
-        load,
-        optimise,
-        plot,
-        rare,
-        run,
-        save,
-        study,
-        view,
-    )
-
-    __version__: str
-
-__all__ = [
-    "Calibrated",
-    "Comparison",
-    "Disturbed",
-    "EpicycleError",
-    "Explained",
-    "Falsified",
-    "Fit",
-    "Model",
-    "ModelError",
-    "Optimised",
-    "Page",
-    "Picture",
-    "RareEvent",
-    "Results",
-    "Simulation",
-    "StudyResults",
-    "calibrate",
-    "compare",
-    "disturb",
-    "draw",
-    "explain",
-    "falsify",
-    "fit",
-    "gym",
-    "load",
-    "open_study",
-    "optimise",
-    "plot",
-    "rare",
-    "run",
-    "save",
-    "study",
-    "view",
-    "zoo",
-]
-
-# Where to find each name on first use: `import epicycle` must not wait for NumPy and networkx. A new call needs a line
-# here and above.
+# Where each name is, as __init__.pyi says it: names are looked up on first use, because `import epicycle` must not wait
+# for NumPy and networkx.
 _HOMES = {
-    "EpicycleError": "actors",
-    **dict.fromkeys(("gym", "zoo"), "bridges"),
-    **dict.fromkeys(("Model", "ModelError", "Results", "Simulation", "StudyResults", "open_study"), "runner"),
-    **dict.fromkeys(
-        (
-            "Calibrated",
-            "Comparison",
-            "Disturbed",
-            "Explained",
-            "Falsified",
-            "Optimised",
-            "Fit",
-            "Page",
-            "Picture",
-            "calibrate",
-            "RareEvent",
-            "compare",
-            "disturb",
-            "draw",
-            "explain",
-            "falsify",
-            "fit",
-            "load",
-            "optimise",
-            "plot",
-            "rare",
-            "run",
-            "save",
-            "study",
-            "view",
-        ),
-        "runner.calls",
-    ),
+    each.name: node.module
+    for node in ast.parse(Path(__file__).with_suffix(".pyi").read_text(encoding="utf-8")).body
+    if isinstance(node, ast.ImportFrom) and node.module
+    for each in node.names
 }
 _FOLDERS = ("actors", "aspects", "bridges", "runner")
+
+__all__ = sorted(_HOMES)  # noqa: PLE0605
 
 
 def __getattr__(name: str) -> Any:
     if name in _HOMES:
-        return getattr(import_module(f"{__name__}.{_HOMES[name]}"), name)
+        return getattr(import_module(_HOMES[name]), name)
     if name in _FOLDERS:  # `epicycle.actors.Clock` without a separate import
         return import_module(f"{__name__}.{name}")
     if name == "__version__":
-        return import_module(f"{__name__}.runner.provenance").version_of("epicycle")
+        return import_module(f"{__name__}.runner.study.provenance").version_of("epicycle")
     raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
 
 

@@ -19,17 +19,17 @@ from typing import Any
 
 from epicycle.runner import StudyResults, open_study
 from epicycle.runner.language.claims import ALWAYS
-from epicycle.runner.study import (
+from epicycle.runner.study.judge.claims import (
     CONFIRMED,
     NOT_REPRODUCED,
     REPRODUCED,
     REVERSED,
     UNDECIDED,
-    Finding,
-    Judgement,
-    Recommendation,
+    ClaimVerdict,
+    ContrastTest,
     ranked,
 )
+from epicycle.runner.study.judge.guideline import Recommendation
 
 SHORT = {REPRODUCED: "**yes**", NOT_REPRODUCED: "no", UNDECIDED: "open"}
 
@@ -67,7 +67,7 @@ def about(results: StudyResults) -> str:
     )
 
 
-def weakest(judgement: Judgement, finding: Finding | None) -> str:
+def weakest(judgement: ClaimVerdict, finding: ContrastTest | None) -> str:
     """The weakest comparison of a claim."""
     if finding is None or not finding.count:
         return "-"
@@ -83,7 +83,7 @@ def weakest(judgement: Judgement, finding: Finding | None) -> str:
     return f"{finding.metric} {value} ({low} to {high}{p}{missing}): {pair}"
 
 
-def claims(found: list[Judgement]) -> Iterator[str]:
+def claims(found: list[ClaimVerdict]) -> Iterator[str]:
     """One line for each claim."""
     counted = ["confirmed", "undecided", "reversed", "agreeing"]
     yield from head(["claim", "", "verdict", *counted, "weakest comparison"])
@@ -93,7 +93,7 @@ def claims(found: list[Judgement]) -> Iterator[str]:
         yield row([*about_it, weakest(each, each.weakest)])
 
 
-def by_level(found: list[Judgement]) -> Iterator[str]:
+def by_level(found: list[ClaimVerdict]) -> Iterator[str]:
     """One line for each level that the claims are judged for, the best first."""
     standings = ranked(found)
     yield from head(["", "no", "in means", "yes", *(each.name for each in standings[0].judgements)])

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from .build.scope import Composite
     from .engine import ActorError, Simulation
     from .results import Results, Signal
-    from .study import StudyResults, open_study
+    from .study.judge.study_results import StudyResults, open_study
     from .text.problems import ModelError
     from .trial import Trial
 
@@ -42,8 +42,8 @@ _HOMES = {
     "ModelError": "text.problems",
     "load_composite": "build.composite_class",
     "load_model": "build.load",
-    "StudyResults": "study",
-    "open_study": "study",
+    "StudyResults": "study.judge.study_results",
+    "open_study": "study.judge.study_results",
 }
 
 

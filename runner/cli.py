@@ -9,9 +9,9 @@ from importlib import import_module
 from typing import Any
 
 from .collection import importing, seldom_collecting
-from .commands import commands
+from .commands import FORMER, commands, grouped
+from .commands.leaving import leave
 from .commands.options import BAD_INPUT, FAILED, INTERRUPTED
-from .leaving import leave
 from .printing import complain, complain_traceback, open_streams
 
 
@@ -24,7 +24,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def _run(arguments: Sequence[str], *, is_program: bool) -> int:
     open_streams()
-    options = parser(arguments).parse_args(arguments)
+    known = parser(arguments)
+    if (word := next((each for each in arguments if not each.startswith("-")), "")) in FORMER:
+        known.error(f"command {word!r} is gone: it is now 'epicycle {FORMER[word]}'")
+    options = known.parse_args(arguments)
     options.given = ["epicycle", *arguments]
     try:
         with importing(for_good=is_program):
@@ -74,7 +77,7 @@ class _Version(argparse.Action):
             from epicycle.actors import CORE, CORE_REASON
         except ImportError as error:
             parser.error(str(error))
-        from .provenance import versions
+        from .study.provenance import versions
 
         found, why = versions(), f" ({CORE_REASON})" if CORE_REASON else ""
         print(f"epicycle {found['epicycle']}, {CORE} core{why}, Python {found['python']}")
@@ -83,14 +86,17 @@ class _Version(argparse.Action):
 
 def parser(arguments: Sequence[str] = ()) -> argparse.ArgumentParser:
     """The parser for all commands; only those that arguments may name get their options, which take long to make."""
+    known = commands(arguments)
     top = argparse.ArgumentParser(
-        prog="epicycle", description="Discrete-event simulation of actor models written in YAML."
+        prog="epicycle",
+        description="Discrete-event simulation of actor models written in YAML.",
+        epilog=grouped(known),
+        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     top.add_argument("--version", action=_Version, help="show the version and the core that makes the runs")
-    parsers = top.add_subparsers(required=True, metavar="COMMAND")
-    for each in commands(arguments):
-        summary = each.summary.replace("%", "%%")  # which argparse would expand
-        command = parsers.add_parser(each.name, help=summary, description=each.description)
+    parsers = top.add_subparsers(required=True, metavar="COMMAND", help=argparse.SUPPRESS)
+    for each in known:
+        command = parsers.add_parser(each.name, description=each.description)
         for add in each.options if each.name in arguments else ():
             add(command)
         command.add_argument("--debug", action="store_true", help="show the full traceback of an error")

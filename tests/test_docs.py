@@ -27,7 +27,7 @@ from epicycle.runner.catalogue.metrics import TAKES, TIME, TOKENS
 from epicycle.runner.catalogue.types import built_in
 from epicycle.runner.cli import main
 from epicycle.runner.language.study import read_study
-from epicycle.runner.study import Plan
+from epicycle.runner.study.plan.plan import Plan
 from tests.plugins import ABSENT
 
 ROOT = Path(__file__).parent.parent

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from epicycle.runner.provenance import git_revision
+from epicycle.runner.study.provenance import git_revision
 
 
 def git(folder: Path, *words: str) -> str:

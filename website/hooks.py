@@ -31,7 +31,8 @@ def on_startup(*, command: str, dirty: bool) -> None:
     shutil.rmtree(PARTS, ignore_errors=True)
     package = PARTS / "epicycle"
     package.mkdir(parents=True)
-    (package / "__init__.py").symlink_to(ROOT / "api" / "__init__.py")
+    for name in ("__init__.py", "__init__.pyi"):
+        (package / name).symlink_to(ROOT / "api" / name)
     for folder in ("actors", "aspects", "ptolemy", "runner"):
         (package / folder).symlink_to(ROOT / folder, target_is_directory=True)
 

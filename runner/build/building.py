@@ -88,6 +88,7 @@ class Building:
 
     def enlist(self, aspects: Iterable[WovenAspect]) -> None:
         """Add these aspects to the model."""
+        self.origin = None
         self.aspects = arranged([*self.aspects, *aspects], self.graph)
 
     def forget(self, path: str) -> None:

@@ -67,7 +67,7 @@ class PartTypes:
             valid = ", ".join(sorted([*composites, *types]))
         else:
             own = ", ".join(composites[:MAX_SHOWN]) + (", ..." if len(composites) > MAX_SHOWN else "")
-            valid = f"{f'{own}, and ' if own else ''}those that 'epicycle {kind}s' lists"
+            valid = f"{f'{own}, and ' if own else ''}those that 'epicycle list {kind}s' lists"
         return f"valid types: {valid}", OF_YOUR_OWN
 
 

@@ -223,7 +223,7 @@ class Model(Building, Scope, Tabled):
     def _repr_html_(self) -> str:
         """The drawing of the model and its contents; drawing is looked up, because it is a layer above models."""
         try:
-            picture = import_module("...calls", __name__).draw(self)._repr_html_()
+            picture = import_module("...calls.picturing", __name__).draw(self)._repr_html_()
         except EpicycleError:  # it may be incomplete
             return super()._repr_html_()
         summary = f"<summary>{escape(visible(self._caption()))}</summary>"

@@ -22,6 +22,8 @@ class Origin:
     settings: Sequence[Setting]
     changes: Sequence[str]
     types: Sequence[type]
+    spec: Any = None  # how it was named, if that is known
+    state: Any = None  # what a program might have set since
 
     def facts(self) -> dict[str, Any]:
         """Everything that a run depends on beside its seed and Epicycle, as plain data without names of folders."""

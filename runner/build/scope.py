@@ -359,6 +359,7 @@ class Scope(Holder):
         if woven.model is not None:  # its composite has no other use
             model.forget(woven.model.path)
         model.aspects = [each for each in model.aspects if each.name != full]
+        model.enlist(())  # which is a change, too
 
 
 class Composite(Scope):

@@ -1,185 +1,36 @@
-"""Pictures of models and results, to show in a notebook or write to a file; and saving results."""
+"""The model graph as a picture."""
 
 from __future__ import annotations
 
-import base64
-import csv
-import tempfile
-from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
-from typing import overload
+from typing import TYPE_CHECKING, Annotated
 
-from epicycle.actors import EpicycleError, did_you_mean
+from ..declare.parameters import option, whole
 
-from ..build.figures import made_figure
-from ..build.load import load_model
-from ..build.model import Model
-from ..catalogue.figure import Figure
-from ..catalogue.types import figure_types
-from ..html import Html, tag
-from ..printing import complain
-from ..results import Results, write_log
-from ..show import TimeSeries, check_folder, draw_figures, write_folder
-from ..show import draw as draw_figure
-from ..show.graph import outline, statechart, write_graph
-from ..show.report import write_report
-from ..study import StudyResults, available_cores
-from ..text.patterns import select
-from ..text.problems import Problems
-from .comparing import Comparison
-
-
-class Picture:
-    """A picture, drawn when it is shown or saved; a notebook shows it as SVG."""
-
-    def __init__(self, name: str, write: Callable[[Path], object]) -> None:
-        self.name = name
-        self._write = write
-
-    def save(self, path: str | Path) -> Path:
-        """Write it to a file, whose suffix decides the format: .svg, .png or .pdf."""
-        self._write(Path(path))
-        return Path(path)
-
-    def svg(self) -> bytes:
-        """The picture as SVG."""
-        with tempfile.TemporaryDirectory() as folder:
-            return self.save(Path(folder, "picture.svg")).read_bytes()
-
-    def __repr__(self) -> str:
-        return f"<Picture {self.name}>"
-
-    def _repr_html_(self) -> str:
-        return _image(self.name, self.svg())
-
-
-class Pictures(Mapping[str, Picture]):
-    """Pictures by name."""
-
-    def __init__(self, pictures: Mapping[str, Picture]) -> None:
-        self._pictures = dict(pictures)
-
-    def __getitem__(self, name: str) -> Picture:
-        if name not in self._pictures:
-            raise EpicycleError(f"there is no figure {name!r}{did_you_mean(name, self._pictures)}")
-        return self._pictures[name]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._pictures)
-
-    def __len__(self) -> int:
-        return len(self._pictures)
-
-    def __repr__(self) -> str:
-        return f"<Pictures {', '.join(self)}>"
-
-    def _repr_html_(self) -> str:
-        return tag("div", [Html(each._repr_html_()) for each in self.values()])
-
-
-def _image(name: str, svg: bytes) -> Html:
-    """An SVG as an image: its content cannot reach the page around it."""
-    data = base64.b64encode(svg).decode()
-    return tag("img", src=f"data:image/svg+xml;base64,{data}", alt=name, style="max-width: 100%")
+if TYPE_CHECKING:
+    from ..build.model import Model
+    from ..show.pictures import Picture
 
 
 def draw(
-    model: Model | str | Path, *, depth: int | None = None, expand: bool = False, machine: str | None = None
+    model: Model | str | Path,
+    *,
+    depth: Annotated[
+        int | None,
+        option(
+            "open composites N levels deep, 0 for none (default: as deep as the drawing stays readable)", "N", whole(0)
+        ),
+    ] = None,
+    expand: Annotated[bool, option("draw every instance of an array, even if they are alike")] = False,
+    machine: Annotated[
+        str | None, option("draw the modes of this machine or composite as a statechart", "PATH")
+    ] = None,
 ) -> Picture:
     """The model graph as a picture: what ``epicycle graph`` draws, with the same options."""
-    made = model if isinstance(model, Model) else load_model(model)
+    from ..show.graph import outline, statechart, write_graph
+    from ..show.pictures import Picture
+    from .running import opened
+
+    made = opened(model, None, None, {}).model
     drawn = outline(made, depth=depth, expand=expand) if machine is None else statechart(made, machine)
     return Picture(made.name if machine is None else f"{made.name}: {machine}", lambda path: write_graph(drawn, path))
-
-
-@overload
-def plot(results: Results | StudyResults, figure: None = None) -> Pictures: ...
-@overload
-def plot(results: Results | StudyResults, figure: str | Figure) -> Picture: ...
-def plot(results: Results | StudyResults, figure: str | Figure | None = None) -> Picture | Pictures:
-    """The figures that a model declares for its runs, or a study for its table; with a name, only that figure.
-
-    For a run, ``figure`` may also be a pattern of recorded signals, which are drawn over time, or a ``Figure``.
-    """
-    if isinstance(results, StudyResults):
-        if isinstance(figure, Figure):
-            raise EpicycleError(f"{type(figure).__name__} is a figure of a run, not of a study")
-        pictures = _of_study(results)
-        return pictures if figure is None else pictures[figure]
-    if isinstance(figure, Figure):
-        return _of_run(type(figure).__name__, figure, results)
-    if figure is not None and figure not in results.figures and select(figure, results.signals):
-        return _of_run(figure, TimeSeries(signals=figure), results)
-    found = {name: _of_run(name, each, results) for name, each in _figures(results).items()}
-    if figure is None:
-        return Pictures(found)
-    if figure not in found:
-        known = [*found, *results.signals]
-        told = f"{results.model} has no figure and no recorded signal {figure!r}{did_you_mean(figure, known)}"
-        raise EpicycleError(f"{told}\n   help: it has {', '.join(known) or 'none'}")
-    return found[figure]
-
-
-def _figures(results: Results) -> dict[str, Figure]:
-    """The figures that the model of a run declares."""
-    problems, known = Problems(), figure_types()
-    found = {name: made_figure(name, known, declared, problems) for name, declared in results.figures.items()}
-    problems.raise_if_any()
-    return {name: figure for name, figure in found.items() if figure}
-
-
-def _of_run(name: str, figure: Figure, results: Results) -> Picture:
-    return Picture(name, lambda path: draw_figure(name, figure, results, path))
-
-
-def _of_study(results: StudyResults) -> Pictures:
-    """All figures of a study, as its report draws them."""
-    found: dict[str, dict[str, bytes]] = {}
-    with tempfile.TemporaryDirectory() as folder:
-        written = write_report(results, Path(folder), jobs=available_cores())
-        for path in written.files:
-            if path.parent.name == "figures":
-                found.setdefault(path.stem, {})[path.suffix] = path.read_bytes()
-    for problem in written.problems:
-        complain(f"error: {problem}")
-    return Pictures({name: Picture(name, _copying(name, kinds)) for name, kinds in found.items()})
-
-
-def _copying(name: str, kinds: dict[str, bytes]) -> Callable[[Path], object]:
-    def write(path: Path) -> None:
-        if path.suffix not in kinds:
-            raise EpicycleError(f"figure {name} cannot be written to {path}: its name must end in {', '.join(kinds)}")
-        path.write_bytes(kinds[path.suffix])
-
-    return write
-
-
-def save(what: Results | StudyResults | Comparison | Picture, path: str | Path) -> list[Path]:
-    """Write to disk; returns the files written.
-
-    A run goes to a folder with manifest, signals, figures and, if it was kept, the log; a study to a folder with its
-    report; the metrics of a comparison's runs to a file (.csv); a picture to a file (.svg, .png, .pdf).
-    """
-    place = Path(path)
-    if isinstance(what, Picture):
-        return [what.save(place)]
-    if isinstance(what, Comparison):
-        rows = what.rows()
-        with place.open("w", encoding="utf-8", newline="") as file:
-            writer = csv.DictWriter(file, list(rows[0]) if rows else ["variant", "seed"])
-            writer.writeheader()
-            writer.writerows(rows)
-        return [place]
-    if isinstance(what, StudyResults):
-        return write_report(what, place, jobs=available_cores()).files
-    given = ["epicycle.save", what.model]
-    if replaced := check_folder(place, what.model, given):
-        complain(replaced)
-    written = write_folder(place, what, given)
-    if what.log.records:
-        written.append(place / "log.parquet")
-        write_log(what.log.records, written[-1])
-    drawn, failed = draw_figures(place, what, _figures(what))
-    for error in failed:
-        raise error
-    return [*drawn, *written]

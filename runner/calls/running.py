@@ -1,56 +1,106 @@
-"""One run, from the model to the files of its results: what ``epicycle.run`` and the command do."""
+"""One run: load a model, run it, look at it."""
 
 from __future__ import annotations
 
-import math
-import threading
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, nullcontext
-from dataclasses import dataclass, field, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import Unpack
+from typing import TYPE_CHECKING, Annotated, Any, Unpack
 
-from epicycle.actors import EpicycleError
+from ..declare.parameters import argument, number, option
+from .changes import SEED, UNTIL, Changes, classes
 
-from ..bars import SOON, bar
-from ..build.figures import figures_of
-from ..build.load import load_model
-from ..build.model import Model
-from ..engine import ActorError, LogFilter, LoopError, Pace, Simulation
-from ..printing import complain, console, notices
-from ..results import LogFile, Results
-from ..shown import in_time
-from ..text.problems import Problems
-from .run_spec import Changes, RunSpec, seconds
+if TYPE_CHECKING:
+    from ..build.model import Model
+    from ..results import Results
+    from ..show.view.pages import Page
+    from ..study.run_spec import OpenedRun
 
-PATIENCE = 5.0  # s after which the length of a run can be judged
-LONG = 600.0  # s that are worth a notice
-NOTICEABLE = 0.05  # s by which a run may be late without a report: the operating system alone takes as much
-
-load = load_model
+REFERENCE = "a model, the results folder of a run, or a run of a study, such as results/table_1/3f9a0c"
 
 
-def loaded(model: Model | str | Path, changes: Changes) -> Model:
-    """The model of that name or file with the changes; an existing model takes none."""
-    if not isinstance(model, Model):
-        return load_model(model, **changes)
-    if changes:
-        raise EpicycleError(
-            f"the model {model.name} exists already and takes no {', '.join(changes)}\n"
-            "   help: give the name or file of the model instead, or pass them to load"
+def factor(text: str) -> float:
+    """How many seconds of model time pass per second."""
+    import argparse
+    import math
+
+    from ..engine import SLOWEST
+
+    if not SLOWEST <= (found := number(text)) < math.inf:
+        # Perhaps the model, which follows the option.
+        raise argparse.ArgumentTypeError(
+            f"{text!r} is not a number of at least {SLOWEST:g} (write MODEL before --realtime)"
         )
-    return model
+    return found
+
+
+def load(
+    model: Annotated[str | Path, argument("a path to a YAML file, or the name of a packaged model", "MODEL")],
+    **changes: Unpack[Changes],
+) -> Model:
+    """Load a packaged model or a file, with changes.
+
+    ``set`` gives parameters their values, ``overrides`` files with such values, ``disturb`` disturbances, ``aspects``
+    further aspects, ``without_aspects`` those that go; ``types`` are classes of your own, or files with them.  Raises
+    ``ModelError`` with everything that is wrong.
+
+    >>> epicycle.load("mm1", set={"load": 0.9}).parameters["load"]
+    """
+    from ..build.load import load_model
+    from ..study.run_spec import RunSpec, named
+
+    given = list(changes.get("types", ()))
+    more: Any = {**changes, "types": classes(given)}
+    made = load_model(model, **more)
+    if any(isinstance(each, type) for each in given):  # which nothing but this program knows
+        return made
+    return named(made, RunSpec.of(model, None, None, changes))
+
+
+def opened(
+    model: Model | str | Path, seed: int | None, until: float | str | None, changes: Mapping[str, Any]
+) -> OpenedRun:
+    """The run of a model that exists, or of what names one; an existing model takes no changes."""
+    from epicycle.actors import EpicycleError
+
+    from ..build.model import Model
+    from ..study.run_spec import OpenedRun, RunSpec, is_reference, named, seconds
+    from ..study.run_spec import opened as opened_run
+
+    if isinstance(model, Model):
+        if changes:
+            raise EpicycleError(
+                f"the model {model.name} exists already and takes no {', '.join(changes)}\n"
+                "   help: give the name or file of the model instead, or pass them to load"
+            )
+        return OpenedRun(model, seed, seconds("until", until))
+    if is_reference(model):
+        return opened_run(RunSpec.of(model, seed, until, changes), "until")
+    made = load(model, **changes)
+    if made.origin is not None and made.origin.spec is not None:
+        named(made, replace(made.origin.spec, until=until))
+    return OpenedRun(made, seed, seconds("until", until))
 
 
 def run(
-    model: Model | str | Path,
+    model: Annotated[Model | str | Path, argument(REFERENCE, "MODEL or RESULTS")],
     *,
-    seed: int | None = None,
-    until: float | str | None = None,
-    realtime: float | None = None,
+    seed: Annotated[int | None, SEED] = None,
+    until: Annotated[float | str | None, UNTIL] = None,
+    realtime: Annotated[
+        float | None,
+        option(
+            "limit model time to FACTOR seconds per second of the wall clock (default: 1)", "FACTOR", factor, bare=1.0
+        ),
+    ] = None,
     keep_log: bool = False,
-    log: str | Path | None = None,
-    out: str | Path | None = None,
+    log: Annotated[
+        str | Path | None, option("write the event log to FILE (.parquet, .csv or .jsonl)", "FILE", Path)
+    ] = None,
+    out: Annotated[
+        str | Path | None,
+        option("folder for manifest, signals and figures (default: results/MODEL; with --json: none)", "DIR", Path),
+    ] = None,
     progress: bool = True,
     **changes: Unpack[Changes],
 ) -> Results:
@@ -63,18 +113,19 @@ def run(
 
     >>> epicycle.run("mm1", seed=3, set={"load": 0.9}).metrics["mean_wait"]
     """
-    made = loaded(model, changes)
-    spec = None if isinstance(model, Model) else RunSpec.of(model, seed, until, changes)
+    from ..engine import Pace
+    from ..results import LogFile
+    from ..show.performing import perform
+
+    found = opened(model, seed, until, changes)
     done = perform(
-        made,
-        seed=seed,
-        until=seconds("until", until),
+        found.model,
+        seed=found.seed,
+        until=found.until,
         pace=None if realtime is None else Pace(realtime),
         keep_log=keep_log or log is not None,
         log=None if log is None else LogFile(Path(log)),
         folder=None if out is None else Path(out),
-        given=("epicycle.run", made.name) if spec is None else spec.command(),
-        spec=spec,
         progress=progress,
     )
     for error in done.failed:
@@ -82,111 +133,38 @@ def run(
     return done.results
 
 
-@dataclass
-class Done:
-    """The outcome of a run, the files written, and the figures that could not be drawn."""
-
-    results: Results
-    written: list[Path] = field(default_factory=list)
-    failed: Sequence[EpicycleError] = ()
-
-
-def perform(
-    model: Model,
-    *,
-    seed: int | None = None,
-    until: float | None = None,
-    pace: Pace | None = None,
-    keep_log: bool | LogFilter = False,
-    log: LogFile | None = None,
-    folder: Path | None = None,
-    given: Sequence[str] = (),
-    spec: RunSpec | None = None,
+def view(
+    *models: Annotated[Model | str | Path, argument(f"one or two of: {REFERENCE}", "MODEL or RESULTS", "+")],
+    seed: Annotated[int | None, SEED] = None,
+    until: Annotated[float | str | None, UNTIL] = None,
+    names: Sequence[str] = (),
     progress: bool = True,
-    after: float = SOON,
-) -> Done:
-    """Run a model and write what is requested; ``given`` is the command or call, and ``spec`` how to make the run
-    again, for the manifest.
+    **changes: Unpack[Changes],
+) -> Page:
+    """Run a model, or two for comparison, and show what happened: space, graph, signals, and what caused what.
 
-    The records of a run that fails are written, too.  ``keep_log`` filters the ``log``, if there is one.
+    ``set``, ``disturb`` and the other options of ``load`` change each model given by name or file; ``names`` tell two
+    runs apart.  ``save`` writes the page, ``open`` shows it in the browser, a notebook shows it in place.
+
+    >>> epicycle.view("collision_avoidance", disturb="wifi_burst").save("run.html")
     """
-    figures = figures_of(model, Problems())
-    if folder is not None and folder.exists() and not folder.is_dir():
-        raise EpicycleError(f"--out {folder} is a file, not a folder")
-    if folder is not None:
-        from ..show import check_folder, draw_figures, write_folder
+    from epicycle.actors import EpicycleError
 
-    replaced = "" if folder is None else check_folder(folder, model.name, list(given))
-    simulation = Simulation(model, seed=seed, keep_log=keep_log, log_to=None if log is None else log.add)
-    if replaced:  # and the request is valid
-        complain(replaced)
-    if until is None and model.endless:
-        complain(f"{model.endless}\n   help: end it with Ctrl-C, which keeps what was recorded, or run it with --until")
-    with log or nullcontext(), watched(model, until, after) if progress else nullcontext() as report:
-        try:
-            results = simulation.run(until=until, progress=report, pace=pace)
-        except (ActorError, LoopError, KeyboardInterrupt) as error:
-            interrupted = isinstance(error, KeyboardInterrupt)
-            results = simulation.results("interrupted" if interrupted else "failed")
-            if folder is not None:
-                write_folder(folder, results, given, "interrupted" if interrupted else str(error), again(spec, results))
-                complain(f"what was recorded before is in {folder}")
-            raise
-        # Before the log is closed, which may fail.
-        saved = [] if folder is None else write_folder(folder, results, given, again=again(spec, results))
-    if pace is not None and pace.worst > NOTICEABLE:
-        complain(
-            f"the run could not keep up with the wall clock: {pace.worst:.3g} s late at worst, "
-            f"{pace.behind:.3g} s at the end"
-        )
-    if folder is None:
-        return Done(results)
-    drawn, failed = draw_figures(folder, results, figures)
-    return Done(results, [*drawn, *saved], failed)
+    from ..build.model import Model
+    from ..show.view.pages import recorded
 
-
-def again(spec: RunSpec | None, results: Results) -> dict[str, object] | None:
-    """How to make a run again, for its manifest: with its seed, which the model may change."""
-    return None if spec is None else (spec if spec.study else replace(spec, seed=results.seed)).plain()
-
-
-def outlook(elapsed: float, now: float, end: float) -> str:
-    """The notice about a run that has taken a while and will take long: a clock of 1 ns is easily written."""
-    if now <= 0.0:  # perhaps a single step does not end
-        state = f"still at 0 s of {end:g} s"
-    elif (left := elapsed * (end - now) / now) > LONG:
-        state = f"at {now:.3g} s of {end:g} s: at this pace it takes another {left / 3_600:,.1f} h"
-    else:
-        return ""
-    return f"after {elapsed:.0f} s the run is {state}; Ctrl-C ends it, and what was recorded is kept"
-
-
-@contextmanager
-def watched(model: Model, until: float | None, after: float = 0.0) -> Iterator[Callable[[float], None]]:
-    """Shows the progress of a run: a bar, and notices if it takes long."""
-    end = until if until is not None else model.stop
-    latest = -math.inf
-
-    def look(now: float) -> None:
-        nonlocal latest
-        if latest < 0.0:  # time starts only now: before, actors were initialised, which says nothing about the run
-            watch.start()
-        latest = now
-        if show is not None:
-            show(now, end, f"{in_time(round(now, 1) if now >= 1.0 else now)} of model time")
-
-    def judge() -> None:
-        if end is not None and (text := outlook(PATIENCE, latest, end)):
-            complain(text)
-
-    # A step of the run may never end, so another thread watches it.
-    watch = threading.Timer(PATIENCE, judge)
-    watch.daemon = True
-    terminal = console(stderr=True)
-    try:
-        with notices(terminal), bar(model.name, after=after, terminal=terminal) as show:
-            if show is not None:
-                show(0.0, end, "0 s of model time")
-            yield look
-    finally:
-        watch.cancel()
+    if not 1 <= len(models) <= 2:
+        raise EpicycleError(f"a page shows one run or two, not {len(models)}")
+    if names and len(names) != len(models):
+        raise EpicycleError(f"names: {len(names)} given for {len(models)} models")
+    runs = [opened(each, seed, until, {} if isinstance(each, Model) else changes) for each in models]
+    if len(runs) == 2 and not names:
+        names = [each.model.name for each in runs]
+        names = [f"{name} {number}" for number, name in enumerate(names, 1)] if len({*names}) == 1 else names
+    return recorded(
+        [each.model for each in runs],
+        seed=[each.seed for each in runs],
+        until=[each.until for each in runs],
+        names=names,
+        progress=progress,
+    )

@@ -1,4 +1,4 @@
-"""The commands of the command line, in the order in which ``epicycle --help`` names them, and what they are made of.
+"""The commands of the command line, by what people want, and what they are made of.
 
 Installed packages add to them by entry points of the group ``epicycle.commands``.
 """
@@ -8,54 +8,36 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ..printing import complain, tell
-from . import (
-    calibrate,
-    compare,
-    completion,
-    describe,
-    disturb,
-    explain,
-    falsify,
-    fit,
-    new,
-    optimise,
-    rare,
-    run,
-    show,
-    studies,
-    trace,
-    view,
-)
+from . import completion, describe, new, recording, running, searching, studies
 from .offered import offered_commands
 from .options import BAD_INPUT, BROKEN, DONE, FAILED, JSON, TYPES, Command, command, option, own_types, several
 
-COMMANDS = (
-    run.run,
-    view.view,
-    compare.compare,
-    explain.explain,
-    falsify.falsify,
-    optimise.optimise,
-    calibrate.calibrate,
-    rare.rare,
-    fit.fit,
-    disturb.disturb,
-    studies.study,
-    studies.resume,
-    studies.status,
-    studies.replay,
-    studies.report,
-    trace.trace,
-    describe.validate,
-    show.show,
-    describe.graph,
-    describe.models,
-    describe.actors,
-    describe.aspects,
-    describe.schema,
-    new.new,
-    completion.completion,
-)
+GROUPS = {
+    "look at one run": (running.run, running.view, searching.explain),
+    "make many runs": (studies.study, studies.status, studies.report, searching.compare),
+    "search": (searching.search, searching.rare),
+    "work with recorded data": (recording.recording,),
+    "write models": (new.new, describe.validate, describe.describe, describe.graph, describe.list_),
+    "set up a shell": (completion.completion,),
+}
+COMMANDS = tuple(each for group in GROUPS.values() for each in group)
+
+# What commands were called before, and what they are now.
+FORMER = {
+    "trace": "run MODEL --trace",
+    "falsify": "search MODEL --break",
+    "optimise": "search MODEL --minimise METRIC",
+    "calibrate": "search MODEL --match SIGNAL=FILE",
+    "fit": "recording fit TRACE",
+    "disturb": "recording apply RECORDING --with DISTURBANCE",
+    "resume": "study DIR",
+    "replay": "run DIR/RUN",
+    "show": "describe MODEL",
+    "models": "list models",
+    "actors": "list actors', and one of them 'epicycle describe TYPE",
+    "aspects": "list aspects', one of them 'epicycle describe TYPE', a model's 'epicycle describe MODEL --aspects",
+    "schema": "list schema",
+}
 
 
 def commands(arguments: Sequence[str] = ()) -> tuple[Command, ...]:
@@ -66,18 +48,32 @@ def commands(arguments: Sequence[str] = ()) -> tuple[Command, ...]:
     return (*COMMANDS, *(each for each in offered_commands() if each.name not in own))
 
 
+def grouped(known: Sequence[Command]) -> str:
+    """The commands with their summaries, by what people want."""
+    others = tuple(each for each in known if each not in COMMANDS)
+    width = max(len(each.name) for each in known) + 2
+    text = []
+    for what, group in {**GROUPS, "of installed packages": others}.items():
+        if group:
+            text += ["", f"{what}:", *(f"  {each.name:{width}}{each.summary}" for each in group)]
+    return "\n".join(text[1:])
+
+
 __all__ = [
     "BAD_INPUT",
     "BROKEN",
     "COMMANDS",
     "DONE",
     "FAILED",
+    "FORMER",
+    "GROUPS",
     "JSON",
     "TYPES",
     "Command",
     "command",
     "commands",
     "complain",
+    "grouped",
     "option",
     "own_types",
     "several",

@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..printing import complain, console, tell, tell_json, tell_json_text
-from .options import CHANGES, DONE, JSON, MODEL, TYPES, command, load, option, own_types, whole
+from ..calls import picturing, running
+from ..declare.commands import arguments, declared
+from ..printing import columns, complain, console, tell, tell_json, tell_json_text
+from .options import DONE, TYPES, command, load, option, own_types, taken
 
 if TYPE_CHECKING:
+    from ..build.model import Model
     from ..catalogue.types import Catalogue
 
 # -- models -----------------------------------------------------------------------------------------------------------
@@ -18,7 +21,7 @@ if TYPE_CHECKING:
 
 @command(
     "check a model or a study",
-    *MODEL,
+    taken(running.load),
     option("--strict", action="store_true", help="treat warnings as errors"),
     imports=("build",),
 )
@@ -54,12 +57,13 @@ def _validate_study(options: argparse.Namespace) -> int:
 
     from ..language.study import read_study
     from ..show.report import check_figures
-    from ..study import Plan
+    from ..study.plan.plan import Plan
 
-    for name in ("overrides", "disturb", "aspect", "without"):
-        if getattr(options, name):
-            raise EpicycleError(f"--{name} is for models: a study states in its file what it changes")
-    plan = Plan.made(read_study(options.model, set=options.set, types=map(Path, options.types)))
+    for each in declared(running.load):
+        if each.name not in ("model", "set", "types") and hasattr(options, each.name):
+            raise EpicycleError(f"{each.flag} is for models: a study states in its file what it changes")
+    given = arguments(running.load, options)
+    plan = Plan.made(read_study(options.model, set=given.get("set", ()), types=map(Path, given.get("types", ()))))
     check_figures(plan)
     tell(
         f"{options.model} is valid: {counted(plan.conditions, 'condition')} of "
@@ -70,7 +74,7 @@ def _validate_study(options: argparse.Namespace) -> int:
 
 @command(
     "draw the model graph",
-    *MODEL,
+    taken(running.load),
     option(
         "-o",
         dest="out",
@@ -78,14 +82,7 @@ def _validate_study(options: argparse.Namespace) -> int:
         type=Path,
         help="write to FILE (.svg, .png or .pdf; .mmd or .md for Mermaid); without it, Mermaid text is printed",
     ),
-    option(
-        "--depth",
-        metavar="N",
-        type=whole(0),
-        help="open composites N levels deep, 0 for none (default: as deep as the drawing stays readable)",
-    ),
-    option("--expand", action="store_true", help="draw every instance of an array, even if they are alike"),
-    option("--machine", metavar="PATH", help="draw the modes of this machine or composite as a statechart"),
+    taken(picturing.draw),
     imports=("build", "show.graph"),
 )
 def graph(options: argparse.Namespace) -> int:
@@ -94,12 +91,13 @@ def graph(options: argparse.Namespace) -> int:
 
     if options.out is not None:
         check_graph_path(options.out)
-    if options.machine is not None:
-        chart = statechart(load(options), options.machine)
+    given = arguments(picturing.draw, options)
+    if (machine := given.get("machine")) is not None:
+        chart = statechart(load(options), machine)
         return _write(mermaid(chart), lambda path: write_graph(chart, path), options.out)
-    drawn = outline(load(options), depth=options.depth, expand=options.expand)
+    drawn = outline(load(options), depth=given.get("depth"), expand=options.expand)
     _write(mermaid(drawn), lambda path: write_graph(drawn, path), options.out)
-    if drawn.note and options.depth is None:
+    if drawn.note and "depth" not in given:
         complain(f"note: {drawn.note}")
     return DONE
 
@@ -113,36 +111,110 @@ def _write(text: str, write: Callable[[Path], None], path: Path | None) -> int:
     return DONE
 
 
-@command("list the packaged models, disturbances and studies", imports=("build",))
-def models(options: argparse.Namespace) -> int:
-    """List the models that come with Epicycle, the disturbances for --disturb, and the studies."""
+# -- lists ------------------------------------------------------------------------------------------------------------
+
+
+LIKE = option("--like", metavar="NAME", help="the types of models with 'director: {like: NAME}'")
+
+
+@command(
+    "list what there is: models, actors, aspects, or the schema of model files",
+    option(
+        "what",
+        choices=("models", "actors", "aspects", "schema"),
+        help="packaged models, disturbances and studies; types of actors or aspects that a model may use; or a JSON "
+        "Schema of model files",
+    ),
+    LIKE,
+    TYPES,
+    option("--json", action="store_true", help="print JSON"),
+    option("-o", "--out", metavar="FILE", type=Path, help="write the schema to FILE (default: standard output)"),
+    imports=("build",),
+)
+def list_(options: argparse.Namespace) -> int:
+    """List what models may use.
+
+    The schema is made from the installed actors and aspects.  An editor with a YAML language server completes and
+    checks a model whose first line is '# yaml-language-server: $schema=FILE'.
+    """
+    from epicycle.actors import EpicycleError
+
+    if options.out is not None and options.what != "schema":
+        raise EpicycleError("--out is for 'epicycle list schema'")
+    if options.what == "schema":
+        return _schema(options)
+    if options.what == "models":
+        return _models(options)
+    return _types(options)
+
+
+def _models(options: argparse.Namespace) -> int:
+    """The models that come with Epicycle, the disturbances for --disturb, and the studies."""
     from ..build.load import load_model
     from ..catalogue.packaged import packaged_disturbances, packaged_models, packaged_studies
     from ..language.disturbance import load_disturbance
     from ..language.study import read_study
     from ..text.problems import Problems
 
-    def tell_of(name: str, doc: str) -> None:
-        tell(f"{name}: {doc.partition('. ')[0]}" if doc else name)
-
-    for name, path in packaged_models().items():
-        tell_of(name, load_model(path).doc)
-    tell("\ndisturbances, added with --disturb:")
     problems = Problems()
-    for name in packaged_disturbances():
-        disturbance = load_disturbance(name, problems)
-        problems.raise_if_any()
-        tell_of(name, disturbance.text.doc if disturbance is not None else "")
-    tell("\nstudies, run with epicycle study:")
-    for name in packaged_studies():
-        tell_of(name, read_study(name).doc)
+    disturbances = {name: load_disturbance(name, problems) for name in packaged_disturbances()}
+    problems.raise_if_any()
+    found = {
+        "models": {name: load_model(path).doc for name, path in packaged_models().items()},
+        "disturbances": {name: "" if each is None else each.text.doc for name, each in disturbances.items()},
+        "studies": {name: read_study(name).doc for name in packaged_studies()},
+    }
+    if options.json:
+        tell_json(found, indent=2)
+        return DONE
+    heads = {
+        "models": "",
+        "disturbances": "\ndisturbances, added with --disturb:",
+        "studies": "\nstudies, run with epicycle study:",
+    }
+    for kind, docs in found.items():
+        if heads[kind]:
+            tell(heads[kind])
+        for name, doc in docs.items():
+            tell(f"{name}: {doc.partition('. ')[0]}" if doc else name)
     return DONE
 
 
-# -- types ------------------------------------------------------------------------------------------------------------
+def _types(options: argparse.Namespace) -> int:
+    from dataclasses import asdict
+
+    from ..catalogue.types import load_all
+    from ..show import described, overview
+
+    known = _known_types(options)
+    loaded, errors = load_all(known.actors if options.what == "actors" else known.aspects)
+    for error in errors:
+        complain(f"warning: {error}")
+    references = described(loaded)
+    if options.json:
+        tell_json([asdict(each) for each in references], indent=2)
+    else:
+        console().print(overview(references))
+    return DONE
 
 
-LIKE = option("--like", metavar="NAME", help="the types of models with 'director: {like: NAME}'")
+def _schema(options: argparse.Namespace) -> int:
+    from ..catalogue.types import figure_types, load_all
+    from ..language.schema import json_schema, schema_text
+    from ..show.report import study_figure_types
+
+    catalogue, errors = _known_types(options).loaded()
+    figures, wrong = load_all(figure_types())
+    of_studies, wrong_too = load_all(study_figure_types())
+    for error in (*errors, *wrong, *wrong_too):
+        complain(f"warning: {error}")
+    text = schema_text(json_schema(catalogue, figures, of_studies))
+    if options.out is None:
+        tell_json_text(text)
+    else:
+        options.out.write_text(text, encoding="utf-8")
+        tell(f"wrote {options.out}")
+    return DONE
 
 
 def _known_types(options: argparse.Namespace) -> Catalogue:
@@ -160,50 +232,44 @@ def _known_types(options: argparse.Namespace) -> Catalogue:
     return known if dialect is None else known.like(dialect)
 
 
+# -- descriptions -----------------------------------------------------------------------------------------------------
+
+
 @command(
-    "list the actors, or describe one",
-    option("name", metavar="NAME", nargs="?", help="an actor type"),
+    "describe a model or a type: what it offers, and where aspects are attached",
+    option("model", metavar="MODEL or TYPE", help="a packaged model, a path to a YAML file, or a type"),
+    taken(running.load, without={"model"}),
     LIKE,
-    TYPES,
-    JSON,
-    imports=("show",),
-)
-def actors(options: argparse.Namespace) -> int:
-    """List the actors that a model may use, or describe one: its ports and parameters."""
-    known = _known_types(options)
-    return _print_reference(known.actors, known.aspects, "actor", options.name, options.json)
-
-
-@command(
-    "list the aspects, describe one, or show where they are attached in a model",
     option(
-        "model",
-        metavar="NAME or MODEL",
-        nargs="?",
-        help="an aspect type, a packaged model, or a path to a YAML file",
+        "--aspects", dest="weaving", action="store_true", help="show which aspects are attached to the ports of a model"
     ),
-    LIKE,
-    *CHANGES,
-    JSON,
-    imports=("show",),
+    option("--json", action="store_true", help="print one JSON object"),
+    imports=("build",),
 )
-def aspects(options: argparse.Namespace) -> int:
-    """List the aspects that a model may use, describe one, or show which aspects are attached to the ports of a model,
-    in the order in which a token meets them."""
+def describe(options: argparse.Namespace) -> int:
+    """Describe a model: its parameters with their types, units, values and docs, the files that it reads, its metrics
+    and monitors, recorded ports, figures and aspects, and the packaged disturbances that fit it; or, with --aspects,
+    the aspects at its ports, in the order in which a token meets them.
+
+    Describe a type of actors, aspects or their parts: its ports and parameters.
+    """
     from epicycle.actors import EpicycleError
 
     from ..catalogue.packaged import is_path, packaged_models
 
-    known = _known_types(options)
-    name, packaged = options.model, packaged_models()
-    if name is None or name in known.aspects or not (name in packaged or is_path(name)):
-        if options.set or options.overrides or options.disturb or options.aspect or options.without:
-            raise EpicycleError("--set, --overrides, --disturb, --aspect and --without change a model: name one")
-        return _print_reference(known.aspects, known.actors, "aspect", name, options.json, also=packaged)
+    changed = [each for each in arguments(running.load, options) if each not in ("model", "types")]
+    if is_path(options.model) or options.model in packaged_models():
+        if options.like is not None:
+            raise EpicycleError("--like is for types: the directors in a model name their dialects themselves")
+        return _weaving(options) if options.weaving else _describe_model(options)
+    if options.weaving or changed:
+        raise EpicycleError(f"{options.model} is no model, and --aspects and changes are for models")
+    return _describe_type(options)
+
+
+def _weaving(options: argparse.Namespace) -> int:
     from ..show import aspects_at, weaving
 
-    if options.like is not None:
-        raise EpicycleError("--like is for the list of types: the directors in a model name their dialects themselves")
     model = load(options)
     if options.json:
         tell_json(aspects_at(model), indent=2)
@@ -212,89 +278,130 @@ def aspects(options: argparse.Namespace) -> int:
     return DONE
 
 
-def _print_reference(
-    types: Mapping[str, type[Any]],
-    others: Mapping[str, type[Any]],
-    kind: str,
-    name: str | None,
-    as_json: bool,
-    *,
-    also: Iterable[str] = (),
-) -> int:
-    """The list of all types, or the description of one.
-
-    ``others`` are the types of the other kind, ``also`` further names that could have been meant.
-    """
+def _describe_type(options: argparse.Namespace) -> int:
+    """The description of a type, or of a class that stands in a parameter."""
     from dataclasses import asdict, replace
 
     from epicycle.actors import EpicycleError, did_you_mean
 
+    from ..catalogue.packaged import packaged_models
     from ..catalogue.reference import describe, parts_of
     from ..catalogue.types import load_all
-    from ..show import described, detail, overview, parts_described
+    from ..show import described, detail, parts_described
 
-    if name is None:
-        loaded, errors = load_all(types)
-        for error in errors:
-            complain(f"warning: {error}")
-        references = described(loaded)
-        if as_json:
-            tell_json([asdict(each) for each in references], indent=2)
-        else:
-            console().print(overview(references))
-        return DONE
-    loaded, _ = ({}, []) if name in types or name in others else load_all(types)
-    of_bases = parts_of(loaded.values())
-    kinds = {base.__name__: known for base, known in of_bases.items() if name in known}
-    variants = [each for known in of_bases.values() for each in known]
-    if kinds:
-        ((base, known),) = kinds.items()
-        reference, parts = replace(describe(name, known[name]), kind=base.lower()), parts_described([known[name]])
-    elif name not in types:
-        if name in others:
-            other = "aspect" if kind == "actor" else "actor"
-            raise EpicycleError(
-                f"{name} is an {other}, not an {kind}\n   help: 'epicycle {other}s {name}' describes it"
-            )
-        what = f"{kind} type or packaged model" if also else f"{kind} type"
-        raise EpicycleError(
-            f"there is no {what} {name!r}{did_you_mean(name, [*types, *also, *variants])}\n"
-            f"   help: 'epicycle {kind}s' lists them\n"
-            f"   help: for your own types, add '--types FILE.py'"
-        )
-    else:
+    known, name = _known_types(options), options.model
+    types = {**known.actors, **known.aspects}
+    if name in types:
         (reference,) = described({name: types[name]})
         parts = parts_described([types[name]])
-    if as_json:
+    else:
+        loaded, _ = load_all(types)
+        of_bases = parts_of(loaded.values())
+        kinds = {base.__name__: found for base, found in of_bases.items() if name in found}
+        if not kinds:
+            variants = [each for found in of_bases.values() for each in found]
+            near = did_you_mean(name, [*types, *packaged_models(), *variants])
+            raise EpicycleError(
+                f"there is no type or packaged model {name!r}{near}\n"
+                "   help: 'epicycle list models', 'epicycle list actors' and 'epicycle list aspects' list them\n"
+                "   help: for your own types, add '--types FILE.py'"
+            )
+        ((base, found),) = kinds.items()
+        reference, parts = replace(describe(name, found[name]), kind=base.lower()), parts_described([found[name]])
+    if options.json:
         tell_json({**asdict(reference), "parts": {k: [asdict(each) for each in v] for k, v in parts.items()}}, indent=2)
     else:
         console().print(detail(reference, parts))
     return DONE
 
 
-@command(
-    "write a JSON Schema of model files, for editors",
-    option("-o", "--out", metavar="FILE", type=Path, help="write to FILE (default: standard output)"),
-    LIKE,
-    TYPES,
-    imports=("show.report",),
-)
-def schema(options: argparse.Namespace) -> int:
-    """Write a JSON Schema of model files, made from the installed actors and aspects. An editor with a YAML language
-    server completes and checks a model whose first line is '# yaml-language-server: $schema=FILE'."""
-    from ..catalogue.types import figure_types, load_all
-    from ..language.schema import json_schema, schema_text
-    from ..show.report import study_figure_types
+def _describe_model(options: argparse.Namespace) -> int:
+    from ..shown import in_time
+    from ..text.files import noting
+    from ..text.patterns import folded
 
-    catalogue, errors = _known_types(options).loaded()
-    figures, wrong = load_all(figure_types())
-    of_studies, wrong_too = load_all(study_figure_types())
-    for error in (*errors, *wrong, *wrong_too):
-        complain(f"warning: {error}")
-    text = schema_text(json_schema(catalogue, figures, of_studies))
-    if options.out is None:
-        tell_json_text(text)
-    else:
-        options.out.write_text(text, encoding="utf-8")
-        tell(f"wrote {options.out}")
+    with noting() as noted:
+        model = load(options)
+    found = {
+        "parameters": list(_parameters(model)),
+        "metrics": list(_metrics(model)),
+        "monitors": list(_monitors(model)),
+        "figures": [{"figure": name, "type": kind} for name, (kind, *_) in model.figures.items()],
+        "aspects": [
+            {"aspect": each.name, "type": each.kind, "at": ", ".join(folded(each.places))} for each in model.aspects
+        ],
+        "disturbances": [{"disturbance": name, "what it is": doc} for name, doc in _disturbances(options)],
+    }
+    about: dict[str, Any] = {"model": model.name, "doc": model.doc, "extent": model.extent, "stop": model.stop}
+    about |= {"records": model.output.recorded, "reads": list(noted.files)}
+    if options.json:
+        tell_json({**about, **found}, indent=2)
+        return DONE
+    tell(f"{model.name}: {model.doc}" if model.doc else model.name)
+    tell(f"{model.extent}" + ("" if model.stop is None else f", stops at {in_time(model.stop)}"))
+    for rows in filter(None, found.values()):
+        tell("")
+        head = [key for key in rows[0] if key != "stands for"]  # it takes room
+        console().print(columns(head, ([str(row[key]) for key in head] for row in rows), whole=(head[0], "unit")))
+    for what in ("records", "reads"):
+        if about[what]:
+            tell(f"\n{what}: {', '.join(folded(about[what]))}")
     return DONE
+
+
+def _parameters(model: Model) -> Iterator[dict[str, str]]:
+    """The declaration of each parameter and its value, which is the default unless it is set."""
+    from epicycle.actors import bounds_text
+
+    from ..shown import in_words, short
+
+    for name, value in model.parameters.items():
+        said = model.declared[name]
+        kinds = {bool: "true or false", str: "text", int: "number", float: "number", list: "list", tuple: "list"}
+        kind = f"one of {', '.join(said.choices)}" if said.choices else kinds.get(type(value), "any value")
+        low, above, high = said.bounds()
+        kind += bounds_text(low, above, high, lambda bound: f"{bound:g}")
+        unit = "" if said.unit == "1" else said.unit
+        told = in_words(value) if isinstance(value, (bool, float)) else short(value)
+        yield {
+            "parameter": name,
+            "type": kind,
+            "unit": unit,
+            "value": told,
+            "stands for": said.source,
+            "what it is": said.doc,
+        }
+
+
+def _metrics(model: Model) -> Iterator[dict[str, str]]:
+    for each in model.output.metrics:
+        if each.monitor:
+            continue
+        takes, unit = each.takes, "" if each.unit == "1" else each.unit
+        yield {"metric": each.name, "takes": takes, "unit": unit, "what it is": each.measure.doc}
+
+
+def _monitors(model: Model) -> Iterator[dict[str, str]]:
+    for each in model.output.monitors:
+        said = each.requirement
+        yield {"monitor": each.name, "property": said.property, "unit": said.unit, "what it is": said.doc}
+
+
+def _disturbances(options: argparse.Namespace) -> Iterator[tuple[str, str]]:
+    """The packaged disturbances that the model can be loaded with."""
+    from epicycle.actors import EpicycleError
+
+    from ..catalogue.packaged import packaged_disturbances
+    from ..catalogue.reference import first_sentence
+    from ..language.disturbance import load_disturbance
+    from ..text.problems import Problems
+
+    given = arguments(running.load, options)
+    given.pop("aspects", None), given.pop("without_aspects", None)
+    for name in packaged_disturbances():
+        disturbance = load_disturbance(name, Problems())
+        try:
+            running.load(**{**given, "disturb": [*given.get("disturb", ()), name]})
+        except EpicycleError:  # it is for models of another kind
+            continue
+        yield name, first_sentence(disturbance.text.doc) if disturbance is not None else ""

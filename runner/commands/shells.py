@@ -46,7 +46,8 @@ def _commands() -> Iterator[tuple[str, str, list[Given]]]:
         "MODEL or RESULTS": models,
         "STUDY": studies,
         "NAME or FILE": tuple(packaged_disturbances()),
-        "NAME or MODEL": (*known.aspects, *models),
+        "MODEL or STUDY": (*models, *studies),
+        "MODEL or TYPE": (*models, *known.actors, *known.aspects),
     }
     for each in commands():
         parser, given = argparse.ArgumentParser(add_help=False), []
@@ -57,8 +58,6 @@ def _commands() -> Iterator[tuple[str, str, list[Given]]]:
         for action in parser._actions:
             metavar = action.metavar if isinstance(action.metavar, str) else ""
             words = tuple(map(str, action.choices or ())) or named.get(metavar, ())
-            if (each.name, metavar) == ("actors", "NAME"):
-                words = tuple(known.actors)
             if (each.name, metavar) == ("validate", "MODEL"):
                 words += studies
             kind = next((kind for end, kind in ENDS.items() if metavar.endswith(end)), "")

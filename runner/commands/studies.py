@@ -1,158 +1,86 @@
-"""The commands for studies: run one, resume it, show its progress, repeat one of its runs, write its report."""
+"""The commands for studies: run one or continue it, show its progress, write its report."""
 
 from __future__ import annotations
 
 import argparse
-import re
-import shlex
 from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..calls import studying
+from ..declare.commands import arguments
 from ..printing import complain, complain_traceback, console, tell, tell_json
-from .options import (
-    COUNT,
-    DONE,
-    FAILED,
-    INTERRUPTED,
-    JOBS,
-    RUN_TIMEOUT,
-    TYPES,
-    command,
-    complain_of,
-    first_seed,
-    option,
-    several,
-)
+from .options import DONE, FAILED, INTERRUPTED, command, option, taken
 
 if TYPE_CHECKING:
-    from ..study import Plan, StudyResults
+    from ..study.judge.study_results import StudyResults
+    from ..study.plan.plan import Plan
 
 SHOWN = 5  # failed runs that are reported one by one
 
 
-def address(text: str) -> str:
-    """The address of a scheduler."""
-    found = re.fullmatch(r"((?:tcp|tls|ws|wss)://)?([^\s:/]+|\[[0-9a-fA-F:]+\]):([0-9]{1,5})", text)
-    if found is None or int(found[3]) >= 2**16:
-        raise argparse.ArgumentTypeError(f"{text!r} is not an address such as tcp://localhost:8786")
-    return f"{found[1] or 'tcp://'}{found[2]}:{found[3]}"
+FOLDER = option("folder", metavar="DIR", type=Path, help="the results folder")
+FOLDER_OF_STUDY = option("folder", metavar="DIR", type=Path, help="the results folder of the study")
 
 
 # -- making runs ------------------------------------------------------------------------------------------------------
 
-FOLDER = option("folder", metavar="DIR", type=Path, help="the results folder")
-FOLDER_OF_STUDY = option("folder", metavar="DIR", type=Path, help="the results folder of the study")
-SESSION = (
-    option(
-        "--executor",
-        choices=("local", "dask"),
-        default="local",
-        help="where to make runs: in processes on this machine, or on Dask workers (default: local)",
-    ),
-    option(
-        "--scheduler",
-        type=address,
-        metavar="ADDRESS",
-        help="the Dask scheduler whose workers make the runs (default: start one here, with --jobs workers)",
-    ),
-    JOBS,
-    RUN_TIMEOUT,
-    option("--retry", action="store_true", help="repeat runs that took too long, or whose process was killed"),
-)
-
 
 @command(
-    "run a study: a model under many conditions",
-    option("study", metavar="STUDY", help="a path to a YAML file, or the name of a packaged study"),
-    several(
-        "--set",
-        metavar="PATH=VALUE",
-        help="set a parameter of the model that the study does not vary; may be repeated",
-    ),
-    option(
-        "--replications",
-        type=COUNT,
-        metavar="N",
-        help="runs of each condition (default: the study's); a larger number adds runs",
-    ),
-    option("--seed", type=first_seed, metavar="N", help="seed of the first replication (default: the study's)"),
-    option("--out", metavar="DIR", type=Path, help="results folder (default: results/STUDY)"),
+    "run a study: a model under many conditions; or continue one",
+    taken(studying.study),
     option("--yes", action="store_true", help="make the runs even if there are very many"),
-    TYPES,
-    *SESSION,
     imports=("show.report", "study"),
 )
 def study(options: argparse.Namespace) -> int:
-    """Make all runs of a study that are not yet in its results folder."""
-    from ..language.study import read_study
-    from ..show.report import check_figures
-    from ..study import Plan, available_cores, check_size
-
-    _check_session(options)
-    found = read_study(
-        options.study,
-        set=options.set,
-        types=map(Path, options.types),
-        replications=options.replications,
-        seed=options.seed,
-    )
-    if options.replications is not None and found.until is not None:
-        complain(f"{found.name} decides by 'until' how many replications it needs: --replications has no effect")
-    plan = Plan.made(found)
-    check_figures(plan)
-    if not options.yes:
-        check_size(plan, options.jobs or available_cores())
-    return _session(plan, options.out or Path("results") / found.name, options)
-
-
-@command("resume a study", FOLDER, TYPES, *SESSION, imports=("study",))
-def resume(options: argparse.Namespace) -> int:
-    """Make the runs that are missing from the results folder of a study."""
-    from ..study import StoreError, plan_of_folder
-
-    _check_session(options)
-    plan = plan_of_folder(options.folder, map(Path, options.types))
-    if plan.search is not None:
-        told = shlex.join(plan.search["command"])
-        raise StoreError(f"{options.folder} holds a search, which its own command continues\n   help: {told}")
-    return _session(plan, options.folder, options)
-
-
-def _check_session(options: argparse.Namespace) -> None:
-    """Raise ``EpicycleError`` for options that exclude each other."""
+    """Make all runs of a study that are not yet in its results folder; with a results folder, those that it lacks."""
     from epicycle.actors import EpicycleError
 
-    if options.scheduler is not None:
-        if options.executor != "dask":
-            raise EpicycleError(f"--scheduler {options.scheduler} is for --executor dask")
-        if options.jobs is not None:
+    from ..study.session import available_cores, check_size
+
+    given = arguments(studying.study, options)
+    session = {name: given.pop(name, None) for name in ("executor", "scheduler", "jobs", "run_timeout", "retry")}
+    if (scheduler := session["scheduler"]) is not None:
+        if session["executor"] != "dask":
+            raise EpicycleError(f"--scheduler {scheduler} is for --executor dask")
+        if session["jobs"] is not None:
             raise EpicycleError(
                 "--jobs counts processes on this machine and does not go with --scheduler, which has its own workers"
             )
+    plan, folder = studying.plan_of(**given)
+    if given.get("replications") is not None and plan.study.until is not None:
+        complain(f"{plan.study.name} decides by 'until' how many replications it needs: --replications has no effect")
+    if not options.yes and not Path(options.study).is_dir():
+        check_size(plan, session["jobs"] or available_cores())
+    return _session(plan, folder, options, session)
 
 
-def _session(plan: Plan, folder: Path, options: argparse.Namespace) -> int:
+def _session(plan: Plan, folder: Path, options: argparse.Namespace, session: dict[str, Any]) -> int:
     """Make the missing runs and report the outcome."""
     from epicycle.actors import counted
 
-    from ..study import WorkerError, WriteError, again, open_study, progress, run_study
+    from ..study.judge.study_results import open_study
+    from ..study.run.processes import WorkerError
+    from ..study.run.progress import progress
+    from ..study.run.runner import again
+    from ..study.run.store import WriteError
+    from ..study.session import run_study
 
     try:
         with progress(plan.study.name) as told:
             outcome = run_study(
                 plan,
                 folder,
-                jobs=options.jobs,
-                timeout=options.run_timeout,
-                retry=options.retry,
+                jobs=session["jobs"],
+                timeout=session["run_timeout"],
+                retry=bool(session["retry"]),
                 tell=told,
-                executor=options.executor,
-                scheduler=options.scheduler,
+                executor=session["executor"] or "local",
+                scheduler=session["scheduler"],
             )
     except KeyboardInterrupt:
-        complain(f"interrupted; finished runs are kept: 'epicycle resume {folder}' continues")
+        complain(f"interrupted; finished runs are kept: 'epicycle study {folder}' continues")
         return INTERRUPTED
     except (WorkerError, WriteError) as error:  # not the study's fault
         complain(f"error: {error}")
@@ -212,7 +140,8 @@ def _about_others(results: StudyResults) -> Iterator[str]:
 )
 def status(options: argparse.Namespace) -> int:
     """Show the progress of a study, also while it is running."""
-    from ..study import is_running, open_study
+    from ..study.judge.study_results import open_study
+    from ..study.run.store import is_running
 
     def counted(statuses: Counter[str]) -> str:
         return ", ".join(f"{number:,} {status}" for status, number in sorted(statuses.items()))
@@ -234,7 +163,7 @@ def status(options: argparse.Namespace) -> int:
     if results.path.exists() and not running and not results.is_written():
         tell(
             f"{results.path} does not match the runs: it is damaged or out of date\n"
-            f"   help: 'epicycle resume {options.folder}' rewrites it"
+            f"   help: 'epicycle study {options.folder}' rewrites it"
         )
     if options.conditions:
         by_condition: dict[int, Counter[str]] = {}
@@ -249,53 +178,10 @@ def status(options: argparse.Namespace) -> int:
 
 
 @command(
-    "repeat one run of a study",
-    FOLDER_OF_STUDY,
-    option("run_key", metavar="RUN", help="the run's name in the column 'run', or the beginning of the name"),
-    option("--out", metavar="DIR", type=Path, help="folder to write to (default: DIR/replays/RUN)"),
-    TYPES,
-    imports=("build", "show", "study"),
-)
-def replay(options: argparse.Namespace) -> int:
-    """Repeat one run of a study, with its event log, all recorded signals and figures."""
-    from ..build.figures import figures_of
-    from ..calls import RunSpec
-    from ..results import write_log
-    from ..show import check_folder, draw_figures, summary_table, write_folder
-    from ..study import again, open_study, plan_of_folder
-    from ..text.problems import Problems
-
-    row = open_study(options.folder).find(options.run_key)
-    plan = plan_of_folder(options.folder, map(Path, options.types))
-    folder = options.out or options.folder / "replays" / row["run"][:12]
-    model, results, error = again(plan, plan.condition(row["condition"]), row["seed"])
-    errors = [] if error is None else [error]
-    figures = {} if errors else figures_of(model, Problems())
-    if replaced := check_folder(folder, model.name, options.given):
-        complain(replaced)
-    how = RunSpec(study=str(options.folder), run=row["run"][:12]).plain()
-    written = write_folder(folder, results, options.given, "".join(map(str, errors)), how)
-    written.append(folder / "log.parquet")
-    write_log(results.log.records, written[-1])
-    drawn, failed = draw_figures(folder, results, figures)
-    console().print(summary_table(model, results))
-    for path in [*drawn, *written]:
-        tell(f"wrote {path}")
-    if errors or failed:
-        return complain_of([*errors, *failed], options)
-    if row["digest"] is not None and row["digest"] != results.digest:
-        complain(f"error: the digest is {results.digest}, but was {row['digest']}: something has changed since")
-        return FAILED
-    tell(f"digest {results.digest}" + (": the same" if row["digest"] is not None else ""))
-    return DONE
-
-
-@command(
     "write the report of a study",
     FOLDER_OF_STUDY,
     option("--out", metavar="DIR", type=Path, help="folder to write to (default: the results folder)"),
-    option("--jobs", metavar="N", type=COUNT, help="runs to repeat at the same time (default: one per core)"),
-    TYPES,
+    taken(studying.study, only={"jobs", "types"}),
     imports=("show.report", "study"),
 )
 def report(options: argparse.Namespace) -> int:
@@ -303,10 +189,11 @@ def report(options: argparse.Namespace) -> int:
     from rich.progress import Progress
 
     from ..show.report import write_report
-    from ..study import available_cores, open_study
+    from ..study.judge.study_results import open_study
+    from ..study.session import available_cores
 
-    results, terminal = open_study(options.folder, types=options.types), console(stderr=True)
-    folder, jobs = options.out or options.folder, options.jobs or available_cores()
+    results, terminal = open_study(options.folder, types=getattr(options, "types", ())), console(stderr=True)
+    folder, jobs = options.out or options.folder, getattr(options, "jobs", None) or available_cores()
     with Progress(console=terminal, transient=True, disable=not terminal.is_terminal) as bar:
         task = bar.add_task("repeating runs for their signals", total=None)
 

@@ -4,27 +4,28 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
-from itertools import pairwise
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from epicycle.actors import EpicycleError, read_table, to_nanoseconds, to_seconds
 
-from ..build.load import load_model
 from ..build.model import Model
-from ..catalogue.types import types_of_file
 from ..engine import Simulation
 from ..language.dimensions import number_node
 from ..language.settings import Setting
 from ..student import student_quantile
+from ..study.session import available_cores
 from ..text.files import COMMAND_LINE
 from ..text.problems import ModelError, Position, Problems
+from .cache import NUMBER, EvaluationCache
+from .calibration import Calibration, Fitted, Matched
+from .evaluator import Evaluator
 from .proposals import SPREAD, Point, spread
 from .space import Interval, read_space
-from .tried import NUMBER, Tried
+from .spec import Match, SearchSpec
 
 if TYPE_CHECKING:
     import numpy as np
@@ -38,117 +39,73 @@ _LARGEST = 1e9  # s; no clock of a model goes further
 _BLIND = 1e-7  # of the largest singular value: below it, the data do not tell a direction
 
 
-@dataclass(frozen=True)
-class Task:
-    """What is to be calibrated: the words of the command."""
-
-    model: str
-    match: Sequence[str]  # signal=file
-    vary: Sequence[str]
-    linear: bool = False
-    seed: int | None = None
-    set: Sequence[str] = ()
-    disturb: Sequence[str] = ()
-    types: Sequence[Path] = ()
-
-
-@dataclass(frozen=True)
-class Fitted:
-    """A parameter with its value, standard error and 95 % interval, in its unit; infinite if unknown."""
-
-    path: str
-    unit: str
-    value: float
-    error: float
-    low: float
-    high: float
-    at_end: bool  # of its range
-
-
-@dataclass(frozen=True)
-class Match:
-    """A measured signal, and what the model sends at the same times."""
-
-    signal: str
-    times: list[int]  # ns
-    measured: list[float]
-    modelled: list[float]
-
-    @property
-    def residuals(self) -> list[float]:
-        """What was measured less what the model sends."""
-        return [one - other for one, other in zip(self.measured, self.modelled, strict=True)]
-
-    @property
-    def rms(self) -> float:
-        """The root of the mean square of the residuals."""
-        return math.sqrt(math.fsum(each * each for each in self.residuals) / len(self.times))
-
-    @property
-    def correlation(self) -> float:
-        """How alike neighbouring residuals are, from -1 to 1: about 0 if nothing but independent errors is left."""
-        squares = math.fsum(each * each for each in self.residuals)
-        return math.fsum(one * other for one, other in pairwise(self.residuals)) / squares if squares else 0.0
-
-
-@dataclass(frozen=True)
-class Calibration:
-    """The fitted parameters, the fit of each signal, and how many of the starts have ended there."""
-
-    model: str
-    seed: int
-    parameters: list[Fitted]
-    matches: list[Match]
-    pairs: list[tuple[str, str, float]]  # of parameters that the data hardly tell apart, with their correlation
-    starts: int
-    agreeing: int
-    runs: int
-
-
-def calibrate(task: Task, folder: Path | None, tell: Callable[[int], None] = lambda runs: None) -> Calibration:
+def calibrate(
+    spec: SearchSpec,
+    goal: Match,
+    folder: Path | None,
+    *,
+    jobs: int | None = None,
+    tell: Callable[[int], None] = lambda runs: None,
+) -> Calibration:
     """Fit parameters to measured signals, from the best of points that are spread over the ranges.
 
     Each run is noted in the folder, so that a search that was killed continues there.  ``tell`` is called with how many
     runs were made.  Raises ``EpicycleError``.
     """
+    task = _Task(spec, goal)
+    cache = EvaluationCache(task.model, task.about(), [NUMBER], folder)
+    with Evaluator(_Worker(task), jobs or available_cores(), _worker_of, spec, goal) as evaluator:
+        return _fitted(_Runs(task, evaluator, cache, tell))
+
+
+def _fitted(runs: _Runs) -> Calibration:
     import numpy as np
     from scipy.optimize import least_squares
 
-    runs = _Runs(task, folder, tell)
-    count = len(runs.axes)
-    if len(runs.scales) <= count:
-        raise EpicycleError(f"{len(runs.scales)} measured values cannot tell {count} parameters: more are needed")
+    task = runs.task
+    count = len(task.axes)
+    if len(task.scales) <= count:
+        raise EpicycleError(f"{len(task.scales)} measured values cannot tell {count} parameters: more are needed")
 
-    def residuals(shifted: NDArray[np.float64]) -> NDArray[np.float64]:
-        # From 1 to 2, not from 0 to 1: steps of derivatives are relative.
-        modelled = runs.modelled(tuple(float(each) - 1.0 for each in shifted))
-        gaps = (one - other for one, other in zip(runs.measured, modelled, strict=True))
-        return np.array([gap / scale for gap, scale in zip(gaps, runs.scales, strict=True)])
+    def residuals(shares: NDArray[np.float64]) -> NDArray[np.float64]:
+        gaps = (one - other for one, other in zip(task.measured, runs.modelled(_point(shares)), strict=True))
+        return np.array([gap / scale for gap, scale in zip(gaps, task.scales, strict=True)])
 
-    points = [point for number in range(SPREAD) for point in spread(count, runs.seed, number)]
-    costs = [math.fsum(each * each for each in residuals(np.array(point) + 1.0).tolist()) for point in points]
+    def jacobian(shares: NDArray[np.float64]) -> NDArray[np.float64]:
+        """Derivatives of second order, which stay within the ranges."""
+        at = residuals(shares)
+        stencils = [_stencil(share) for share in shares.tolist()]
+        places = [[_moved(shares, axis, step) for step in steps] for axis, (steps, *_) in enumerate(stencils)]
+        runs.expect(_point(place) for each in places for place in each)
+        columns = []
+        for (_, own, (first, second)), (one, other) in zip(stencils, places, strict=True):
+            columns.append((own * at + first * residuals(one) + second * residuals(other)) / _STEP)
+        return np.array(columns).T
+
+    points = [point for number in range(SPREAD) for point in spread(count, task.seed, number)]
+    runs.expect(points)
+    costs = [math.fsum(each * each for each in residuals(np.array(point)).tolist()) for point in points]
     ends = []
     for at in sorted(range(len(points)), key=costs.__getitem__)[:STARTS]:
         found = least_squares(
             residuals,
-            np.array(points[at]) + 1.0,
-            jac="3-point",
-            bounds=(1.0, 2.0),
-            diff_step=_STEP,
+            np.array(points[at]),
+            jac=jacobian,
+            bounds=(0.0, 1.0),
             xtol=1e-10,
             ftol=1e-10,
             gtol=1e-12,
             max_nfev=100,
         )
-        ends.append((float(found.cost), [float(each) - 1.0 for each in found.x], found.jac))
+        ends.append((float(found.cost), _point(found.x), found.jac))
     cost, best, slopes = min(ends, key=lambda each: each[0])
     agreeing = sum(max(abs(a - b) for a, b in zip(place, best, strict=True)) < _ALIKE for _, place, _ in ends)
-    parameters, pairs = _parameters(runs.axes, best, slopes, 2.0 * cost)
-    modelled, matches, start = runs.modelled(tuple(best)), [], 0
-    for signal, times, measured in runs.signals:
-        matches.append(Match(signal, times, measured, modelled[start : start + len(times)]))
+    parameters, pairs = _parameters(task.axes, best, slopes, 2.0 * cost)
+    modelled, matches, start = runs.modelled(best), [], 0
+    for signal, times, measured in task.signals:
+        matches.append(Matched(signal, times, measured, modelled[start : start + len(times)]))
         start += len(times)
-    return Calibration(runs.name, runs.seed, parameters, matches, pairs, len(ends), agreeing, runs.number)
+    return Calibration(task.model.name, task.seed, parameters, matches, pairs, len(ends), agreeing)
 
 
 def _parameters(
@@ -180,38 +137,57 @@ def _parameters(
     return fitted, pairs
 
 
-class _Runs:
-    """Runs of a model with different parameters, each made once; ``modelled`` is what they are asked for."""
+def _point(shares: NDArray[np.float64]) -> Point:
+    return tuple(map(float, shares))
 
-    def __init__(self, task: Task, folder: Path | None, tell: Callable[[int], None]) -> None:
-        self._task, self._tell = task, tell
-        self._types = [each for file in task.types for each in types_of_file(file)]
-        model = self._load(())
+
+def _moved(shares: NDArray[np.float64], axis: int, step: float) -> NDArray[np.float64]:
+    moved = shares.copy()
+    moved[axis] += step
+    return moved
+
+
+def _stencil(share: float) -> tuple[tuple[float, float], float, tuple[float, float]]:
+    """Two steps from a share of a range, and the weights of the value there and after each of them."""
+    if share < _STEP:
+        return (_STEP, 2.0 * _STEP), -1.5, (2.0, -0.5)
+    if share > 1.0 - _STEP:
+        return (-_STEP, -2.0 * _STEP), 1.5, (-2.0, 0.5)
+    return (-_STEP, _STEP), 0.0, (-0.5, 0.5)
+
+
+class _Task:
+    """What is fitted to what, read once."""
+
+    def __init__(self, spec: SearchSpec, goal: Match) -> None:
+        self.spec, self.linear = spec, goal.between == "linear"
+        self.model = spec.load()
         problems = Problems()
-        space = read_space(task.vary, model, (), task.set, problems)
+        space = read_space(spec.vary, self.model, (), spec.set, problems)
         problems.raise_if_any()
         self.axes = [axis for axis in space.axes if isinstance(axis, Interval) and not axis.is_whole]
         if wrong := [axis.path for axis in space.axes if axis not in self.axes]:
             raise EpicycleError(f"{wrong[0]!r} has no range of real numbers, which least squares need")
         if not self.axes:
             raise EpicycleError("there is nothing to vary\n   help: add --vary load=0.5..0.9")
-        self.signals = [_measured(text) for text in task.match]
+        self.signals = [_measured(text) for text in goal.files]
         if not self.signals:
             raise EpicycleError("there is nothing to match\n   help: add --match server.size=measured.csv")
         self.measured = [value for _, _, values in self.signals for value in values]
         self.scales = [_deviation(values) for _, _, values in self.signals for _ in values]
-        self.seed = model.output.seed if task.seed is None else task.seed
-        self.name, self.number = model.name, 0
-        digest = self._results(model).digest
-        about = {"model": model.name, "seed": self.seed, "digest": digest, "match": list(task.match)}
-        about |= {"times": [times for _, times, _ in self.signals], "linear": task.linear}
-        self._tried = Tried(model, about, [NUMBER], folder)
+        self.seed = self.model.output.seed if spec.seed is None else spec.seed
+        self.files = goal.files
 
-    def _load(self, settings: Sequence[Setting]) -> Model:
-        task = self._task
-        return load_model(task.model, set=[*task.set, *settings], disturb=task.disturb, types=self._types)
+    def about(self) -> dict[str, Any]:
+        """What outcomes depend on besides the model."""
+        said = {"model": self.model.name, "seed": self.seed, "match": self.files, "linear": self.linear}
+        return said | {
+            "digest": self.results(self.model).digest,
+            "times": [times for _, times, _ in self.signals],
+        }
 
-    def _results(self, model: Model) -> Any:
+    def results(self, model: Model) -> Any:
+        """What comes of a run, with the signals that are matched."""
         for signal, _, _ in self.signals:
             try:
                 model.record(signal)
@@ -221,28 +197,69 @@ class _Runs:
                 raise ModelError(replace(problem, position=at) for problem in error.problems) from None
         return Simulation(model, seed=self.seed).run()
 
-    def modelled(self, point: Point) -> list[float]:
-        """What the model sends at the times of all measured values."""
-        settings = [
+    def settings(self, point: Point) -> list[Setting]:
+        """What sets the parameters to the shares of their ranges."""
+        return [
             Setting(axis.path, number_node(_number(axis, share), axis.unit, axis.position), axis.position)
             for axis, share in zip(self.axes, point, strict=True)
         ]
-        key = ", ".join(f"{each.path}={getattr(each.node, 'text', '')}" for each in settings)
 
-        def found() -> list[float]:
-            self.number += 1
-            self._tell(self.number)
-            try:
-                results = self._results(self._load(settings))
-            except EpicycleError as error:
-                raise EpicycleError(f"{key}: {error}") from error
-            return [
-                value
-                for signal, times, _ in self.signals
-                for value in _sampled(results.signals[signal], signal, times, results.end, self._task.linear, key)
-            ]
 
-        values: list[float] = self._tried.outcome(key, found)
+class _Worker:
+    """Makes runs with given parameters."""
+
+    def __init__(self, task: _Task) -> None:
+        self._task = task
+
+    def prepare(self, request: object) -> None:
+        """There is nothing to load."""
+
+    def make(self, request: tuple[Point, str]) -> list[float]:
+        """What the model sends at the times of all measured values."""
+        task, (point, key) = self._task, request
+        try:
+            results = task.results(task.spec.load(task.settings(point)))
+        except EpicycleError as error:
+            raise EpicycleError(f"{key}: {error}") from error
+        return [
+            value
+            for signal, times, _ in task.signals
+            for value in _sampled(results.signals[signal], signal, times, results.end, task.linear, key)
+        ]
+
+
+def _worker_of(spec: SearchSpec, goal: Match) -> _Worker:
+    """The same in another process."""
+    return _Worker(_Task(spec, goal))
+
+
+class _Runs:
+    """Runs with different parameters, each made once."""
+
+    def __init__(self, task: _Task, evaluator: Evaluator, cache: EvaluationCache, tell: Callable[[int], None]) -> None:
+        self.task = task
+        self._evaluator, self._cache, self._tell = evaluator, cache, tell
+        self._number = 0
+
+    def _key(self, point: Point) -> str:
+        settings = self.task.settings(point)
+        return ", ".join(f"{each.path}={getattr(each.node, 'text', '')}" for each in settings)
+
+    def expect(self, points: Iterable[Point]) -> None:
+        """Say which runs will be asked for next."""
+        keys = ((self._key(point), point) for point in points)
+        self._evaluator.expect((key, (point, key)) for key, point in keys if key not in self._cache)
+
+    def modelled(self, point: Point) -> list[float]:
+        """What the model sends at the times of all measured values."""
+        key = self._key(point)
+
+        def found() -> Any:
+            self._number += 1
+            self._tell(self._number)
+            return self._evaluator.make(key, (point, key))
+
+        values: list[float] = self._cache.outcome(key, found)
         return values
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -16,79 +16,11 @@ from ..engine import Interventions, Simulation
 from ..graph.acts import Act, ActName
 from ..graph.model_graph import ModelGraph
 from ..results import Results, Verdict, canonical, plain
+from .cache import NUMBER, EvaluationCache
+from .evaluator import Evaluator, Recipe, jobs_for
+from .explanation import INTERRUPT, LIMIT, RUNS, Effect, Explanation, Step
 from .minimal import minimal
 from .monitored import property_of
-from .tried import NUMBER, Tried
-
-RUNS = 500  # that a search makes at most by default
-LIMIT, INTERRUPT = "limit", "interrupt"  # what ended a search too soon
-
-
-@dataclass(frozen=True)
-class Effect:
-    """What one act of a smallest set does: the robustness of the property without it, and with it alone.
-
-    ``act`` is the act in the run of the set, ``whole`` the one of that name in the whole run.  They may differ, because
-    acts are counted, and the run takes another course without the others.
-    """
-
-    act: Act
-    whole: Act
-    without: float | None = None
-    alone: float | None = None
-
-    @property
-    def has_moved(self) -> bool:
-        """Whether the act of that name is another one in the whole run."""
-        return (self.act.time, self.act.source, self.act.token) != (
-            self.whole.time,
-            self.whole.source,
-            self.whole.token,
-        )
-
-
-@dataclass(frozen=True)
-class Step:
-    """The first send of a port that is another one without an act; one of the tokens is None if nothing was sent."""
-
-    port: str
-    time: float  # s
-    token: Any
-    instead: Any
-
-
-@dataclass(frozen=True)
-class Explanation:
-    """A smallest set of acts that breaks a property in a run.
-
-    With these acts and no others it is broken, and without any single one of them it holds: ``effects``, in the order
-    in which they happen.  There are none if it is broken without any act.  ``steps`` lead from the first act to a port
-    that the property asks for.  If the search was ended before that, by ``LIMIT`` or ``INTERRUPT``, the set breaks the
-    property, but need not be minimal.  With ``only``, acts of other aspects, the ``others``, happen in all runs.
-    """
-
-    model: str
-    seed: int
-    monitor: str
-    source: str  # its property
-    verdict: Verdict  # of the run as it was
-    verdict_of_set: Verdict
-    verdict_of_none: Verdict
-    acts: int  # that may be in the set: those of the run up to when it broke
-    effects: list[Effect]
-    steps: list[Step] = field(default_factory=list)
-    runs: int = 0  # that were made now
-    limit: int = RUNS
-    ended: str = ""
-    only: tuple[str, ...] = ()
-    others: frozenset[ActName] = frozenset()
-    also: tuple[str, ...] = ()  # other monitors that are broken in the whole run
-
-    @property
-    def names(self) -> list[ActName]:
-        """The acts of the set."""
-        return [each.act.name for each in self.effects]
-
 
 _NONE = type(None)
 _SHAPE = [(bool, _NONE), (*NUMBER, _NONE), [(int,)]]  # of an outcome
@@ -98,64 +30,90 @@ class _LimitError(Exception):
     """There are as many runs as a search may make."""
 
 
-class _Runs:
-    """Runs of a model in which some acts happen and, of those that are looked at, no others."""
+class _Worker:
+    """Makes runs of a model in which some acts happen and, of those that are looked at, no others."""
 
-    def __init__(self, model: Model, seed: int | None, until: float | None, limit: int) -> None:
-        self.model = model
-        self.monitor = ""
-        self.seed = seed
-        self.until = until
-        self.limit = limit
-        self.number = 0
-        self.tried = Tried(model, {}, _SHAPE)
-        self.others: frozenset[ActName] = frozenset()  # which happen in all runs
-        self.order: list[ActName] = []  # of the acts by name, to which the outcomes refer
-        self.best: frozenset[ActName] | None = None  # the smallest set so far
-        self.looks_ahead = False
-        self._asked: dict[frozenset[ActName], list[Any]] = {}
+    def __init__(
+        self,
+        model: Model,
+        monitor: str,
+        seed: int | None,
+        until: float | None,
+        order: Sequence[ActName] = (),  # of the acts that are looked at, to which the outcomes refer
+        others: frozenset[ActName] = frozenset(),  # which happen in all runs
+    ) -> None:
+        self._model, self._monitor, self._seed, self._until = model, monitor, seed, until
+        self._order, self._others = order, others
 
     def results(self, exactly: Collection[ActName] | None, *, keep_log: bool = False) -> Results:
         """What comes of the run with these acts; with None, with all."""
-        self.number += 1
-        acts = Interventions(None if exactly is None else self.others.union(exactly))
-        return Simulation(self.model, seed=self.seed, acts=acts, keep_log=keep_log).run(until=self.until)
+        acts = Interventions(None if exactly is None else self._others.union(exactly))
+        return Simulation(self._model, seed=self._seed, acts=acts, keep_log=keep_log).run(until=self._until)
+
+    def prepare(self, request: object) -> None:
+        """There is nothing to load."""
+
+    def make(self, request: tuple[frozenset[ActName], bool]) -> list[Any]:
+        """Whether the property holds, its robustness, and if it is broken the places of acts that are not to blame."""
+        names, looks_ahead = request
+        results = self.results(names)
+        verdict = results.monitors[self._monitor]
+        if verdict.holds is not False:
+            return [verdict.holds, verdict.robustness, []]
+        acting = {act.name for act in _up_to(verdict, results.acts, looks_ahead)}
+        idle = [place for place, name in enumerate(self._order) if name in names and name not in acting]
+        return [verdict.holds, verdict.robustness, idle]
+
+
+def _worker_of(recipe: Recipe, *others: Any) -> _Worker:
+    """The same in another process."""
+    return _Worker(recipe.model(), *others)
+
+
+def _up_to(verdict: Verdict, acts: Iterable[Act], looks_ahead: bool) -> list[Act]:
+    """The acts that may have broken a property: not later ones, unless it looks ahead."""
+    return [act for act in acts if looks_ahead or verdict.time is None or to_seconds(act.time) <= verdict.time]
+
+
+class _Sets:
+    """Sets of acts that a search asks about, each once and as many as its limit."""
+
+    def __init__(self, evaluator: Evaluator, cache: EvaluationCache, order: Sequence[ActName], limit: int) -> None:
+        self._evaluator, self._cache, self._order, self._limit = evaluator, cache, order, limit
+        self._asked: dict[frozenset[ActName], list[Any]] = {}
+        self.best: frozenset[ActName] | None = None  # the smallest set so far
+        self.looks_ahead = False
+        self.made = 0  # runs that were made now
 
     def _outcome(self, names: frozenset[ActName]) -> list[Any]:
-        """Whether the property holds, its robustness, and if it is broken the places of acts that are not to blame."""
-
         def found() -> list[Any]:
-            results = self.results(names)
-            verdict = results.monitors[self.monitor]
-            if verdict.holds is not False:
-                return [verdict.holds, verdict.robustness, []]
-            acting = {act.name for act in self.up_to(verdict, results.acts)}
-            idle = [place for place, name in enumerate(self.order) if name in names and name not in acting]
-            return [verdict.holds, verdict.robustness, idle]
+            self.made += 1
+            made: list[Any] = self._evaluator.make(names, (names, self.looks_ahead))
+            return made
 
         if names not in self._asked:
-            # A digest, as there may be thousands of names.
-            key = hashlib.sha256("; ".join(map(str, sorted(names))).encode()).hexdigest()[:32]
-            self._asked[names] = self.tried.outcome(key, found)
+            self._asked[names] = self._cache.outcome(_key(names), found)
         return self._asked[names]
+
+    def expect(self, sets: Iterable[frozenset[ActName]]) -> None:
+        """Say what will probably be asked next."""
+        new = (each for each in sets if each not in self._asked and _key(each) not in self._cache)
+        left = max(self._limit - len(self._asked), 0)
+        self._evaluator.expect((each, (each, self.looks_ahead)) for each in islice(new, left))
 
     def breaks(self, names: frozenset[ActName]) -> bool:
         """Whether the property is broken with these acts; raises ``_LimitError``."""
         # Runs that are known count too, so that a search that was killed comes to the same.
-        if names not in self._asked and len(self._asked) >= self.limit:
+        if names not in self._asked and len(self._asked) >= self._limit:
             raise _LimitError
         is_broken = self._outcome(names)[0] is False
         if is_broken and (self.best is None or len(names) < len(self.best)):
             self.best = names
         return is_broken
 
-    def up_to(self, verdict: Verdict, acts: Iterable[Act]) -> list[Act]:
-        """The acts that may have broken a property: not later ones, unless it looks ahead."""
-        return [act for act in acts if self.looks_ahead or verdict.time is None or to_seconds(act.time) <= verdict.time]
-
     def active(self, names: frozenset[ActName]) -> frozenset[ActName]:
         """The acts of a set that breaks the property which happen, and before it is broken."""
-        return names.difference(self.order[place] for place in self._outcome(names)[2])
+        return names.difference(self._order[place] for place in self._outcome(names)[2])
 
     def effect(self, names: frozenset[ActName], name: ActName) -> tuple[float | None, float | None]:
         """The robustness without an act of a set, and with it alone."""
@@ -168,6 +126,11 @@ class _Runs:
         return len(self._asked)
 
 
+def _key(names: Iterable[ActName]) -> str:
+    """A digest, as there may be thousands of names."""
+    return hashlib.sha256("; ".join(map(str, sorted(names))).encode()).hexdigest()[:32]
+
+
 def explain(
     model: Model,
     monitors: Sequence[str],
@@ -177,7 +140,9 @@ def explain(
     limit: int = RUNS,
     only: Collection[str] = (),
     folder: Path | None = None,
+    jobs: int | None = None,
     tell: Callable[[int, int], None] | None = None,
+    command: Sequence[str] = (),
 ) -> Explanation:
     """Find a smallest set of acts that breaks the monitor of a model that is broken first in a run.
 
@@ -188,10 +153,9 @@ def explain(
     """
     sources = {monitor: property_of(model, monitor) for monitor in monitors}
     chosen = _chosen(model, only)
-    runs = _Runs(model, seed, until, limit)
-    whole = runs.results(model.exactly)
+    whole = _Worker(model, "", seed, until).results(model.exactly)
     monitor, *also = _broken(model.name, {each: whole.monitors[each] for each in monitors})
-    runs.monitor, verdict, source = monitor, whole.monitors[monitor], sources[monitor]
+    verdict, source = whole.monitors[monitor], sources[monitor]
     about = {
         "model": model.name,
         "seed": whole.seed,
@@ -200,48 +164,53 @@ def explain(
         "digest": whole.digest,
         "only": sorted(chosen),
     }
-    runs.tried = Tried(model, about, _SHAPE, folder)
     acts = {act.name: act for act in whole.acts}
     mine = [name for name in acts if not chosen or name.aspect in chosen]
-    runs.order, runs.others = sorted(mine), frozenset(acts).difference(mine)
-
-    def breaks(names: frozenset[ActName]) -> bool:
-        found = runs.breaks(names)
-        if tell is not None:
-            tell(runs.asked, len(mine) if runs.best is None else len(runs.best))
-        return found
-
+    order, others = sorted(mine), frozenset(acts).difference(mine)
+    given = (monitor, seed, until, order, others)
+    worker, cache = _Worker(model, *given), EvaluationCache(model, about, _SHAPE, folder)
     none: frozenset[ActName] = frozenset()
-    before = [act.name for act in runs.up_to(verdict, whole.acts) if act.name not in runs.others]
+    before = [act.name for act in _up_to(verdict, whole.acts, False) if act.name not in others]
     candidates, ended, effects = mine, "", dict[ActName, tuple[float | None, float | None]]()
-    try:
-        if not breaks(none):
-            candidates = before
-            if not breaks(frozenset(before)):
-                candidates, runs.looks_ahead = mine, True
-                if not breaks(frozenset(mine)):
-                    raise EpicycleError(
-                        f"monitor {monitor} holds where all {len(mine):,} acts of this run happen and no others: what "
-                        "broke it left nothing in the event log"
-                    )
-            names = frozenset(minimal(candidates, breaks, runs.active))
-            effects = {name: runs.effect(names, name) for name in names}
-    except (_LimitError, KeyboardInterrupt) as end:
-        ended = LIMIT if isinstance(end, _LimitError) else INTERRUPT
-    best = frozenset(mine) if runs.best is None else runs.best
-    with_set, with_none = runs.results(best, keep_log=True), runs.results(none)
+    with Evaluator(worker, jobs_for(model, jobs), _worker_of, Recipe.of(model), *given) as evaluator:
+        sets = _Sets(evaluator, cache, order, limit)
+
+        def breaks(names: frozenset[ActName]) -> bool:
+            found = sets.breaks(names)
+            if tell is not None:
+                tell(sets.asked, len(mine) if sets.best is None else len(sets.best))
+            return found
+
+        try:
+            if not breaks(none):
+                candidates = before
+                if not breaks(frozenset(before)):
+                    candidates, sets.looks_ahead = mine, True
+                    if not breaks(frozenset(mine)):
+                        raise EpicycleError(
+                            f"monitor {monitor} holds where all {len(mine):,} faults of this run happen and no others: "
+                            "what broke it left nothing in the event log"
+                        )
+                names = frozenset(minimal(candidates, breaks, sets.active, sets.expect))
+                sets.expect(each for name in names for each in (names - {name}, frozenset([name])))
+                effects = {name: sets.effect(names, name) for name in names}
+        except (_LimitError, KeyboardInterrupt) as end:
+            ended = LIMIT if isinstance(end, _LimitError) else INTERRUPT
+    best = frozenset(mine) if sets.best is None else sets.best
+    with_set, with_none = worker.results(best, keep_log=True), worker.results(none)
     if ended:  # perhaps before the acts were left out that are not to blame
-        acting = best.intersection(act.name for act in runs.up_to(with_set.monitors[monitor], with_set.acts))
-        fewer = runs.results(acting, keep_log=True)
+        last = _up_to(with_set.monitors[monitor], with_set.acts, sets.looks_ahead)
+        acting = best.intersection(act.name for act in last)
+        fewer = worker.results(acting, keep_log=True)
         if fewer.monitors[monitor].holds is False:
             best, with_set = acting, fewer
     there = {act.name: act for act in with_set.acts if act.name in best}
     # An act that is not noted in the run of the set is reported as it was.
-    there |= {name: acts[name] for name in runs.order if name in best and name not in there}
+    there |= {name: acts[name] for name in order if name in best and name not in there}
     steps = []
     if there and not ended:
         ports = next(each.ports for each in model.output.monitors if each.name == monitor)
-        rest = runs.results(best - {next(iter(there))}, keep_log=True)
+        rest = worker.results(best - {next(iter(there))}, keep_log=True)
         steps = _steps(model.graph, ports, with_set, rest)
     return Explanation(
         model.name,
@@ -254,12 +223,15 @@ def explain(
         len(candidates),
         [Effect(act, acts[name], *effects.get(name, ())) for name, act in there.items()],
         steps,
-        runs.number,
+        sets.made,
         limit,
         ended,
         tuple(sorted(chosen)),
-        runs.others,
+        others,
         tuple(also),
+        until,
+        tuple(command),
+        model,
     )
 
 

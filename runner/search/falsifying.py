@@ -4,205 +4,116 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from epicycle.actors import EpicycleError
 
-from ..build.load import load_model
 from ..build.model import Model
-from ..catalogue.types import types_of_file
 from ..engine import Interventions, Simulation
-from ..language.dimensions import Level
-from ..language.settings import Setting
 from ..language.study import study_of_text
-from ..study import OK, Search, Trials, available_cores, open_trials
+from ..study.plan.plan import Search
+from ..study.search_runs import SearchRuns, open_search_runs
+from ..study.session import available_cores
 from ..text.problems import Problems
+from .falsification import Falsification, Run
 from .faults import FaultSpace
 from .growing import Growing, place_of, text_of
 from .monitored import AD_HOC, monitors_named, property_of
-from .proposals import BATCH, SPREAD, Point, is_guided, proposals
-from .space import Interval, Space, read_space
+from .proposals import Point, is_guided, proposals
+from .space import Interval, read_space
+from .spec import MAX_RUNS, Break, SearchSpec
 
 FILE = Path("falsify")  # what the study of a search has for a file, so that paths are relative to the working directory
-MAX_RUNS = 1_000_000
 MAX_POINTS = 150_000  # numbers in the text of a study, which is read with limits
 
 
-@dataclass(frozen=True)
-class Asked:
-    """What is to be searched: the words of the command, and as many runs at most; no ``monitor`` means all."""
-
-    model: str
-    monitor: str | None = None
-    vary: Sequence[str] = ()
-    runs: int = 500
-    seed: int = 0
-    set: Sequence[str] = ()
-    disturb: Sequence[str] = ()
-    types: Sequence[Path] = ()
-    command: Sequence[str] = ()
-    acts: int = 0  # the largest number of acts of aspects in a run; 0: all that happen
-    aspects: Sequence[str] = ()
-    without: Sequence[str] = ()
-    until: float | None = None  # s
-
-    def load(self, settings: Sequence[Setting] = ()) -> Model:
-        """The model, with further settings."""
-        model = load_model(
-            self.model,
-            set=[*self.set, *settings],
-            disturb=self.disturb,
-            aspects=self.aspects,
-            without_aspects=self.without,
-            types=[each for file in self.types for each in types_of_file(file)],
-        )
-        if self.until is not None:
-            model.stop = self.until
-        return model
-
-
-@dataclass(frozen=True)
-class Run:
-    """A run of a search: its number from 1, what was set, its seed, and what came of it.
-
-    Of several monitors, ``broken`` are those that do not hold, and ``robustness`` is the least.
-    """
-
-    number: int
-    level: Level
-    seed: int
-    status: str
-    holds: bool | None
-    robustness: float | None
-    error: str | None
-    digest: str | None
-    key: str
-    broken: tuple[str, ...] = ()
-
-
-@dataclass
-class Findings:
-    """What a search has found: all its runs, in order, and the first that is broken."""
-
-    model: str
-    monitors: dict[str, str]  # the property of each
-    space: Space | FaultSpace
-    guided: bool
-    runs: list[Run] = field(default_factory=list)
-    broken: Run | None = None  # the first run that breaks the property
-    least: Run | None = None  # the first run of least robustness
-    margin: float | None = None  # its robustness
-
-    @property
-    def failed(self) -> list[Run]:
-        """The runs of which nothing is known, as they raised an error or took too long."""
-        return [each for each in self.runs if each.status != OK]
-
-    @property
-    def not_judged(self) -> list[Run]:
-        """The runs of which nobody can tell whether they have the property."""
-        return [each for each in self.runs if each.status == OK and each.holds is None]
-
-    @property
-    def unguided(self) -> bool:
-        """Whether it would have been guided by now, were the library there."""
-        has_ranges = any(isinstance(axis, Interval) for axis in self.space.axes)
-        return has_ranges and not self.guided and len(self.runs) > SPREAD * BATCH
-
-    def add(self, run: Run) -> None:
-        """Another run is over."""
-        self.runs.append(run)
-        if self.broken is None and run.holds is False:
-            self.broken = run
-        margin = run.robustness
-        if margin is not None and not math.isnan(margin) and (self.margin is None or margin < self.margin):
-            self.least, self.margin = run, margin
-
-
 def falsify(
-    asked: Asked,
+    spec: SearchSpec,
+    goal: Break,
     folder: Path,
     *,
     jobs: int | None = None,
     timeout: float | None = None,
     tell: Callable[[int, Run | None], None] = lambda runs, least: None,
-) -> Findings:
+) -> Falsification:
     """Make runs until one breaks the property, or there are as many as are asked for.
 
     Runs that are in the folder already are not made again, so that a search that was killed continues.  ``tell`` is
     called with how many there are, and the one of least robustness.  Raises ``EpicycleError``.
     """
-    searching = _Searching(asked)
-    found, growing = searching.findings, searching.growing
+    searching = _Searching(spec, goal, folder)
+    found, growing = searching.found, searching.growing
     points = searching.next()
     growing.add(points)
-    with open_trials(growing.whole(), folder, jobs or available_cores(), timeout) as made:
+    with open_search_runs(growing.whole(), folder, jobs or available_cores(), timeout) as made:
         try:
             while points:
                 searching.make(points, made, lambda: tell(len(found.runs), found.least))
                 points = [] if found.broken else searching.next()
         finally:
             growing.tell(made, over=True)
+    if found.broken is not None:
+        found.repeat(found.broken)
     return found
 
 
 class _Searching:
     """What is chosen, batch by batch, and what came of it."""
 
-    def __init__(self, asked: Asked) -> None:
-        self._asked = asked
-        if not 0 < asked.runs <= MAX_RUNS:
-            raise EpicycleError(f"runs {asked.runs:,}: expected a whole number from 1 to {MAX_RUNS:,}")
-        model = asked.load()
-        names = monitors_named(model, asked.monitor, flag="--monitor" if asked.command else "")
+    def __init__(self, spec: SearchSpec, goal: Break, folder: Path) -> None:
+        self._spec, self._goal, self._seed = spec, goal, spec.seed or 0
+        if not 0 < goal.runs <= MAX_RUNS:
+            raise EpicycleError(f"runs {goal.runs:,}: expected a whole number from 1 to {MAX_RUNS:,}")
+        model = spec.load()
+        names = monitors_named(model, goal.monitor or None, flag="--break" if spec.command else "")
         monitors = {name: property_of(model, name) for name in names}
         metrics = [metric for name in names for metric in (name, f"{name}_robustness")]
         problems = Problems()
-        space = read_space(asked.vary, model, metrics, asked.set, problems)
+        space = read_space(spec.vary, model, metrics, spec.set, problems)
         problems.raise_if_any()
-        searched = space if not asked.acts else self._faults(model)
-        if asked.runs * searched.width > MAX_POINTS:
+        searched = space if not goal.max_faults else self._faults(model)
+        if goal.runs * searched.width > MAX_POINTS:
             most = MAX_POINTS // searched.width
             raise EpicycleError(
-                f"{asked.runs:,} runs are too many for one folder, where {searched.content} may take {most:,} values "
+                f"{goal.runs:,} runs are too many for one folder, where {searched.content} may take {most:,} values "
                 f"each\n   help: search with --runs {most} and several seeds, in a folder each"
             )
         keys = self._keys(model.name, metrics)
         study = replace(
-            study_of_text(text_of(keys, []), FILE, asked.set, asked.types),
-            aspects=tuple(asked.aspects),
-            without_aspects=tuple(asked.without),
-            stop=asked.until,
+            study_of_text(text_of(keys, []), FILE, spec.set, spec.types),
+            aspects=tuple(spec.aspects),
+            without_aspects=tuple(spec.without_aspects),
+            stop=spec.until,
         )
-        self.growing = Growing(study, keys, searched, Search(runs=asked.runs, command=list(asked.command)))
+        self.growing = Growing(study, keys, searched, Search(runs=goal.runs, command=list(spec.command)))
         guided = is_guided() and any(isinstance(axis, Interval) for axis in space.axes)
-        self.findings = Findings(model.name, monitors, searched, guided)
+        self.found = Falsification(spec, goal, model.name, monitors, searched, guided)
+        self.found.folder = folder
         self._proposals = (
-            searched.proposals(asked.seed)
+            searched.proposals(self._seed)
             if isinstance(searched, FaultSpace)
-            else proposals(len(space.axes), asked.seed, guided)
+            else proposals(len(space.axes), self._seed, guided)
         )
         self._latest: list[float | None] | None = None
 
     def _faults(self, model: Model) -> FaultSpace:
-        """The acts that happen in the run of the seed."""
-        asked = self._asked
-        if asked.vary:
+        """The faults that happen in the run of the seed."""
+        if self._spec.vary:
             raise EpicycleError(
-                "acts are searched in one run, in which nothing varies\n   help: leave out --vary or --acts"
+                "faults are searched in one run, in which nothing varies\n   help: leave out --vary or --max-faults"
             )
-        acts = Simulation(model, seed=asked.seed, acts=Interventions(model.exactly)).run().acts
+        acts = Simulation(model, seed=self._seed, acts=Interventions(model.exactly)).run().acts
         if not acts:
             raise EpicycleError(
-                f"no aspect does anything in the run of {model.name} with seed {asked.seed}\n   help: add --disturb"
+                f"no aspect does anything in the run of {model.name} with seed {self._seed}\n   help: add --disturb"
             )
-        return FaultSpace([act.name for act in acts], asked.acts)
+        return FaultSpace([act.name for act in acts], self._goal.max_faults)
 
     def next(self) -> list[Point]:
         """The points of the next batch; none if there are as many runs as were asked for, or no others."""
-        left = self._asked.runs - len(self.findings.runs)
+        left = self._goal.runs - len(self.found.runs)
         if left <= 0:
             return []
         try:
@@ -211,15 +122,15 @@ class _Searching:
             return []
         return points[:left]
 
-    def make(self, points: Sequence[Point], made: Trials, tell: Callable[[], None]) -> None:
+    def make(self, points: Sequence[Point], made: SearchRuns, tell: Callable[[], None]) -> None:
         """Make the runs of a batch."""
-        found = self.findings
+        found = self.found
         levels, distinct = self.growing.add(points)
         self.growing.tell(made)
         order = list(distinct)
         start = len(found.runs)
         # Acts are those of one run, which has the first seed.
-        step = 0 if self._asked.acts else 1
+        step = 0 if self._goal.max_faults else 1
         numbers = [(order.index(place_of(level)), step * (start + at)) for at, level in enumerate(levels)]
         rows = made.made(self.growing.plan(list(distinct.values())), numbers, tell)
         for at, (level, row) in enumerate(zip(levels, rows, strict=True), start=1):
@@ -236,13 +147,13 @@ class _Searching:
 
     def _keys(self, model: str, metrics: list[str]) -> dict[str, Any]:
         """What the file of the study says beside the points."""
-        asked = self._asked
-        keys: dict[str, Any] = {"study": f"falsify_{model}", "model": asked.model}
-        if asked.disturb:
-            keys["disturb"] = {"given": list(asked.disturb)}
-        keys["seed"] = asked.seed
-        if AD_HOC in metrics and asked.monitor is not None:
-            keys["monitors"] = {AD_HOC: asked.monitor}
+        spec = self._spec
+        keys: dict[str, Any] = {"study": f"falsify_{model}", "model": spec.model}
+        if spec.disturb:
+            keys["disturb"] = {"given": list(spec.disturb)}
+        keys["seed"] = self._seed
+        if AD_HOC in metrics and self._goal.monitor:
+            keys["monitors"] = {AD_HOC: self._goal.monitor}
         keys["metrics"] = metrics
         return keys
 

@@ -18,7 +18,7 @@ from ..text.program import node_of
 from .proposals import BATCH, Point, Proposals, ranks
 from .space import Axis
 
-_OPTION = Position(COMMAND_LINE, 1, 1, 1, "--acts")
+_OPTION = Position(COMMAND_LINE, 1, 1, 1, "--max-faults")
 _VALUES = 8  # numbers in the text of a study that an act takes, about
 
 
@@ -32,7 +32,7 @@ class FaultSpace:
         self.most = min(most, len(acts))
         self.columns = {EXACTLY: "text"}
         self.width = _VALUES * self.most
-        self.content = "acts"
+        self.content = "faults"
 
     def level(self, point: Point) -> Level:
         """The acts of a point, and no others."""

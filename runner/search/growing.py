@@ -10,7 +10,8 @@ import yaml
 
 from ..language.dimensions import Level
 from ..language.study import Study
-from ..study import Plan, Search, Trials
+from ..study.plan.plan import Plan, Search
+from ..study.search_runs import SearchRuns
 from .faults import FaultSpace
 from .proposals import Point
 from .space import Space, said
@@ -59,7 +60,7 @@ class Growing:
         plan = self.plan(levels)
         return replace(plan, study=replace(plan.study, text=text_of(self._keys, levels)))
 
-    def tell(self, made: Trials, *, over: bool = False) -> None:
+    def tell(self, made: SearchRuns, *, over: bool = False) -> None:
         """Tell the folder of the points, now and then while they grow, and when the search is over."""
         if over or len(self._levels) >= _GROWTH * self._told:
             self._told = len(self._levels)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 from epicycle.actors import EpicycleError, did_you_mean
@@ -41,6 +42,15 @@ def monitors_named(model: Model, text: str | None, flag: str = "") -> list[str]:
             f"{flag or 'monitor='}{' ' if flag else ''}'always server.size < 40'"
         )
     return [each.name for each in model.output.monitors]
+
+
+def with_monitors(model: Model, monitors: Mapping[str, str]) -> Model:
+    """A model with these monitors: those that it does not have are added."""
+    known = {each.name for each in model.output.monitors}
+    for name, text in monitors.items():
+        if name not in known:
+            model.monitor(name, text)
+    return model
 
 
 def property_of(model: Model, monitor: str) -> str:

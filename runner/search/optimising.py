@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,97 +12,30 @@ from epicycle.actors import EpicycleError, did_you_mean
 from epicycle.actors.expression import ExpressionError, Formula
 
 from ..catalogue.packaged import is_path, packaged_files
-from ..language.dimensions import Level
 from ..language.study import is_study, read_study, study_of_text
 from ..language.study_metric import asks_for_none
-from ..study import OK, Estimate, Plan, Search, Trials, available_cores, mean, open_trials
+from ..study.inference import mean
+from ..study.plan.plan import Plan, Search
+from ..study.run.backlog import OK
+from ..study.search_runs import SearchRuns, open_search_runs
+from ..study.session import available_cores
 from ..text.document import parse, plain
 from ..text.files import COMMAND_LINE
 from ..text.problems import Position, Problems
 from .growing import Growing, place_of, text_of
+from .optimum import Optimum, Outcome, Tested
 from .proposals import Point, is_guided, proposals
-from .space import Interval, Space, read_space
+from .space import Interval, read_space
+from .spec import Maximise, Minimise, SearchSpec
 
-MAX_POINTS = 100_000
 FILE = Path("optimise")  # the file of the study of a search over a model: paths are relative to the working directory
-_FORBIDDEN = math.ldexp(1.0, 1_000)  # what a point that breaks a condition counts as, more than any number
 _SHARED = 0.05  # of the runs may be without a number
 _TOGETHER = 8  # points that are chosen together when the search is guided; more are quicker only on many cores
 
 
-@dataclass(frozen=True)
-class Goal:
-    """What is to be optimised: the words of the command, and as many points at most."""
-
-    target: str  # a model or a study
-    objective: str
-    greatest: bool = False
-    subject_to: Sequence[str] = ()
-    vary: Sequence[str] = ()
-    points: int = 200
-    replications: int | None = None
-    seed: int | None = None
-    set: Sequence[str] = ()
-    disturb: Sequence[str] = ()
-    types: Sequence[Path] = ()
-    command: Sequence[str] = ()
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """What came of the runs of a point: the mean of the objective, and how many runs broke which condition."""
-
-    value: Estimate | None  # None: too many runs have no number
-    runs: int
-    broken: dict[str, int]
-
-    @property
-    def is_feasible(self) -> bool:
-        """Whether all runs meet all conditions, and the mean is known."""
-        return self.value is not None and not any(self.broken.values())
-
-
-@dataclass(frozen=True)
-class Tested:
-    """A point that was tried, by its number from 1."""
-
-    number: int
-    level: Level
-    outcome: Outcome
-
-
-@dataclass
-class Optimum:
-    """What an optimisation has found: all points, the best of them, and what came of it with new seeds."""
-
-    goal: Goal
-    space: Space
-    guided: bool
-    tested: list[Tested] = field(default_factory=list)
-    check: Outcome | None = None
-
-    @property
-    def best(self) -> Tested | None:
-        """The first of the points with the best mean that meet all conditions."""
-        return next(iter(self.ranked), None)
-
-    @property
-    def ranked(self) -> list[Tested]:
-        """The points that meet all conditions, the best first."""
-        feasible = (each for each in self.tested if each.outcome.is_feasible)
-        return sorted(feasible, key=lambda each: self.cost(each.outcome))
-
-    def cost(self, outcome: Outcome) -> float:
-        """What is to be small: a condition that is broken counts more than any number, and no number most of all."""
-        if outcome.value is None:
-            return math.inf
-        if not outcome.is_feasible:
-            return _FORBIDDEN * (1.0 + math.fsum(outcome.broken.values()) / outcome.runs)
-        return -outcome.value.value if self.goal.greatest else outcome.value.value
-
-
 def optimise(
-    goal: Goal,
+    spec: SearchSpec,
+    goal: Minimise,
     folder: Path,
     *,
     jobs: int | None = None,
@@ -114,12 +47,12 @@ def optimise(
     Runs that are in the folder already are not made again, so that a search that was killed continues.  ``tell`` is
     called after each batch.  Raises ``EpicycleError``.
     """
-    work = _Optimising(goal)
+    work = _Optimising(spec, goal, folder)
     found = work.found
     chosen = proposals(len(found.space.axes), work.seed, found.guided, _TOGETHER)
     points = next(chosen)[: goal.points]
     work.growing.add(points)
-    with open_trials(work.growing.whole(), folder, jobs or available_cores(), timeout) as made:
+    with open_search_runs(work.growing.whole(), folder, jobs or available_cores(), timeout) as made:
         try:
             while True:
                 tested = work.test(points, made)
@@ -127,45 +60,48 @@ def optimise(
                 if len(found.tested) >= goal.points:
                     break
                 points = chosen.send([found.cost(each.outcome) for each in tested])[: goal.points - len(found.tested)]
-            if found.best is not None:
-                found.check = work.check(found.best, made)
+            if found.point is not None:
+                found.check = work.check(found.point, made)
         finally:
             work.growing.tell(made, over=True)
     return found
 
 
 class _Optimising:
-    def __init__(self, goal: Goal) -> None:
-        self._goal = goal
-        keys, path = _keys_of(goal)
-        study = study_of_text(text_of(keys, []), path, goal.set, goal.types, goal.replications, goal.seed)
+    def __init__(self, spec: SearchSpec, goal: Minimise, folder: Path) -> None:
+        keys, path = _keys_of(spec)
+        study = study_of_text(text_of(keys, []), path, spec.set, spec.types, goal.replications, spec.seed)
+        aspects, without_aspects = tuple(spec.aspects), tuple(spec.without_aspects)
+        study = replace(study, aspects=aspects, without_aspects=without_aspects, stop=spec.until)
         base = Plan.made(study)
         problems = Problems()
         metrics = [metric.name for metric in base.metrics]
         taken = (*metrics, *study.factors)
-        space = read_space(goal.vary, base.load(base.condition(0)), taken, goal.set, problems)
+        space = read_space(spec.vary, base.load(base.condition(0)), taken, spec.set, problems)
         problems.raise_if_any()
         if not space.axes:
             raise EpicycleError("there is nothing to vary\n   help: add --vary load=0.5..0.9")
         names = [*metrics, *space.columns]
-        flag = "--maximise" if goal.greatest else "--minimise"
+        flag = "--maximise" if isinstance(goal, Maximise) else "--minimise"
         self._objective = _formula(flag, goal.objective, names, problems, is_condition=False)
         conditions = {
-            text: _formula("--subject-to", text, names, problems, is_condition=True) for text in goal.subject_to
+            text: _formula("--subject-to", text, names, problems, is_condition=True) for text in goal.conditions
         }
         problems.raise_if_any()
         self._conditions = {text: each for text, each in conditions.items() if each is not None}
         self._others = base.conditions
         runs = (goal.points + 1) * self._others * study.replications
-        self.growing = Growing(study, keys, space, Search(runs=runs, command=list(goal.command)))
-        self.found = Optimum(goal, space, is_guided() and any(isinstance(each, Interval) for each in space.axes))
+        self.growing = Growing(study, keys, space, Search(runs=runs, command=list(spec.command)))
+        guided = is_guided() and any(isinstance(each, Interval) for each in space.axes)
+        self.found = Optimum(goal, space, guided)
+        self.found.folder = folder
 
     @property
     def seed(self) -> int:
         """The seed of the study, which is that of the search."""
         return self.growing.study.seed
 
-    def test(self, points: Sequence[Point], made: Trials) -> list[Tested]:
+    def test(self, points: Sequence[Point], made: SearchRuns) -> list[Tested]:
         """Make the runs of some points, and judge them."""
         levels, distinct = self.growing.add(points)
         self.growing.tell(made)
@@ -181,7 +117,7 @@ class _Optimising:
             self.found.tested.append(tested[-1])
         return tested
 
-    def check(self, best: Tested, made: Trials) -> Outcome:
+    def check(self, best: Tested, made: SearchRuns) -> Outcome:
         """What comes of a point with as many seeds again, which had no part in its choice."""
         count = self.growing.study.replications
         numbers = [(index, count + each) for index in range(self._others) for each in range(count)]
@@ -204,15 +140,17 @@ class _Optimising:
         return Outcome(mean(means) if means and missing <= _SHARED * len(rows) else None, len(rows), broken)
 
 
-def _keys_of(goal: Goal) -> tuple[dict[str, Any], Path]:
+def _keys_of(spec: SearchSpec) -> tuple[dict[str, Any], Path]:
     """The study that a search adds points to, as a mapping, and its file."""
-    target = Path(goal.target)
-    if not (is_study(target) if is_path(goal.target) else goal.target in packaged_files("study")):
-        said: dict[str, Any] = {"study": "optimisation", "model": goal.target}
-        return said | ({"disturb": {"given": list(goal.disturb)}} if goal.disturb else {}), FILE
-    if goal.disturb:
-        raise EpicycleError("--disturb is for models: a study declares its own disturbances")
-    study = read_study(goal.target)
+    target = Path(spec.model)
+    if not (is_study(target) if is_path(spec.model) else spec.model in packaged_files("study")):
+        said: dict[str, Any] = {"study": "optimisation", "model": spec.model}
+        return said | ({"disturb": {"given": list(spec.disturb)}} if spec.disturb else {}), FILE
+    told = {"--disturb": spec.disturb, "--aspect": spec.aspects, "--without": spec.without_aspects}
+    for flag, given in (told | {"--until": () if spec.until is None else (spec.until,)}).items():
+        if given:
+            raise EpicycleError(f"{flag} is for models: a study declares its own")
+    study = read_study(spec.model)
     node = parse(study.text, str(study.path), Problems())
     whole: Any = plain(node) if node is not None else {}
     if "point" in (whole.get("vary") or {}):

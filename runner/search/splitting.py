@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -23,11 +23,13 @@ from epicycle.actors import EpicycleError, Process, counted, elementary, random_
 
 from ..build.model import Model
 from ..engine import Simulation
-from ..provenance import version_of
 from ..shown import finite, short
 from ..student import student_quantile
-from ..tables import Table, Tabled
-from .tried import NUMBER, Tried
+from ..study.provenance import version_of
+from ..tables import Table
+from .answer import Answer
+from .cache import NUMBER, EvaluationCache
+from .evaluator import Evaluator, Recipe, jobs_for
 
 SHARE = 0.2  # of the runs that should get from one level to the next: few levels, and yet many runs at each
 ENOUGH = 0.1  # of the runs from a level that break the property: it needs no further level
@@ -35,14 +37,16 @@ MOST = 100  # levels
 CONFIDENCE = 0.95
 
 
-@dataclass(frozen=True)
-class RareEvent(Tabled):
+@dataclass(repr=False)
+class RareEvent(Answer):
     """The probability that a run of a model breaks a monitor, and what its estimate is made of.
 
     ``levels`` are what the robustness of ``guide`` falls to, and ``shares``, in each repetition, how many of the
     ``runs`` from one level get to the next, and from the last to the break; it ends where none does.  ``runs_made`` and
     ``tags``, of which there are ``tags_of_run`` in a whole run, count the search for levels, too.
     """
+
+    NAME = "rare"
 
     model: str
     seed: int
@@ -104,43 +108,37 @@ class RareEvent(Tabled):
             return math.nan
         return (1.0 - self.probability) / self.probability / (self.error * self.error)
 
-    @property
-    def sentence(self) -> str:
-        """What is to be known, in words."""
+    def _sentences(self) -> Iterator[str]:
         number = len(self.shares)
         done = (
             f"{number} repetitions with {self.runs:,} runs from each of {counted(len(self.levels) + 1, 'level')}, the "
             f"beginning included; {self.runs_made:,} runs in all"
         )
         if self.interval is None:
-            return f"No run broke {self.monitor} ({self.source}): {done}. That does not bound the probability."
+            yield f"No run broke {self.monitor} ({self.source}): {done}. That does not bound the probability."
+            return
         low, high = self.interval
-        said = (
+        yield (
             f"A run of {self.model} breaks {self.monitor} ({self.source}) with a probability of {self.probability:.2g} "
             f"(95 % interval: {low:.2g} to {high:.2g}): {done}."
         )
         if not math.isnan(self.plain_runs):
             events = self.plain_runs * self.tags_of_run / self.tags
-            said += (
-                f" Plain sampling needs {self.plain_runs / self.runs_made:.2g} times as many runs, and {events:.2g} "
+            yield (
+                f"Plain sampling needs {self.plain_runs / self.runs_made:.2g} times as many runs, and {events:.2g} "
                 "times as many tags, for the same standard error."
             )
         if empty := self.estimates.count(0.0):
-            said += f" {counted(empty, 'repetition')} broke nothing, so the interval is too narrow: use more runs."
+            yield f"{counted(empty, 'repetition')} broke nothing, so the interval is too narrow: use more runs."
         if not self.levels:
-            said += " There was no level on the way, so this is plain sampling."
-        return said
+            yield "There was no level on the way, so this is plain sampling."
 
     def facts(self) -> dict[str, Any]:
-        """Everything that was found, for programs."""
         own = {"probability": self.probability, "interval": self.interval, "error": self.error}
         more = {"estimates": self.estimates, "plain_runs": self.plain_runs, "sentence": self.sentence}
         found = finite({**own, **more, **asdict(self), "version": version_of("epicycle")})
         assert isinstance(found, dict)
         return found
-
-    def _caption(self) -> str:
-        return self.sentence
 
     def _tables(self) -> list[Table]:
         rows = []
@@ -151,7 +149,7 @@ class RareEvent(Tabled):
         return [Table((f"robustness of {self.guide}", "share that gets there", "repetitions that tried"), rows)]
 
 
-class _Trial(NamedTuple):
+class _Branch(NamedTuple):
     """A run from a level on: the least robustness that it came to, and itself if it can go on from there."""
 
     reached: float  # -infinity once the property is broken
@@ -159,8 +157,8 @@ class _Trial(NamedTuple):
     tags: int
 
 
-class _Trials:
-    """Trials of a model, from level to level."""
+class _Branches:
+    """Branches of a model, from level to level."""
 
     def __init__(self, model: Model, monitor: str, guide: str, seed: int, until: float | None, runs: int) -> None:
         self.model = model
@@ -172,25 +170,25 @@ class _Trials:
         self.made = self.tags = 0
         self._has_processes = any(isinstance(actor, Process) for actor in model.graph.actors.values())
 
-    def from_level(self, before: Sequence[_Trial] | None, level: float | None, key: str) -> list[_Trial]:
-        """Trials that begin where others got to, or with None at the beginning, and go on to a level or to the end.
+    def from_level(self, before: Sequence[_Branch] | None, level: float | None, key: str) -> list[_Branch]:
+        """Branches that begin where others got to, or with None at the beginning, and go on to a level or to the end.
 
-        Those with the same ``key`` are the same trials.
+        Those with the same ``key`` are the same branches.
         """
         if before is None:
-            return [self._trial(None, level, f"{key} {number}") for number in range(self.runs)]
+            return [self._branch(None, level, f"{key} {number}") for number in range(self.runs)]
         each, more = divmod(self.runs, len(before))
         chosen = random_stream(self.seed, key).permutation(len(before))[:more].tolist()
-        origins = [trial for trial in before for _ in range(each)] + [before[place] for place in chosen]
-        return [self._trial(origin, level, f"{key} {number}") for number, origin in enumerate(origins)]
+        origins = [branch for branch in before for _ in range(each)] + [before[place] for place in chosen]
+        return [self._branch(origin, level, f"{key} {number}") for number, origin in enumerate(origins)]
 
-    def _trial(self, origin: _Trial | None, level: float | None, key: str) -> _Trial:
+    def _branch(self, origin: _Branch | None, level: float | None, key: str) -> _Branch:
         seed = int.from_bytes(hashlib.sha256(f"{self.seed} {key}".encode()).digest()[:7], "little")
         before = 0
         if origin is None:
             simulation = Simulation(self.model, seed=seed)
         elif origin.simulation is None:
-            return _Trial(-math.inf, None, 0)
+            return _Branch(-math.inf, None, 0)
         else:
             simulation = origin.simulation.fork(reseed=seed)
             # Where there are processes, the fork has come there from the beginning.
@@ -203,33 +201,33 @@ class _Trials:
         self.made += 1
         self.tags += tags
         if simulation.robustness(self.monitor) <= 0.0:
-            return _Trial(-math.inf, None, tags)
+            return _Branch(-math.inf, None, tags)
         if is_there:
-            return _Trial(simulation.robustness(self.guide), simulation, tags)
+            return _Branch(simulation.robustness(self.guide), simulation, tags)
         verdict = simulation.verdict(self.monitor)
         if verdict.holds is None:
             raise EpicycleError(
                 f"monitor {self.monitor} cannot be judged in a run of {self.model.name}, because {verdict.missing}"
             )
-        return _Trial(simulation.robustness(self.guide) if verdict.holds else -math.inf, None, tags)
+        return _Branch(simulation.robustness(self.guide) if verdict.holds else -math.inf, None, tags)
 
     def levels(self) -> tuple[list[float], float]:
-        """Levels of which each is reached by about a fifth of the trials from the one before; the tags of a run."""
+        """Levels of which each is reached by about a fifth of the branches from the one before; the tags of a run."""
         levels: list[float] = []
         origins, tags = None, 0.0
         while len(levels) < MOST:
             key = f"levels {len(levels)}"
-            trials = self.from_level(origins, None, key)
+            branches = self.from_level(origins, None, key)
             if origins is None:
                 tags = self.tags / self.runs
-            reached = sorted(trial.reached for trial in trials)
+            reached = sorted(branch.reached for branch in branches)
             level = reached[math.ceil(SHARE * self.runs) - 1]
             if level == reached[-1]:  # which all of them reach: the next one that some do
                 level = max((each for each in reached if each < level), default=-math.inf)
             if level == -math.inf or reached.count(-math.inf) >= ENOUGH * self.runs:
                 break
             levels.append(level)
-            origins = [trial for trial in self.from_level(origins, level, key) if trial.reached <= level]
+            origins = [branch for branch in self.from_level(origins, level, key) if branch.reached <= level]
         return levels, tags
 
     def spent(self) -> tuple[int, int]:
@@ -243,12 +241,26 @@ class _Trials:
         shares: list[float] = []
         origins = None
         for place, level in enumerate([*levels, None]):
-            trials = self.from_level(origins, level, f"{key} {place}")
-            origins = [trial for trial in trials if trial.reached <= (-math.inf if level is None else level)]
+            branches = self.from_level(origins, level, f"{key} {place}")
+            origins = [branch for branch in branches if branch.reached <= (-math.inf if level is None else level)]
             shares.append(len(origins) / self.runs)
             if not origins:
                 break
         return shares
+
+    def prepare(self, request: object) -> None:
+        """There is nothing to load."""
+
+    def make(self, request: tuple[str, Sequence[float] | None]) -> list[Any]:
+        """A repetition over these levels, or the levels; and the runs and tags that it took."""
+        key, levels = request
+        found = self.levels() if levels is None else (self.shares(levels, key), 0)
+        return [*found, *self.spent()]
+
+
+def _branches_of(recipe: Recipe, *others: Any) -> _Branches:
+    """The same in another process."""
+    return _Branches(recipe.model(), *others)
 
 
 def rare(
@@ -261,13 +273,14 @@ def rare(
     seed: int | None = None,
     until: float | None = None,
     folder: Path | None = None,
+    jobs: int | None = None,
     tell: Callable[[int, int], None] | None = None,
 ) -> RareEvent:
     """Estimate the probability that a run of a model breaks a monitor.
 
     ``guide`` is the monitor whose robustness says how far a run has come: by default this one.  In a ``folder``, each
-    repetition is noted, and an estimate that was killed continues there.  ``tell`` is called with how many runs were
-    made, and how many repetitions are done.
+    repetition is noted, and an estimate that was killed continues there.  ``jobs`` processes make them.  ``tell`` is
+    called with how many runs were made, and how many repetitions are done.
     """
     guide = guide or monitor
     known = {each.name: each.requirement.property for each in model.output.monitors}
@@ -282,20 +295,24 @@ def rare(
         "runs": runs,
         "digest": "" if folder is None else first.run(until=until).digest,
     }  # fmt: skip
-    tried = Tried(model, about, [[NUMBER], NUMBER, (int,), (int,)], folder)
-    trials = _Trials(model, monitor, guide, seed, until, runs)
-    levels, tags_of_run, made, tags = tried.outcome("levels", lambda: [*trials.levels(), *trials.spent()])
-
-    def repetition(key: str) -> tuple[list[float], int, int]:
-        shares, _, made, tags = tried.outcome(key, lambda: [trials.shares(levels, key), 0, *trials.spent()])
-        return shares, made, tags
-
+    cache = EvaluationCache(model, about, [[NUMBER], NUMBER, (int,), (int,)], folder)
+    others = (monitor, guide, seed, until, runs)
     found: list[list[float]] = []
-    for number in range(repetitions):
-        if tell is not None:
-            tell(made, number)
-        shares, more, tags_more = repetition(f"repetition {number}")
-        found.append(shares)
-        made, tags = made + more, tags + tags_more
+    here = _Branches(model, *others)
+    with Evaluator(here, jobs_for(model, jobs), _branches_of, Recipe.of(model), *others) as evaluator:
+
+        def outcome(key: str, levels: Sequence[float] | None) -> list[Any]:
+            made: list[Any] = cache.outcome(key, lambda: evaluator.make(key, (key, levels)))
+            return made
+
+        levels, tags_of_run, made, tags = outcome("levels", None)
+        keys = [f"repetition {number}" for number in range(repetitions)]
+        evaluator.expect((key, (key, levels)) for key in keys if key not in cache)
+        for key in keys:
+            if tell is not None:
+                tell(made, len(found))
+            shares, _, more, tags_more = outcome(key, levels)
+            found.append(shares)
+            made, tags = made + more, tags + tags_more
     source = known[monitor]
     return RareEvent(model.name, seed, until, monitor, source, guide, levels, runs, found, made, tags, tags_of_run)

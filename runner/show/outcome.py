@@ -18,9 +18,9 @@ from ..build.model import Model
 from ..catalogue.figure import Figure
 from ..graph.woven import extent
 from ..printing import columns
-from ..provenance import versions
 from ..results import Results, plain, write_signals
 from ..shown import finite, in_time, in_words
+from ..study.provenance import versions
 from .pen import FigureError, draw
 
 MAX_NAME = 60  # characters of a file name; file systems limit it

@@ -78,7 +78,7 @@ def detail(reference: TypeReference, parts: Mapping[str, Sequence[TypeReference]
     for base, known in parts.items():
         if len(known) > _FEW:
             names = ", ".join(each.name for each in known)
-            told = f": one of {names}; 'epicycle actors NAME' describes one"
+            told = f": one of {names}; 'epicycle describe NAME' describes one"
             blocks += [Text(""), Text.assemble((base, "bold"), told)]
             continue
         for each in known:
@@ -127,8 +127,8 @@ def aspects_at(model: Model) -> dict[str, list[tuple[str, str, str]]]:
 INTRODUCTION = """\
 # Reference
 
-Everything that a model may name, as declared in the code. `make reference` generates this file; `epicycle actors`
-and `epicycle aspects` print the same for everything installed, including types from other packages.
+Everything that a model may name, as declared in the code. `make reference` generates this file; `epicycle list`
+and `epicycle describe` print the same for everything installed, including types from other packages.
 """
 
 

@@ -13,13 +13,13 @@ from typing import Any
 from epicycle.actors import EpicycleError, counted
 
 from ..engine import Simulation
-from ..provenance import git_revision, machine, versions
 from .judge.study_results import StudyResults
 from .plan.plan import Plan, epicycle_version
+from .provenance import git_revision, machine, versions
 from .run.backlog import RETRIED, Backlog
-from .run.making import Keeper, keeping, make_here
+from .run.making import Recorder, make_here, recording
 from .run.manifest import FORMAT, StoreError, read_manifest
-from .run.pulse import duration
+from .run.progress import duration
 from .run.store import lock, prepare
 
 LOCAL, DASK = "local", "dask"  # executors
@@ -66,14 +66,14 @@ def run_study(
         store = prepare(folder, manifest_of(plan))
         known = store.known(plan.decides)
         backlog = Backlog(plan, {key: done for key, done in known.items() if not (retry and done.status in RETRIED)})
-        with keeping(store, backlog, timeout) as keeper:
-            make(keeper, jobs or available_cores(), lambda: None if tell is None else tell(backlog))
+        with recording(store, backlog, timeout) as recorder:
+            make(recorder, jobs or available_cores(), lambda: None if tell is None else tell(backlog))
         table = StudyResults(folder).write_table()
     made, there = backlog.made.total(), backlog.there.total()
     return Outcome(made, there, backlog.failed, backlog.stopped_early, table)
 
 
-def _maker(executor: str, scheduler: str | None) -> Callable[[Keeper, int, Callable[[], None]], None]:
+def _maker(executor: str, scheduler: str | None) -> Callable[[Recorder, int, Callable[[], None]], None]:
     """A function that makes all runs of a backlog, ``jobs`` at a time, and now and then calls its last argument.
 
     Raises ``EpicycleError`` if what an executor needs is not installed.
@@ -85,7 +85,7 @@ def _maker(executor: str, scheduler: str | None) -> Callable[[Keeper, int, Calla
     from .run.cluster import Cluster, distributed_module
 
     distributed_module()
-    return lambda keeper, jobs, tell: Cluster(keeper, jobs, scheduler).run(tell)
+    return lambda recorder, jobs, tell: Cluster(recorder, jobs, scheduler).run(tell)
 
 
 def manifest_of(plan: Plan) -> dict[str, Any]:

@@ -23,7 +23,7 @@ from epicycle.runner.catalogue.types import CatalogueError, Types, _offered, bui
 from epicycle.runner.engine import Simulation
 from epicycle.runner.language.study import read_study
 from epicycle.runner.show.report import check_figures
-from epicycle.runner.study import Plan
+from epicycle.runner.study.plan.plan import Plan
 from epicycle.runner.text.problems import ModelError
 
 THIRD_PARTY = Path(__file__).parents[1] / "third_party"

@@ -45,11 +45,11 @@ def test_bash_completes_commands_options_and_names(capsys: pytest.CaptureFixture
         "run mm1 --seed ": [],
         "run mm1 --out ": ["my_folder"],
         "study wait": ["waiting_time"],
-        "actors Pois": ["PoissonClock"],
-        "aspects Pack": ["PacketLoss"],
+        "describe Pois": ["PoissonClock"],
+        "describe Pack": ["PacketLoss"],
         "completion ": ["bash", "fish", "zsh"],
         "study load --executor ": ["dask", "local"],
-        "schema -o my": ["my_folder", "my_model.yaml"],
+        "list schema -o my": ["my_folder", "my_model.yaml"],
         "run --debu": ["--debug"],
     }
     found = {line: in_bash(text, line or '""', tmp_path) for line in offers}

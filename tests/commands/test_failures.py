@@ -229,7 +229,7 @@ def test_a_study_tells_the_line_and_repeats_the_run_for_its_traceback(capsys: py
     assert main(command) == 1
     said = capsys.readouterr().err
     told = RUNNING["fire"].removeprefix("error: ").replace("m.yaml", f"{os.getcwd()}/m.yaml")
-    assert said.startswith(f"failed: {told}   to repeat it: epicycle replay out ")
+    assert said.startswith(f"failed: {told}   to repeat it: epicycle run out/")
     assert "Traceback (most recent call last):\n" in said
     assert said.endswith("ZeroDivisionError: division by zero\nerror: 1 run failed\n")
 

@@ -50,11 +50,13 @@ def kind(request: pytest.FixtureRequest) -> str:
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        *((f"{command} x.yaml", "x.yaml {}") for command in ("run", "validate", "graph", "trace", "aspects", "study")),
+        *((f"{command} x.yaml", "x.yaml {}") for command in ("run", "validate", "graph", "describe", "study")),
+        ("run x.yaml --trace", "x.yaml {}"),
+        ("describe x.yaml --aspects", "x.yaml {}"),
         ("run m.yaml --overrides x.yaml", "x.yaml {}"),
         ("run m.yaml --disturb ./x.yaml", "x.yaml {}"),
         ("run m.yaml --types x.py", "--types x.py: this {}"),
-        ("actors --types x.py", "--types x.py: this {}"),
+        ("list actors --types x.py", "--types x.py: this {}"),
     ],
 )
 def test_on_the_command_line(words: str, message: str, kind: str, capsys: pytest.CaptureFixture[str]) -> None:
@@ -110,5 +112,5 @@ def test_names_that_are_too_long(line: str, column: int, what: str, capsys: pyte
 
 
 def test_own_types_in_a_file_whose_name_is_too_long(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["actors", "--types", f"{LONG}.py"]) == 2
+    assert main(["list", "actors", "--types", f"{LONG}.py"]) == 2
     assert capsys.readouterr().err == f"error: --types {LONG}.py: this cannot be read: File name too long\n"

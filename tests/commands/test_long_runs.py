@@ -13,14 +13,14 @@ from pathlib import Path
 
 import pytest
 
-from epicycle.runner.calls.running import outlook
+from epicycle.runner.show.watching import outlook
 
 # Takes the terminal, to which Ctrl-C goes; what is said of long runs comes after a second, not after five.
 EPICYCLE = """
 import os
 os.login_tty(0)
-from epicycle.runner.calls import running
-running.PATIENCE = 1.0
+from epicycle.runner.show import watching
+watching.PATIENCE = 1.0
 from epicycle.runner.cli import main
 raise SystemExit(main())
 """

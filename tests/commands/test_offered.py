@@ -36,12 +36,12 @@ def test_a_command_of_a_package(site: Path, capsys: pytest.CaptureFixture[str]) 
     assert capsys.readouterr() == ("hello world\n", "")
     with pytest.raises(SystemExit):
         main(["--help"])
-    assert "    greet     say hello, 100 % of it\n" in capsys.readouterr().out
+    assert "  greet       say hello, 100 % of it\n" in capsys.readouterr().out
 
 
 def test_nothing_is_imported_for_our_own_commands(site: Path, capsys: pytest.CaptureFixture[str]) -> None:
     install(site, "acme_a", "raise SystemExit(7)", commands="run = acme_a:run\nrepair = acme_a:repair")
-    assert commands(["--debug", "models"]) is COMMANDS
+    assert commands(["--debug", "list"]) is COMMANDS
     assert main(["completion", "bash"]) == 0
     assert [each.name for each in commands()].count("run") == 1
     assert next(each for each in commands() if each.name == "run") is COMMANDS[0]
@@ -69,7 +69,7 @@ def test_a_command_that_cannot_be_had(
     assert capsys.readouterr() == ("", f"error: command 'greet' {reason}\n")
     with pytest.raises(SystemExit):
         main(["--help"])
-    assert "    greet     (cannot be loaded)\n" in capsys.readouterr().out
+    assert "  greet       (cannot be loaded)\n" in capsys.readouterr().out
 
 
 def test_a_command_that_two_packages_offer(site: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -87,4 +87,4 @@ def test_a_list_of_commands_that_cannot_be_read(site: Path, capsys: pytest.Captu
         main(["--help"])
     told = capsys.readouterr()
     assert told.err.startswith("warning: the commands of installed packages cannot be read: ")
-    assert "    run       run a model" in told.out
+    assert "  run         run a model" in told.out

@@ -54,24 +54,27 @@ def test_json_stays_exact(capsys: pytest.CaptureFixture[str]) -> None:
     printed = capsys.readouterr().out
     assert json.loads(printed)["metrics"] == {"what": EVIL}
     assert printed.rstrip("\n").isprintable()
-    assert main(["trace", "m.yaml", "--json", "--actor", "clock"]) == 0
+    assert main(["run", "m.yaml", "--json", "--trace", "clock"]) == 0
     printed = capsys.readouterr().out
     assert [json.loads(line)["sends"][0]["token"] for line in printed.splitlines()] == [EVIL, EVIL]
     assert all(line.isprintable() for line in printed.splitlines())
 
 
-@pytest.mark.parametrize("command", ["trace", "graph", "validate", "aspects"])
+@pytest.mark.parametrize("command", ["run --trace", "graph", "validate", "describe --aspects", "describe"])
 def test_other_commands_print_text_as_text(command: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main([command, "m.yaml"]) == 0
+    assert main([command.split(maxsplit=1)[0], "m.yaml", *command.split()[1:]]) == 0
     printed = capsys.readouterr()
     assert all(line.isprintable() for line in (*printed.out.splitlines(), *printed.err.splitlines()))
 
 
 def test_what_is_no_model_is_told_in_clean_words(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["actors", EVIL]) == 2
+    assert main(["describe", EVIL.replace("/", "")]) == 2
     assert capsys.readouterr().err == (
-        f"error: there is no actor type {CLEAN.replace(chr(92), chr(92) * 2)!r}\n".replace(chr(92) * 4, chr(92))
-        + "   help: 'epicycle actors' lists them\n   help: for your own types, add '--types FILE.py'\n"
+        f"error: there is no type or packaged model {CLEAN.replace('/', '').replace(chr(92), chr(92) * 2)!r}\n".replace(
+            chr(92) * 4, chr(92)
+        )
+        + "   help: 'epicycle list models', 'epicycle list actors' and 'epicycle list aspects' list them\n"
+        + "   help: for your own types, add '--types FILE.py'\n"
     )
 
 
@@ -103,10 +106,10 @@ class Ascii(io.TextIOWrapper):
         (["run", "umlaut.yaml"], lambda text: r"K\xe4fer \U0001f41e" in text),
         (["run", "umlaut.yaml", "--json"], lambda text: json.loads(text)["metrics"] == {"what": "Käfer 🐞"}),
         (["graph", "collision_avoidance"], lambda text: r"\xabpacket_loss\xbb" in text),
-        (["schema"], lambda text: len(json.loads(text)) > 5),
+        (["list", "schema"], lambda text: len(json.loads(text)) > 5),
         (["status", "out"], lambda text: text.startswith(r"studie: 2 of 2 runs are finished (2 ok)")),
         (["status", "out", "--conditions"], lambda text: r"(t=K\xe4fer): 1 ok of 1" in text),
-        (["aspects", "PacketLoss"], lambda text: "PacketLoss" in text),
+        (["describe", "PacketLoss"], lambda text: "PacketLoss" in text),
     ],
     ids=lambda value: " ".join(value) if isinstance(value, list) else "",
 )
@@ -135,7 +138,7 @@ def test_streams_that_are_closed(monkeypatch: pytest.MonkeyPatch) -> None:
     assert main(["run", "m.yaml", "--out", "out"]) == 0
     assert Path("out/manifest.json").is_file()
     assert main(["graph", "m.yaml"]) == 0
-    assert main(["actors", "Clok"]) == 2
+    assert main(["describe", "Clok"]) == 2
 
 
 @pytest.mark.skipif(os.name == "nt", reason="a shell of Unix")

@@ -1,4 +1,4 @@
-"""`epicycle actors`, `aspects` and `schema`: what they print, for people and for programs."""
+"""`epicycle list` and `epicycle describe`: what they print, for people and for programs."""
 
 from __future__ import annotations
 
@@ -81,11 +81,11 @@ def test_everything_has_a_doc(reference: TypeReference) -> None:
 
 @pytest.mark.parametrize("kind", ["actors", "aspects"])
 def test_list_has_a_line_for_each_type(kind: str, capsys: pytest.CaptureFixture[str]) -> None:
-    text = printed(capsys, kind)
+    text = printed(capsys, "list", kind)
     known = getattr(built_in(), kind)
     listed = [line.split()[0] for line in text.splitlines() if line.startswith("  ") and not line.startswith("   ")]
     assert sorted(listed) == sorted(known)
-    assert {each["name"] for each in json.loads(printed(capsys, kind, "--json"))} == set(known)
+    assert {each["name"] for each in json.loads(printed(capsys, "list", kind, "--json"))} == set(known)
 
 
 def test_one_type_in_words() -> None:
@@ -96,7 +96,7 @@ def test_one_type_in_words() -> None:
 
 
 def test_one_aspect_for_programs(capsys: pytest.CaptureFixture[str]) -> None:
-    found = json.loads(printed(capsys, "aspects", "PacketLoss", "--json"))
+    found = json.loads(printed(capsys, "describe", "PacketLoss", "--json"))
     assert (found["name"], found["kind"], found["group"]) == ("PacketLoss", "aspect", "communication")
     assert (found["stands_at"], found["events"]) == (["input"], ["dropped"])
     assert found["parameters"][0] == {
@@ -116,11 +116,11 @@ def test_one_aspect_for_programs(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 def test_parts_are_described_with_the_actor(capsys: pytest.CaptureFixture[str]) -> None:
-    text = printed(capsys, "actors", "RobustController")
+    text = printed(capsys, "describe", "RobustController")
     assert "Inform  objective\n" in text
     assert "Casadi  solver\n" in text
     # In a process of its own: the parts of other tests are known here.
-    command = [sys.executable, "-m", "epicycle.runner.cli", "actors", "RobustController", "--json"]
+    command = [sys.executable, "-m", "epicycle.runner.cli", "describe", "RobustController", "--json"]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     parts = json.loads(done.stdout)["parts"]
     assert {base: [each["name"] for each in known] for base, known in parts.items()} == {
@@ -139,14 +139,16 @@ def test_aspects_of_a_model_in_order(capsys: pytest.CaptureFixture[str]) -> None
         "--aspect",
         "late=Latency,delay=0.1,at=main.peer_plan",
     )
-    found = json.loads(printed(capsys, "aspects", "collision_avoidance", *options, "--json"))
+    found = json.loads(printed(capsys, "describe", "collision_avoidance", "--aspects", *options, "--json"))
     assert {port: [each[:2] for each in aspects] for port, aspects in found.items()} == {
         "main.peer_measurement": [["packet_loss", "PacketLoss"]],
         "main.peer_plan": [["plans_due", "Count"], ["packet_loss", "PacketLoss"], ["late", "Latency"]],
         "main.controller.peer_plans": [["plans_heard", "Count"]],
         "main.sensor.measurement": [["measurement_failure", "MeasurementFailure"]],
     }
-    rows = [line.split() for line in printed(capsys, "aspects", "collision_avoidance", *options).splitlines()]
+    rows = [
+        line.split() for line in printed(capsys, "describe", "collision_avoidance", "--aspects", *options).splitlines()
+    ]
     assert [row[:4] for row in rows[2:5]] == [
         ["main.peer_plan", "1", "plans_due", "Count"],
         ["2", "packet_loss", "PacketLoss", "probability:"],
@@ -158,34 +160,24 @@ def test_aspects_of_a_model_in_order(capsys: pytest.CaptureFixture[str]) -> None
     ("arguments", "message"),
     [
         (
-            ("actors", "Clok"),
+            ("describe", "Clok"),
             (
-                "error: there is no actor type 'Clok', did you mean 'Clock'?\n   help: 'epicycle actors' lists them\n"
+                "error: there is no type or packaged model 'Clok', did you mean 'Clock'?\n"
+                "   help: 'epicycle list models', 'epicycle list actors' and 'epicycle list aspects' list them\n"
                 "   help: for your own types, add '--types FILE.py'\n"
             ),
         ),
         (
-            ("actors", "Throttle"),
-            "error: Throttle is an aspect, not an actor\n   help: 'epicycle aspects Throttle' describes it\n",
+            ("describe", "PacketLoss", "--set", "x=1"),
+            "error: PacketLoss is no model, and --aspects and changes are for models\n",
         ),
         (
-            ("aspects", "Clock"),
-            "error: Clock is an actor, not an aspect\n   help: 'epicycle actors Clock' describes it\n",
+            ("describe", "mm1", "--like", "ptolemy"),
+            "error: --like is for types: the directors in a model name their dialects themselves\n",
         ),
-        (
-            ("aspects", "PacketLos"),
-            (
-                "error: there is no aspect type or packaged model 'PacketLos', did you mean 'PacketLoss'?\n"
-                "   help: 'epicycle aspects' lists them\n"
-                "   help: for your own types, add '--types FILE.py'\n"
-            ),
-        ),
-        (
-            ("aspects", "PacketLoss", "--set", "x=1"),
-            "error: --set, --overrides, --disturb, --aspect and --without change a model: name one\n",
-        ),
-        (("aspects", "nowhere/m.yaml"), "error: there is no file nowhere/m.yaml: there is no folder nowhere\n"),
-        (("schema", "-o", "nowhere/s.json"), "error: [Errno 2] No such file or directory: 'nowhere/s.json'\n"),
+        (("list", "models", "-o", "x"), "error: --out is for 'epicycle list schema'\n"),
+        (("describe", "nowhere/m.yaml"), "error: there is no file nowhere/m.yaml: there is no folder nowhere\n"),
+        (("list", "schema", "-o", "nowhere/s.json"), "error: [Errno 2] No such file or directory: 'nowhere/s.json'\n"),
     ],
 )
 def test_what_cannot_be_found(arguments: tuple[str, ...], message: str, capsys: pytest.CaptureFixture[str]) -> None:
@@ -195,8 +187,8 @@ def test_what_cannot_be_found(arguments: tuple[str, ...], message: str, capsys: 
 
 def test_schema_is_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = tmp_path / "s.json"
-    assert printed(capsys, "schema", "-o", str(file)) == f"wrote {file}\n"
-    assert file.read_text(encoding="utf-8") == printed(capsys, "schema")
+    assert printed(capsys, "list", "schema", "-o", str(file)) == f"wrote {file}\n"
+    assert file.read_text(encoding="utf-8") == printed(capsys, "list", "schema")
 
 
 def test_help_needs_nothing_heavy() -> None:
@@ -207,24 +199,24 @@ def test_help_needs_nothing_heavy() -> None:
 
 
 def test_many_parts_are_named_only(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["actors", "Pool"]) == 0
+    assert main(["describe", "Pool"]) == 0
     told = capsys.readouterr().out
     assert len(told.splitlines()) < 80
     assert " ".join(told.split()).endswith(
         "Distribution: one of Bernoulli, Binomial, Cauchy, ChiSquare, Choice, Constant, Exponential, Gamma, LogNormal, "
-        "NegativeBinomial, Normal, Poisson, RandomInteger, StudentT, Triangular, Uniform, VonMises; 'epicycle actors "
-        "NAME' describes one"
+        "NegativeBinomial, Normal, Poisson, RandomInteger, StudentT, Triangular, Uniform, VonMises; 'epicycle "
+        "describe NAME' describes one"
     )
-    assert main(["actors", "Exponential"]) == 0
+    assert main(["describe", "Exponential"]) == 0
     assert capsys.readouterr().out.splitlines()[0] == "Exponential  distribution, distributions"
-    assert main(["actors", "Exponentail"]) == 2
+    assert main(["describe", "Exponentail"]) == 2
     assert capsys.readouterr().err.splitlines()[0] == (
-        "error: there is no actor type 'Exponentail', did you mean 'Exponential'?"
+        "error: there is no type or packaged model 'Exponentail', did you mean 'Exponential'?"
     )
 
 
 def test_replicas_are_shown_as_one(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["show", "warehouse"]) == 0
+    assert main(["describe", "warehouse"]) == 0
     told = " ".join(capsys.readouterr().out.split())
     assert "orders rate of robot[*].delivered (20) 1/h" in told
     assert "stops at 6 h" in told
@@ -239,6 +231,6 @@ def test_a_default_that_no_file_can_say_is_shown_by_its_type(
     types.write_text(
         f"from epicycle.actors import Actor, Parameter\nclass OddDefaults(Actor):\n    'A thing.'\n{lines}"
     )
-    told = json.loads(printed(capsys, "actors", "OddDefaults", "--json", "--types", str(types)))
+    told = json.loads(printed(capsys, "describe", "OddDefaults", "--json", "--types", str(types)))
     assert [each["default"] for each in told["parameters"]] == ["<complex>", "<object>", ["<bytes>", 1.5]]
-    assert '"default": "<complex>"' in printed(capsys, "schema", "--types", str(types))
+    assert '"default": "<complex>"' in printed(capsys, "list", "schema", "--types", str(types))

@@ -53,23 +53,25 @@ def references(capsys: pytest.CaptureFixture[str]) -> dict[str, str]:
     """References to runs, and the digest of each."""
     assert main(["run", "line.yaml", "--set", "period=0.25", "--seed", "4", "--until", "2", "--out", "by_command"]) == 0
     epicycle.run("line.yaml", set={"period": "250 ms"}, seed=4, until=2, out="by_program", progress=False)
+    model = epicycle.load("line.yaml", set={"period": "250 ms"})
+    epicycle.run(model, seed=4, until=2, out="by_model", progress=False)
     Path("lines.yaml").write_text(STUDY, encoding="utf-8")
     assert main(["study", "lines.yaml", "--jobs", "1", "--out", "results/lines"]) == 0
     row = epicycle.open_study("results/lines").table().to_pylist()[3]
-    assert main(["replay", "results/lines", row["run"][:10]]) == 0
+    assert main(["run", f"results/lines/{row['run'][:10]}"]) == 0
     capsys.readouterr()
-    found = {each: manifest(each)["digest"] for each in ("by_command", "by_program")}
+    found = {each: manifest(each)["digest"] for each in ("by_command", "by_program", "by_model")}
     name = f"results/lines/{row['run'][:10]}"
     replayed = f"results/lines/replays/{row['run'][:12]}"
     return {**found, name: row["digest"], replayed: row["digest"]}
 
 
 def test_every_command_opens_every_run(references: dict[str, str], capsys: pytest.CaptureFixture[str]) -> None:
-    assert references["by_command"] == references["by_program"]
+    assert references["by_command"] == references["by_program"] == references["by_model"]
     for name, digest in references.items():
         assert said(capsys, "view", name, "-o", "page.html") == "wrote page.html\n"
         assert json.loads(said(capsys, "run", name, "--json"))["digest"] == digest
-        traced = said(capsys, "trace", name, "--actor", "noise")
+        traced = said(capsys, "run", name, "--trace", "noise")
         explained = json.loads(
             said(capsys, "explain", name, "--monitor", "always noise.output <= 0.001", "--json", "--no-page")
         )
@@ -79,10 +81,41 @@ def test_every_command_opens_every_run(references: dict[str, str], capsys: pytes
         assert json.loads(said(capsys, *command[1:], "--json"))["digest"] == digest
 
 
+def test_a_program_opens_every_run(references: dict[str, str]) -> None:
+    for name, digest in references.items():
+        assert epicycle.run(name, progress=False).digest == digest
+        [recording] = epicycle.view(name, progress=False).recordings
+        assert recording.results is not None
+        assert recording.results.digest == digest
+        found = epicycle.explain(name, "always noise.output <= 0.001", progress=False)
+        assert main([*found.command[1:], "--json"]) == 0
+
+
+def test_a_model_that_a_program_has_changed_has_no_reference(capsys: pytest.CaptureFixture[str]) -> None:
+    def stops_sooner(model: epicycle.Model) -> None:
+        model.stop = 1.0
+
+    def loses_less(model: epicycle.Model) -> None:
+        model.unweave("losses")
+
+    def loses_more(model: epicycle.Model) -> None:
+        model.weave("more", epicycle.aspects.PacketLoss(probability=0.1), at="sink.input")
+
+    for number, change in enumerate((stops_sooner, loses_less, loses_more)):
+        model = epicycle.load("line.yaml")
+        change(model)
+        epicycle.run(model, out=f"changed_{number}", progress=False)
+        assert said(capsys, "run", f"changed_{number}", code=2) == (
+            f"error: changed_{number}/manifest.json does not say how to make the run again: 'epicycle.run line' was "
+            "made by another version, or from a model that only a program knows\n"
+        )
+
+
 def test_a_folder_says_how_its_run_is_made(references: dict[str, str]) -> None:
-    by_command, by_program, _, replayed = (manifest_of(name) for name in references)
+    by_command, by_program, by_model, _, replayed = (manifest_of(name) for name in references)
     assert by_command == {"model": "line.yaml", "set": ["period=0.25"], "seed": 4, "until": "2"}
     assert by_program == {"model": "line.yaml", "set": ['period="250 ms"'], "seed": 4, "until": 2}
+    assert by_model == by_program
     assert replayed.keys() == {"study", "run"}
 
 

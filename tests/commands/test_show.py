@@ -1,4 +1,4 @@
-"""`epicycle show` and `epicycle compare`: what a model offers, and how its variants differ."""
+"""`epicycle describe` and `epicycle compare`: what a model offers, and how its variants differ."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def test_a_model_shows_what_it_offers(capsys: pytest.CaptureFixture[str]) -> Non
     monitors = "monitors: {alive: {property: eventually sends clock.output, doc: it ticks}}\n"
     Path("m.yaml").write_text(MODEL + monitors)
     assert (
-        printed(capsys, "show", "m.yaml", "--set", "share=0.25")
+        printed(capsys, "describe", "m.yaml", "--set", "share=0.25")
         == """\
 m: A clock.
 1 actor, 0 connections, 0 aspects, stops at 4 s
@@ -71,7 +71,7 @@ reads: m.yaml
 
 
 def test_programs_are_shown_the_same(capsys: pytest.CaptureFixture[str]) -> None:
-    found: dict[str, Any] = json.loads(printed(capsys, "show", "collision_avoidance", "--json"))
+    found: dict[str, Any] = json.loads(printed(capsys, "describe", "collision_avoidance", "--json"))
     assert {"parameter": "measurement_range", "type": "number >= 0", "unit": "m", "value": "30"}.items() <= next(
         each for each in found["parameters"] if each["parameter"] == "measurement_range"
     ).items()

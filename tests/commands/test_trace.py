@@ -1,4 +1,4 @@
-"""`epicycle trace`, runs paced by the wall clock, and runs that are interrupted."""
+"""`epicycle run --trace`, runs paced by the wall clock, and runs that are interrupted."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def model(tmp_path: Path) -> str:
 
 
 def test_trace_in_columns(model: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["trace", model, "--to", "0.6 s"]) == 0
+    assert main(["run", model, "--trace", "--to", "0.6 s"]) == 0
     assert (
         capsys.readouterr().out
         == """\
@@ -61,8 +61,8 @@ def test_trace_in_columns(model: str, capsys: pytest.CaptureFixture[str]) -> Non
 
 def test_trace_as_json(model: str, capsys: pytest.CaptureFixture[str]) -> None:
     """A composite selects everything in it; the end is the model's."""
-    arguments = ["--actor", "room", "--actor", "sink", "--from", "600 ms", "--to", "9", "--json"]
-    assert main(["trace", model, *arguments]) == 0
+    arguments = ["--trace", "room", "--trace", "sink", "--from", "600 ms", "--to", "9", "--json"]
+    assert main(["run", model, *arguments]) == 0
 
     def token(source: str, sent: float, value: int) -> dict[str, Any]:
         at = {"time": sent, "microstep": 1}
@@ -85,14 +85,16 @@ def test_trace_as_json(model: str, capsys: pytest.CaptureFixture[str]) -> None:
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--actor", "rom"], "error: --actor rom matches no actor, did you mean 'room'?\n"),
-        (["--actor", "a..b"], "error: --actor a..b: '' is not a name, a name with an index, '*' or '**'\n"),
-        (["--from", "1 m"], "error: '1 m' is a length, expected a time in s\n"),
-        (["--to", "-1"], "error: --to -1: expected a time from 0 s to 1e9 s\n"),
+        (["--trace", "rom"], "error: --trace rom matches no actor, did you mean 'room'?\n"),
+        (["--trace", "a..b"], "error: --trace a..b: '' is not a name, a name with an index, '*' or '**'\n"),
+        (["--trace", "--from", "1 m"], "error: '1 m' is a length, expected a time in s\n"),
+        (["--trace", "--to", "-1"], "error: --to -1: expected a time from 0 s to 1e9 s\n"),
+        (["--to", "1"], "error: --to is for --trace\n"),
+        (["--trace", "--out", "o"], "error: --trace prints a run and writes nothing: without --out\n"),
     ],
 )
 def test_wrong_options(arguments: list[str], message: str, model: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["trace", model, *arguments]) == 2
+    assert main(["run", model, *arguments]) == 2
     assert capsys.readouterr().err == message
 
 

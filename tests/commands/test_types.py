@@ -68,15 +68,15 @@ def test_types_are_known_to_all_commands(capsys: pytest.CaptureFixture[str]) -> 
     printed = json.loads(capsys.readouterr().out)
     assert (printed["metrics"], printed["aspects"]) == ({"largest": 4.0}, {"gone": {"swallowed": 3}})
     assert main(["validate", "m.yaml", *types]) == 0
-    assert main(["aspects", "m.yaml", *types]) == 0
-    assert main(["aspects", *types]) == 0
+    assert main(["describe", "m.yaml", "--aspects", *types]) == 0
+    assert main(["list", "aspects", *types]) == 0
     printed = capsys.readouterr().out
     assert "Swallows what is greater than two" in printed
-    assert main(["actors", *types]) == 0
+    assert main(["list", "actors", *types]) == 0
     printed = capsys.readouterr().out
     assert "Sends twice what comes" in printed
     assert "_Hidden" not in printed
-    assert main(["schema", *types]) == 0
+    assert main(["list", "schema", *types]) == 0
     assert '"Double"' in capsys.readouterr().out
 
 

@@ -157,7 +157,7 @@ def test_studies_and_listings_have_them(tmp_path: Path, capsys: pytest.CaptureFi
         "  each: {of: b.output, take: count}\n  ratio: {from: each / all}\n",
         encoding="utf-8",
     )
-    assert main(["show", str(file), "--json"]) == 0
+    assert main(["describe", str(file), "--json"]) == 0
     listed = json.loads(capsys.readouterr().out)["metrics"]
     assert [each["takes"] for each in listed] == [
         "sum of the count of a.output, b.output",
@@ -168,7 +168,7 @@ def test_studies_and_listings_have_them(tmp_path: Path, capsys: pytest.CaptureFi
     study.write_text("study: s\nmodel: ./m.yaml\nreplications: 2\nmetrics: [ratio]\n", encoding="utf-8")
     assert main(["study", str(study), "--out", str(tmp_path / "out")]) == 0
     capsys.readouterr()
-    from epicycle.runner.study import StudyResults
+    from epicycle.runner.study.judge.study_results import StudyResults
 
     assert list(StudyResults(tmp_path / "out").to_pandas()["ratio"]) == [6 / 17] * 2
 

@@ -53,8 +53,8 @@ folder.mkdir()
 for name, line in (("reads", "open('/etc/hostname')"), ("starts", "import os; os.system('true')")):
     file = folder / f"{name}.py"
     file.write_text(line)
-    print(problem(home, folder, Case(("actors", "--types", file), code=folder))[1].splitlines()[-1])
-    print(problem(home, folder, Case(("actors", "--types", file)))[1].splitlines()[-1])
+    print(problem(home, folder, Case(("list", "actors", "--types", file), code=folder))[1].splitlines()[-1])
+    print(problem(home, folder, Case(("list", "actors", "--types", file)))[1].splitlines()[-1])
 """
 
 

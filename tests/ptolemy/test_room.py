@@ -55,13 +55,13 @@ def test_the_face_has_no_other_names() -> None:
 
 
 def test_commands_describe_the_types(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["actors", "--like", "ptolemy", "Queue"]) == 0
+    assert main(["describe", "--like", "ptolemy", "Queue"]) == 0
     assert "`size` is sent at the end of each firing, changed or not." in capsys.readouterr().out
-    assert main(["actors", "--like", "Ptolemy"]) == 2
+    assert main(["list", "actors", "--like", "Ptolemy"]) == 2
     told = "error: --like 'Ptolemy' is not one of epicycle, ptolemy, did you mean 'ptolemy'?\n"
     assert capsys.readouterr() == ("", told)
-    assert main(["schema", "--like", "ptolemy"]) == 0
+    assert main(["list", "schema", "--like", "ptolemy"]) == 0
     assert '"generator"' in capsys.readouterr().out
-    assert main(["aspects", "--like", "ptolemy", "mm1"]) == 2
-    told = "error: --like is for the list of types: the directors in a model name their dialects themselves\n"
+    assert main(["describe", "--like", "ptolemy", "mm1"]) == 2
+    told = "error: --like is for types: the directors in a model name their dialects themselves\n"
     assert capsys.readouterr() == ("", told)

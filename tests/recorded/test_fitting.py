@@ -13,11 +13,10 @@ import pytest
 from scipy import stats
 
 import epicycle
-from epicycle.actors import EpicycleError
 from epicycle.aspects import GilbertElliott, Latency, PacketLoss, PortAspect
 from epicycle.runner.cli import main
-from epicycle.runner.recorded import LossModel, delay_laws, loss_models
-from epicycle.runner.recorded.losses import Channel, gilbert, log_likelihood, run_lengths, runs
+from epicycle.runner.recorded.delays import delay_laws
+from epicycle.runner.recorded.losses import Channel, LossModel, gilbert, log_likelihood, loss_models, run_lengths, runs
 from tests.aspects.bench import Bench
 from tests.aspects.laws import lost_of
 
@@ -231,7 +230,7 @@ def test_a_fit_is_a_disturbance(trace: Path) -> None:
 
 
 def test_the_command(trace: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    words = ["fit", str(trace), "--delay", "rtt", "--delay-unit", "ms", "--at", "server.input"]
+    words = ["recording", "fit", str(trace), "--delay", "rtt", "--delay-unit", "ms", "--at", "server.input"]
     assert main(words) == 0
     said = capsys.readouterr().out
     fit = epicycle.fit(trace, at="server.input", delay="rtt", delay_unit="ms")
@@ -277,7 +276,5 @@ def test_what_cannot_be_fitted(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "t.csv").write_text("x\n1\n")
-    assert main(["fit", *words]) == 2
+    assert main(["recording", "fit", *words]) == 2
     assert capsys.readouterr().err == message
-    with pytest.raises(EpicycleError, match=r"TraceFile has no parameter 'los', did you mean 'lost'\?"):
-        epicycle.fit("t.csv", los="x")

@@ -106,8 +106,8 @@ def test_equal_seeds_give_equal_files_and_others_do_not() -> None:
         epicycle.disturb(source, "wifi_burst", f"{name}.csv", at="/robot/*", seed=seed, set={"bad_share": 0.4})
         files.append(Path(f"{name}.csv").read_bytes())
     assert files[0] == files[1] != files[2]
-    assert main(["disturb", str(source), "--with", "wifi_burst", "-o", "d.csv", "--at", "/robot/*", "--seed", "1",
-                 "--set", "bad_share=0.4"]) == 0  # fmt: skip
+    assert main(["recording", "apply", str(source), "--with", "wifi_burst", "-o", "d.csv", "--at", "/robot/*",
+                 "--seed", "1", "--set", "bad_share=0.4"]) == 0  # fmt: skip
     assert Path("d.csv").read_bytes() == files[0]
 
 
@@ -123,7 +123,7 @@ def test_one_topic_does_not_depend_on_the_others() -> None:
 
 def test_the_command_tells_what_happened(capsys: pytest.CaptureFixture[str]) -> None:
     log([(row[0], row[1].replace("/plan", "/peer_plan"), row[2]) for row in ROWS])
-    assert main(["disturb", "in.csv", "--with", "wifi_burst", "-o", "out.csv"]) == 0
+    assert main(["recording", "apply", "in.csv", "--with", "wifi_burst", "-o", "out.csv"]) == 0
     said = capsys.readouterr().out
     lost = 900 - len(read("out.csv"))
     assert (
@@ -144,7 +144,7 @@ wifi_latency  delayed  {300 - lost}
 wrote out.csv
 """
     )
-    assert main(["disturb", "in.csv", "--with", "wifi_burst", "-o", "out.csv", "--json"]) == 0
+    assert main(["recording", "apply", "in.csv", "--with", "wifi_burst", "-o", "out.csv", "--json"]) == 0
     facts = json.loads(capsys.readouterr().out)
     assert facts["delivered"]["/robot/peer_plan"] == 300 - lost
 
@@ -359,14 +359,14 @@ def test_what_is_refused(words: list[str], message: str, capsys: pytest.CaptureF
     log(ROWS)
     Path("in.txt").write_text("")
     Path("bias.yaml").write_text("disturbance: b\naspects: {it: {type: Bias, by: 1, at: '*.x'}}\n")
-    code = main(["disturb", *words])
+    code = main(["recording", "apply", *words])
     assert (code, capsys.readouterr().err) == ((2, f"error: {message}\n") if message else (0, ""))
 
 
 def test_what_cannot_be_altered_is_told(capsys: pytest.CaptureFixture[str]) -> None:
     record()
     disturbance("{type: Bias, by: 1}")
-    assert main(["disturb", "in.mcap", "--with", "d.yaml", "-o", "o.mcap", "--at", "/robot/scan"]) == 2
+    assert main(["recording", "apply", "in.mcap", "--with", "d.yaml", "-o", "o.mcap", "--at", "/robot/scan"]) == 2
     assert capsys.readouterr().err == (
         "error: aspect it failed in pass_token() at recording.robot_scan at (0 s, 2): a token of type Opaque holds no "
         "numbers to alter\n   declared at d.yaml:3:3\n   help: only JSON messages can be altered; choose their topics "

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import epicycle
-from epicycle.actors import random_stream
+from epicycle.actors import EpicycleError, random_stream
 from epicycle.runner.cli import main
 
 OSCILLATOR = """
@@ -74,20 +74,21 @@ def noise(seed: int, count: int, deviation: float) -> list[float]:
 TIMES = [round(0.05 * each, 9) for each in range(61)]
 
 
-def oscillator(**more: Any) -> epicycle.Calibrated:
-    return epicycle.calibrate("./oscillator.yaml", **{"match": {"mass.place": "measured.csv"}, "vary": VARY, **more})
+def oscillator(match: object = None, **more: Any) -> epicycle.Calibration:
+    goal = epicycle.Match(match or {"mass.place": "measured.csv"})
+    return epicycle.search("./oscillator.yaml", goal, **{"vary": VARY, "jobs": 1, **more})
 
 
 @pytest.mark.slow  # the same with noise: in every run
 def test_a_damped_oscillator_without_noise() -> None:
     measured(TIMES, [place(time) for time in TIMES])
     found = oscillator()
-    for each in found.calibration.parameters:
+    for each in found.parameters:
         assert each.value == pytest.approx(TRUE[each.path], rel=1e-4)
         assert not each.at_end
-    assert found.best["damping"] == found.calibration.parameters[1].value
+    assert found.best["damping"] == found.parameters[1].value
     assert str(found.best["frequency"]).endswith(" Hz")
-    assert found.calibration.matches[0].rms < 1e-4
+    assert found.matches[0].rms < 1e-4
 
 
 @pytest.mark.slow
@@ -99,7 +100,7 @@ def test_a_damped_oscillator_with_noise_is_resumed_and_saved(capsys: pytest.Capt
         "mass.place=measured.csv",
         *(word for each in VARY.items() for word in ("--vary", "=".join(each))),
     ]
-    assert main(["calibrate", "./oscillator.yaml", *words, "--out", "out", "--json"]) == 0
+    assert main(["search", "./oscillator.yaml", *words, "--out", "out", "--json"]) == 0
     facts = json.loads(capsys.readouterr().out)
     for each in facts["parameters"]:
         assert each["low"] < TRUE[each["path"]] < each["high"]
@@ -108,7 +109,7 @@ def test_a_damped_oscillator_with_noise_is_resumed_and_saved(capsys: pytest.Capt
     [tried] = Path("out").glob("tried-*.jsonl")
     lines = tried.read_text().splitlines(keepends=True)
     tried.write_text("".join(lines[: len(lines) // 2]))  # as if it had been killed
-    assert main(["calibrate", "./oscillator.yaml", *words, "--out", "out", "--json"]) == 0
+    assert main(["search", "./oscillator.yaml", *words, "--out", "out", "--json"]) == 0
     assert json.loads(capsys.readouterr().out) == facts
     assert tried.read_text().splitlines(keepends=True) == lines
     assert main(["run", "./oscillator.yaml", "--overrides", "out/parameters.yaml"]) == 0
@@ -122,7 +123,7 @@ def test_a_line_has_the_values_and_errors_of_linear_regression() -> None:
     values = [2 * time - 3 + gap for time, gap in zip(times, noise(2, 21, 0.5), strict=True)]
     measured(times, values)
     vary = ["slope=-10..10", "offset=-10..10"]
-    found = epicycle.calibrate("./line.yaml", match="f.output=measured.csv", vary=vary).calibration
+    found = epicycle.search("./line.yaml", epicycle.Match("f.output=measured.csv"), vary=vary)
     design = np.array([times, [1.0] * 21]).T
     expected, [squares], *_ = np.linalg.lstsq(design, np.array(values))
     errors = np.sqrt(np.diag(np.linalg.inv(design.T @ design)) * squares / 19)
@@ -140,10 +141,10 @@ def test_intervals_hold_the_truth_nineteen_times_of_twenty() -> None:
     hits = 0
     for seed in range(40):
         measured(times, [2 * time - 3 + gap for time, gap in zip(times, noise(seed, 21, 0.5), strict=True)])
-        found = epicycle.calibrate(
-            "./line.yaml", match="f.output=measured.csv", vary={"slope": "0..5"}, set={"offset": -3}
+        found = epicycle.search(
+            "./line.yaml", epicycle.Match("f.output=measured.csv"), vary={"slope": "0..5"}, set={"offset": -3}
         )
-        [slope] = found.calibration.parameters
+        [slope] = found.parameters
         hits += slope.low < 2 < slope.high
     assert hits >= 34  # of 40 that each hold it with 95 %: fewer in 1 of 500 cases
 
@@ -152,15 +153,15 @@ def test_what_the_data_do_not_tell() -> None:
     times = [float(each) for each in range(21)]
     measured(times, [2 * time for time in times])
     vary = {"slope": "0..5", "other": "0..1"}
-    found = epicycle.calibrate("./line.yaml", match="f.output=measured.csv", vary=vary)
+    found = epicycle.search("./line.yaml", epicycle.Match("f.output=measured.csv"), vary=vary)
     assert "These data do not tell other: other values fit as well." in found.sentence
-    assert [math.isinf(each.error) for each in found.calibration.parameters] == [False, True]
+    assert [math.isinf(each.error) for each in found.parameters] == [False, True]
 
 
 def test_an_end_of_a_range_and_residuals_with_a_pattern_are_told() -> None:
     times = [float(each) for each in range(21)]
     measured(times, [2 * time + math.sin(time / 2) for time in times])
-    found = epicycle.calibrate("./line.yaml", match="f.output=measured.csv", vary={"slope": "0..1.5"})
+    found = epicycle.search("./line.yaml", epicycle.Match("f.output=measured.csv"), vary={"slope": "0..1.5"})
     assert "slope is at the end of its range: the best may lie beyond, and its interval says little." in found.sentence
     assert "The residuals of f.output are no independent errors (correlation of neighbours 0." in found.sentence
 
@@ -170,7 +171,9 @@ def test_between_tokens_a_signal_holds_or_is_linear() -> None:
     measured(times, [3 * time for time in times])
     for linear, offset in ((True, 0.0), (False, 1.5)):
         vary = ["slope=0..5", "offset=-5..5"]
-        found = epicycle.calibrate("./line.yaml", match="f.output=measured.csv", vary=vary, linear=linear).best
+        found = epicycle.search(
+            "./line.yaml", epicycle.Match("f.output=measured.csv", between="linear" if linear else "hold"), vary=vary
+        ).best
         assert found == {"slope": pytest.approx(3, abs=1e-4), "offset": pytest.approx(offset, abs=1e-3)}
 
 
@@ -182,8 +185,8 @@ def test_several_signals_of_one_table() -> None:
     pq.write_table(pa.table(columns), "both.parquet")
     match = {"mass.place": "both.parquet", "show.output": "both.parquet"}
     found = oscillator(match=match, vary={"start": "0.1 m..2 m"}, set={"frequency": "1.3 Hz", "damping": 0.08, "n": 2})
-    assert found.calibration.parameters[0].value == pytest.approx(0.7, rel=1e-5)
-    assert [each.signal for each in found.calibration.matches] == ["mass.place", "show.output"]
+    assert found.parameters[0].value == pytest.approx(0.7, rel=1e-5)
+    assert [each.signal for each in found.matches] == ["mass.place", "show.output"]
 
 
 @pytest.mark.parametrize(
@@ -227,15 +230,14 @@ def test_several_signals_of_one_table() -> None:
 def test_messages(text: str, match: str, vary: str, told: str, capsys: pytest.CaptureFixture[str]) -> None:
     Path("m.csv").write_text(text, encoding="utf-8")
     words = ["--match", match or "mass.place=m.csv", "--vary", vary or "damping=0.01..0.5"]
-    assert main(["calibrate", "./oscillator.yaml", *words, "--out", "out"]) == 2
+    assert main(["search", "./oscillator.yaml", *words, "--out", "out"]) == 2
     assert capsys.readouterr().err == told
 
 
 def test_there_must_be_something_to_match_and_to_vary(capsys: pytest.CaptureFixture[str]) -> None:
     measured([0.0, 1.0], [1.0, 2.0])
-    assert main(["calibrate", "./oscillator.yaml", "--vary", "damping=0.01..0.5"]) == 2
-    assert main(["calibrate", "./oscillator.yaml", "--match", "mass.place=measured.csv"]) == 2
-    assert capsys.readouterr().err == (
-        "error: there is nothing to match\n   help: add --match server.size=measured.csv\n"
-        "error: there is nothing to vary\n   help: add --vary load=0.5..0.9\n"
-    )
+    with pytest.raises(EpicycleError) as caught:
+        epicycle.search("./oscillator.yaml", epicycle.Match([]), vary={"damping": "0.01..0.5"})
+    assert str(caught.value) == "there is nothing to match\n   help: add --match server.size=measured.csv"
+    assert main(["search", "./oscillator.yaml", "--match", "mass.place=measured.csv"]) == 2
+    assert capsys.readouterr().err == ("error: there is nothing to vary\n   help: add --vary load=0.5..0.9\n")

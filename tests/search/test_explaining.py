@@ -53,8 +53,8 @@ def model(tmp_path: Path) -> Path:
     return file
 
 
-def losses(found: epicycle.Explained) -> list[int]:
-    return [name.token for name in found.explanation.names]
+def losses(found: epicycle.Explanation) -> list[int]:
+    return [name.token for name in found.names]
 
 
 @pytest.mark.parametrize("seed", range(12))
@@ -68,14 +68,14 @@ def test_two_losses_in_a_row_suffice(model: Path, seed: int) -> None:
             epicycle.explain(model, "alive", seed=seed)
         return
     found = epicycle.explain(model, "alive", seed=seed)
-    names = found.explanation.names
+    names = found.names
     assert len(names) == 2
     assert names[1].token == names[0].token + 1
     # By brute force: with these it is broken, without one of them it is not.
     for exactly in ([*names], names[:1], names[1:], []):
         verdict = Simulation(made, seed=seed, acts=Interventions(frozenset(exactly))).run().monitors["alive"]
         assert verdict.holds is (exactly != names)
-    assert all(effect.without == effect.alone == float("inf") for effect in found.explanation.effects)
+    assert all(effect.without == effect.alone == float("inf") for effect in found.effects)
 
 
 def broken_seed(model: Path) -> int:
@@ -86,18 +86,18 @@ def broken_seed(model: Path) -> int:
 def test_what_is_said_and_written(model: Path, tmp_path: Path) -> None:
     seed = broken_seed(model)
     found = epicycle.explain(model, "alive", seed=seed)
-    first, second = (effect.act for effect in found.explanation.effects)
+    first, second = (effect.act for effect in found.effects)
     times = f"{first.time / 1e9:g} s and {second.time / 1e9:g} s"
-    broken = found.explanation.verdict_of_set.time
+    broken = found.verdict_of_set.time
     assert broken is not None
     assert found.sentence == (
-        f"2 acts of {found.explanation.acts} suffice: loss dropped a token of clock.output at relay.input at {times}. "
+        f"2 faults of {found.acts} suffice: loss dropped a token of clock.output at relay.input at {times}. "
         "With these alone, alive (always after 1 s eventually within 2.5 s sends double.output) is broken at "
         f"{broken:.9g} s. Without any single one of them, it holds."
     )
-    assert [step.port for step in found.explanation.steps] == ["relay.output", "double.output"]
-    assert {step.time for step in found.explanation.steps} == {first.time / 1e9}
-    assert all(step.token is None or step.instead is None for step in found.explanation.steps)
+    assert [step.port for step in found.steps] == ["relay.output", "double.output"]
+    assert {step.time for step in found.steps} == {first.time / 1e9}
+    assert all(step.token is None or step.instead is None for step in found.steps)
     written = found.save(tmp_path / "out")
     assert [path.name for path in written] == ["explanation.yaml", "explanation.json", "explanation.html"]
     facts = json.loads(written[1].read_text(encoding="utf-8"))
@@ -108,9 +108,9 @@ def test_what_is_said_and_written(model: Path, tmp_path: Path) -> None:
     ]
     # Anybody can run it.
     again = epicycle.run(model, seed=seed, disturb=written[0])
-    assert again.monitors["alive"] == found.explanation.verdict_of_set
+    assert again.monitors["alive"] == found.verdict_of_set
     assert again.aspects["loss"] == {"dropped": 2}
-    assert "1 act" not in str(found)
+    assert "1 fault" not in str(found)
     assert "robustness without it" in str(found)
 
 
@@ -119,8 +119,8 @@ def test_the_monitor_that_is_broken_first_by_default(model: Path, tmp_path: Path
     verdicts = epicycle.run(model, seed=broken_seed(model)).monitors
     times = {name: each.time for name, each in verdicts.items() if each.holds is False and each.time is not None}
     first, *others = sorted(times, key=lambda name: times[name])
-    assert found.explanation.monitor == first
-    assert found.explanation.also == tuple(others)
+    assert found.monitor == first
+    assert found.also == tuple(others)
     assert others
     assert found.sentence.endswith(f" Also broken in the whole run: {', '.join(others)}.")
     with pytest.raises(EpicycleError) as raised:
@@ -133,9 +133,9 @@ def test_the_monitor_that_is_broken_first_by_default(model: Path, tmp_path: Path
 
 def test_a_model_that_breaks_by_itself(model: Path) -> None:
     found = epicycle.explain(model, "always double.output < 10", seed=1)
-    assert found.explanation.effects == []
+    assert found.effects == []
     assert found.sentence == (
-        "property (always double.output < 10) is broken at 5 s without any act of an aspect: the model breaks it by "
+        "property (always double.output < 10) is broken at 5 s without any fault of an aspect: the model breaks it by "
         "itself."
     )
     assert found.disturbance().endswith("exactly: []\n")
@@ -165,9 +165,9 @@ def test_a_search_that_is_killed_continues_to_the_same_answer(model: Path, tmp_p
     # Killed in the middle of a line.
     (part / name).write_text("".join(lines[:4]) + lines[4][: len(lines[4]) // 2], encoding="utf-8")
     again = epicycle.explain(model, "alive", seed=seed, out=part)
-    assert again.explanation.names == whole.explanation.names
-    assert again.explanation.effects == whole.explanation.effects
-    assert again.explanation.runs < whole.explanation.runs
+    assert again.names == whole.names
+    assert again.effects == whole.effects
+    assert again.runs < whole.runs
     assert (part / name).read_text(encoding="utf-8").splitlines(keepends=True)[:4] == lines[:4]
 
 
@@ -176,7 +176,7 @@ def test_the_command(model: Path, tmp_path: Path, capsys: pytest.CaptureFixture[
     words = ["explain", str(model), "--seed", str(seed), "--monitor", "alive", "--out", str(out)]
     assert main(words) == 0
     printed = capsys.readouterr().out
-    assert printed.startswith("2 acts of ")
+    assert printed.startswith("2 faults of ")
     assert f"wrote {out / 'explanation.html'}" in printed
     assert main([*words, "--json", "--no-page"]) == 0
     facts = json.loads(capsys.readouterr().out)
@@ -222,7 +222,7 @@ def twice(tmp_path: Path) -> Path:
 def test_all_times_are_those_of_the_run_of_the_set(twice: Path) -> None:
     made, moved, elsewhere = load_model(twice), 0, 0
     for seed in range(12):
-        found = epicycle.explain(twice, "alive", seed=seed).explanation
+        found = epicycle.explain(twice, "alive", seed=seed)
         results = Simulation(made, seed=seed, acts=Interventions(frozenset(found.names))).run()
         assert [effect.act for effect in found.effects] == results.acts
         assert found.verdict_of_set == results.monitors["alive"]
@@ -237,11 +237,11 @@ def test_all_times_are_those_of_the_run_of_the_set(twice: Path) -> None:
 def test_an_act_that_is_another_in_the_whole_run_is_told(twice: Path) -> None:
     found = epicycle.explain(twice, "alive", seed=3)
     assert found.sentence == (
-        "2 acts of 17 suffice: behind dropped a token of relay.output at double.input at 9 s; loss dropped a token of "
-        "clock.output at relay.input at 10 s. With these alone, alive (always after 1 s eventually within 2.5 s sends "
-        "double.output) is broken at 8 s (in the whole run at 7 s). Without any single one of them, it holds. One act "
-        "is not the same in the whole run, which takes another course: behind at double.input, token 10: at 12 s, "
-        "another token."
+        "2 faults of 17 suffice: behind dropped a token of relay.output at double.input at 9 s; loss dropped a token "
+        "of clock.output at relay.input at 10 s. With these alone, alive (always after 1 s eventually within 2.5 s "
+        "sends double.output) is broken at 8 s (in the whole run at 7 s). Without any single one of them, it holds. "
+        "One fault is not the same in the whole run, which takes another course: behind at double.input, token 10: at "
+        "12 s, another token."
     )
     assert "in the whole run" in str(found).split("\n\n")[1].splitlines()[0]
 
@@ -276,13 +276,13 @@ def late(tmp_path: Path) -> Path:
     return file
 
 
-def breaks(file: Path, found: epicycle.Explained) -> bool:
+def breaks(file: Path, found: epicycle.Explanation) -> bool:
     """Whether what was told breaks the property, by the disturbance that is written."""
     folder = file.parent / "check"
     written = found.save(folder, page=False)
-    again = epicycle.run(file, seed=found.explanation.seed, disturb=written[0])
-    assert again.monitors[found.explanation.monitor] == found.explanation.verdict_of_set
-    return again.monitors[found.explanation.monitor].holds is False
+    again = epicycle.run(file, seed=found.seed, disturb=written[0])
+    assert again.monitors[found.monitor] == found.verdict_of_set
+    return again.monitors[found.monitor].holds is False
 
 
 @pytest.mark.slow
@@ -300,11 +300,11 @@ def test_a_limit_of_runs(late: Path, tmp_path: Path) -> None:
     assert breaks(late, found)
     # The same again, and further with more runs, from what is noted.
     again = epicycle.explain(late, "enough", seed=1, runs=40, out=tmp_path / "out")
-    assert again.explanation.names == found.explanation.names
-    assert again.explanation.runs < 10
+    assert again.names == found.names
+    assert again.runs < 10
     more = epicycle.explain(late, "enough", seed=1, runs=60, out=tmp_path / "out")
-    assert len(more.explanation.names) <= len(found.explanation.names)
-    assert more.explanation.runs < 30
+    assert len(more.names) <= len(found.names)
+    assert more.runs < 30
     with pytest.raises(EpicycleError, match="runs: 0 is not a whole number of at least 1"):
         epicycle.explain(late, "enough", runs=0)
 
@@ -352,8 +352,8 @@ def test_the_acts_of_one_aspect(late: Path, tmp_path: Path, capsys: pytest.Captu
     words = ["explain", str(late), "--seed", "1", "--monitor", "enough", "--only", "slow", "--out", str(out)]
     assert main([*words, "--no-page"]) == 0
     assert capsys.readouterr().out.splitlines()[0] == (
-        "enough (eventually within 20 s sums.output >= 12000) is broken at 20 s without any act of slow: other aspects "
-        "or the model itself break it."
+        "enough (eventually within 20 s sums.output >= 12000) is broken at 20 s without any fault of slow: other "
+        "aspects or the model itself break it."
     )
     assert main([*words[:-3], "loss", "--out", str(out), "--runs", "30", "--no-page"]) == 0
     said = capsys.readouterr().out.splitlines()[0]
@@ -361,7 +361,7 @@ def test_the_acts_of_one_aspect(late: Path, tmp_path: Path, capsys: pytest.Captu
     assert facts["only"] == ["loss"]
     assert {each["act"]["name"][0] for each in facts["effects"]} == {"loss"}
     assert {each[0] for each in facts["others"]} == {"slow"}
-    assert said.endswith(f"The acts of other aspects ({len(facts['others'])}) happened as well.")
+    assert said.endswith(f"The faults of other aspects ({len(facts['others'])}) happened as well.")
     again = epicycle.run(late, seed=1, disturb=out / "explanation.yaml")
     assert again.monitors["enough"].holds is False
     assert again.aspects["loss"]["dropped"] == len(facts["effects"])
@@ -388,13 +388,13 @@ def check_paper(seed: int) -> int:
         return Simulation(made, seed=seed, acts=Interventions(frozenset(names))).run().monitors["near"].holds
 
     found = epicycle.explain(made, "near", seed=seed)
-    names = found.explanation.names
+    names = found.names
     assert names
     assert holds(names) is False
     assert holds([]) is True
     for each in names:
         assert holds([other for other in names if other != each]) is True
-    assert found.explanation.steps[-1].port == "clearance.distance"
+    assert found.steps[-1].port == "clearance.distance"
     return len(names)
 
 

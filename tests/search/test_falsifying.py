@@ -55,7 +55,14 @@ def _folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def falsify(*arguments: object) -> int:
-    return main(["falsify", "far.yaml", "--monitor", "away", "--jobs", "1", *map(str, arguments)])
+    return main(["search", "far.yaml", "--break", "away", "--jobs", "1", *map(str, arguments)])
+
+
+def made_again(run: str) -> str:
+    """The digest of a run of a folder, made again."""
+    assert main(["run", run, "--out", "again"]) == 0
+    digest: str = json.loads(Path("again/manifest.json").read_text(encoding="utf-8"))["digest"]
+    return digest
 
 
 # -- what it finds ----------------------------------------------------------------------------------------------------
@@ -64,9 +71,9 @@ def falsify(*arguments: object) -> int:
 def test_a_broken_run_and_what_is_said_of_it(capsys: pytest.CaptureFixture[str]) -> None:
     code = main(
         [
-            "falsify",
+            "search",
             "far.yaml",
-            "--monitor",
+            "--break",
             "always far.output < 4.3",
             "--vary",
             "y=0 m..1 m",
@@ -93,6 +100,7 @@ def test_a_broken_run_and_what_is_said_of_it(capsys: pytest.CaptureFixture[str])
         "15   0.80855 m  14    -0.66453",
         "3    0.75571 m  2     -0.595613",
         "wrote out/table.parquet",
+        "wrote out/falsification.json",
     ]
 
 
@@ -112,15 +120,18 @@ def test_nothing_found_is_not_called_safe(capsys: pytest.CaptureFixture[str]) ->
         "24   1  lifo    30    1.5209",
         "25   1  lifo    31    1.5209",
         "wrote out/table.parquet",
+        "wrote out/falsification.json",
     ]
 
 
 @pytest.mark.slow
 def test_it_follows_robustness_where_the_library_is() -> None:
     pytest.importorskip("cma")
-    found = epicycle.falsify("far.yaml", "away", vary=BOX, set={"n": 0, "policy": "lifo"}, out="out", jobs=1)
+    found = epicycle.search(
+        "far.yaml", epicycle.Break("away"), vary=BOX, set={"n": 0, "policy": "lifo"}, out="out", jobs=1
+    )
     assert found.broken is not None
-    assert found.findings.guided
+    assert found.guided
     x, y = (float(number) for number in found.broken.level.values.values())  # type: ignore[arg-type]
     assert (x - 0.71) ** 2 + (y - 0.13) ** 2 <= 0.0001
     assert found.broken.seed == found.broken.number - 1
@@ -133,7 +144,7 @@ def test_it_follows_robustness_where_the_library_is() -> None:
 @pytest.mark.slow
 def test_without_the_library_it_goes_on_at_random_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(falsifying, "is_guided", lambda: False)
-    found = epicycle.falsify("far.yaml", "away", vary=BOX, set=ALONE, out="out", runs=70, jobs=1)
+    found = epicycle.search("far.yaml", epicycle.Break("away", runs=70), vary=BOX, set=ALONE, out="out", jobs=1)
     assert found.broken is None
     assert found.sentence.endswith(
         "All values were chosen at random: the library that guides a search is not installed (pip install "
@@ -142,7 +153,7 @@ def test_without_the_library_it_goes_on_at_random_and_says_so(monkeypatch: pytes
 
 
 def test_runs_that_are_all_the_same_are_told() -> None:
-    found = epicycle.falsify("far.yaml", "away", runs=5, out="out", jobs=1)
+    found = epicycle.search("far.yaml", epicycle.Break("away", runs=5), out="out", jobs=1)
     assert found.sentence == (
         "No run broke away (always far.output > 0.0001), which does not prove that it always holds. "
         "Tried: 5 runs, seeds 0 to 4. All runs were the same: nothing in the model depends on the seed or on what was "
@@ -153,19 +164,23 @@ def test_runs_that_are_all_the_same_are_told() -> None:
 def test_a_program_asks_for_some_runs() -> None:
     for runs in (0, 10**7):
         with pytest.raises(EpicycleError, match=f"runs {runs:,}: expected a whole number from 1 to 1,000,000"):
-            epicycle.falsify("far.yaml", "away", runs=runs, out="out")
+            epicycle.search("far.yaml", epicycle.Break("away", runs=runs), out="out")
 
 
 def test_runs_that_fail_or_cannot_be_judged_are_told(capsys: pytest.CaptureFixture[str]) -> None:
     Path("walk.yaml").write_text(MODEL, encoding="utf-8")
     options = ["--types", str(THIS), "--runs", "20", "--out", "out", "--set", "fails=[3, 4]", "--jobs", "1"]
-    assert main(["falsify", "walk.yaml", "--monitor", "always walk.output < 100", *options]) == 1
+    assert main(["search", "walk.yaml", "--break", "always walk.output < 100", *options]) == 1
     assert capsys.readouterr().out.splitlines()[0] == (
         "No run broke property (always walk.output < 100), which does not prove that it always holds. Tried: 20 runs, "
         "seeds 0 to 19. 4 runs failed, and nothing is known of the property there: 'epicycle status out' shows them."
     )
-    late = epicycle.falsify(
-        "walk.yaml", "eventually within 1 min walk.output > 1000", runs=2, types=[THIS], out="late", jobs=1
+    late = epicycle.search(
+        "walk.yaml",
+        epicycle.Break("eventually within 1 min walk.output > 1000", runs=2),
+        types=[THIS],
+        out="late",
+        jobs=1,
     )
     assert late.sentence.endswith("Tried: 2 runs, seeds 0 to 1. In 2 runs the property could not be judged.")
 
@@ -178,7 +193,7 @@ BOTH = "  low: always far.output < 4.3\n"
 @pytest.mark.slow
 def test_all_monitors_of_the_model_by_default(capsys: pytest.CaptureFixture[str]) -> None:
     Path("both.yaml").write_text(TEXT + BOTH, encoding="utf-8")
-    words = ["falsify", "both.yaml", "--vary", "y=0 m..1 m", "--out", "out", "--jobs", "1"]
+    words = ["search", "both.yaml", "--break", "--vary", "y=0 m..1 m", "--out", "out", "--jobs", "1"]
     assert main([*words, "--json"]) == 3
     facts = json.loads(capsys.readouterr().out)
     assert facts["monitors"] == {"away": "always far.output > 0.0001", "low": "always far.output < 4.3"}
@@ -189,7 +204,7 @@ def test_all_monitors_of_the_model_by_default(capsys: pytest.CaptureFixture[str]
     assert capsys.readouterr().out.startswith(
         "Run 1, with y=0.47529 m and seed 0, breaks low (always far.output < 4.3): "
     )
-    calm = epicycle.falsify("both.yaml", set={"n": 1}, runs=2, out="calm", jobs=1)
+    calm = epicycle.search("both.yaml", epicycle.Break(runs=2), set={"n": 1}, out="calm", jobs=1)
     assert calm.sentence.startswith(
         "No run broke away (always far.output > 0.0001) or low (always far.output < 4.3), which does not prove that "
         "they always hold. "
@@ -198,10 +213,10 @@ def test_all_monitors_of_the_model_by_default(capsys: pytest.CaptureFixture[str]
 
 
 def test_a_model_without_monitors(capsys: pytest.CaptureFixture[str]) -> None:
-    for name, more in (("falsify", ["--jobs", "1"]), ("explain", [])):
+    for name, flag, more in (("search", "--break", ["--break", "--jobs", "1"]), ("explain", "--monitor", [])):
         assert main([name, "mm1", "--out", "out", *more]) == 2
         assert capsys.readouterr().err == (
-            "error: mm1 has no monitor\n   help: say what is to hold, such as --monitor 'always server.size < 40'\n"
+            f"error: mm1 has no monitor\n   help: say what is to hold, such as {flag} 'always server.size < 40'\n"
         )
 
 
@@ -211,23 +226,28 @@ def test_aspects_and_a_stop_time_as_run_has_them(capsys: pytest.CaptureFixture[s
     Path("far.yaml").write_text(TEXT + aspects, encoding="utf-8")
     loss = "lost=PacketLoss,probability=0.5,at=sink.input"
     changes = ["--aspect", loss, "--without", "rounds", "--until", "8 s"]
-    few = ["--monitor", "eventually within 5 s sends far.output", "--runs", "2", "--out", "out"]
-    assert main(["falsify", "far.yaml", *few, *changes, "--jobs", "1"]) == 0
+    few = ["--break", "eventually within 5 s sends far.output", "--runs", "2", "--out", "out"]
+    assert main(["search", "far.yaml", *few, *changes, "--jobs", "1"]) == 0
     capsys.readouterr()
     table = epicycle.open_study("out").table().to_pylist()
     for row in table:
         again = epicycle.run("far.yaml", seed=row["seed"], aspects=[loss], without_aspects=["rounds"], until="8 s")
         assert again.digest == row["digest"]
-        assert main(["replay", "out", row["run"]]) == 0
-        assert capsys.readouterr().out.endswith(": the same\n")
+        assert made_again(f"out/{row['run']}") == row["digest"]
     # The commands that it tells make the same run, too.
-    found = epicycle.falsify(
-        "far.yaml", "always far.output < 4.3", aspects=[loss], without_aspects=["rounds"], until=8, out="broken", jobs=1
+    found = epicycle.search(
+        "far.yaml",
+        epicycle.Break("always far.output < 4.3"),
+        aspects=[loss],
+        without_aspects=["rounds"],
+        until=8,
+        out="broken",
+        jobs=1,
     )
     assert found.broken is not None
     assert found.command[3:] == ["--aspect", loss, "--without", "rounds", "--seed", "0", "--until", "8"]
     # Other changes are another search.
-    assert main(["falsify", "far.yaml", *few, *changes[:-2], "--jobs", "1"]) in (0, 2)
+    assert main(["search", "far.yaml", *few, *changes[:-2], "--jobs", "1"]) in (0, 2)
 
 
 # -- what it leaves ---------------------------------------------------------------------------------------------------
@@ -263,10 +283,9 @@ def test_the_folder_is_that_of_a_study(capsys: pytest.CaptureFixture[str]) -> No
     assert main(["status", "out"]) == 0
     assert capsys.readouterr().out == "falsify_far: 30 of at most 30 runs are finished (30 ok)\n"
     run = table["run"][17].as_py()
-    assert main(["replay", "out", run]) == 0
-    assert capsys.readouterr().out.endswith(": the same\n")
-    assert main(["resume", "out"]) == 2
-    told = shlex.join(["epicycle", "falsify", "far.yaml", "--monitor", "away", "--jobs", "1", *map(str, options)])
+    assert made_again(f"out/{run}") == table["digest"][17].as_py()
+    assert main(["study", "out"]) == 2
+    told = shlex.join(["epicycle", "search", "far.yaml", "--break", "away", "--jobs", "1", *map(str, options)])
     assert capsys.readouterr().err == f"error: out holds a search, which its own command continues\n   help: {told}\n"
 
 
@@ -351,7 +370,7 @@ def test_more_runs_continue_it() -> None:
 @pytest.mark.slow  # an estimate that is killed (test_rare.py), and a study, keep their rows in the same way
 def test_a_search_that_is_killed_comes_to_the_same() -> None:
     Path("walk.yaml").write_text(MODEL, encoding="utf-8")
-    said = ["falsify", "walk.yaml", "--monitor", "always walk.output < 8.5", "--vary", "drift=-1 m/s..0.2 m/s"]
+    said = ["search", "walk.yaml", "--break", "always walk.output < 8.5", "--vary", "drift=-1 m/s..0.2 m/s"]
     words = command(*said, "--types", THIS, "--runs", 80, "--jobs", 2, "--set", "pause=0.01")
     calm = subprocess.run([*words, "--out", "calm", "--json"], capture_output=True, check=False)
     out = Path("out")
@@ -378,7 +397,7 @@ def size(folder: Path) -> int:
 @pytest.mark.slow
 def test_an_interrupt_keeps_what_is_there() -> None:
     Path("walk.yaml").write_text(MODEL, encoding="utf-8")
-    said = ["falsify", "walk.yaml", "--monitor", "always walk.output < 1000", "--types", THIS, "--set", "pause=0.2"]
+    said = ["search", "walk.yaml", "--break", "always walk.output < 1000", "--types", THIS, "--set", "pause=0.2"]
     words = command(*said, "--jobs", 1, "--out", "out")
     process = subprocess.Popen(words, start_new_session=True, stderr=subprocess.PIPE, text=True)
     start = time.monotonic()
@@ -400,12 +419,12 @@ LISTS = re.compile(r"(packaged \w+: )[^;\n]*")  # which grow with the house
 
 def message(case: Case) -> str:
     """What is said about the options of a case."""
-    options = {"--monitor": "away", "--runs": "1", "--out": "out"}
+    options = {"--break": "away", "--runs": "1", "--out": "out"}
     words = [word for option in [*options.items(), *case.options] for word in option]
     said = StringIO()
     with contextlib.redirect_stderr(said), contextlib.redirect_stdout(said), contextlib.suppress(SystemExit):
-        main(["falsify", "far.yaml", *words])
-    return LISTS.sub(r"\1...", said.getvalue().rpartition("MODEL\n")[2])
+        main(["search", "far.yaml", *words])
+    return LISTS.sub(r"\1...", said.getvalue().rpartition("MODEL or STUDY\n")[2])
 
 
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
@@ -422,7 +441,7 @@ def test_a_folder_of_something_else_is_left_alone(capsys: pytest.CaptureFixture[
         "error: out was made when falsify_far had different factors: none, not x (float)\n"
         "   help: choose another folder with --out\n"
     )
-    assert main(["falsify", "nosuch", "--monitor", "away"]) == 2
+    assert main(["search", "nosuch", "--break", "away"]) == 2
     assert capsys.readouterr().err.startswith("error: there is no packaged model 'nosuch'\n   help: packaged models: ")
 
 

@@ -12,8 +12,7 @@ import epicycle
 from epicycle.actors import EpicycleError
 from epicycle.runner.cli import main
 from epicycle.runner.graph.acts import ActName
-from epicycle.runner.search import FaultSpace
-from epicycle.runner.search.faults import _by_sum
+from epicycle.runner.search.faults import FaultSpace, _by_sum
 
 # A plan comes each second: one that is lost makes the robot's plan 1.9 s old, two in a row 2.9 s.
 TEXT = """
@@ -46,7 +45,7 @@ def _folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def falsify(*arguments: object) -> int:
-    return main(["falsify", "stale.yaml", "--jobs", "1", "--out", "out", *map(str, arguments)])
+    return main(["search", "stale.yaml", "--jobs", "1", "--out", "out", *map(str, arguments)])
 
 
 def lost(seed: int) -> list[int]:
@@ -62,30 +61,28 @@ def test_two_faults_that_no_single_one_replaces(capsys: pytest.CaptureFixture[st
     numbers = lost(4)
     pairs = [each for each in itertools.combinations(numbers, 2) if each[1] == each[0] + 1]
     assert pairs  # or the run has no such fault
-    assert falsify("--monitor", "fresh", "--acts", 2, "--seed", 4) == 3
+    assert falsify("--break", "fresh", "--max-faults", 2, "--seed", 4) == 3
     said = capsys.readouterr().out
     results = epicycle.open_study("out")
     table = results.to_pandas()
     assert set(table["seed"]) == {4}
-    found = epicycle.falsify("stale.yaml", "fresh", acts=2, seed=4, out="out", progress=False)
+    found = epicycle.search("stale.yaml", epicycle.Break("fresh", max_faults=2), seed=4, out="out", progress=False)
     assert found.broken is not None
     first, second = sorted(int(each["token"]) for each in _exactly(found))
     assert (first, second) in pairs
     assert any(f"exactly radio at robot.plan, token {each}; " in said for each in (first, second))
-    assert f"no act at all, {len(numbers)} of {len(numbers)} sets of 1 act, " in said
+    assert f"no fault at all, {len(numbers)} of {len(numbers)} sets of 1 fault, " in said
     alone = table[[text.count("token") == 1 for text in table["exactly"]]]
     assert len(alone) == len(numbers)
     assert alone["fresh"].all()
     # What it tells to do gives the same; and there is no smaller explanation.
     assert main([*found.command[1:], "--check"]) == 3
     capsys.readouterr()
-    explained = epicycle.explain(
-        epicycle.load("stale.yaml", set={"exactly": _exactly(found)}), "fresh", seed=4
-    ).explanation
+    explained = epicycle.explain(epicycle.load("stale.yaml", set={"exactly": _exactly(found)}), "fresh", seed=4)
     assert sorted(each.act.name.token for each in explained.effects) == [first, second]
 
 
-def _exactly(found: epicycle.Falsified) -> list[dict[str, object]]:
+def _exactly(found: epicycle.Falsification) -> list[dict[str, object]]:
     assert found.broken is not None
     facts = found.facts()["run"]["set"]["exactly"]
     assert isinstance(facts, list)
@@ -95,9 +92,9 @@ def _exactly(found: epicycle.Falsified) -> list[dict[str, object]]:
 @pytest.mark.slow
 def test_it_ends_when_all_sets_are_tried(capsys: pytest.CaptureFixture[str]) -> None:
     count = len(lost(2))
-    assert falsify("--monitor", "usable", "--acts", 2, "--seed", 2) == 0
+    assert falsify("--break", "usable", "--max-faults", 2, "--seed", 2) == 0
     pairs = math.comb(count, 2)
-    tried = f"no act at all, {count} of {count} sets of 1 act, {pairs} of {pairs} sets of 2 acts."
+    tried = f"no fault at all, {count} of {count} sets of 1 fault, {pairs} of {pairs} sets of 2 faults."
     assert capsys.readouterr().out.split("\n")[0] == (
         "No run broke usable (always robot.output <= 3.5), which does not prove that it always holds. Tried: "
         f"{1 + count + pairs} runs, seed 2, {tried}"
@@ -106,37 +103,37 @@ def test_it_ends_when_all_sets_are_tried(capsys: pytest.CaptureFixture[str]) -> 
 
 def test_what_needs_no_fault(capsys: pytest.CaptureFixture[str]) -> None:
     """The first run has none."""
-    assert falsify("--monitor", "always robot.output < 0.85", "--acts", 1, "--seed", 2) == 3
+    assert falsify("--break", "always robot.output < 0.85", "--max-faults", 1, "--seed", 2) == 3
     assert capsys.readouterr().out.startswith(
-        "Run 1, with exactly no act and seed 2, breaks property (always robot.output < 0.85): "
+        "Run 1, with exactly no fault and seed 2, breaks property (always robot.output < 0.85): "
     )
 
 
 @pytest.mark.slow
 def test_a_longer_search_continues(capsys: pytest.CaptureFixture[str]) -> None:
-    assert falsify("--monitor", "usable", "--acts", 2, "--seed", 2, "--runs", 5) == 0
-    assert falsify("--monitor", "usable", "--acts", 2, "--seed", 2) == 0
+    assert falsify("--break", "usable", "--max-faults", 2, "--seed", 2, "--runs", 5) == 0
+    assert falsify("--break", "usable", "--max-faults", 2, "--seed", 2) == 0
     said = capsys.readouterr().out.replace("out/", "").rpartition("No run")[2]
-    assert falsify("--monitor", "usable", "--acts", 2, "--seed", 2, "--out", "anew", "--jobs", 2) == 0
+    assert falsify("--break", "usable", "--max-faults", 2, "--seed", 2, "--out", "anew", "--jobs", 2) == 0
     assert capsys.readouterr().out.replace("anew/", "").rpartition("No run")[2] == said
     parts = [(Path(each) / "table.parquet").read_bytes() for each in ("out", "anew")]
     assert parts[0] == parts[1]
 
 
-ONE = "acts are searched in one run"
-MANY = "20,000 runs are too many for one folder, where acts may take 9,375 values each"
+ONE = "faults are searched in one run"
+MANY = "20,000 runs are too many for one folder, where faults may take 9,375 values each"
 
 
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ("--vary loss=0.1..0.2", f"{ONE}, in which nothing varies\n   help: leave out --vary or --acts"),
+        ("--vary loss=0.1..0.2", f"{ONE}, in which nothing varies\n   help: leave out --vary or --max-faults"),
         ("--set loss=0", "no aspect does anything in the run of stale with seed 0\n   help: add --disturb"),
         ("--runs 20000", f"{MANY}\n   help: search with --runs 9375 and several seeds, in a folder each"),
     ],
 )
 def test_what_is_wrong(options: str, message: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert falsify("--monitor", "fresh", "--acts", 2, *options.split()) == 2
+    assert falsify("--break", "fresh", "--max-faults", 2, *options.split()) == 2
     assert capsys.readouterr().err == f"error: {message}\n"
     assert not Path("out").exists()
 

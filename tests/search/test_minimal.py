@@ -6,7 +6,7 @@ import random  # noqa: TID251 (what to try, and not what a model draws)
 
 import pytest
 
-from epicycle.runner.search import minimal
+from epicycle.runner.search.minimal import minimal
 
 
 @pytest.mark.parametrize("seed", range(200))

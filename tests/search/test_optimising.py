@@ -42,8 +42,13 @@ def bowl(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
     return "./bowl.yaml"
 
 
-def optimum(bowl: str, **more: Any) -> epicycle.Optimised:
-    return epicycle.optimise(bowl, **{"minimise": "cost", "vary": VARY, "set": {"n": 4}, "jobs": 2, **more})
+def optimum(bowl: str, **more: Any) -> epicycle.Optimum:
+    """What a search finds: the options of its goal, and others."""
+    given = {"vary": VARY, "set": {"n": 4}, "jobs": 2, **more}
+    kind = epicycle.Maximise if "maximise" in given else epicycle.Minimise
+    objective = given.pop("maximise", None) or given.pop("minimise", "cost")
+    own = {name: given.pop(name) for name in ("subject_to", "points", "replications") if name in given}
+    return epicycle.search(bowl, kind(objective, **own), **given)
 
 
 def test_the_minimum_of_a_bowl(bowl: str) -> None:
@@ -56,7 +61,7 @@ def test_the_minimum_of_a_bowl(bowl: str) -> None:
     assert found.checked.value == found.value.value  # nothing is random
     table = found.results.table()
     assert min(table["cost"].to_pylist()) == found.value.value
-    number = found.optimum.best.number if found.optimum.best else 0
+    number = found.point.number if found.point else 0
     x, y = found.best.values()
     assert found.sentence == (
         f"The least cost of 200 points is {found.value.value:g}, at x={x}, y={y} (point {number}). In 1 run with new "
@@ -73,7 +78,7 @@ def test_whole_numbers_lists_and_expressions(bowl: str) -> None:
 
 @pytest.mark.slow
 def test_the_greatest_lies_at_an_end(bowl: str) -> None:
-    found = optimum(bowl, minimise="", maximise="cost", vary={"x": "-5..5"}, points=100)
+    found = optimum(bowl, maximise="cost", vary={"x": "-5..5"}, points=100)
     assert found.best == {"x": pytest.approx(-5.0, abs=0.1)}
     assert "x is at the end of its range: the best may lie beyond." in found.sentence
 
@@ -118,7 +123,7 @@ def test_the_runs_hang_on_the_seed_alone(bowl: str) -> None:
 def test_a_search_continues(bowl: str) -> None:
     first = optimum(bowl, points=80, out="grown")
     keys = set(first.results.table()["run"].to_pylist())
-    assert main(["resume", "grown"]) == 2  # by its own command
+    assert main(["study", "grown"]) == 2  # by its own command
     grown, fresh = optimum(bowl, points=120, out="grown"), optimum(bowl, points=120, out="fresh")
     assert grown.facts() == {**fresh.facts(), "folder": "grown"}
     assert len(keys - set(grown.results.table()["run"].to_pylist())) <= 1  # the check of what was best then
@@ -126,7 +131,7 @@ def test_a_search_continues(bowl: str) -> None:
 
 @pytest.mark.slow
 def test_a_killed_search_continues_to_the_same_answer(bowl: str) -> None:
-    words = ["optimise", bowl, "--minimise", "cost", "--vary", "x=-5..5", "--vary", "y=-5..5", "--jobs", "2", "--json"]
+    words = ["search", bowl, "--minimise", "cost", "--vary", "x=-5..5", "--vary", "y=-5..5", "--jobs", "2", "--json"]
     process = subprocess.Popen(command(*words, "--out", "killed"), start_new_session=True)
     while not list(Path("killed").glob("journal*")) and process.poll() is None:
         time.sleep(0.02)
@@ -146,18 +151,17 @@ def test_the_conditions_of_a_study_count_alike(bowl: str) -> None:
         "study: s\nmodel: ./bowl.yaml\nvary: {y: [0.5, -1.5], n: [4, 5]}\nmetrics: {double: 2 * cost}\nseed: 3\n"
         "claims: {low: {always: double < 3}}\n"
     )
-    found = epicycle.optimise("./s.yaml", minimise="double", vary={"x": "0..3"}, points=100, jobs=2)
+    found = epicycle.search("./s.yaml", epicycle.Minimise("double", points=100), vary={"x": "0..3"}, jobs=2)
     assert found.best == {"x": pytest.approx(1.5, abs=0.1)}
     assert found.value is not None
     assert found.value.value == pytest.approx(2 * (2 + 0.5), abs=0.05)
-    assert found.results.counts().total() == 4 * (len({each.level.values["x"] for each in found.optimum.tested}) + 1)
+    assert found.results.counts().total() == 4 * (len({each.level.values["x"] for each in found.tested}) + 1)
     assert set(found.results.table()["seed"].to_pylist()) == {3, 4}
 
 
 @pytest.mark.parametrize(
     ("given", "told"),
     [
-        (["--vary", "x=0..1"], "error: give one of --minimise METRIC and --maximise METRIC\n"),
         (["--minimise", "cost"], "error: there is nothing to vary\n   help: add --vary load=0.5..0.9\n"),
         (
             ["--minimise", "csot", "--vary", "x=0..1"],
@@ -206,24 +210,54 @@ def test_the_conditions_of_a_study_count_alike(bowl: str) -> None:
     ],
 )
 def test_messages(bowl: str, given: list[str], told: str, capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["optimise", bowl, *given, "--points", "5"]) == 2
+    assert main(["search", bowl, *given, "--points", "5"]) == 2
     assert capsys.readouterr().err == told
+
+
+@pytest.mark.parametrize(
+    ("given", "told"),
+    [
+        (["--vary", "x=0..1"], "one of the arguments --break --minimise --maximise --match is required"),
+        (["--minimise", "cost", "--maximise", "cost"], "argument --maximise: not allowed with argument --minimise"),
+    ],
+)
+def test_a_search_has_one_goal(bowl: str, given: list[str], told: str, capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit):
+        main(["search", bowl, *given])
+    assert capsys.readouterr().err.splitlines()[-1] == f"epicycle search: error: {told}"
+
+
+@pytest.mark.parametrize(
+    ("given", "told"),
+    [
+        (["--minimise", "cost", "--runs", "5"], "--runs is for --break"),
+        (["--break", "--points", "5"], "--points is for --minimise and --maximise"),
+        (["--maximise", "cost", "--between", "linear"], "--between is for --match"),
+        (
+            ["--match", "f.output=m.csv", "--run-timeout", "5"],
+            "--run-timeout is not for --match, which needs every run",
+        ),
+    ],
+)
+def test_an_option_of_another_goal(bowl: str, given: list[str], told: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["search", bowl, *given, "--vary", "x=0..1"]) == 2
+    assert capsys.readouterr().err == f"error: {told}\n"
 
 
 def test_failed_runs_are_told(bowl: str) -> None:
     found = optimum(bowl, minimise="1 / (x > 0)", points=40, vary={"x": "-1..1"})
-    known = [each for each in found.optimum.tested if each.outcome.value is not None]
+    known = [each for each in found.tested if each.outcome.value is not None]
     assert 0 < len(known) < 40
     assert f"{40 - len(known)} points have no mean: runs failed or have no number." in found.sentence
 
 
 def test_without_conditions_it_must_be_a_model_for_a_disturbance() -> None:
-    with pytest.raises(EpicycleError, match="--disturb is for models: a study declares its own disturbances"):
-        epicycle.optimise("waiting_time", minimise="mean_wait", vary={"load": "0.1..0.2"}, disturb="wifi_burst")
+    with pytest.raises(EpicycleError, match="--disturb is for models: a study declares its own"):
+        epicycle.search("waiting_time", epicycle.Minimise("mean_wait"), vary={"load": "0.1..0.2"}, disturb="wifi_burst")
 
 
 def test_a_study_may_not_vary_what_a_search_adds(bowl: str) -> None:
     Path("s.yaml").write_text("study: s\nmodel: ./bowl.yaml\nvary: {point: {cases: {one: , two: {n: 5}}}}\n")
     told = "^s varies 'point', which is the name of what a search varies: rename it$"
     with pytest.raises(EpicycleError, match=told):
-        epicycle.optimise("./s.yaml", minimise="cost", vary={"x": "0..3"})
+        epicycle.search("./s.yaml", epicycle.Minimise("cost"), vary={"x": "0..3"})

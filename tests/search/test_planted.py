@@ -66,7 +66,9 @@ PLANTS = {
 
 def check(name: str, seed: int, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file, plant = PLANTED / f"{name}.yaml", PLANTS[name]
-    found = epicycle.falsify(file, plant.monitor, vary=plant.vary, runs=RUNS, seed=seed, out=folder, jobs=1)
+    found = epicycle.search(
+        file, epicycle.Break(plant.monitor, runs=RUNS), vary=plant.vary, seed=seed, out=folder, jobs=1
+    )
     assert found.broken is not None, found.sentence
     assert found.explain[:2] == ["epicycle", "explain"]
     # What is printed, in a shell.

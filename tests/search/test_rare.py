@@ -14,7 +14,7 @@ import epicycle
 from epicycle.actors import EpicycleError
 from epicycle.runner.build.model import Model
 from epicycle.runner.cli import main
-from epicycle.runner.search import RareEvent, rare
+from epicycle.runner.search.splitting import RareEvent, rare
 from tests.engine.engine_parts import load
 
 # What is in a queue after each arrival or departure, from its first customer until it is empty.

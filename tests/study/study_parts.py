@@ -10,8 +10,8 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from epicycle.actors import Actor, OutputPort, Parameter
-from epicycle.runner.seal import seal
 from epicycle.runner.study.plan.plan import sealed
+from epicycle.runner.study.plan.seal import seal
 
 THIS = Path(__file__)
 
@@ -88,7 +88,7 @@ def command(*arguments: object) -> list[str]:
 def plan_of(path: Path, **changes: Any) -> Any:
     """A study that has been tried."""
     from epicycle.runner.language.study import read_study
-    from epicycle.runner.study import Plan
+    from epicycle.runner.study.plan.plan import Plan
 
     return Plan.made(read_study(path, types=[THIS], **changes))
 

@@ -20,7 +20,7 @@ from epicycle.runner.catalogue.types import built_in
 from epicycle.runner.cli import main
 from epicycle.runner.language.schema import json_schema
 from epicycle.runner.show.report import check_figures, own_study_figures
-from epicycle.runner.study import open_study
+from epicycle.runner.study.judge.study_results import open_study
 from epicycle.runner.text.document import parse, plain
 from epicycle.runner.text.problems import Problems
 from tests import cases

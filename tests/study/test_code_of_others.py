@@ -113,8 +113,8 @@ def test_a_folder_of_somebody_else_runs_no_code(
         place.change(types=[str(more)])
     capsys.readouterr()
     name = place.code.stem if how != "more code" else str(tmp_path / "evil")
-    for words in (["resume"], ["replay"], ["report"]):
-        assert main([words[0], str(place.out), *([run] if words[0] == "replay" else [])]) != 0
+    for words in (["study", str(place.out)], ["run", str(place.out / run)], ["report", str(place.out)]):
+        assert main(words) != 0
         assert said(capsys, place).endswith(NOT_YOURS.format(name)), words
     assert main(["status", str(place.out)]) == 0
     results = open_study(place.out)
@@ -125,17 +125,17 @@ def test_a_folder_of_somebody_else_runs_no_code(
     assert not (tmp_path / "ran").exists()
     # With leave, it does.
     options = ["--types", str(place.code)]
-    assert main(["resume", str(place.out), *options]) == 0
+    assert main(["study", str(place.out), *options]) == 0
     assert main(["report", str(place.out), *options]) == 0
-    assert main(["replay", str(place.out), run, *options]) == 0
+    assert main(["run", str(place.out / run), *options]) == 0
     assert place.has_run()
 
 
 def test_what_one_has_made_oneself_needs_no_leave(tmp_path: Path) -> None:
     place = Place(tmp_path / "study", "Mine")
     run = open_study(place.out).table().column("run")[0].as_py()
-    for words in (["resume"], ["report"], ["replay"]):
-        assert main([words[0], str(place.out), *([run] if words[0] == "replay" else [])]) == 0
+    for words in (["study", str(place.out)], ["report", str(place.out)], ["run", str(place.out / run)]):
+        assert main(words) == 0
         assert place.has_run()
     key = tmp_path / "state" / "epicycle" / "key"
     assert (stat.S_IMODE(key.stat().st_mode), key.stat().st_size, os.listdir(key.parent)) == (0o600, 32, ["key"])
@@ -147,7 +147,7 @@ def test_changed_code_is_not_run(tmp_path: Path, part: str, capsys: pytest.Captu
     changed: Path = getattr(place, part)
     changed.write_text(changed.read_text() + "\n# other\n")
     capsys.readouterr()
-    assert main(["resume", str(place.out)]) == 2
+    assert main(["study", str(place.out)]) == 2
     assert said(capsys, place) == (
         f"error: code has changed since the results were made, and is not run: {changed.name}\n"
         f"   help: if you trust it, add --types {place.code.name}; in Python, types=[...]\n"
@@ -169,7 +169,7 @@ def test_a_key_that_others_can_read_seals_nothing(tmp_path: Path, capsys: pytest
     place = Place(tmp_path / "study", "Open")
     (tmp_path / "state" / "epicycle" / "key").chmod(0o644)
     capsys.readouterr()
-    assert main(["resume", str(place.out)]) == 2
+    assert main(["study", str(place.out)]) == 2
     assert said(capsys, place) == "error: " + NOT_YOURS.format("Open")
     assert not place.has_run()
 
@@ -184,7 +184,7 @@ def test_a_model_that_a_folder_of_somebody_else_names_is_not_read(
     assert main(["study", str(study), "--out", str(out)]) == 0
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "other"))
     capsys.readouterr()
-    for words in ("resume", "report"):
+    for words in ("study", "report"):
         assert main([words, str(out)]) != 0
         told = capsys.readouterr().err.replace(f"{tmp_path}/", "")
         assert told.endswith(
@@ -196,4 +196,4 @@ def test_a_model_that_a_folder_of_somebody_else_names_is_not_read(
     study.write_text("study: queue\nmodel: mm1\nreplications: 1\n")
     assert main(["study", str(study), "--out", str(tmp_path / "queue")]) == 0
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "third"))
-    assert main(["resume", str(tmp_path / "queue")]) == 0
+    assert main(["study", str(tmp_path / "queue")]) == 0

@@ -11,11 +11,11 @@ import pytest
 
 from epicycle.runner import open_study
 from epicycle.runner.cli import main
-from epicycle.runner.study import run_study
 from epicycle.runner.study import session as session_module
 from epicycle.runner.study.plan import plan as plan_module
 from epicycle.runner.study.run.backlog import Backlog
 from epicycle.runner.study.run.manifest import manifest_text
+from epicycle.runner.study.session import run_study
 from tests.study.study_commands import message, study
 from tests.study.study_parts import MODEL, STUDY, moved, plan_of, write
 
@@ -64,7 +64,7 @@ def test_another_first_seed_is_that_of_a_study_that_says_so(tmp_path: Path, caps
         f"epicycle study: error: argument --seed: '{2**63}' is not a whole number from 0 to {2**63 - 1 - 10**9}"
     )
     # The folder knows it, whatever the file says.
-    assert main(["resume", str(tmp_path / "asked")]) == 0
+    assert main(["study", str(tmp_path / "asked")]) == 0
     assert "0 new runs, 4 already there" in capsys.readouterr().out
     write(tmp_path, STUDY.replace("seed: 20", "seed: 120"))
     assert study(tmp_path, "--replications", 2, out="said") == 0
@@ -77,7 +77,7 @@ def test_resume_wants_the_same_model(copied: Path, capsys: pytest.CaptureFixture
     (copied / "walk.yaml").write_text(MODEL + "\n")
     manifest = json.loads((copied / "out" / "manifest.json").read_text())
     (copied / "out" / "manifest.json").write_text(manifest_text(moved(manifest, copied / "walks.yaml")))
-    assert main(["resume", str(copied / "out")]) == 2
+    assert main(["study", str(copied / "out")]) == 2
     assert message(capsys, copied) == (
         "error: the model has changed since out was made: walk.yaml\n"
         "   help: 'epicycle study walks.yaml --out out' makes the runs of the changed model\n"
@@ -94,7 +94,7 @@ def test_results_can_be_read_where_their_model_is_not(copied: Path, capsys: pyte
     assert open_study(home / "out").means("place") == before
     assert main(["status", str(home / "out")]) == 0
     capsys.readouterr()
-    assert main(["resume", str(home / "out")]) == 2
+    assert main(["study", str(home / "out")]) == 2
     assert capsys.readouterr().err == "error: there is no file /nowhere/walk.yaml: there is no folder /nowhere\n"
 
 
@@ -107,7 +107,7 @@ def test_results_of_another_version_are_read_and_not_gone_on_with(
     for module in (plan_module, session_module):
         monkeypatch.setattr(module, "epicycle_version", lambda: "47.11")
     assert open_study(copied / "out").table() == before
-    assert main(["resume", str(copied / "out")]) == 2
+    assert main(["study", str(copied / "out")]) == 2
     assert message(capsys, copied) == (
         f"error: out was made with Epicycle {manifest['epicycle']}, but this is Epicycle 47.11\n"
         "   help: install that version, or repeat all runs: 'epicycle study walks.yaml --out ANOTHER'\n"

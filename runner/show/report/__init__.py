@@ -11,7 +11,11 @@ from typing import Any
 
 from epicycle.actors import EpicycleError, abridged
 
-from ...study import Replay, StudyResults, plan_of_folder, ranked, repeat, replace_file
+from ...study.judge.claims import ranked
+from ...study.judge.study_results import StudyResults
+from ...study.run.runner import Replay, repeat
+from ...study.run.store import replace_file
+from ...study.session import plan_of_folder
 from ...text.problems import ModelError, Problems
 from ...text.program import describe, raised_at
 from ..outcome import MAX_NAME

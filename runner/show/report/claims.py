@@ -10,21 +10,21 @@ from epicycle.actors import counted
 from ...html import Content, Html, note, tag, wide_table
 from ...language.claims import ALWAYS
 from ...shown import rounded
-from ...study import (
+from ...study.judge.claims import (
     CONFIRMED,
     NOT_REPRODUCED,
     REPRODUCED,
     REVERSED,
     UNDECIDED,
-    Finding,
-    Judgement,
-    Recommendation,
+    ClaimVerdict,
+    ContrastTest,
     ranked,
 )
+from ...study.judge.guideline import Recommendation
 from .data import Data, Names, estimated, mean_of, shown
 
 
-def claims(names: Names, judgements: Sequence[Judgement]) -> Iterable[Html]:
+def claims(names: Names, judgements: Sequence[ClaimVerdict]) -> Iterable[Html]:
     """The verdict of each claim, and all comparisons behind it."""
     if not judgements:
         return
@@ -67,7 +67,7 @@ def class_of(verdict: str) -> str:
     return verdict.replace(" ", "-")
 
 
-def _by_level(names: Names, judgements: Sequence[Judgement]) -> Html:
+def _by_level(names: Names, judgements: Sequence[ClaimVerdict]) -> Html:
     """Which claims hold at which level of the factors for which they are judged separately, the best first."""
     standings = ranked(judgements)
     claims = [each.name for each in standings[0].judgements]
@@ -90,11 +90,11 @@ def _by_level(names: Names, judgements: Sequence[Judgement]) -> Html:
     )
 
 
-def _verdict(judgement: Judgement) -> Html:
+def _verdict(judgement: ClaimVerdict) -> Html:
     return tag("b", judgement.verdict, class_=class_of(judgement.verdict))
 
 
-def _findings(names: Names, judgement: Judgement) -> Html:
+def _findings(names: Names, judgement: ClaimVerdict) -> Html:
     is_rate = judgement.claim.form == ALWAYS
     head = ["comparison", "share of runs" if is_rate else "difference", "95 % interval", "runs" if is_rate else "pairs"]
     rows = [
@@ -111,20 +111,20 @@ def _findings(names: Names, judgement: Judgement) -> Html:
     return wide_table([*head, *([] if is_rate else ["p (Holm)"]), "outcome"], rows)
 
 
-def _weakest(names: Names, judgement: Judgement) -> Content:
+def _weakest(names: Names, judgement: ClaimVerdict) -> Content:
     finding = judgement.weakest
     if finding is None or not finding.count:
         return "–"
     return [f"{_value(finding)} ({_interval(finding)}) ", tag("small", _compared(names, judgement, finding))]
 
 
-def _interval(finding: Finding) -> str:
+def _interval(finding: ContrastTest) -> str:
     if math.isnan(finding.low):
         return "–"
     return " to ".join(rounded(end, finding.high - finding.low) for end in (finding.low, finding.high))
 
 
-def _compared(names: Names, judgement: Judgement, finding: Finding) -> str:
+def _compared(names: Names, judgement: ClaimVerdict, finding: ContrastTest) -> str:
     claim, where = judgement.claim, names.place(finding.where)
     if claim.form == ALWAYS:
         return where or "all runs"
@@ -135,7 +135,7 @@ def _compared(names: Names, judgement: Judgement, finding: Finding) -> str:
     return f"{pair}; {where}" if where else pair
 
 
-def _value(finding: Finding) -> str:
+def _value(finding: ContrastTest) -> str:
     if not finding.count:
         return "–"
     return rounded(finding.value, finding.high - finding.low)

@@ -10,7 +10,7 @@ from epicycle.actors import Fault, UnitError, variants
 from ...build.figures import made_figure, tell_of_figure
 from ...catalogue.types import with_offered
 from ...language.dimensions import in_si, split_number
-from ...study import Plan
+from ...study.plan.plan import Plan
 from ...text.document import Mapping, Node, Sequence, plain
 from ...text.faults import place_in
 from ...text.problems import Problems

@@ -12,7 +12,7 @@ from epicycle.actors import Configurable, Fault, MappingParameter, Parameter, co
 from ...build.model import Model
 from ...language.dimensions import Dimension, Factor
 from ...results import Results
-from ...study import Plan
+from ...study.plan.plan import Plan
 from ..sheet import DASHES, FEW, MARKERS, MAX_LINES, MAX_PANELS, Sheet, colours
 from .data import MAX_LISTED, Condition, Data, Names, is_numeric, shown
 

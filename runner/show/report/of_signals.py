@@ -28,7 +28,8 @@ from ...build.figures import figures_of
 from ...build.model import Model
 from ...catalogue.figure import Figure
 from ...results import STOP_TIME, Results
-from ...study import Plan, half_width
+from ...study.inference import half_width
+from ...study.plan.plan import Plan
 from ...text.problems import Problems
 from ..pen import FORMATS, draw
 from ..samples import selected

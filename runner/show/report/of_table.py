@@ -12,7 +12,8 @@ from typing import Any, NamedTuple
 from epicycle.actors import EpicycleError, Fault, Parameter, counted, texts_parameter
 
 from ...language.dimensions import Factor
-from ...study import Estimate, Plan, mean
+from ...study.inference import Estimate, mean
+from ...study.plan.plan import Plan
 from ..sheet import LIMIT, Sheet, set_log
 from .data import Condition, Data, Names, estimated, is_numeric, mean_of
 from .figure import Layout, Panel, RunKey, StudyFigure

@@ -13,13 +13,9 @@ from epicycle.actors import counted
 
 from ...html import Content, Html, note, page, tag, wide_table
 from ...language.dimensions import Factor
-from ...study import (
-    REPRODUCED,
-    UNDECIDED,
-    Judgement,
-    Recommendation,
-    mean,
-)
+from ...study.inference import mean
+from ...study.judge.claims import REPRODUCED, UNDECIDED, ClaimVerdict
+from ...study.judge.guideline import Recommendation
 from ...text.document import plain
 from ..sheet import tips_of
 from .claims import claims, class_of, guideline
@@ -44,7 +40,7 @@ class Picture(NamedTuple):
 def report_page(
     data: Data,
     pictures: Sequence[Picture],
-    judgements: Sequence[Judgement],
+    judgements: Sequence[ClaimVerdict],
     recommendations: Sequence[Recommendation],
 ) -> str:
     study = data.plan.study
@@ -79,7 +75,7 @@ def _beside(ending: str) -> str:
     return Path(__file__).with_suffix(f".{ending}").read_text(encoding="utf-8")
 
 
-def _in_short(data: Data, judgements: Sequence[Judgement]) -> Iterable[Html]:
+def _in_short(data: Data, judgements: Sequence[ClaimVerdict]) -> Iterable[Html]:
     """What a reader should know first: the verdicts of the claims, and what is missing or failed."""
     verdicts = Counter(each.verdict for each in judgements)
     if verdicts:
@@ -158,7 +154,7 @@ def _provenance(data: Data) -> Iterable[Html]:
         "made with": ", ".join(f"{name} {found}" for name, found in versions.items() if found and name != "epicycle"),
         "machine": f"{machine.get('system', '')}, {cores}",
         "SHA-256 of the table": data.results.digest(),
-        "repeat a run": f"epicycle replay {data.results.folder.as_posix()} RUN",
+        "repeat a run": f"epicycle run {data.results.folder.as_posix()}/RUN",
     }
     yield wide_table(["", ""], [[name, tag("code", value)] for name, value in facts.items() if value], class_="facts")
 
@@ -185,7 +181,7 @@ def _failures(data: Data, failures: list[dict[str, Any]]) -> Iterable[Html]:
             data.names.place(data.conditions[row["condition"]].values),
             str(row["seed"]),
             tag("pre", row["error"]),
-            tag("code", f"epicycle replay {folder} {row['run'][:12]}"),
+            tag("code", f"epicycle run {folder}/{row['run'][:12]}"),
         ]
         for row in failures[:MAX_FAILURES]
     ]

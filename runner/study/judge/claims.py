@@ -35,7 +35,7 @@ Choices = Sequence[Sequence[int]]  # levels, by dimension
 
 
 @dataclass(frozen=True)
-class Finding:
+class ContrastTest:
     """The result of one comparison: how much greater ``metric`` is at ``level`` than ``against`` another, ``where``.
 
     For a condition that should always hold, ``metric`` is the condition, and ``value`` the share of runs in which it
@@ -66,13 +66,13 @@ class Finding:
 
 
 @dataclass(frozen=True)
-class Judgement:
+class ClaimVerdict:
     """The outcome of a claim, at one level of each factor that is judged separately (``where``)."""
 
     claim: Claim
     where: Levels
     verdict: str
-    findings: tuple[Finding, ...]
+    findings: tuple[ContrastTest, ...]
 
     @property
     def name(self) -> str:
@@ -101,7 +101,7 @@ class Judgement:
         return sum(finding.missing for finding in self.findings)
 
     @property
-    def weakest(self) -> Finding | None:
+    def weakest(self) -> ContrastTest | None:
         """The weakest comparison, in standard errors in favour of the claim; None without comparisons."""
         return min(self.findings, key=lambda each: _support(self.claim, each), default=None)
 
@@ -124,11 +124,11 @@ class Judgement:
 
 
 @dataclass(frozen=True)
-class Standing:
+class Ranking:
     """The evidence for one level of each factor that claims are judged separately for: the outcomes of all claims."""
 
     where: Levels
-    judgements: tuple[Judgement, ...]
+    judgements: tuple[ClaimVerdict, ...]
 
     @property
     def in_means(self) -> int:
@@ -157,16 +157,16 @@ class Standing:
         }
 
 
-def ranked(judgements: Sequence[Judgement]) -> list[Standing]:
+def ranked(judgements: Sequence[ClaimVerdict]) -> list[Ranking]:
     """The levels that claims are judged separately for, best supported first.
 
     They are ordered by the number of claims refuted, then of claims that hold in the means, of claims reproduced, and
     by the share that agrees.
     """
-    apart: dict[tuple[Factor, ...], list[Judgement]] = {}
+    apart: dict[tuple[Factor, ...], list[ClaimVerdict]] = {}
     for each in judgements:
         apart.setdefault(tuple(each.where.values()), []).append(each)
-    standings = [Standing(found[0].where, tuple(found)) for found in apart.values()]
+    standings = [Ranking(found[0].where, tuple(found)) for found in apart.values()]
     return sorted(
         standings,
         key=lambda each: (-each.counts(NOT_REPRODUCED), each.in_means, each.counts(REPRODUCED), each.agreeing),
@@ -174,22 +174,22 @@ def ranked(judgements: Sequence[Judgement]) -> list[Standing]:
     )
 
 
-def judge(samples: Samples) -> list[Judgement]:
+def judge(samples: Samples) -> list[ClaimVerdict]:
     """Judge all claims of a study in turn; those of another study at each level of the factors that it lacks."""
     questions = samples.study.questions
     return [_judged(claim, apart, samples) for apart in samples.levels(questions.apart) for claim in questions.claims]
 
 
-def _judged(claim: Claim, apart: Levels, samples: Samples) -> Judgement:
+def _judged(claim: Claim, apart: Levels, samples: Samples) -> ClaimVerdict:
     where: Selection = {**claim.where, **{factor: (value,) for factor, value in apart.items()}}
     found = (_occurrences if claim.form == ALWAYS else _comparisons)(claim, where, samples)
     findings = [
         replace(each, where={name: value for name, value in each.where.items() if name not in apart}) for each in found
     ]
-    return Judgement(claim, apart, verdict(claim, findings), tuple(findings))
+    return ClaimVerdict(claim, apart, verdict(claim, findings), tuple(findings))
 
 
-def verdict(claim: Claim, findings: Sequence[Finding]) -> str:
+def verdict(claim: Claim, findings: Sequence[ContrastTest]) -> str:
     """What the outcomes of all comparisons mean for their claim."""
     outcomes = [each.outcome for each in findings]
     count, confirmed, turned = len(outcomes), outcomes.count(CONFIRMED), outcomes.count(REVERSED)
@@ -207,7 +207,7 @@ def verdict(claim: Claim, findings: Sequence[Finding]) -> str:
 # -- comparisons ------------------------------------------------------------------------------------------------------
 
 
-def _comparisons(claim: Claim, where: Selection, samples: Samples) -> Iterator[Finding]:
+def _comparisons(claim: Claim, where: Selection, samples: Samples) -> Iterator[ContrastTest]:
     """A comparison counts if it is significant and few numbers are missing."""
     contrasts = list(_contrasts(claim, where, samples))
     findings = [_finding(metric.text, *each, samples) for metric in claim.metrics for each in contrasts]
@@ -278,7 +278,7 @@ def _slope(claim: Claim, choices: Choices, samples: Samples) -> dict[Place, floa
 
 def _finding(
     metric: str, weights: dict[int, float], levels: tuple[Levels, Levels, Levels], samples: Samples
-) -> Finding:
+) -> ContrastTest:
     """The mean of a contrast over the replications in which all its conditions have a number."""
     numbers = {each: samples.numbers(each, metric) for each in weights}
     over = set.intersection(*(set(samples.over(each)) for each in weights))
@@ -287,7 +287,7 @@ def _finding(
     values = without_rounding(map(math.fsum, terms), max((abs(term) for each in terms for term in each), default=0.0))
     found = paired_difference(dict.fromkeys(pairs, 0.0), dict(zip(pairs, values, strict=True)))
     bootstrap = bootstrap_mean(values, resamples=RESAMPLES)
-    return Finding(
+    return ContrastTest(
         metric,
         *levels,
         **asdict(found.estimate),
@@ -298,7 +298,7 @@ def _finding(
     )
 
 
-def _occurrences(claim: Claim, where: Selection, samples: Samples) -> Iterator[Finding]:
+def _occurrences(claim: Claim, where: Selection, samples: Samples) -> Iterator[ContrastTest]:
     """How often a condition holds, at every combination of levels."""
     formula = Formula(claim.condition)
     may_be_none = asks_for_none(claim.condition)
@@ -315,11 +315,11 @@ def _occurrences(claim: Claim, where: Selection, samples: Samples) -> Iterator[F
         answers = [is_true(row) for row in samples.rows(samples.at(place), formula.names)]
         holds, missing = answers.count(True), answers.count(None)
         found = rate(holds, len(answers) - missing)
-        finding = Finding(claim.condition, samples.values(place), {}, {}, **asdict(found), missing=missing)
+        finding = ContrastTest(claim.condition, samples.values(place), {}, {}, **asdict(found), missing=missing)
         yield replace(finding, outcome=_outcome_of_rate(claim, finding, holds))
 
 
-def _outcome_of_rate(claim: Claim, finding: Finding, holds: int) -> str:
+def _outcome_of_rate(claim: Claim, finding: ContrastTest, holds: int) -> str:
     """One contrary run refutes ``always``, whatever is missing; without any, enough runs are needed to confirm it."""
     if claim.share == 1:
         if holds < finding.count:
@@ -336,7 +336,7 @@ def _sign(claim: Claim) -> int:
     return 1 if claim.form in (GREATER, RISES) else -1
 
 
-def _support(claim: Claim, finding: Finding) -> float:
+def _support(claim: Claim, finding: ContrastTest) -> float:
     """The support of a finding for its claim, in standard errors."""
     if claim.form == ALWAYS:
         return finding.value if finding.count else -math.inf

@@ -21,7 +21,7 @@ from ..plan.plan import Plan
 from ..run.backlog import OK
 from ..run.manifest import StoreError
 from ..run.store import BEST_FIRST, Store, parquet_of, replace_file
-from .claims import Judgement, Standing, judge, ranked
+from .claims import ClaimVerdict, Ranking, judge, ranked
 from .guideline import Recommendation, recommend
 from .samples import Samples
 from .sensitivity import sensitivity
@@ -153,7 +153,7 @@ class StudyResults(Tabled):
     def failures(self) -> list[dict[str, Any]]:
         """The rows that are not ``ok``, each with the command that repeats its run."""
         return [
-            {**row, "replay": f"epicycle replay {self.folder} {row['run'][:12]}"}
+            {**row, "replay": f"epicycle run {self.folder / row['run'][:12]}"}
             for row in self.table().to_pylist()
             if row["status"] != OK
         ]
@@ -209,11 +209,11 @@ class StudyResults(Tabled):
             told = f"{self.folder} has no {what} {name!r}{did_you_mean(name, known)}"
             raise StoreError(f"{told}; it has {', '.join(known) or 'none'}")
 
-    def claims(self) -> list[Judgement]:
+    def claims(self) -> list[ClaimVerdict]:
         """The verdicts on the claims of the study's file; those of another study at each level of what it lacks."""
         return judge(self._samples())
 
-    def standings(self) -> list[Standing]:
+    def rankings(self) -> list[Ranking]:
         """The evidence for each level that claims are judged separately for, the best first."""
         return ranked(self.claims())
 

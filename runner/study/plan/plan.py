@@ -23,12 +23,12 @@ from ...catalogue.types import types_of_file
 from ...language.dimensions import Dimension, Factor, Level
 from ...language.study import RESERVED, Study, study_of_text
 from ...language.study_metric import StudyMetric
-from ...provenance import version_of
-from ...seal import has_seal, seal
 from ...text.document import plain
 from ...text.files import Noted, noting
 from ...text.problems import ModelError, Problems
+from ..provenance import version_of
 from .columns import Column, check_metric, columns_of
+from .seal import has_seal, seal
 
 _LOGGER = logging.getLogger("epicycle")
 

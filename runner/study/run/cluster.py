@@ -18,8 +18,8 @@ from uuid import uuid4
 from epicycle.actors import EpicycleError
 
 from .backlog import Task
-from .making import Keeper
-from .parcel import SENT, fitness, make_on_worker, pack, parcel_key, unfit
+from .making import Recorder
+from .parcel import SENT, environment, make_on_worker, mismatch, pack, parcel_key
 from .processes import DONE, Outcome, WorkerError
 
 CONNECT = 10.0  # s for a scheduler to answer
@@ -49,10 +49,10 @@ class Cluster:
     Without an address, it starts a scheduler on this machine, with ``jobs`` processes at a time.
     """
 
-    def __init__(self, keeper: Keeper, jobs: int, scheduler: str | None) -> None:
+    def __init__(self, recorder: Recorder, jobs: int, scheduler: str | None) -> None:
         self._distributed = distributed_module()
-        self._keeper = keeper
-        self._backlog = keeper.backlog
+        self._recorder = recorder
+        self._backlog = recorder.backlog
         self._jobs = jobs
         self._scheduler = scheduler
         self._study = f"epicycle-{uuid4().hex}"
@@ -145,11 +145,11 @@ class Cluster:
     async def _welcome(self, client: Any, workers: list[str]) -> None:
         """Send new workers the parcel; raises ``WorkerError`` if one differs from this machine."""
         options = {"workers": workers, "on_error": "return"}
-        for address, there in (await self._asked(client.run(resolve_name, _name(fitness), **options))).items():
+        for address, there in (await self._asked(client.run(resolve_name, _name(environment), **options))).items():
             if isinstance(there, ImportError | AttributeError):
                 raise WorkerError(f"the Dask worker {address} {_without(there)}")
-        for address, there in (await self._asked(client.run(fitness, **options))).items():
-            if isinstance(there, dict) and (unlike := unfit(there, fitness())):
+        for address, there in (await self._asked(client.run(environment, **options))).items():
+            if isinstance(there, dict) and (unlike := mismatch(there, environment())):
                 raise WorkerError(f"the Dask worker {address} {unlike}")
         # Each worker gets the parcel before any work, so that none is preferred for having it, or waited for.
         for address in workers:
@@ -166,7 +166,7 @@ class Cluster:
     def _lost(self) -> WorkerError:
         return WorkerError(
             f"the scheduler{'' if self._scheduler is None else f' {self._scheduler}'} no longer answers\n"
-            f"   help: finished runs are kept; 'epicycle resume {self._keeper.store.folder}' continues"
+            f"   help: finished runs are kept; 'epicycle study {self._recorder.store.folder}' continues"
         )
 
     # -- runs -----------------------------------------------------------------------------------------------------
@@ -193,7 +193,7 @@ class Cluster:
         key = f"{self._study}-{self._batches}"
         make = (resolve_name, _name(make_on_worker))
         tasks = [astuple(each) for each in batch]
-        given = {"study": self._study, "timeout": self._keeper.timeout, "tasks": tasks}
+        given = {"study": self._study, "timeout": self._recorder.timeout, "tasks": tasks}
         (future,) = client.get({key: (call, make, json.dumps(given))}, [key], sync=False)
         self._running[asyncio.ensure_future(future.result())] = batch
 
@@ -206,7 +206,7 @@ class Cluster:
                 if len(batch) > 1:  # another run of the batch may be to blame
                     self._backlog.again(task)
                 else:
-                    self._keeper.again(task, "the Dask workers that made it ended one after another")
+                    self._recorder.again(task, "the Dask workers that made it ended one after another")
             return
         except (CancelledError, asyncio.CancelledError, self._distributed.core.CommClosedError) as error:
             raise self._lost() from error
@@ -224,7 +224,7 @@ class Cluster:
                         f"a Dask worker cannot load the model, although this machine can:\n{why_not}\n{SENT}"
                     )
                 self._seconds += 0.2 * (told["wall_time"] - self._seconds)
-            self._keeper.settle(task, (what, told))
+            self._recorder.settle(task, (what, told))
 
     def _is_right_here(self, task: Task) -> bool:
         """Whether this machine can load the model of a run."""

@@ -18,7 +18,7 @@ ATTEMPTS = 3  # for a run whose process dies; others may have used up the memory
 
 
 @dataclass
-class Keeper:
+class Recorder:
     """Keeps the rows of finished runs, whoever made them, and has the others made again."""
 
     store: Store
@@ -57,39 +57,39 @@ class Keeper:
 
 
 @contextmanager
-def keeping(store: Store, backlog: Backlog, timeout: float | None) -> Iterator[Keeper]:
+def recording(store: Store, backlog: Backlog, timeout: float | None) -> Iterator[Recorder]:
     """An interrupted session leaves its journal, which the next one to open the folder turns into a part."""
     writer = Writer(store)
     try:
-        yield Keeper(store, backlog, timeout, writer)
+        yield Recorder(store, backlog, timeout, writer)
         with writing(store.folder):
             writer.flush()
     finally:
         writer.close()
 
 
-def make_here(keeper: Keeper, jobs: int, tell: Callable[[], None]) -> None:
+def make_here(recorder: Recorder, jobs: int, tell: Callable[[], None]) -> None:
     """Make the runs in processes on this machine."""
-    with Processes(Runner.of_manifest, keeper.store.manifest) as processes:
-        make_in(processes, keeper, jobs, tell)
+    with Processes(Runner.of_manifest, recorder.store.manifest) as processes:
+        make_in(processes, recorder, jobs, tell)
 
 
-def make_in(processes: Processes, keeper: Keeper, jobs: int, tell: Callable[[], None]) -> None:
+def make_in(processes: Processes, recorder: Recorder, jobs: int, tell: Callable[[], None]) -> None:
     """Make the runs in these processes."""
-    backlog, tasks = keeper.backlog, dict[Future[Outcome], Task]()
+    backlog, tasks = recorder.backlog, dict[Future[Outcome], Task]()
     over: queue.SimpleQueue[Future[Outcome]] = queue.SimpleQueue()
     with ThreadPoolExecutor(jobs) as threads:
         while True:
             # More than there are processes: each starts its next run before the last one is written.
             while len(tasks) < 2 * jobs and (task := backlog.next()) is not None:
-                future = threads.submit(_make, processes, task, keeper.timeout)
+                future = threads.submit(_make, processes, task, recorder.timeout)
                 tasks[future] = task
                 future.add_done_callback(over.put)
             if not tasks:
                 return
             try:
                 future = over.get(timeout=_LOOK)
-                keeper.settle(tasks.pop(future), future.result())
+                recorder.settle(tasks.pop(future), future.result())
             except queue.Empty:
                 pass
             tell()

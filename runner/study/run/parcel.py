@@ -22,10 +22,10 @@ from pathlib import Path
 from typing import Any
 
 from ...catalogue.code import code_of
-from ...provenance import version_of, versions
 from ...text.files import noting
 from ...text.problems import ModelError
 from ..plan.plan import Plan
+from ..provenance import version_of, versions
 from .backlog import Task
 from .processes import Outcome, Processes, UnwantedError, WorkerError
 from .runner import Runner
@@ -54,7 +54,7 @@ def pack(plan: Plan) -> bytes:
         for each in (path, path.parent.resolve() / path.name, path.resolve()):
             files[str(each)] = content
     manifest = {**plan.manifest(), "model": {}}
-    found = {"manifest": manifest, "files": files, "folder": os.getcwd(), "fitness": fitness()}
+    found = {"manifest": manifest, "files": files, "folder": os.getcwd(), "environment": environment()}
     return zlib.compress(pickle.dumps(found), 1)
 
 
@@ -65,7 +65,7 @@ def unpack(parcel: bytes, root: Path) -> Plan:
     ``WorkerError`` on a machine where a seed may give a different run.
     """
     found: dict[str, Any] = pickle.loads(zlib.decompress(parcel))
-    if unlike := unfit(fitness(), found["fitness"]):
+    if unlike := mismatch(environment(), found["environment"]):
         raise WorkerError(unlike)
     manifest = found["manifest"]
     for name, content in found["files"].items():
@@ -90,7 +90,7 @@ def below(root: Path, name: str) -> Path:
 
 
 @lru_cache(maxsize=1)
-def fitness() -> dict[str, str | None]:
+def environment() -> dict[str, str | None]:
     """What must be the same wherever a seed should give the same run."""
     found = {name: each for name, each in versions().items() if name not in _NO_MATTER}
     found |= {name: version_of(name) for name in _OPTIONAL}
@@ -99,7 +99,7 @@ def fitness() -> dict[str, str | None]:
     return found
 
 
-def unfit(worker: Mapping[str, str | None], client: Mapping[str, str | None]) -> str:
+def mismatch(worker: Mapping[str, str | None], client: Mapping[str, str | None]) -> str:
     """What is wrong with a worker that differs from the machine that employs it, to follow its name; or empty."""
     told = [
         f"{name} {worker.get(name) or 'is missing'} there, {wanted or 'none'} here"
@@ -131,7 +131,7 @@ def _code() -> str:
 # -- on a worker ------------------------------------------------------------------------------------------------------
 
 
-class Guest:
+class ParcelWorker:
     """Makes runs of a plan whose files are elsewhere than in the study's place."""
 
     def __init__(self, parcel: bytes, folder: str) -> None:
@@ -165,7 +165,7 @@ class Guest:
 
 
 @dataclass
-class _House:
+class _Pool:
     """The processes of one study on this worker, the number of batches they work on, and what ends them."""
 
     processes: Processes
@@ -173,7 +173,7 @@ class _House:
     timer: threading.Timer | None = None
 
 
-_houses: dict[str, _House] = {}  # by study
+_pools: dict[str, _Pool] = {}  # by study
 _guard = threading.Lock()
 
 
@@ -214,25 +214,25 @@ def make_on_worker(batch: str) -> list[Outcome]:
 def _at_work(study: str, parcel: bytes, place: str) -> Iterator[Processes]:
     """The processes of a study, which are ended when there has been no work for a while."""
     with _guard:
-        if (house := _houses.get(study)) is None:
-            house = _houses[study] = _House(Processes(Guest, parcel, place=place))
-        if house.timer is not None:
-            house.timer.cancel()
-        house.batches += 1
+        if (pool := _pools.get(study)) is None:
+            pool = _pools[study] = _Pool(Processes(ParcelWorker, parcel, place=place))
+        if pool.timer is not None:
+            pool.timer.cancel()
+        pool.batches += 1
     try:
-        yield house.processes
+        yield pool.processes
     finally:
         with _guard:
-            house.batches -= 1
-            if not house.batches:
-                house.timer = threading.Timer(_IDLE, _close, (study,))
-                house.timer.daemon = True
-                house.timer.start()
+            pool.batches -= 1
+            if not pool.batches:
+                pool.timer = threading.Timer(_IDLE, _close, (study,))
+                pool.timer.daemon = True
+                pool.timer.start()
 
 
 def _close(study: str) -> None:
     with _guard:
-        if (house := _houses.get(study)) is None or house.batches:
+        if (pool := _pools.get(study)) is None or pool.batches:
             return  # work has just arrived
-        del _houses[study]
-    house.processes.end()
+        del _pools[study]
+    pool.processes.end()

@@ -1,7 +1,7 @@
 """Processes that make runs for this one; some may hang, run out of memory or be killed.
 
 This process survives runs that hang or kill their process, and can end them.  Each process reads from standard input
-what it needs to make a bench, and then one request after another; it answers on its original standard output, and ends
+what it needs to make a worker, and then one request after another; it answers on its original standard output, and ends
 when its input does.
 """
 
@@ -44,7 +44,7 @@ class UnwantedError(EpicycleError):
     """Nobody waits for the result any longer."""
 
 
-class Bench(Protocol):
+class Worker(Protocol):
     """Makes things in a process, one after another."""
 
     def prepare(self, request: Any) -> None:
@@ -55,7 +55,7 @@ class Bench(Protocol):
 
 
 class _Process:
-    def __init__(self, begin: Callable[..., Bench], arguments: tuple[object, ...], folder: str) -> None:
+    def __init__(self, begin: Callable[..., Worker], arguments: tuple[object, ...], folder: str) -> None:
         self._folder = folder
         environment = {**os.environ, **dict.fromkeys(_THREADS, "1"), "PYTHONPATH": os.pathsep.join(sys.path)}
         # No multiprocessing: the processes of Dask are daemons, which it allows no children. With -P they import what
@@ -73,7 +73,7 @@ class _Process:
         self.is_ready = False
 
     def make(self, request: object, timeout: float | None, is_wanted: Callable[[], bool]) -> Outcome:
-        """The outcome of a request; raises what the bench has raised, and ``UnwantedError``."""
+        """The outcome of a request; raises what the worker has raised, and ``UnwantedError``."""
         if self._first is not None:
             self._give(self._first)
             self._first = None
@@ -123,11 +123,11 @@ class _Process:
 class Processes:
     """Several processes at once, each of which makes one thing after another.
 
-    In each, ``begin(*arguments)`` makes the bench.  ``place``, if given, is where each gets a temporary folder, which
+    In each, ``begin(*arguments)`` makes the worker.  ``place``, if given, is where each gets a temporary folder, which
     becomes the last argument.
     """
 
-    def __init__(self, begin: Callable[..., Bench], *arguments: object, place: str = "") -> None:
+    def __init__(self, begin: Callable[..., Worker], *arguments: object, place: str = "") -> None:
         self._begin = begin
         self._arguments = arguments
         self._place = place
@@ -141,7 +141,7 @@ class Processes:
     ) -> Outcome:
         """The outcome of a request in one of the processes, in at most ``timeout`` seconds from its start.
 
-        Raises ``WorkerError``, what the bench has raised, and ``UnwantedError`` if it is no longer wanted.
+        Raises ``WorkerError``, what the worker has raised, and ``UnwantedError`` if it is no longer wanted.
         """
         code = None
         for _ in range(MAX_STILLBORN):
@@ -212,14 +212,14 @@ def serve() -> None:
     try:
         with seldom_collecting():
             begin, arguments = given.get()
-            bench: Bench = begin(*arguments)
+            worker: Worker = begin(*arguments)
             tell(READY)
             is_settled = False
             while True:
                 request = given.get()
-                bench.prepare(request)
+                worker.prepare(request)
                 tell(BEGUN)
-                tell(DONE, bench.make(request))
+                tell(DONE, worker.make(request))
                 if not is_settled:  # what the first run has loaded need not be scanned in later ones
                     keep_for_good()
                     is_settled = True

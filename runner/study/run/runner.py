@@ -91,12 +91,17 @@ def again(plan: Plan, condition: Condition, seed: int) -> tuple[Model, Results, 
         results = simulation.run()
     except EpicycleError as error:
         return model, simulation.results("failed"), error
+    return model, results, error_of_metrics(plan, results)
+
+
+def error_of_metrics(plan: Plan, results: Results) -> EpicycleError | None:
+    """What is wrong with a metric of a study in a run."""
     try:
         for metric in plan.metrics:
             value_of(metric, results)
     except EpicycleError as error:
-        return model, results, error
-    return model, results, None
+        return error
+    return None
 
 
 class ReplayError(EpicycleError):

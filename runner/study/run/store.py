@@ -98,7 +98,7 @@ class Store:
 
     def _check(self, path: Path, damage: str) -> None:
         if damage:
-            told = f"'epicycle resume {self.folder}' sets it aside and repeats its lost runs"
+            told = f"'epicycle study {self.folder}' sets it aside and repeats its lost runs"
             raise DamagedError(f"{path} {damage}\n   help: {told}")
 
 
@@ -217,7 +217,7 @@ def writing(folder: Path) -> Iterator[None]:
     except OSError as error:
         message = f"cannot write to {folder}: {error.strerror or error}"
         if (folder / "manifest.json").is_file():  # there is something to resume
-            message += f"\n   help: finished runs are kept; 'epicycle resume {folder}' continues"
+            message += f"\n   help: finished runs are kept; 'epicycle study {folder}' continues"
         raise WriteError(message) from error
 
 

@@ -134,7 +134,7 @@ def test_a_car_arrives_and_others_know_where_it_goes(folder: Path) -> None:
 
 def test_the_car_from_the_command_line(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["validate", "car.yaml", "--types", str(OWN / "car.py")]) == 0
-    assert main(["actors", "Vehicle", "--types", str(OWN / "car.py")]) == 0
+    assert main(["describe", "Vehicle", "--types", str(OWN / "car.py")]) == 0
     assert "Bicycle" in capsys.readouterr().out
 
 

@@ -26,7 +26,7 @@ WIRE = "inputs: [request]\n    outputs: [response]\n    connections: [request ->
         (
             "net: {type: Desks, at: a.input}",
             """m.yaml:33:23: error: aspect net: there is no aspect type 'Desks', did you mean 'Desk'?
-   help: valid types: those that 'epicycle aspects' lists
+   help: valid types: those that 'epicycle list aspects' lists
    help: for your own types, add '--types FILE.py'; in Python, pass the classes as types=[...]""",
         ),
         (

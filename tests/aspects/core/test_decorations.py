@@ -154,7 +154,7 @@ def test_the_command_line_shows_them(tmp_path: Path, capsys: pytest.CaptureFixtu
         "from epicycle.actors import Scale\nfrom epicycle.aspects import Bias\n\n\n"
         '@Bias(by=2.0).at("output")\nclass Warm(Scale):\n    """Off by two."""\n'
     )
-    assert main(["aspects", str(tmp_path / "m.yaml"), "--types", str(tmp_path / "own.py")]) == 0
+    assert main(["describe", str(tmp_path / "m.yaml"), "--aspects", "--types", str(tmp_path / "own.py")]) == 0
     lines = [line.split() for line in capsys.readouterr().out.splitlines()]
     assert lines[1:] == [[f"s[{i}].output", f"s[{i}].bias", "Bias", "by:", "2"] for i in range(2)]
 

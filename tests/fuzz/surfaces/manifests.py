@@ -44,8 +44,8 @@ def commands(random: np.random.Generator, results: Path, kind: str) -> tuple[obj
         ("status", results),
         ("status", results, "--conditions", "--json"),
         ("report", results, "--out", out, "--jobs", 1),
-        ("resume", results, "--jobs", 1),
-        ("replay", results, str(chosen(random, "0123456789abcdef")), "--out", out),
+        ("study", results, "--jobs", 1),
+        ("run", f"{results}/{chosen(random, '0123456789abcdef')}", "--out", out),
     ))  # fmt: skip
 
 

@@ -70,16 +70,22 @@ def _make(random: np.random.Generator, home: Path, folder: Path) -> Case:
         (package / "entry_points.txt").write_bytes(points.replace(b"plug", f"plug_{number}".encode()))
         (folder / f"plug_{number}.py").write_bytes(data)
         arguments = chosen(
-            random, (("actors",), ("aspects",), ("models",), ("actors", "Thing"), ("run", home / "m.yaml"))
+            random,
+            (
+                ("list", "actors"),
+                ("list", "aspects"),
+                ("list", "models"),
+                ("describe", "Thing"),
+                ("run", home / "m.yaml"),
+            ),
         )
         return Case(arguments, path=folder, code=folder)
     file = folder / f"types_{number}.py"
     file.write_bytes(data)
     changed = MODEL.replace("{type: Scale, factor: 2}", "{type: Thing}")
     model = write(folder, "m.yaml", changed)
-    commands = (("actors", "--types", file), ("actors", "Thing", "--types", file), ("validate", model, "--types", file),
-                ("run", model, "--types", file), ("schema", "--types", file))  # fmt: skip
-    return Case(chosen(random, commands), code=folder)
+    commands = (("list", "actors"), ("describe", "Thing"), ("validate", model), ("run", model), ("list", "schema"))
+    return Case((*chosen(random, commands), "--types", file), code=folder)
 
 
 SURFACE = Surface("plug-ins", lambda home: write(home, "m.yaml", MODEL) and None, _make)

@@ -44,10 +44,10 @@ def _make(random: np.random.Generator, home: Path, folder: Path) -> Case:
     else:
         file.write_bytes(spoiled(data, random))
     if kind == "trace":
-        return Case(("fit", file, "-o", folder / "fitted.yaml"))
+        return Case(("recording", "fit", file, "-o", folder / "fitted.yaml"))
     if kind == "topics":
         options = ("--with", "wifi_burst", "--at", "/scale/input", "-o", folder / f"out{file.suffix}")
-        return Case(("disturb", file, *options))
+        return Case(("recording", "apply", file, *options))
     vary = ("--vary", "size=1..3", "--out", folder / "out")
     return Case(("calibrate", home / "m.yaml", "--match", f"scale.output={file}", *vary))
 

@@ -75,7 +75,7 @@ def _make(random: np.random.Generator, home: Path, folder: Path) -> Case:
         is_forged = True
         file.rename(file.with_name(f"{file.stem.rpartition('-')[0]}-{checksum(file.read_bytes())}.parquet"))
     arguments = commands(random, results, kind)
-    if is_forged or arguments[0] != "resume":
+    if is_forged or arguments[0] != "study":
         return Case(arguments)
     return Case(arguments, lambda answer: _other_numbers(answer, results, home / kind))
 

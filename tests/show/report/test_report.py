@@ -24,9 +24,11 @@ from epicycle.runner.show.report.figure import Layout, roles
 from epicycle.runner.show.report.of_signals import over_time
 from epicycle.runner.show.report.of_table import Distributions, Means
 from epicycle.runner.show.sheet import Sheet
-from epicycle.runner.study import Column, Plan, Replay, ReplayError, half_width, repeat
-from epicycle.runner.study.plan.columns import si_unit
+from epicycle.runner.study.inference import half_width
+from epicycle.runner.study.plan.columns import Column, si_unit
+from epicycle.runner.study.plan.plan import Plan
 from epicycle.runner.study.run.manifest import manifest_text
+from epicycle.runner.study.run.runner import Replay, ReplayError, repeat
 from epicycle.runner.text.problems import Problems
 from tests.study.study_parts import STUDY, THIS, moved, write
 
@@ -222,7 +224,7 @@ def test_unfinished_and_failed_runs_and_hostile_names(tmp_path: Path, capsys: py
     failures = open_study(out).failures()
     shown = found.tables["Runs without a result"][1:]
     assert shown == [
-        ["failed", f"wind: {row['wind']}", "21", row["error"], f"epicycle replay {out} {row['run'][:12]}"]
+        ["failed", f"wind: {row['wind']}", "21", row["error"], f"epicycle run {out}/{row['run'][:12]}"]
         for row in failures
     ]
     assert "6 runs in 2 conditions, 2 of them failed." in found.text

@@ -17,8 +17,8 @@ from scipy import stats
 
 from epicycle.runner.language.study import Study, study_of_text
 from epicycle.runner.study.judge.claims import (
-    Finding,
-    Judgement,
+    ClaimVerdict,
+    ContrastTest,
     judge,
     verdict,
 )
@@ -60,12 +60,12 @@ def table(text: str, numbers: Numbers, runs: int = 30, seed: int = 0, failed: tu
     return Samples(study, found)
 
 
-def one(text: str, numbers: Numbers, **more: Any) -> Judgement:
+def one(text: str, numbers: Numbers, **more: Any) -> ClaimVerdict:
     (found,) = judge(table(f"claims: {{c: {{{text}}}}}", numbers, **more))
     return found
 
 
-def outcomes(found: Judgement) -> list[str]:
+def outcomes(found: ClaimVerdict) -> list[str]:
     return [each.outcome for each in found.findings]
 
 
@@ -215,7 +215,7 @@ def test_verdict(form: str, share: float, words: str, expected: str) -> None:
     names = {"c": "confirmed", "r": "reversed", "u": "undecided"}
     sign = 1 if form in ("greater", "rises") else -1
     findings = [
-        Finding("wait", {}, {}, {}, -sign if "-" in word else sign, 0, 0, 0, 9, 0, outcome=names[word[0]])
+        ContrastTest("wait", {}, {}, {}, -sign if "-" in word else sign, 0, 0, 0, 9, 0, outcome=names[word[0]])
         for word in words.split()
     ]
     assert verdict(claim, findings) == expected

@@ -14,15 +14,16 @@ from epicycle.runner.language.claims import Claim
 from epicycle.runner.language.study import read_study
 from epicycle.runner.show.report.claims import claims
 from epicycle.runner.show.report.data import Data
-from epicycle.runner.study import Plan, run_study
 from epicycle.runner.study.judge.claims import (
     NOT_REPRODUCED,
     REPRODUCED,
     UNDECIDED,
-    Finding,
-    Judgement,
+    ClaimVerdict,
+    ContrastTest,
     ranked,
 )
+from epicycle.runner.study.plan.plan import Plan
+from epicycle.runner.study.session import run_study
 from epicycle.runner.text.problems import Position
 
 QUEUE = """
@@ -107,15 +108,15 @@ def test_claims_of_another_study_are_judged_at_each_level_of_what_it_has_not(que
     ]
 
 
-def judged(where: str, *claims: tuple[str, float, int, int]) -> list[Judgement]:
+def judged(where: str, *claims: tuple[str, float, int, int]) -> list[ClaimVerdict]:
     """Claims of ten comparisons each: verdict, share that the claim asks for, how many agree, how many more do not."""
     found = []
     for outcome, share, agreeing, against in claims:
         claim = Claim("c", "less", (), Position("", 1, 1, 1, ""), share=share)
         findings = tuple(
-            Finding("m", {}, {}, {}, value, 0.1, 0.0, 0.0, 20, 0) for value in [-1.0] * agreeing + [1.0] * against
+            ContrastTest("m", {}, {}, {}, value, 0.1, 0.0, 0.0, 20, 0) for value in [-1.0] * agreeing + [1.0] * against
         )
-        found.append(Judgement(claim, {"variant": where}, outcome, findings))
+        found.append(ClaimVerdict(claim, {"variant": where}, outcome, findings))
     return found
 
 

@@ -13,9 +13,9 @@ import pytest
 import epicycle
 from epicycle.runner.language.sampling import Design
 from epicycle.runner.language.study import Study, study_of_text
-from epicycle.runner.study import open_study
 from epicycle.runner.study.judge.samples import Samples
 from epicycle.runner.study.judge.sensitivity import Index, sensitivity
+from epicycle.runner.study.judge.study_results import open_study
 from tests.study.study_commands import study as study_command
 from tests.study.study_parts import write
 

@@ -13,8 +13,9 @@ from scipy import stats
 from epicycle.actors import EpicycleError
 from epicycle.runner import open_study
 from epicycle.runner.cli import main
-from epicycle.runner.study import StoreError, run_study
+from epicycle.runner.study.run.manifest import StoreError
 from epicycle.runner.study.run.store import lock
+from epicycle.runner.study.session import run_study
 from tests.study.study_commands import message, study
 from tests.study.study_parts import STUDY, plan_of, write
 

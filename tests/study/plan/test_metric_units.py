@@ -9,8 +9,9 @@ import pytest
 
 from epicycle.runner import ModelError, open_study
 from epicycle.runner.cli import main
-from epicycle.runner.study import Plan, run_study
+from epicycle.runner.study.plan.plan import Plan
 from epicycle.runner.study.run.manifest import read_manifest
+from epicycle.runner.study.session import run_study
 from tests.study.study_parts import MODEL, STUDY, plan_of, write
 
 UNITS = MODEL.replace("{of: walk.output, take: last}", "{of: walk.output, take: last, unit: m, doc: where it ends}")

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from epicycle.runner.study.run import pulse as pulse_module
+from epicycle.runner.study.run import progress as progress_module
 from epicycle.runner.study.run.backlog import OK, Backlog, Done
 from tests.study.study_parts import STUDY, plan_of, write
 
@@ -42,8 +42,8 @@ def test_progress_is_a_line_a_minute_without_a_terminal(
     backlog = Backlog(plan_of(write(tmp_path)), {})
     tasks = [backlog.next() for _ in range(10)]
     now = 1000.0
-    monkeypatch.setattr(pulse_module.time, "monotonic", lambda: now)
-    with pulse_module.progress("walks") as tell:
+    monkeypatch.setattr(progress_module.time, "monotonic", lambda: now)
+    with progress_module.progress("walks") as tell:
         for number, task in enumerate(tasks):
             assert task is not None
             backlog.finished(task, Done("failed" if number == 2 else OK))
@@ -62,13 +62,13 @@ def test_what_is_left_is_only_what_has_to_be_made(tmp_path: Path, monkeypatch: p
     keys = [plan.key(plan.condition(each), one) for each in range(2) for one in range(5)]
     there = {key: Done(OK) for key in (*keys[:2], *keys[5:8], "a run of another model")}
     now = 1000.0
-    monkeypatch.setattr(pulse_module.time, "monotonic", lambda: now)
-    backlog, pulse = Backlog(plan, there), pulse_module.Pulse()
+    monkeypatch.setattr(progress_module.time, "monotonic", lambda: now)
+    backlog, rate = Backlog(plan, there), progress_module.Rate()
     lines = []
     while (task := backlog.next()) is not None:
         now += 12.0
         backlog.finished(task, Done(OK))
-        lines.append(pulse.line(backlog))
+        lines.append(rate.line(backlog))
     assert lines == [
         "3 of 10 runs, 0.0833 runs/s, 48 s left",
         "4 of 10 runs, 0.0833 runs/s, 36 s left",
@@ -82,4 +82,4 @@ def test_what_is_left_is_only_what_has_to_be_made(tmp_path: Path, monkeypatch: p
     ("seconds", "shown"), [(3, "3 s"), (600, "10 min"), (7200, "2 h"), (864_000, "10 days"), (1e10, "317 years")]
 )
 def test_duration_is_readable(seconds: float, shown: str) -> None:
-    assert pulse_module.duration(seconds) == shown
+    assert progress_module.duration(seconds) == shown

@@ -15,13 +15,13 @@ import pytest
 
 from epicycle.actors import EpicycleError
 from epicycle.runner.cli import main
-from epicycle.runner.study import StoreError, open_study, run_study
-from epicycle.runner.study.run.manifest import checksum, manifest_text, read_manifest
+from epicycle.runner.study.judge.study_results import open_study
+from epicycle.runner.study.run.manifest import StoreError, checksum, manifest_text, read_manifest
 from epicycle.runner.study.run.store import Store, lock, prepare
-from epicycle.runner.study.session import manifest_of
+from epicycle.runner.study.session import manifest_of, run_study
 from tests.study.study_parts import plan_of, write
 
-HELP = "   help: 'epicycle resume out' sets it aside and repeats its lost runs"
+HELP = "   help: 'epicycle study out' sets it aside and repeats its lost runs"
 ANEW = "   help: 'epicycle study STUDY --out out' rewrites it and keeps the existing runs"
 
 
@@ -133,7 +133,7 @@ def test_damaged_journal(copied: Path, capsys: pytest.CaptureFixture[str], caplo
 def test_damaged_manifest(copied: Path, capsys: pytest.CaptureFixture[str], caplog: pytest.LogCaptureFixture) -> None:
     path = copied / "out" / "manifest.json"
     path.write_bytes(path.read_bytes().replace(b'"replications": 5', b'"replications": 4'))
-    for command in ("status", "report", "resume"):
+    for command in ("status", "report", "study"):
         assert main([command, "out"]) == 2
         assert (
             capsys.readouterr().err == f"error: out/manifest.json is damaged: it does not match its checksum\n{ANEW}\n"
@@ -161,7 +161,7 @@ def test_damaged_table(copied: Path, capsys: pytest.CaptureFixture[str]) -> None
     assert capsys.readouterr().out == (
         "walks: 10 of 10 runs are finished (10 ok)\n"
         "out/table.parquet does not match the runs: it is damaged or out of date\n"
-        "   help: 'epicycle resume out' rewrites it\n"
+        "   help: 'epicycle study out' rewrites it\n"
     )
     run_study(plan_of(copied / "walks.yaml"), Path("out"), jobs=1)
     assert path.read_bytes() == data

@@ -21,10 +21,11 @@ import pytest
 
 from epicycle.runner.cli import main
 from epicycle.runner.language.study import read_study
-from epicycle.runner.study import Plan, open_study
+from epicycle.runner.study.judge.study_results import open_study
+from epicycle.runner.study.plan.plan import Plan
 from epicycle.runner.study.run import parcel
 from epicycle.runner.study.run.backlog import Backlog
-from epicycle.runner.study.run.parcel import fitness, pack
+from epicycle.runner.study.run.parcel import environment, pack
 from epicycle.runner.study.run.runner import Runner
 from tests.study.dask_cluster import Cluster, a_cluster, without_epicycle
 from tests.study.study_commands import study
@@ -64,7 +65,7 @@ def test_table_is_that_of_local_processes(cluster: Cluster, tmp_path: Path, caps
     statuses = Counter(pq.read_table(tmp_path / "dask" / "table.parquet")["status"].to_pylist())
     assert statuses.keys() == {"ok", "failed", "timeout", "killed"}
     # If there is nothing to do, no scheduler is contacted.
-    assert main(["resume", str(tmp_path / "dask"), "--executor", "dask", "--scheduler", "127.0.0.1:9"]) == 1
+    assert main(["study", str(tmp_path / "dask"), "--executor", "dask", "--scheduler", "127.0.0.1:9"]) == 1
     assert f"0 new runs, {statuses.total()} already there" in capsys.readouterr().out
 
 
@@ -94,12 +95,12 @@ def test_workers_and_the_scheduler_are_lost(tmp_path: Path, capsys: pytest.Captu
         _, said = process.communicate(timeout=60)
     assert without_progress(said) == (
         f"error: the scheduler {cluster.address} no longer answers\n"
-        f"   help: finished runs are kept; 'epicycle resume {tmp_path / 'dask'}' continues\n"
+        f"   help: finished runs are kept; 'epicycle study {tmp_path / 'dask'}' continues\n"
     )
     assert process.returncode == 1
     kept = len(open_study(tmp_path / "dask").table())
     assert 8 <= kept < 40
-    assert main(["resume", str(tmp_path / "dask"), "--jobs", "2"]) == 0
+    assert main(["study", str(tmp_path / "dask"), "--jobs", "2"]) == 0
     assert capsys.readouterr().out.startswith(f"walks: 2 conditions, {40 - kept} new runs, {kept} already there\n")
     assert table_of(tmp_path / "dask") == table_of(tmp_path / "local")
 
@@ -117,7 +118,7 @@ def test_a_cluster_of_its_own(tmp_path: Path) -> None:
         time.sleep(0.02)
     os.killpg(process.pid, signal.SIGINT)  # as a terminal does
     _, said = process.communicate(timeout=60)
-    assert without_progress(said) == f"interrupted; finished runs are kept: 'epicycle resume {out}' continues\n"
+    assert without_progress(said) == f"interrupted; finished runs are kept: 'epicycle study {out}' continues\n"
     assert process.returncode == 130
     assert 0 < len(open_study(out).table()) < 10
 
@@ -265,12 +266,12 @@ def test_what_cannot_be(
             )
     monkeypatch.setattr(cluster_module, "CONNECT", 10.0)
     for name, unlike in (
-        ("numpy", f"numpy {fitness()['numpy']} there, 1.0 here"),
-        ("casadi", f"casadi {fitness()['casadi'] or 'is missing'} there, 1.0 here"),
+        ("numpy", f"numpy {environment()['numpy']} there, 1.0 here"),
+        ("casadi", f"casadi {environment()['casadi'] or 'is missing'} there, 1.0 here"),
         ("code", "the code of Epicycle differs"),
     ):
         with monkeypatch.context() as context:
-            context.setitem(fitness(), name, "1.0")
+            context.setitem(environment(), name, "1.0")
             said = error_of(tmp_path, capsys, "--scheduler", cluster.address)
         assert re.sub(r"127.0.0.1:[0-9]+", "WORKER", said) == (
             f"1: error: the Dask worker tcp://WORKER differs from this machine: {unlike}\n"

@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from epicycle.runner.study import open_study, run_study
+from epicycle.runner.study.judge.study_results import open_study
+from epicycle.runner.study.session import run_study
 from tests.study.study_parts import STUDY, THIS, command, plan_of, write
 
 pytestmark = pytest.mark.skipif(not Path("/proc/self/stat").exists(), reason="finds processes in /proc")
@@ -72,7 +73,7 @@ def kill_and_resume(
 
     def next_command() -> list[str]:
         if (out / "manifest.json").is_file():
-            return command("resume", out, *options)
+            return command("study", out, *options)
         return command("study", tmp_path / "walks.yaml", "--types", THIS, "--set", pause, "--out", out, *options)
 
     done = 0
@@ -118,7 +119,7 @@ def test_an_interrupt_ends_it_with_a_word(tmp_path: Path) -> None:
     os.killpg(process.pid, signal.SIGINT)  # as a terminal does
     _, said = process.communicate(timeout=30)
     assert process.returncode == 130
-    assert said == f"interrupted; finished runs are kept: 'epicycle resume {out}' continues\n"
+    assert said == f"interrupted; finished runs are kept: 'epicycle study {out}' continues\n"
     assert 0 < len(rows(out)) < 10
     deadline = time.monotonic() + 30
     while members(process.pid) and time.monotonic() < deadline:

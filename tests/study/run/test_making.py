@@ -15,7 +15,7 @@ from scipy import stats
 
 from epicycle.runner import Simulation, load_model, open_study
 from epicycle.runner.cli import main
-from epicycle.runner.study import run_study
+from epicycle.runner.study.session import run_study
 from tests.study.study_commands import study
 from tests.study.study_parts import STUDY, THIS, plan_of, write
 
@@ -102,20 +102,31 @@ def test_runs_that_fail_hang_or_die_are_rows(tmp_path: Path, capsys: pytest.Capt
     assert (rows["timeout"]["seed"], rows["timeout"]["error"]) == (25, "it took longer than 1 s")
     assert (rows["killed"]["seed"], rows["killed"]["error"]) == (27, "its process ended 3 times (exit code 3)")
     assert said.endswith("error: 3 runs failed\n")
-    assert f"epicycle replay {tmp_path / 'out'} {rows['failed']['run'][:12]}\n" in said
+    assert f"epicycle run {tmp_path / 'out' / rows['failed']['run'][:12]}\n" in said
     # What has failed is not run again; what hangs on the machine is, if that is asked for.
     assert study(tmp_path, "--run-timeout", 0.5) == 1
     assert capsys.readouterr().out.startswith("walks: 1 condition, 0 new runs, 10 already there\n")
     assert study(tmp_path, "--run-timeout", 0.5, "--retry", "--jobs", 2) == 1
     assert capsys.readouterr().out.startswith("walks: 1 condition, 2 new runs, 8 already there\n")
-    assert main(["replay", str(tmp_path / "out"), rows["failed"]["run"][:12]]) == 1
+    assert main(["run", str(tmp_path / "out" / rows["failed"]["run"][:12])]) == 1
     assert "ValueError: seed 23 is unlucky" in capsys.readouterr().err
 
 
-def test_replay_gives_the_digest_of_the_row(done: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_run_that_is_made_again_has_the_digest_of_the_row(done: Path, tmp_path: Path) -> None:
     for row in open_study(done / "out").table().to_pylist()[::4]:
-        assert main(["replay", str(done / "out"), row["run"][:12], "--out", str(tmp_path)]) == 0
-        assert capsys.readouterr().out.splitlines()[-1] == f"digest {row['digest']}: the same"
+        assert (
+            main(
+                [
+                    "run",
+                    str(done / "out" / row["run"][:12]),
+                    "--out",
+                    str(tmp_path),
+                    "--log",
+                    str(tmp_path / "log.parquet"),
+                ]
+            )
+            == 0
+        )
         manifest = json.loads((tmp_path / "manifest.json").read_text())
         assert (manifest["seed"], manifest["digest"]) == (row["seed"], row["digest"])
         log = pq.read_table(tmp_path / "log.parquet")
@@ -134,7 +145,7 @@ def test_a_metric_that_cannot_be_calculated_is_told_by_replay_too(
     (row,) = open_study(tmp_path / "out").failures()
     assert row["error"] == "'1 / (end - end)': 1 / (end - end) divides by zero, with end = 9.0"
     capsys.readouterr()
-    assert main(["replay", str(tmp_path / "out"), row["run"][:12]]) == 1
+    assert main(["run", str(tmp_path / "out" / row["run"][:12])]) == 1
     said = capsys.readouterr()
     assert said.err == f"error: {row['error']}\n"
     assert "ended by no events left" in said.out

@@ -12,11 +12,10 @@ import pytest
 
 from epicycle.runner import open_study
 from epicycle.runner.cli import main
-from epicycle.runner.study import run_study
 from epicycle.runner.study.run import store as store_module
 from epicycle.runner.study.run.manifest import checksum, manifest_text
 from epicycle.runner.study.run.store import Store, Writer, lock, prepare
-from epicycle.runner.study.session import manifest_of
+from epicycle.runner.study.session import manifest_of, run_study
 from tests.study.study_commands import message, study
 from tests.study.study_parts import STUDY, plan_of, write
 
@@ -63,10 +62,9 @@ def test_folder_of_another_study(copied: Path, capsys: pytest.CaptureFixture[str
         assert study(copied) == 2
     said = message(capsys, copied)
     assert said == f"error: out is in use: another process is writing to it (pid {os.getpid()})\n"
-    for command in ("resume", "status"):
-        assert main([command, str(copied / "nothing")]) == 2
-        assert message(capsys, copied) == "error: there is no folder nothing\n"
-    assert main(["replay", str(copied / "out"), "abc"]) == 2
+    assert main(["status", str(copied / "nothing")]) == 2
+    assert message(capsys, copied) == "error: there is no folder nothing\n"
+    assert main(["run", str(copied / "out" / "abc")]) == 2
     assert message(capsys, copied) == (
         "error: out has no run 'abc'\n   help: the column 'run' of out/table.parquet lists their names\n"
     )
@@ -79,7 +77,7 @@ def test_truncated_part(copied: Path, capsys: pytest.CaptureFixture[str]) -> Non
     assert main(["status", str(copied / "out")]) == 2
     assert message(capsys, copied) == (
         f"error: out/parts/{part.name} is damaged: it does not match its checksum\n"
-        "   help: 'epicycle resume out' sets it aside and repeats its lost runs\n"
+        "   help: 'epicycle study out' sets it aside and repeats its lost runs\n"
     )
     assert study(copied) == 0
     assert [path.name for path in (copied / "out" / "damaged").iterdir()] == [part.name]
@@ -134,7 +132,7 @@ def test_full_disk_leaves_nothing_half(
     assert study(copied, "--replications", 6) == 1
     assert message(capsys, copied) == (
         "error: cannot write to out: No space left on device\n"
-        "   help: finished runs are kept; 'epicycle resume out' continues\n"
+        "   help: finished runs are kept; 'epicycle study out' continues\n"
     )
     monkeypatch.undo()
     writer.flush()

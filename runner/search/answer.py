@@ -1,0 +1,55 @@
+"""What every search answers with: a sentence for people, facts for programs, and files."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+from typing import Any, ClassVar
+
+from epicycle.actors import EpicycleError
+
+from ..tables import Tabled
+
+
+class Answer(Tabled):
+    """What a search found; ``NAME`` is that of its file of facts."""
+
+    NAME: ClassVar[str]
+    folder: Path | None = None  # where its runs are noted
+
+    @property
+    def sentence(self) -> str:
+        """What came of the search, in words."""
+        return " ".join(self._sentences())
+
+    def _sentences(self) -> Iterable[str]:
+        raise NotImplementedError
+
+    def facts(self) -> dict[str, Any]:
+        """Everything that was found, for programs."""
+        raise NotImplementedError
+
+    def save(self, folder: str | Path | None = None) -> list[Path]:
+        """Write the facts as JSON, by default to the folder of its runs; the files."""
+        path = self.place(folder) / f"{self.NAME}.json"
+        path.write_text(json.dumps(self.facts(), indent=2) + "\n", encoding="utf-8")
+        return [path]
+
+    def place(self, folder: str | Path | None) -> Path:
+        """The folder to write to, which is made if it is not there."""
+        if (found := self.folder if folder is None else Path(folder)) is None:
+            raise EpicycleError("there is no folder to save it in: name one")
+        found.mkdir(parents=True, exist_ok=True)
+        return found
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__}: {self.sentence}>"
+
+    def _caption(self) -> str:
+        return self.sentence
+
+
+def listed(texts: Sequence[str], last: str = "and") -> str:
+    """Texts as a list in a sentence."""
+    return f" {last} ".join([", ".join(texts[:-1]), texts[-1]] if len(texts) > 1 else texts)

@@ -1,0 +1,90 @@
+"""Runs as a page."""
+
+from __future__ import annotations
+
+import html
+import tempfile
+import webbrowser
+from collections.abc import Sequence
+from contextlib import nullcontext
+from pathlib import Path
+
+from epicycle.actors import EpicycleError
+
+from ...bars import SOON
+from ...build.figures import figures_of
+from ...build.model import Model
+from ...engine import ActorError, LoopError
+from ...printing import complain
+from ...text.problems import Problems
+from ..watching import watched
+from .page import page_of, write_page
+from .recording import Recording
+
+
+class Page:
+    """A page that shows one run or two, in a notebook, a browser or a file; it needs no network.
+
+    A run that failed or was interrupted is shown up to that point; ``errors`` give the reasons.
+    """
+
+    def __init__(
+        self,
+        recordings: Sequence[Recording],
+        names: Sequence[str],
+        errors: Sequence[EpicycleError | KeyboardInterrupt],
+    ) -> None:
+        self.recordings = recordings
+        self.names = names
+        self.errors = errors
+
+    def save(self, path: str | Path) -> Path:
+        """Write it to a file (.html)."""
+        write_page(self.recordings, Path(path), names=self.names)
+        return Path(path)
+
+    def open(self) -> Path:
+        """Open it in the browser; returns the file, which stays until the computer clears its temporary files."""
+        path = self.save(Path(tempfile.mkdtemp(prefix="epicycle-"), f"{self.recordings[0].model.name}.html"))
+        webbrowser.open(path.as_uri())
+        return path
+
+    def __repr__(self) -> str:
+        return f"<Page of {' and '.join(self.names or [self.recordings[0].model.name])}>"
+
+    def _repr_html_(self) -> str:
+        whole = html.escape(page_of(self.recordings, names=self.names))
+        look = "width: 100%; height: 80vh; border: 0"
+        return f'<iframe sandbox="allow-scripts" srcdoc="{whole}" style="{look}"></iframe>'
+
+
+def recorded(
+    models: Sequence[Model],
+    *,
+    seed: int | Sequence[int | None] | None = None,
+    until: float | Sequence[float | None] | None = None,
+    names: Sequence[str] = (),
+    progress: bool = True,
+) -> Page:
+    """The page of these models' runs; seeds and stop times apply to all, or are given for each."""
+    recordings, errors = [], list[EpicycleError | KeyboardInterrupt]()
+    for number, model in enumerate(models):
+        own_seed = seed[number] if isinstance(seed, Sequence) else seed
+        stop = until[number] if isinstance(until, Sequence) else until
+        problems = Problems()
+        figures = figures_of(model, problems)
+        problems.raise_if_any()
+        if stop is None and model.endless:
+            complain(
+                f"{model.endless}\n   help: end it with Ctrl-C, which keeps what was recorded, or give a stop time"
+            )
+        recordings.append(Recording(model, figures, seed=own_seed, is_compared=len(models) > 1))
+        with watched(model, stop, SOON) if progress else nullcontext() as report:
+            try:
+                recordings[-1].run(until=stop, progress=report)
+            except (ActorError, LoopError) as error:  # what led to the error is the very thing to look at
+                errors.append(error)
+            except KeyboardInterrupt as error:  # the records are kept, and nothing else is started
+                errors.append(error)
+                break
+    return Page(recordings, names if len(recordings) > 1 else [], errors)

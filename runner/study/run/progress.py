@@ -1,0 +1,58 @@
+"""The progress of a study: a bar where somebody can see it, a line per minute elsewhere."""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+from ...bars import bar
+from ...printing import complain
+from .backlog import Backlog
+
+EVERY = 60.0  # s between two lines where there is no bar
+
+
+class Rate:
+    """The rate of a session, and the work left."""
+
+    def __init__(self) -> None:
+        self.started = time.monotonic()
+
+    def line(self, backlog: Backlog) -> str:
+        """``120 of 6,000 runs, 2 failed, 3.1 runs/s, 32 min left``."""
+        parts = [f"{backlog.over:,} of {backlog.total:,} runs"]
+        if backlog.failed:
+            parts.append(f"{backlog.failed:,} failed")
+        if rate := backlog.made.total() / ((time.monotonic() - self.started) or math.inf):
+            parts += [f"{rate:.3g} runs/s", f"{duration(backlog.left / rate)} left"]
+        return ", ".join(parts)
+
+
+@contextmanager
+def progress(name: str) -> Iterator[Callable[[Backlog], None]]:
+    """A function for a session to call now and then."""
+    rate = Rate()
+    with bar(name) as show:
+        last = rate.started
+        if show is not None:
+            show(0.0, None, "")
+
+        def tell(backlog: Backlog) -> None:
+            nonlocal last
+            if show is not None:
+                show(backlog.over, backlog.total, rate.line(backlog))
+            elif time.monotonic() - last >= EVERY:
+                last = time.monotonic()
+                complain(f"{time.strftime('%H:%M:%S')} {name}: {rate.line(backlog)}")
+
+        yield tell
+
+
+def duration(seconds: float) -> str:
+    """A duration in words."""
+    for limit, size, unit in ((100, 1, "s"), (6_000, 60, "min"), (172_800, 3600, "h"), (63_072_000, 86_400, "days")):
+        if seconds < limit:
+            return f"{seconds / size:.0f} {unit}"
+    return f"{seconds / 31_536_000:,.0f} years"

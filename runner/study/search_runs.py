@@ -1,0 +1,99 @@
+"""Trials: runs of a search, which chooses batch by batch what it runs, in the results folder of a study."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from .judge.study_results import StudyResults
+from .plan.plan import Plan
+from .run.backlog import Backlog, Task
+from .run.making import Recorder, make_in, recording
+from .run.manifest import manifest_text
+from .run.processes import Processes
+from .run.runner import Runner
+from .run.store import BEST_FIRST, Row, lock, prepare, replace_file
+from .session import manifest_of
+
+
+@dataclass(kw_only=True)
+class _SearchTask(Task):
+    """A run of a plan that the process which makes it may not know yet."""
+
+    batch: int
+    plan: Plan
+
+
+class _Worker:
+    """Makes the trials of one plan after the other."""
+
+    def __init__(self) -> None:
+        self._batch = 0
+        self._runner: Runner | None = None
+
+    def prepare(self, trial: _SearchTask) -> None:
+        """Load the model of the trial's condition, unless it is there."""
+        self._of(trial).prepare(trial)
+
+    def make(self, trial: _SearchTask) -> Row:
+        """The row of a run."""
+        return self._of(trial).make(trial)
+
+    def _of(self, trial: _SearchTask) -> Runner:
+        if self._runner is None or trial.batch != self._batch:
+            self._runner, self._batch = Runner(trial.plan), trial.batch
+        return self._runner
+
+
+class SearchRuns:
+    """A results folder that a search writes to; ``open_search_runs`` opens one."""
+
+    def __init__(self, recorder: Recorder, processes: Processes, jobs: int, known: dict[str, Row]) -> None:
+        self._recorder = recorder
+        self._processes = processes
+        self._jobs = jobs
+        self._known = known
+        self._batches = 0
+        recorder.tell = self._keep
+
+    def made(self, plan: Plan, numbers: Sequence[tuple[int, int]], tell: Callable[[], None]) -> list[Row]:
+        """The rows of these runs, each a condition of the plan and a replication; those that are not there are made."""
+        self._batches += 1
+        sent, tasks = replace(plan, texts={}, files=()), []
+        keys = [plan.key(plan.condition(index), replication) for index, replication in numbers]
+        for (index, replication), key in zip(numbers, keys, strict=True):
+            if key not in self._known:
+                seed = plan.seed(plan.condition(index), replication)
+                tasks.append(_SearchTask(index, replication, seed, key, batch=self._batches, plan=sent))
+        self._recorder.backlog = Backlog(plan, {}, tasks)
+        make_in(self._processes, self._recorder, self._jobs, tell)
+        return [self._known[key] for key in keys]
+
+    def describe(self, plan: Plan) -> None:
+        """Say in the folder's manifest which runs it has: those of a plan."""
+        store = self._recorder.store
+        replace_file(store.folder / "manifest.json", manifest_text({**store.manifest, **plan.manifest()}).encode())
+
+    def _keep(self, row: Row) -> None:
+        self._known[row["run"]] = row
+
+
+@contextmanager
+def open_search_runs(plan: Plan, folder: Path, jobs: int, timeout: float | None) -> Iterator[SearchRuns]:
+    """Open a folder for a search whose first conditions are those of a plan; raises ``StoreError``.
+
+    At the end, the table of the runs is written that were described last.
+    """
+    with lock(folder):
+        store = prepare(folder, manifest_of(plan))
+        known: dict[str, Row] = {}
+        for batch in store.rows():
+            for row in batch.to_pylist():
+                before = known.get(row["run"])
+                if before is None or BEST_FIRST.index(row["status"]) < BEST_FIRST.index(before["status"]):
+                    known[row["run"]] = row
+        with recording(store, Backlog(plan, {}, ()), timeout) as recorder, Processes(_Worker) as processes:
+            yield SearchRuns(recorder, processes, jobs, known)
+        StudyResults(folder).write_table()

@@ -1,0 +1,129 @@
+"""The evaluator of points: the same answers in one process and in several, in the order in which they are asked for."""
+
+from __future__ import annotations
+
+import os
+import time
+from pathlib import Path
+
+import pytest
+
+import epicycle
+from epicycle.actors import EpicycleError
+from epicycle.runner.search import evaluator as module
+from epicycle.runner.search.evaluator import Evaluator, Recipe, jobs_for
+from epicycle.runner.study.run.processes import WorkerError
+
+
+class Squares:
+    """Makes squares, and says in which process."""
+
+    def __init__(self, pause: float = 0.0) -> None:
+        self._pause = pause
+
+    def prepare(self, request: object) -> None:
+        """There is nothing to load."""
+
+    def make(self, request: int) -> tuple[int, int]:
+        """The square and the process."""
+        if request == 13:
+            raise EpicycleError("13 has none")
+        if request == 14:
+            os._exit(3)
+        time.sleep(self._pause)
+        return request * request, os.getpid()
+
+
+def test_one_process_works_here() -> None:
+    with Evaluator(Squares(), 1, Squares) as evaluator:
+        evaluator.expect((each, each) for each in range(5))
+        assert [evaluator.make(each, each) for each in range(5)] == [(each * each, os.getpid()) for each in range(5)]
+        with pytest.raises(EpicycleError, match=r"^13 has none$"):
+            evaluator.make(13, 13)
+
+
+def test_several_work_ahead_and_answer_in_order() -> None:
+    with Evaluator(Squares(), 2, Squares, 0.05, patience=0.0) as evaluator:
+        evaluator.expect((each, each) for each in range(8))
+        made = [evaluator.make(each, each) for each in range(8)]
+        assert [square for square, _ in made] == [each * each for each in range(8)]
+        assert len({process for _, process in made} - {os.getpid()}) == 2
+        # What was not expected is made as well, and what was expected in vain is left.
+        evaluator.expect((each, each) for each in (20, 21, 22))
+        assert evaluator.make(5, 5)[0] == 25
+        with pytest.raises(EpicycleError, match=r"^13 has none$"):
+            evaluator.make(13, 13)
+
+
+def test_a_process_that_dies_is_reported() -> None:
+    with (
+        Evaluator(Squares(), 2, Squares, patience=0.0) as evaluator,
+        pytest.raises(WorkerError, match=r"^a process that was making runs died; is there enough memory\?$"),
+    ):
+        evaluator.make(14, 14)
+
+
+def test_processes_start_where_the_work_is_long() -> None:
+    with Evaluator(Squares(0.06), 2, Squares, patience=0.1) as evaluator:
+        assert [evaluator.make(each, each)[1] == os.getpid() for each in range(4)] == [True, True, False, False]
+
+
+def test_a_model_that_only_this_program_knows(tmp_path: Path) -> None:
+    model = epicycle.load("mm1", set={"load": 0.5})
+    recipe = Recipe.of(model)
+    assert recipe is not None
+    assert recipe.model().parameters["load"] == 0.5
+    assert jobs_for(model, 2) == 2
+    model.weave("loss", epicycle.aspects.PacketLoss(probability=0.1), at="server.input")
+    assert jobs_for(model, None) == 1
+    with pytest.raises(EpicycleError) as caught:
+        jobs_for(model, 2)
+    assert str(caught.value) == (
+        "mm1 cannot be made in other processes, which do not know the models and classes of this program\n"
+        "   help: leave out jobs"
+    )
+    with pytest.raises(EpicycleError, match=r"^jobs: 0 is not a whole number of at least 1$"):
+        jobs_for(model, 0)
+
+
+MODEL = """
+model: line
+parameters: {slope: 1.0, offset: 0.0}
+actors:
+  clock: {type: Clock, period: 100 ms}
+  noise: {type: Random, distribution: {type: Uniform}}
+  walk: {type: Accumulator}
+  f: {type: Expression, expression: "(${slope}) * time + (${offset}) + 0 * tick"}
+connections:
+  - clock.output -> noise.trigger
+  - noise.output -> walk.input
+  - clock.output -> f.tick
+aspects: {loss: {type: PacketLoss, probability: 0.3, at: walk.input}}
+run: {stop: 10 s}
+monitors: {enough: "eventually within 10 s walk.output > 45"}
+"""
+
+
+@pytest.fixture
+def line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
+    """A model, where processes start at once."""
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(Evaluator.__init__, "__kwdefaults__", {"patience": 0.0})
+    Path("line.yaml").write_text(MODEL, encoding="utf-8")
+    rows = "".join(f"{time},{1.5 * time - 0.5 + 0.01 * (time % 3)}\n" for time in range(1, 9))
+    Path("measured.csv").write_text(f"time,value\n{rows}", encoding="utf-8")
+    return "line.yaml"
+
+
+def test_each_search_answers_the_same_with_several(line: str) -> None:
+    def facts(jobs: int) -> list[object]:
+        goal, out = epicycle.Match({"f.output": "measured.csv"}), Path(f"jobs {jobs}")
+        vary = {"slope": "0..3", "offset": "-2..2"}
+        calibration = epicycle.search(line, goal, vary=vary, jobs=jobs, out=out / "calibration")
+        explanation = epicycle.explain(line, "enough", seed=1, jobs=jobs, out=out / "explanation")
+        rare = epicycle.rare(line, "always walk.output < 45", runs=20, repetitions=4, jobs=jobs, out=out / "rare")
+        noted = [sorted(each.read_text() for each in folder.glob("tried-*")) for folder in sorted(out.iterdir())]
+        return [calibration.facts(), explanation.facts(), rare.facts(), noted]
+
+    assert facts(1) == facts(2)
+    assert module.PATIENCE > 0.0

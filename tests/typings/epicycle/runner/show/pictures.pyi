@@ -1,0 +1,1 @@
+from runner.show.pictures import *
