@@ -91,7 +91,7 @@ wheel: $(DEV)
 clean:
 	rm -rf $(VENV) build dist site site-parts epicycle.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis .coverage htmlcov
 	rm -rf actors/built
-	find actors aspects models $(wildcard ptolemy) runner tests -name __pycache__ -type d -prune -exec rm -rf {} +
+	find actors aspects models $(wildcard bridges) $(wildcard ptolemy) runner tests -name __pycache__ -type d -prune -exec rm -rf {} +
 	find actors aspects runner \( -name '*.so' -o -name '*.pyd' \) -exec rm -f {} +
 
 # Three stamps on one environment; all become stale when pyproject.toml changes.
@@ -105,7 +105,7 @@ $(LINKED): pyproject.toml | $(BIN)/python
 	@site=$$($(BIN)/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))') && \
 	mkdir -p "$$site/epicycle-stubs" && \
 	ln -sfn "$(CURDIR)/api/__init__.py" "$$site/epicycle-stubs/__init__.pyi" && \
-	for folder in actors aspects $(wildcard ptolemy) runner; do ln -sfn "$(CURDIR)/$$folder" "$$site/epicycle-stubs/$$folder"; done
+	for folder in actors aspects bridges $(wildcard ptolemy) runner; do ln -sfn "$(CURDIR)/$$folder" "$$site/epicycle-stubs/$$folder"; done
 	@touch $@
 
 $(USE): pyproject.toml setup.py | $(BIN)/python $(LINKED)

@@ -20,7 +20,7 @@ _HOMES = {
     if isinstance(node, ast.ImportFrom) and node.module
     for each in node.names
 }
-_FOLDERS = ("actors", "aspects", "runner")
+_FOLDERS = ("actors", "aspects", "bridges", "runner")
 
 __all__ = sorted(_HOMES)  # noqa: PLE0605
 

@@ -40,22 +40,23 @@ def between_steps(interrupt: Callable[[], None]) -> Iterator[None]:
     if before is not signal.default_int_handler:  # somebody else handles Ctrl-C
         yield
         return
-    again = partial(signal.pthread_kill, threading.get_ident(), signal.SIGINT)
-    late = threading.Timer(_PATIENCE, again)
-    late.daemon = True
+    late: list[threading.Timer] = []  # made when it is needed: a run may be made of very many short parts
 
     def handle(number: int, frame: Any) -> None:
         signal.signal(signal.SIGINT, signal.default_int_handler)
         interrupt()
-        late.start()
+        late.append(threading.Timer(_PATIENCE, partial(signal.pthread_kill, threading.get_ident(), signal.SIGINT)))
+        late[0].daemon = True
+        late[0].start()
 
     signal.signal(signal.SIGINT, handle)
     try:
         yield
     finally:
-        late.cancel()
-        with suppress(KeyboardInterrupt, RuntimeError):  # its signal arrives just now; the timer was not started
-            late.join()
+        for timer in late:
+            timer.cancel()
+            with suppress(KeyboardInterrupt, RuntimeError):  # its signal arrives just now; the timer was not started
+                timer.join()
         signal.signal(signal.SIGINT, before)
 
 

@@ -14,7 +14,7 @@ from collections.abc import Iterator
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
-FOLDERS = ("actors", "aspects", "ptolemy", "runner")
+FOLDERS = ("actors", "aspects", "bridges", "ptolemy", "runner")
 
 _LIBM = "exp exp2 expm1 log log1p log2 log10 sin cos tan sinh cosh tanh pow hypot cbrt"
 _INVERSE = "asin acos atan atan2 asinh acosh atanh"

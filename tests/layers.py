@@ -20,7 +20,7 @@ def main() -> int:
     with tempfile.TemporaryDirectory() as folder:
         package = Path(folder, "epicycle")
         package.mkdir()
-        for name in ("actors", "aspects", "models", "ptolemy", "runner"):
+        for name in ("actors", "aspects", "bridges", "models", "ptolemy", "runner"):
             (package / name).symlink_to(ROOT / name)
         for file in (ROOT / "api").glob("*.py"):
             (package / file.name).symlink_to(file)

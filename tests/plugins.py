@@ -38,7 +38,7 @@ def copied(to: Path) -> dict[str, str]:
             shutil.copy2(ROOT / name, to / name)
     package = to / "links" / "epicycle"
     package.mkdir(parents=True)
-    for folder in ("actors", "aspects", "models", "runner"):
+    for folder in ("actors", "aspects", "bridges", "models", "runner"):
         (package / folder).symlink_to(to / folder)
     for file in (to / "api").iterdir():
         (package / file.name).symlink_to(file)

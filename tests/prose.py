@@ -18,7 +18,7 @@ from typing import NamedTuple
 import yaml
 
 ROOT = Path(__file__).parents[1]
-FOLDERS = ("actors", "api", "aspects", "ptolemy", "runner", "website")
+FOLDERS = ("actors", "api", "aspects", "bridges", "ptolemy", "runner", "website")
 MADE = ("docs/reference.md",)  # of what declarations say, which are looked at where they stand
 
 

@@ -23,8 +23,8 @@ from tests.plugins import ABSENT, PLUGINS
 
 ROOT = Path(__file__).parents[1]
 THERE = tuple(name for name in PLUGINS if name not in ABSENT)
-FOLDERS = ("actors", "aspects", "models", "runner", *THERE, "api")  # the last is `epicycle` itself
-CODE_FOLDERS = ("actors", "aspects", "runner", "api", *PLUGINS)
+FOLDERS = ("actors", "aspects", "models", "runner", "bridges", *THERE, "api")  # the last is `epicycle` itself
+CODE_FOLDERS = ("actors", "aspects", "runner", "api", "bridges", *PLUGINS)
 # What is declared, without the plug-ins whose folders are missing.
 DECLARED = "".join(
     line

@@ -14,7 +14,7 @@ import pytest
 
 from tests.plugins import ABSENT, ROOT, copied, main
 
-HOUSE = ("actors", "aspects", "api", "runner")
+HOUSE = ("actors", "aspects", "api", "bridges", "runner")
 # What belongs to Ptolemy's room: its rules, its actors' ways, the order of posting, Java's generators.
 WORDS = re.compile(
     r"ptolemy\s*=|like: ptolemy|one_at_a_time|whole_channel|set_last|follow_ptolemy|are_ptolemys|are_posted|"

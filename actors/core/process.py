@@ -44,8 +44,11 @@ class Process(Actor):
         self._awaited: set[Event] = set()
         self._queued: dict[str, deque[Any]] = {name: deque() for name in self.inputs}
         self.failure: BaseException | None = None
-        start = self.wait(0.0)
-        self.process = SimPyProcess(self.environment, self._behave(start))
+        self.process = SimPyProcess(self.environment, self._behave(self.beginning()))
+
+    def beginning(self) -> Event:
+        """What ``run()`` waits for: the first tag."""
+        return self.wait(0.0)
 
     def _behave(self, start: Event) -> Generator[Event, Any, None]:
         yield start

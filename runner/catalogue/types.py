@@ -13,15 +13,15 @@ from __future__ import annotations
 import re
 import sys
 from collections import ChainMap
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
 from importlib.metadata import EntryPoint, distributions, entry_points
 from importlib.util import module_from_spec, spec_from_file_location
-from inspect import isabstract
+from inspect import isabstract, isfunction, signature
 from pathlib import Path
-from types import ModuleType
+from types import MappingProxyType, ModuleType
 from typing import Any, Generic, TypeVar
 
 import epicycle.actors
@@ -317,6 +317,17 @@ def load_all(types: Mapping[str, type[T]]) -> tuple[dict[str, type[T]], list[Cat
     return found, errors
 
 
+_functions: dict[str, Callable[..., Any]] = {}
+
+
+def given_functions() -> Mapping[str, Callable[..., Any]]:
+    """The functions of files that the user has named (``types_of_file``), as ``module.name``.
+
+    Those that have a parameter ``env``: they are written for SimPy.
+    """
+    return MappingProxyType(_functions)
+
+
 class TypesError(EpicycleError):
     """A file that provides no types."""
 
@@ -324,7 +335,7 @@ class TypesError(EpicycleError):
 def types_of_file(path: Path) -> list[type]:
     """The actors, aspects and parts that a Python file defines; its code is run, as by ``import``.
 
-    Raises ``TypesError``.
+    Its functions for SimPy become known, too (``given_functions``).  Raises ``TypesError``.
     """
     module = _imported(path)
     found = [
@@ -336,8 +347,17 @@ def types_of_file(path: Path) -> list[type]:
         and not name.startswith("_")
         and not isabstract(each)
     ]
-    if not found:
-        raise TypesError(f"--types {path}: the file defines no actor, no aspect and no part such as an Objective")
+    functions = {
+        f"{module.__name__}.{name}": each
+        for name, each in vars(module).items()
+        if isfunction(each) and each.__module__ == module.__name__ and "env" in signature(each).parameters
+    }
+    _functions.update(functions)
+    if not found and not functions:
+        raise TypesError(
+            f"--types {path}: the file defines no actor, no aspect, no part such as an Objective, and no function with "
+            "a parameter 'env'"
+        )
     return found
 
 

@@ -59,6 +59,7 @@ if TYPE_CHECKING:
 
     from ..graph.model_graph import ModelGraph
 
+NO_EVENTS = "no events left"  # why a run ends that nothing else ends
 REPORTED = 256  # tokens that come together at one port are counted in groups of this size
 
 
@@ -102,7 +103,7 @@ class Director:
         self.rank = -1  # the rank of the activation handled now
         self.is_plain = type(self) is Director  # a subclass may have another order
         self._stop_after: Tag | None = None
-        self._reason = "no events left"
+        self._reason = NO_EVENTS
         self._recent: list[str] | None = None  # actors that fire while time seems to stand still
         self._is_interrupted = False
         # Called with the time (ns) before it advances there; true if the run is to end instead.
@@ -137,6 +138,11 @@ class Director:
         """The time of the next event of SimPy's (ns)."""
         time: int = self.events.first
         return time
+
+    @property
+    def next_time(self) -> int:
+        """The time of the next tag (ns); ``NEVER`` if there is none."""
+        return self._times.first()
 
     def put_event(self, event: Event, priority: EventPriority, delay: int) -> None:
         """Let an event of SimPy's happen after ``delay`` ns."""

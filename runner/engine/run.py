@@ -18,7 +18,7 @@ from ..interrupt import between_steps
 from ..results import STOP_TIME, EventLog, Record, Results, Signal, Verdict
 from ..text.program import describe, raised_at
 from .copies import Copies
-from .director import Director
+from .director import NO_EVENTS, Director
 from .directors import director_of
 from .errors import ActorError
 from .forms import attach
@@ -193,6 +193,25 @@ class Run:
         finally:
             self.director.watch, self._awaited = before, {}
 
+    def advance_until(self, stop: int | None, condition: Callable[[], bool]) -> bool:
+        """Go on until ``stop`` (ns), or until a condition holds before the time advances; whether it does."""
+        before, holds = self.director.watch, False
+
+        def watch(upcoming: int) -> bool:
+            nonlocal holds
+            holds = condition()
+            return holds or (before is not None and before(upcoming))
+
+        self.director.watch = watch
+        try:
+            self.advance(stop)
+        finally:
+            self.director.watch = before
+        holds = holds or (self.stopped == NO_EVENTS and condition())
+        if holds:
+            self.stopped = ""  # it is not over
+        return holds
+
     def reseed(self, seed: int) -> None:
         """From now on draw the random numbers of a run with another seed."""
         self.reseeds.append((self.is_begun, self.director.steps, seed))
@@ -227,6 +246,15 @@ class Run:
             except ActorError as error:
                 first = first or error
         return first
+
+    def live_in(self, environment: Any) -> None:
+        """Let processes live in an environment from outside; before the run begins."""
+        self._ways.live_in(environment)
+
+    def failed(self, error: ActorError) -> ActorError:
+        """End the run because of an error; the error with its places."""
+        self.end()
+        return self._placed(error)
 
     def finish(self) -> Results:
         """End the run; its results."""

@@ -6,6 +6,9 @@ import copy
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, TypeVar, overload
 
+import simpy
+from simpy.events import Event
+
 from epicycle.actors import Actor, EpicycleError, Process, Tag, did_you_mean, to_nanoseconds
 from epicycle.aspects import Aspect
 
@@ -14,6 +17,7 @@ from ..collection import without_collection
 from ..graph.woven import WovenAspect
 from ..results import STOP_TIME, EventLog, Record, Results, Signal, Verdict
 from ..tables import Table, Tabled
+from .attached import Attached
 from .copies import Copies
 from .director import Director
 from .interventions import Interventions
@@ -107,6 +111,7 @@ class Simulation(Tabled):
         self.model = model
         self._is_told_of = log_to is not None or tracer is not None
         self._parts = _parts(model.graph.actors, model.aspects)
+        self._attached: Attached | None = None
         self._run = Run(model, seed, keep_log.keeps if keep_log else None, log_to, tracer, acts)
 
     def __repr__(self) -> str:
@@ -158,6 +163,14 @@ class Simulation(Tabled):
         self._run.reach(self.model.output.stop_time if until is None else to_nanoseconds(until), robustness)
         return any(self.robustness(name) <= least for name, least in robustness.items())
 
+    def advance_until(self, condition: Callable[[], bool]) -> bool:
+        """Run until a condition holds, or to the stop time; returns whether it holds.
+
+        The condition is asked whenever the time is about to advance: everything at the present time is done.
+        """
+        self._refuse_over()
+        return self._run.advance_until(self.model.output.stop_time, condition)
+
     def step(self) -> bool:
         """Handle the next tag, or SimPy events before it; returns whether there was anything until the stop time."""
         self._refuse_over()
@@ -165,8 +178,26 @@ class Simulation(Tabled):
 
     def finish(self) -> Results:
         """End the run where it is, and return the results."""
+        if self._attached is not None and not self._run.is_over:
+            return self._attached.finish()
         self._refuse_over()
         return self._run.finish()
+
+    def attach(self, env: simpy.Environment, *, until: float | None = None) -> Event:
+        """Let a program's own SimPy environment run this: both have one clock, and may share resources and events.
+
+        The run begins at the time of ``env`` (s), with which it advances from then on.  At one instant all events of
+        SimPy come first, of the program and of the run's processes in the order of SimPy; then the tags of the run.
+        Returns an event that happens at the end of the run (``until``, in s, default: the model's stop time; or when
+        ``finish`` is called), with its ``Results``: ``results = env.run(until=simulation.attach(env))``.
+        An exception in an actor is raised by ``env.run`` as ``ActorError``.
+        """
+        self._refuse_over()
+        if self._run.is_begun:
+            raise EpicycleError(f"the run of {self.model.name} has begun: attach another Simulation to the environment")
+        stop = self.model.output.stop_time if until is None else to_nanoseconds(until)
+        self._attached = Attached(self._run, env, stop)
+        return self._attached.done
 
     def results(self, stopped: str) -> Results:
         """The results so far; ``stopped`` says why the run is over."""
@@ -186,6 +217,10 @@ class Simulation(Tabled):
         return self._run.verdict(monitor, self._run.stopped)
 
     def _refuse_over(self) -> None:
+        if self._attached is not None and not self._run.is_over:
+            raise EpicycleError(
+                f"the run of {self.model.name} is attached to a SimPy environment, which lets its time pass: run that"
+            )
         if self._run.is_over:
             raise RuntimeError("a Simulation runs once: make another one for another run")
 
@@ -199,6 +234,10 @@ class Simulation(Tabled):
         is over, or that reports to others; ``CopyError`` for parts that cannot be copied.
         """
         self._refuse_told()
+        if self._attached is not None:
+            raise SnapshotError(
+                f"the run of {self.model.name} is attached to a SimPy environment, which cannot be copied"
+            )
         if self._run.is_over:
             raise SnapshotError(f"the run of {self.model.name} is over: take a snapshot before its end")
         return Snapshot(self._run)

@@ -158,6 +158,13 @@ class Wiring:
         """The actors with aspects, at themselves or at their parameters."""
         return self._executions
 
+    def live_in(self, environment: Any) -> None:
+        """Let processes live in another environment than the one that the director has made."""
+        before, self.director._environment = self.director.environment, environment
+        for execution in self._executions.values():
+            if execution.environment is before:
+                execution.environment = environment
+
     def open(self) -> None:
         """Let tokens be sent from now on."""
         for output, emitter in zip(self._outputs, self._emitters, strict=True):

@@ -94,7 +94,10 @@ def test_without_types_the_model_is_wrong(capsys: pytest.CaptureFixture[str]) ->
         (
             "none_of_mine.py",
             "from epicycle.actors import Clock",
-            "the file defines no actor, no aspect and no part such as an Objective",
+            (
+                "the file defines no actor, no aspect, no part such as an Objective, and no function with a parameter "
+                "'env'"
+            ),
         ),
         ("bad_of_mine.py", "x = 1\n1 / 0", "ZeroDivisionError: division by zero (line 2)"),
         ("exit_of_mine.py", "raise SystemExit(3)", "SystemExit: 3 (line 1)"),

@@ -1,0 +1,32 @@
+"""What others have, as parts of a model, and models as parts of what others have.
+
+``processes``: functions and programs written for SimPy.  ``learning``: models as environments of Gymnasium and
+PettingZoo.  Bridges use Epicycle's public interface only.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from .extras import needed
+
+if TYPE_CHECKING:
+    from .environments import gym, zoo
+    from .learning import Agent, AgentError, GymEnv, ZooEnv, deploy
+    from .processes import Environment, Process, process
+
+__all__ = ["Agent", "AgentError", "Environment", "GymEnv", "Process", "ZooEnv", "deploy", "gym", "process", "zoo"]
+
+_HOMES = {
+    "environments": ("gym", "zoo"),
+    "learning": ("Agent", "AgentError", "GymEnv", "ZooEnv", "deploy"),
+    "processes": ("Environment", "Process", "process"),
+}
+
+
+def __getattr__(name: str) -> Any:
+    # On first use: most need a package of their own.
+    home = next((home for home, names in _HOMES.items() if name in names), None)
+    if home is None:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(needed(home, name), name)

@@ -1,0 +1,23 @@
+"""Modules that need packages which need not be installed."""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import Any
+
+from epicycle.actors import EpicycleError
+
+EXTRAS = {"gymnasium": "rl", "pettingzoo": "rl"}  # by which extra each is installed
+
+
+def needed(module: str, who: str) -> Any:
+    """A module of this folder; raises ``EpicycleError`` if a package that it needs is missing."""
+    try:
+        return import_module(f".{module}", __package__)
+    except ModuleNotFoundError as error:
+        package = (error.name or "").partition(".")[0]
+        if package not in EXTRAS:
+            raise
+        raise EpicycleError(
+            f"{who} needs the package {package}, which is not installed: pip install 'epicycle[{EXTRAS[package]}]'"
+        ) from None
