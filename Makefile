@@ -104,7 +104,7 @@ $(BIN)/python:
 $(LINKED): pyproject.toml | $(BIN)/python
 	@site=$$($(BIN)/python -c 'import sysconfig; print(sysconfig.get_path("purelib"))') && \
 	mkdir -p "$$site/epicycle-stubs" && \
-	ln -sfn "$(CURDIR)/api/__init__.py" "$$site/epicycle-stubs/__init__.pyi" && \
+	ln -sfn "$(CURDIR)/api/__init__.pyi" "$$site/epicycle-stubs/__init__.pyi" && \
 	for folder in actors aspects bridges $(wildcard ptolemy) runner; do ln -sfn "$(CURDIR)/$$folder" "$$site/epicycle-stubs/$$folder"; done
 	@touch $@
 
