@@ -1,6 +1,6 @@
 from epicycle.actors import EpicycleError as EpicycleError
-from epicycle.bridges.environments import gym as gym
-from epicycle.bridges.environments import zoo as zoo
+from epicycle.bridges import gym as gym
+from epicycle.bridges import zoo as zoo
 from epicycle.runner import Model as Model
 from epicycle.runner import ModelError as ModelError
 from epicycle.runner import Results as Results

@@ -1,7 +1,7 @@
 """What others have, as parts of a model, and models as parts of what others have.
 
 ``processes``: functions and programs written for SimPy.  ``learning``: models as environments of Gymnasium and
-PettingZoo.  Bridges use Epicycle's public interface only.
+PettingZoo.  ``bags``: recordings of ROS 2.  Bridges use Epicycle's public interface only.
 """
 
 from __future__ import annotations
@@ -11,13 +11,29 @@ from typing import TYPE_CHECKING, Any
 from .extras import needed
 
 if TYPE_CHECKING:
+    from .bags import Bag, bag, lockstep
     from .environments import gym, zoo
     from .learning import Agent, AgentError, GymEnv, ZooEnv, deploy
     from .processes import Environment, Process, process
 
-__all__ = ["Agent", "AgentError", "Environment", "GymEnv", "Process", "ZooEnv", "deploy", "gym", "process", "zoo"]
+__all__ = [
+    "Agent",
+    "AgentError",
+    "Bag",
+    "Environment",
+    "GymEnv",
+    "Process",
+    "ZooEnv",
+    "bag",
+    "deploy",
+    "gym",
+    "lockstep",
+    "process",
+    "zoo",
+]
 
 _HOMES = {
+    "bags": ("Bag", "bag", "lockstep"),
     "environments": ("gym", "zoo"),
     "learning": ("Agent", "AgentError", "GymEnv", "ZooEnv", "deploy"),
     "processes": ("Environment", "Process", "process"),

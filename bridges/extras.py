@@ -7,7 +7,14 @@ from typing import Any
 
 from epicycle.actors import EpicycleError
 
-EXTRAS = {"gymnasium": "rl", "pettingzoo": "rl"}  # by which extra each is installed
+EXTRAS = {  # by which extra each is installed
+    "control": "control",
+    "fmpy": "fmi",
+    "gymnasium": "rl",
+    "mcap": "ros",
+    "pettingzoo": "rl",
+    "rosbags": "ros",
+}
 
 
 def needed(module: str, who: str) -> Any:

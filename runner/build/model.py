@@ -104,16 +104,30 @@ class Model(Building, Scope, Tabled):
     # -- what disturbs it -----------------------------------------------------------------------------------------
 
     def disturb(
-        self, disturbance: str | Path, *, set: Mapping[str, object] | None = None, types: Iterable[type] = ()
+        self,
+        disturbance: str | Path,
+        *,
+        at: Iterable[str] | None = None,
+        set: Mapping[str, object] | None = None,
+        types: Iterable[type] = (),
     ) -> list[WovenAspect]:
         """Weave the aspects of a packaged disturbance, or of a YAML file, around the model.
 
         ``set`` gives the disturbance's own parameters their values; ``types`` are your own aspect classes that it may
-        name.  A disturbance that sets parameters of the model must be loaded together with it: ``load_model(...,
+        name.  ``at`` are ports in place of those that it names: then only aspects that alter, delay or lose tokens
+        are woven.  A disturbance that sets parameters of the model must be loaded together with it: ``load_model(...,
         disturb=...)``.  Raises ``ModelError``.
         """
-        from .disturbance import disturb
+        from .disturbance import disturb, disturb_ports
 
+        if at is not None:
+            places: dict[str, list[str]] = {"input": [], "output": []}
+            for path in at:
+                places[self.graph.ports[path].direction].append(path)
+            before = len(self.aspects)
+            _, acts = disturb_ports(self, [str(disturbance)], places, set or {}, types)
+            self.exactly = (self.exactly or frozenset()) | acts if acts is not None else self.exactly
+            return list(self.aspects[before:])
         graph, found, acts = disturb(self, str(disturbance), set or {}, types, call_site())
         self.adopt(graph, found)
         if acts is not None:

@@ -6,15 +6,18 @@ import csv
 import json
 import os
 from collections.abc import Iterable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass
 from decimal import Decimal, InvalidOperation
+from importlib.metadata import entry_points
 from io import TextIOWrapper
+from itertools import pairwise
 from pathlib import Path
 from typing import IO, Any, BinaryIO, Protocol
 
 from epicycle.actors import EpicycleError, did_you_mean, open_regular
 
+FOLDERS = "epicycle.recordings"  # entry points of what reads folders
 COLUMNS = ["time", "topic", "value"]
 NANOSECONDS = Decimal(1_000_000_000)
 _LINE = 2**20  # characters in a line of a CSV log, at most
@@ -48,8 +51,8 @@ class Recording(Protocol):
     def messages(self) -> Iterator[Message]:
         """The messages in order of time; raises ``RecordingError``."""
 
-    def writing(self, file: BinaryIO) -> Writing:
-        """What writes a recording of the same kind."""
+    def replacing(self, path: Path) -> AbstractContextManager[Writing]:
+        """What writes a recording of the same kind; it is at a path once it is complete."""
 
 
 class Writing(Protocol):
@@ -62,15 +65,26 @@ class Writing(Protocol):
 @contextmanager
 def opened(path: Path) -> Iterator[Recording]:
     """The recording in a file; raises ``RecordingError``."""
+    if path.is_dir():
+        yield _folder(path)
+        return
     kinds: dict[str, Any] = {".mcap": McapRecording, ".csv": CsvRecording}
     kind = kinds.get(path.suffix.lower())
     if kind is None:
-        raise RecordingError(f"{path} is not a recording: its name must end in .mcap or .csv")
+        raise RecordingError(f"{path} is not a recording: its name must end in .mcap or .csv, or it is a folder")
     try:
         with open_regular(path) as file:
             yield kind(path, file)
     except OSError as error:
         raise RecordingError(f"{path} cannot be read: {error.strerror or error}") from None
+
+
+def _folder(path: Path) -> Recording:
+    """A recording that is a folder, as an installed package reads it."""
+    for point in entry_points(group=FOLDERS):
+        made: Recording = point.load()(path)
+        return made
+    raise RecordingError(f"{path} is a folder, and no installed package reads those")
 
 
 @contextmanager
@@ -160,8 +174,10 @@ class CsvRecording:
     def _error(self, reason: str) -> RecordingError:
         return RecordingError(f"{self.path} is not a recording: {reason}")
 
-    def writing(self, file: BinaryIO) -> Writing:
-        return _CsvWriting(self.channels, file)
+    @contextmanager
+    def replacing(self, path: Path) -> Iterator[Writing]:
+        with replaced(path) as file:
+            yield _CsvWriting(self.channels, file)
 
 
 class _CsvWriting:
@@ -193,6 +209,7 @@ class McapRecording:
                 "an MCAP file needs the package mcap, which is not installed: pip install 'epicycle[mcap]'"
             ) from None
         self.path = path
+        self._file = file
         with self._checked():
             self._reader = make_reader(file)
             self._header = self._reader.get_header()
@@ -211,14 +228,35 @@ class McapRecording:
             # Without chunks, messages are taken as they stand: sorting would need them all.
             is_sorted = bool(self._summary.chunk_indexes)
             latest = 0
-            for _, channel, message in self._reader.iter_messages(log_time_order=is_sorted):
+            in_turn = self._each_chunk() if is_sorted else None
+            for message in in_turn or (each for *_, each in self._reader.iter_messages(log_time_order=is_sorted)):
                 if message.log_time < latest:
                     raise self._error("its messages are not in order of time, and it has no index")
-                latest = message.log_time
+                latest, number = message.log_time, message.channel_id
                 content: bytes | str = message.data
-                if channel.id in self._are_read:
-                    content = self._text(message.data, channel.topic, message.log_time)
-                yield Message(message.log_time, channel.id, content, f"{message.sequence} {message.publish_time}")
+                if number in self._are_read:
+                    content = self._text(message.data, self.channels[number], message.log_time)
+                yield Message(message.log_time, number, content, f"{message.sequence} {message.publish_time}")
+
+    def _each_chunk(self) -> Iterator[Any] | None:
+        """The messages, chunk by chunk, if these follow each other; this takes half the time of merging them."""
+        chunks = sorted(
+            self._summary.chunk_indexes, key=lambda each: (each.message_start_time, each.chunk_start_offset)
+        )
+        if any(one.message_end_time >= other.message_start_time for one, other in pairwise(chunks)):
+            return None
+        return self._messages_of(chunks)
+
+    def _messages_of(self, chunks: list[Any]) -> Iterator[Any]:
+        from mcap.data_stream import ReadDataStream
+        from mcap.records import Chunk
+        from mcap.records import Message as Record
+        from mcap.stream_reader import breakup_chunk
+
+        for each in chunks:
+            self._file.seek(each.chunk_start_offset + 9)  # behind its kind and length
+            records = breakup_chunk(Chunk.read(ReadDataStream(self._file)))
+            yield from sorted((one for one in records if isinstance(one, Record)), key=lambda one: one.log_time)
 
     def _text(self, data: bytes, topic: str, time: int) -> str:
         try:
@@ -242,8 +280,10 @@ class McapRecording:
     def _error(self, reason: str) -> RecordingError:
         return RecordingError(f"{self.path} is not a recording: {reason}")
 
-    def writing(self, file: BinaryIO) -> Writing:
-        return _McapWriting(self, file)
+    @contextmanager
+    def replacing(self, path: Path) -> Iterator[Writing]:
+        with replaced(path) as file:
+            yield _McapWriting(self, file)
 
     def copy_to(self, writer: Any) -> dict[int, int]:
         """Write everything but messages; the numbers of the channels in the new file by those in this one."""

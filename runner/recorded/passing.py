@@ -19,7 +19,7 @@ from ..engine import ActorError, Simulation
 from ..language.settings import Setting
 from ..results import Results
 from ..shown import finite
-from .files import Message, Recording, RecordingError, check_topics, opened, replaced
+from .files import Message, Recording, RecordingError, check_topics, opened
 
 SENDER = "recording"
 _LONGEST = 1_000_000_000 * 10**9  # ns
@@ -128,8 +128,7 @@ def pass_recording(
         raise RecordingError(f"{target} must be of the same kind as {source}: {source.suffix}")
     with opened(source) as recording:
         names = _names(recording.channels)
-        with replaced(target) as file:
-            writing = recording.writing(file)
+        with recording.replacing(target) as writing:
             start = next((message.time for message in recording.messages()), 0)
             came: dict[str, int] = dict.fromkeys(recording.channels.values(), 0)
             delivered = dict(came)

@@ -341,7 +341,7 @@ def test_what_is_not_json_although_its_channel_says_so() -> None:
     [
         (
             ["in.txt", "--with", "wifi_burst", "-o", "o.txt"],
-            "in.txt is not a recording: its name must end in .mcap or .csv",
+            "in.txt is not a recording: its name must end in .mcap or .csv, or it is a folder",
         ),
         (["none.csv", "--with", "wifi_burst", "-o", "o.csv"], "none.csv cannot be read: No such file or directory"),
         (["in.csv", "--with", "wifi_burst", "-o", "o.mcap"], "o.mcap must be of the same kind as in.csv: .csv"),

@@ -1,0 +1,446 @@
+"""Recordings of ROS 2, read and written without ROS: folders with MCAP or SQLite files, and single MCAP files.
+
+A message becomes a token: a mapping of its fields, in which those of a field are attributes, too
+(``message.pose.pose.position.x``), with its header, and arrays as arrays.  The time of a message is that of its
+recording; time 0 of a run is the first message.
+"""
+
+from __future__ import annotations
+
+import copy
+import dataclasses
+import re
+import shutil
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from functools import cached_property
+from pathlib import Path
+from typing import Any, ClassVar
+
+import mcap.reader
+from rosbags import rosbag2
+from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
+
+from epicycle.actors import (
+    Actor,
+    EpicycleError,
+    InputPort,
+    OutputPort,
+    Parameter,
+    ParameterError,
+    brief,
+    did_you_mean,
+    texts_parameter,
+)
+from epicycle.runner import Model
+from epicycle.runner.recorded import Message, RecordingError, Writing
+
+KINDS: Mapping[str, Any] = {"number": float, "truth value": bool, "text": str, "any value": Any}
+LONGEST = 1_000_000_000 * 10**9  # ns, of a run
+
+
+class Fields(dict[str, Any]):
+    """The fields of a message, which are attributes, too."""
+
+    def __getattr__(self, name: str) -> Any:
+        try:
+            return self[name]
+        except KeyError:
+            near = did_you_mean(name, self)
+            raise AttributeError(f"the message has no field {name!r}{near}; fields: {', '.join(self)}") from None
+
+
+def port_of(topic: str) -> str:
+    """The name of a topic as a port: ``/robot/front/scan`` is ``robot_front_scan``."""
+    name = re.sub(r"\W+", "_", topic, flags=re.ASCII).strip("_") or "topic"
+    return f"_{name}" if name[0].isdigit() else name
+
+
+class BagFile:
+    """What is in a recording: ``topics`` with the types of their messages.  This one is a folder."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._store: Any = None
+        with self.checked(), self.opened() as reader:
+            self.topics: dict[str, str] = self._topics(reader)
+
+    def raw(self, topics: Iterable[str] = ()) -> Iterator[tuple[int, str, bytes]]:
+        """Time (ns), topic and bytes of each message, of all topics if none is named; raises ``RecordingError``."""
+        latest = None
+        with self.checked(), self.opened() as reader:
+            for time, topic, data in self._each(reader, tuple(topics)):
+                if latest is not None and time < latest:
+                    raise self.error(f"a message of {topic} at {time} ns comes after one at {latest} ns")
+                latest = time
+                yield time, topic, data
+
+    def messages(self, topics: Iterable[str] = ()) -> Iterator[tuple[int, str, Fields]]:
+        """Time (ns), topic and fields of each message; raises ``RecordingError``."""
+        store = self.store
+        for time, topic, data in self.raw(topics):
+            kind = self.topics[topic]
+            try:
+                message = store.deserialize_cdr(data, kind)
+            except Exception as error:  # of many kinds, for bytes that are no such message
+                said = brief(str(error) or type(error).__name__)
+                raise self.error(f"a message of {topic} at {time} ns is not a {kind}: {said}") from None
+            yield time, topic, fields_of(message)
+
+    @cached_property
+    def start(self) -> int:
+        """The time of the first message (ns)."""
+        first = next(self.raw(), None)
+        return 0 if first is None else first[0]
+
+    @property
+    def store(self) -> Any:
+        """What knows the types of the messages, which takes a while to make."""
+        if self._store is None:
+            self._store = get_typestore(Stores.LATEST)
+            with self.checked(), self.opened() as reader:
+                own = get_typestore(Stores.EMPTY)
+                found: dict[str, Any] = {}
+                for kind, language, text in self._definitions(reader):
+                    if language in ("ros2msg", "msg"):
+                        found |= get_types_from_msg(text, kind)
+                    elif text:
+                        found |= get_types_from_idl(re.sub(r"^(=+\nIDL: .*|=+)$", "", text, flags=re.M))
+                if found:
+                    own.register(found)
+                    self._store = own
+        return self._store
+
+    @contextmanager
+    def opened(self) -> Iterator[Any]:
+        """The reader of the file."""
+        with rosbag2.Reader(self.path) as reader:
+            yield reader
+
+    def _topics(self, reader: Any) -> dict[str, str]:
+        return {each.topic: each.msgtype for each in reader.connections}
+
+    def _definitions(self, reader: Any) -> Iterator[tuple[str, str, str]]:
+        """Each type of messages, the language of its definition, and this."""
+        for each in reader.connections:
+            if each.msgdef.data:
+                yield each.msgtype, each.msgdef.format.name.lower(), each.msgdef.data
+
+    def _each(self, reader: Any, topics: tuple[str, ...]) -> Iterator[tuple[int, str, bytes]]:
+        chosen = [each for each in reader.connections if not topics or each.topic in topics]
+        for connection, time, data in reader.messages(chosen):
+            yield time, connection.topic, data
+
+    @contextmanager
+    def checked(self) -> Iterator[None]:
+        """The libraries raise errors of many kinds for files that are damaged."""
+        try:
+            yield
+        except (EpicycleError, GeneratorExit):
+            raise
+        except Exception as error:
+            said = " ".join(str(error).split())[:200]
+            raise self.error(said or type(error).__name__) from None
+
+    def error(self, reason: str) -> RecordingError:
+        """What is wrong with the file."""
+        return RecordingError(f"{self.path} is not a recording of ROS 2: {reason}")
+
+
+class _McapFile(BagFile):
+    """A single MCAP file."""
+
+    @contextmanager
+    def opened(self) -> Iterator[Any]:
+        with self.path.open("rb") as file:
+            yield mcap.reader.make_reader(file)
+
+    def _topics(self, reader: Any) -> dict[str, str]:
+        summary = reader.get_summary()
+        if summary is None or not summary.channels:
+            raise self.error("it has no summary of its channels; repair it with 'mcap recover'")
+        for each in summary.channels.values():
+            if each.message_encoding != "cdr":
+                raise self.error(
+                    f"messages of {each.topic} are in {each.message_encoding or 'no encoding'}, not in cdr"
+                )
+        return {each.topic: summary.schemas[each.schema_id].name for each in summary.channels.values()}
+
+    def _definitions(self, reader: Any) -> Iterator[tuple[str, str, str]]:
+        for each in reader.get_summary().schemas.values():
+            yield each.name, each.encoding, each.data.decode()
+
+    def _each(self, reader: Any, topics: tuple[str, ...]) -> Iterator[tuple[int, str, bytes]]:
+        is_sorted = bool(reader.get_summary().chunk_indexes)
+        for _, channel, message in reader.iter_messages(topics or None, log_time_order=is_sorted):
+            yield message.log_time, channel.topic, message.data
+
+
+def bag(path: str | Path) -> BagFile:
+    """Open a recording of ROS 2: a folder (or the metadata.yaml in it), or an MCAP file; raises ``RecordingError``."""
+    path = Path(path)
+    if path.name == "metadata.yaml":
+        path = path.parent
+    if path.is_dir():
+        return BagFile(path)
+    if path.suffix.lower() != ".mcap":
+        raise RecordingError(f"{path} is not a recording of ROS 2: a folder with metadata.yaml, or a file *.mcap")
+    if not path.is_file():
+        raise RecordingError(f"{path} cannot be read: there is no such file")
+    return _McapFile(path)
+
+
+_names: dict[type, tuple[str, ...]] = {}
+
+
+def fields_of(message: Any) -> Any:
+    """A message as a token."""
+    if isinstance(message, list):
+        return [fields_of(each) for each in message]
+    kind = type(message)
+    if kind not in _names:
+        found = [each.name for each in dataclasses.fields(kind)] if dataclasses.is_dataclass(kind) else []
+        _names[kind] = tuple(name for name in found if not name.startswith("_"))
+    if not (names := _names[kind]):
+        return message
+    return Fields({name: fields_of(getattr(message, name)) for name in names})
+
+
+class _Position:
+    """A place among the messages of a recording; a copy goes there again by itself."""
+
+    def __init__(self, file: BagFile, topics: tuple[str, ...]) -> None:
+        self._file, self._topics, self._number = file, topics, 0
+        self._messages: Iterator[tuple[int, str, Fields]] | None = None
+
+    def next(self) -> tuple[int, str, Fields] | None:
+        """The next message; None behind the last."""
+        if self._messages is None:
+            self._messages = self._file.messages(self._topics)
+            for _ in range(self._number):
+                next(self._messages, None)
+        self._number += 1
+        return next(self._messages, None)
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> _Position:
+        made = _Position(self._file, self._topics)
+        made._number = self._number
+        return made
+
+
+class Bag(Actor):
+    """Sends the messages of a recording of ROS 2, each at its time and by the output of its topic.
+
+    The output of ``/robot/front/scan`` is ``robot_front_scan``.  A token is a mapping of the fields of the message,
+    with its header.  Time 0 is the first message of the recording.
+    """
+
+    file = Parameter(Path, doc="an .mcap file, or the metadata.yaml of a folder")
+    topics: Any = texts_parameter(None, doc="the topics to send; all if left out")
+
+    is_source: ClassVar[bool] = True
+    copies_share: ClassVar[tuple[str, ...]] = ("_bag",)
+
+    def own_ports(self) -> dict[str, InputPort[Any] | OutputPort[Any]]:
+        self._bag = bag(self.file)
+        self._topics = tuple(self._bag.topics if self.topics is None else self.topics)
+        for topic in self._topics:
+            if topic not in self._bag.topics:
+                near, known = did_you_mean(topic, self._bag.topics), ", ".join(self._bag.topics)
+                raise ParameterError(f"topics: {self.file.name} has no topic {topic!r}{near}; topics: {known}")
+        self._ports = {topic: port_of(topic) for topic in self._topics}
+        return {port: OutputPort(doc=f"messages of {topic}") for topic, port in self._ports.items()}
+
+    _next: tuple[int, str, Fields] | None = None
+
+    def initialize(self) -> None:
+        self._start = self._bag.start
+        self._position = _Position(self._bag, self._topics)
+        self._prepare()
+
+    def restart(self) -> None:
+        while self._next is not None and self._next[0] - self._start < self.context.time:
+            self._next = self._position.next()
+        self._wake()
+
+    def _prepare(self) -> None:
+        self._next = self._position.next()
+        self._wake()
+
+    def _wake(self) -> None:
+        if self._next is not None:
+            time = self._next[0] - self._start
+            if time > LONGEST:
+                raise self._bag.error(f"a message of {self._next[1]} comes {time // 10**9:,} s after the first one")
+            self.context.wake(self, time)
+
+    def fire(self) -> None:
+        assert self._next is not None
+        _, topic, message = self._next
+        self.outputs[self._ports[topic]].send(message)
+        self._prepare()
+
+
+class _Node(Actor):
+    """A program that listens to topics; a subclass knows the program and its topics."""
+
+    program: ClassVar[Any]
+    topics: ClassVar[Mapping[str, str]]  # by input
+
+    def initialize(self) -> None:
+        program = type(self).program
+        made = program() if isinstance(program, type) else program
+        self._hear = copy.deepcopy(made).on_message if hasattr(made, "on_message") else made
+
+    def fire(self) -> None:
+        for name, port in self.inputs.items():
+            for token in port.tokens:
+                said = self._hear(self.topics[name], _as_fields(token))
+                if said is not None:
+                    self._send(name, said)
+
+    def _send(self, name: str, said: Any) -> None:
+        if not isinstance(said, Mapping) or (len(self.outputs) == 1 and not said.keys() <= self.outputs.keys()):
+            if len(self.outputs) != 1:
+                raise EpicycleError(
+                    f"on_message({self.topics[name]!r}, ...) returns {brief(said)}, not a mapping of outputs to "
+                    f"values; outputs: {', '.join(self.outputs) or 'none'}"
+                )
+            said = {next(iter(self.outputs)): said}
+        for key, value in said.items():
+            if key not in self.outputs:
+                near = did_you_mean(key, self.outputs)
+                raise EpicycleError(
+                    f"on_message({self.topics[name]!r}, ...) returns a value for {key!r}, which is no output{near}; "
+                    f"outputs: {', '.join(self.outputs) or 'none'}"
+                )
+            port = self.outputs[key]
+            if port.type is float:
+                value = float(value)
+            port.send(value)
+
+
+def _as_fields(token: Any) -> Any:
+    """What an aspect has made of a message, with attributes again."""
+    if isinstance(token, Mapping):
+        return Fields({name: _as_fields(each) for name, each in token.items()})
+    return token
+
+
+def lockstep(
+    recording: str | Path,
+    program: Any,
+    *,
+    outputs: Iterable[str] | Mapping[str, str],
+    topics: Iterable[str] | None = None,
+    disturb: str | Path | Iterable[str | Path] = (),
+    at: str | Iterable[str] | None = None,
+    set: Mapping[str, object] | None = None,
+) -> Model:
+    """A model in which a program hears the messages of a recording, one after the other: each run has the same bits.
+
+    ``program`` is a function of a topic and a message, or a class (each run makes an object of it) or object (each run
+    has a copy) with ``on_message(topic, message)``.  It returns values for ``outputs`` by name, one value if there is
+    only one output, or None.  ``outputs`` may say what they send: ``{"error": "number"}``.  ``disturb`` names
+    disturbances, ``at`` the topics that they are for, by patterns (default: the ports that they name; ``/imu`` is
+    ``node.imu``).
+    The parts are ``bag`` and ``node``.  Raises ``RecordingError``, ``ModelError``.
+
+    >>> model = lockstep("walk.mcap", Filter, outputs={"error": "number"}, disturb="lost.yaml", at="/gps")
+    """
+    from fnmatch import fnmatchcase
+
+    file = bag(recording)
+    model = Model(file.path.stem)
+    chosen = None if topics is None else list(topics)
+    source = model.add(Bag("bag", file=file.path.resolve(), topics=chosen))
+    names = {port_of(topic): topic for topic in (file.topics if chosen is None else chosen)}
+    kinds = dict(outputs) if isinstance(outputs, Mapping) else dict.fromkeys(outputs, "any value")
+    for name, each in kinds.items():
+        if each not in KINDS:
+            raise EpicycleError(f"output {name} sends {each!r}{did_you_mean(each, KINDS)}; valid: {', '.join(KINDS)}")
+    ports: dict[str, Any] = {name: InputPort[Any](doc=f"messages of {topic}") for name, topic in names.items()}
+    ports |= {name: OutputPort(KINDS[each]) for name, each in kinds.items()}
+    members = {**ports, "program": staticmethod(program) if not isinstance(program, type) else program, "topics": names}
+    node = model.add(type("Node", (_Node,), {**members, "__doc__": _Node.__doc__, "__module__": __name__})("node"))
+    for name in names:
+        model.connect(source.outputs[name], node.inputs[name])
+    places = None
+    if at is not None:
+        patterns = [at] if isinstance(at, str) else list(at)
+        for pattern in patterns:
+            if not any(fnmatchcase(topic, pattern) for topic in names.values()):
+                near, known = did_you_mean(pattern, names.values()), ", ".join(names.values())
+                raise RecordingError(f"{pattern!r} matches no topic{near}; topics: {known}")
+        heard = [name for name, topic in names.items() if any(fnmatchcase(topic, pattern) for pattern in patterns)]
+        places = [path for name in heard for path in (f"node.{name}", f"bag.{name}")]
+    for each in [disturb] if isinstance(disturb, (str, Path)) else disturb:
+        model.disturb(each, at=places, set=set)
+    model.record(*(node.outputs[name] for name in kinds))
+    return model
+
+
+class BagFolder:
+    """A recording that is a folder, for ``epicycle recording apply``: its messages pass as bytes that nobody reads."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self._file = bag(path)
+        self._numbers = {topic: number for number, topic in enumerate(self._file.topics)}
+        self.channels = {number: topic for topic, number in self._numbers.items()}
+
+    def messages(self) -> Iterator[Message]:
+        """The messages in order of time."""
+        for time, topic, data in self._file.raw():
+            yield Message(time, self._numbers[topic], bytes(data))
+
+    @contextmanager
+    def replacing(self, path: Path) -> Iterator[Writing]:
+        """A new folder, with the same kind of files."""
+        if path.exists() and not (path / "metadata.yaml").is_file():
+            raise RecordingError(f"{path} exists and is not a recording: choose another name")
+        aside = path.with_name(f".{path.name}")
+        shutil.rmtree(aside, ignore_errors=True)
+        try:
+            with self._file.checked(), self._file.opened() as reader:
+                stored = rosbag2.StoragePlugin.MCAP if any(self.path.glob("*.mcap")) else rosbag2.StoragePlugin.SQLITE3
+                with rosbag2.Writer(aside, version=9, storage_plugin=stored) as writer:
+                    yield _Writing(writer, reader, self._numbers)
+            for each in aside.iterdir():  # the files in it are named after the folder
+                if each.name.startswith(aside.name):
+                    each.rename(each.with_name(each.name.removeprefix(".")))
+            about = aside / "metadata.yaml"
+            about.write_text(about.read_text(encoding="utf-8").replace(aside.name, path.name), encoding="utf-8")
+            if path.exists():
+                shutil.rmtree(path)
+            aside.rename(path)
+        except OSError as error:
+            raise RecordingError(f"{path} cannot be written: {error.strerror or error}") from None
+        finally:
+            with suppress(OSError):
+                shutil.rmtree(aside, ignore_errors=True)
+
+
+class _Writing:
+    def __init__(self, writer: Any, reader: Any, numbers: Mapping[str, int]) -> None:
+        self._writer = writer
+        self._connections: dict[int, Any] = {}
+        for each in reader.connections:
+            if numbers[each.topic] not in self._connections:
+                self._connections[numbers[each.topic]] = writer.add_connection(
+                    each.topic,
+                    each.msgtype,
+                    msgdef=each.msgdef.data,
+                    rihs01=each.digest,
+                    serialization_format=each.ext.serialization_format,
+                    offered_qos_profiles=each.ext.offered_qos_profiles,
+                )
+
+    def write(self, time: int, message: Message, changed: str | None) -> None:
+        """Add a message."""
+        if changed is not None or not isinstance(message.content, bytes):
+            raise RecordingError("messages of ROS 2 can only be lost, delayed or duplicated")
+        self._writer.write(self._connections[message.channel], time, message.content)
+
+    def finish(self) -> None:
+        """Nothing: the file is closed by who has opened it."""

@@ -1,0 +1,202 @@
+"""Recordings of ROS 2: sources of models, under disturbances, and a program in lockstep with them."""
+
+from __future__ import annotations
+
+import resource
+import time
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+pytest.importorskip("rosbags")
+reading = pytest.importorskip("mcap.reader")
+
+import epicycle  # noqa: E402
+from epicycle.bridges import Bag, bag, lockstep  # noqa: E402
+from epicycle.runner import ActorError, Model, Simulation  # noqa: E402
+from epicycle.runner.recorded import RecordingError  # noqa: E402
+from tests.bridges.made_bags import START, made  # noqa: E402
+
+
+class Tracker:
+    """Integrates the speed, and believes the position when there is one; as somebody would have written it."""
+
+    def __init__(self) -> None:
+        self.x = 0.0
+        self.latest: float | None = None
+        self.heard: list[str] = []
+
+    def on_message(self, topic: str, message: Any) -> dict[str, float] | None:
+        self.heard.append(topic)
+        if topic == "/robot/numbers":
+            return None
+        stamp = message.header.stamp.sec + message.header.stamp.nanosec * 1e-9
+        if topic == "/robot/gps":
+            self.x += 0.5 * (message.point.x - self.x)
+        else:
+            if self.latest is not None:
+                self.x += message.twist.linear.x * (stamp - self.latest)
+            self.latest = stamp
+        return {"x": self.x, "error": abs(self.x - (stamp - START * 1e-9))}
+
+
+OUTPUTS = {"x": "number", "error": "number"}
+
+
+@pytest.fixture(params=["mcap", "sqlite3", "file"])
+def walk(request: pytest.FixtureRequest, tmp_path: Path) -> Path:
+    kind = request.param
+    path = made(tmp_path / "walk", "mcap" if kind == "file" else kind)
+    return path / "walk.mcap" if kind == "file" else path
+
+
+def test_messages_are_sources_with_stamps_and_headers(walk: Path) -> None:
+    model = Model("replay")
+    source = model.add(Bag("bag", file=walk))
+    model.record(*source.outputs.values())
+    results = Simulation(model).run()
+    speed, place, numbers = (results[f"bag.robot_{name}"] for name in ("twist", "gps", "numbers"))
+    assert len(speed) == 50
+    assert list(place.times) == [0.5 * number for number in range(10)]
+    assert place.values[3].header.frame_id == "map"
+    assert place.values[3].header.stamp == {"sec": 1_700_000_001, "nanosec": 500_000_000}
+    assert place.values[3].point.x == 1.5
+    assert numbers.values[0].data.tolist() == [1.0, 2.0]
+    assert Simulation(model).run().digest == results.digest
+
+
+def test_a_model_in_a_file_names_a_bag_in_its_folder(walk: Path) -> None:
+    file = walk.parent / "model.yaml"
+    name = f"{walk.name}/metadata.yaml" if walk.is_dir() else walk.name
+    file.write_text(
+        f"model: m\nactors:\n  bag: {{type: Bag, file: {name}, topics: /robot/gps}}\nrun: {{record: bag.robot_gps}}\n"
+    )
+    assert len(epicycle.run(file)["bag.robot_gps"]) == 10
+
+
+def test_a_program_hears_messages_in_lockstep(walk: Path) -> None:
+    results = epicycle.run(lockstep(walk, Tracker, outputs=OUTPUTS))
+    assert results["node.error"].values.max() < 1e-6
+    again = epicycle.run(lockstep(walk, Tracker(), outputs=OUTPUTS))
+    assert again.digest == results.digest
+
+
+def test_a_function_is_a_program_too(walk: Path) -> None:
+    model = lockstep(walk, lambda topic, message: message.point.x, outputs=["x"], topics=["/robot/gps"])
+    assert list(epicycle.run(model)["node.x"].values) == [number * 0.5 for number in range(10)]
+
+
+def test_explain_finds_the_smallest_set_of_lost_messages(walk: Path, tmp_path: Path) -> None:
+    lost = tmp_path / "lost.yaml"
+    lost.write_text("disturbance: lost\naspects: {lost: {type: PacketLoss, probability: 0.4, at: nowhere}}\n")
+    model = lockstep(walk, Tracker, outputs=OUTPUTS, disturb=lost, at="/robot/twist")
+    model.monitor("close", "always node.error <= 0.08")  # a position comes when two speeds in a row are missing
+    found = epicycle.explain(model, seed=1)
+    assert len(found.effects) == 2
+    assert found.sentence.startswith("2 faults of ")
+    assert "lost dropped a token of bag.robot_twist at node.robot_twist at " in found.sentence
+
+
+def test_topics_that_are_not_there_are_named(walk: Path) -> None:
+    with pytest.raises(RecordingError) as caught:
+        lockstep(walk, Tracker, outputs=OUTPUTS, disturb="wifi_burst", at="/robot/gsp")
+    assert str(caught.value) == (
+        "'/robot/gsp' matches no topic, did you mean '/robot/gps'?; topics: /robot/twist, /robot/gps, /robot/numbers"
+    )
+    with pytest.raises(epicycle.EpicycleError) as other:
+        lockstep(walk, Tracker, outputs=OUTPUTS, topics=["/robot/gsp"])
+    assert str(other.value) == (
+        f"topics: {walk.name} has no topic '/robot/gsp', did you mean '/robot/gps'?; topics: /robot/twist, "
+        "/robot/gps, /robot/numbers"
+    )
+
+
+def test_what_a_program_says_must_be_its_outputs(walk: Path) -> None:
+    for said, reason in (
+        (3.0, "returns 3.0, not a mapping of outputs to values; outputs: x, error"),
+        ({"eror": 3.0}, "returns a value for 'eror', which is no output, did you mean 'error'?; outputs: x, error"),
+    ):
+        with pytest.raises(ActorError) as caught:
+            epicycle.run(lockstep(walk, lambda topic, message, said=said: said, outputs=OUTPUTS))
+        line = str(caught.value).splitlines()[0]
+        assert line == f"node failed in fire() at (0 s, 1): on_message('/robot/twist', ...) {reason}"
+    with pytest.raises(ActorError) as caught:
+        epicycle.run(lockstep(walk, lambda topic, message: message.point.x, outputs=["x"]))
+    assert str(caught.value).splitlines()[0] == (
+        "node failed in fire() at (0 s, 1): AttributeError: the message has no field 'point'; fields: header, twist"
+    )
+
+
+def test_what_is_no_recording_is_reported(tmp_path: Path) -> None:
+    broken = tmp_path / "broken.mcap"
+    broken.write_bytes(b"\x89MCAP0\r\n" + b"x" * 50)
+    for path, reason in (
+        (tmp_path / "none.mcap", "cannot be read: there is no such file"),
+        (tmp_path / "a.txt", "is not a recording of ROS 2: a folder with metadata.yaml, or a file *.mcap"),
+    ):
+        with pytest.raises(RecordingError) as caught:
+            bag(path)
+        assert str(caught.value) == f"{path} {reason}"
+    for path in (broken, tmp_path):
+        with pytest.raises(RecordingError) as caught:
+            bag(path)
+        assert str(caught.value).startswith(f"{path} is not a recording of ROS 2: ")
+
+
+def test_damaged_content_is_named(walk: Path) -> None:
+    file = bag(walk)
+    file.topics["/robot/numbers"] = "geometry_msgs/msg/TwistStamped"
+    with pytest.raises(RecordingError) as caught:
+        list(file.messages(["/robot/numbers"]))
+    assert str(caught.value).startswith(
+        f"{walk} is not a recording of ROS 2: a message of /robot/numbers at {START + 4_900_000_001} ns is not a "
+        "geometry_msgs/msg/TwistStamped: "
+    )
+
+
+@pytest.mark.parametrize("kind", ["mcap", "sqlite3"])
+def test_a_folder_passes_a_disturbance(kind: str, tmp_path: Path) -> None:
+    source, out = made(tmp_path / "walk", kind), tmp_path / "out"
+    for _ in range(2):  # the second one replaces the first
+        done = epicycle.disturb(source, "wifi_burst", out, at="/robot/*", seed=3)
+    assert "51 messages" not in repr(done)
+    before, after = list(bag(source).raw()), list(bag(out).raw())
+    assert 0 < len(after) < len(before)
+    assert bag(out).topics == bag(source).topics
+    assert {data for _, _, data in after} <= {data for _, _, data in before}
+    assert [time for time, *_ in after] == sorted(time for time, *_ in after)
+    assert sorted(path.suffix for path in out.iterdir()) == [".db3" if kind == "sqlite3" else ".mcap", ".yaml"]
+    if kind == "mcap":
+        with (out / "out.mcap").open("rb") as file:
+            assert sum(1 for _ in reading.make_reader(file).iter_messages()) == len(after)
+
+
+@pytest.mark.slow
+def test_a_million_messages(tmp_path: Path) -> None:
+    from mcap.writer import Writer
+
+    source = tmp_path / "large.mcap"
+    with source.open("wb") as file:
+        writer = Writer(file)
+        writer.start(profile="ros2")
+        schema = writer.register_schema("std_msgs/msg/Float64", "ros2msg", b"float64 data\n")
+        channel = writer.register_channel("/x", "cdr", schema)
+        for number in range(1_000_000):
+            writer.add_message(channel, number * 1000, b"\x00\x01\x00\x00" + bytes(8), number * 1000, number)
+        writer.finish()
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    lost = tmp_path / "lost.yaml"
+    lost.write_text("disturbance: lost\naspects: {lost: {type: PacketLoss, probability: 0.1, at: topic.x}}\n")
+    begin = time.process_time()
+    done = epicycle.disturb(source, lost, tmp_path / "out.mcap", seed=1)
+    assert time.process_time() - begin < 150  # 60 s on an idle machine
+    assert resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before < 200_000  # kB
+    with (tmp_path / "out.mcap").open("rb") as file:
+        reader = reading.make_reader(file)
+        summary = reader.get_summary()
+        found = [message.sequence for _, _, message in islice(reader.iter_messages(), 10_000)]
+    assert summary.statistics.message_count == done.passed.delivered["/x"]
+    assert 890_000 < summary.statistics.message_count < 910_000
+    assert found == sorted(found)
