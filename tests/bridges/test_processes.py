@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Generator
+import sys
+from collections.abc import Generator, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -297,11 +298,13 @@ def bank(tmp_path: Path) -> Path:
 
 
 @pytest.fixture(autouse=True)
-def forget_modules(monkeypatch: pytest.MonkeyPatch) -> None:
+def forget_modules(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
     from epicycle.runner.catalogue import types
 
     monkeypatch.setattr(types, "_functions", {})
-    monkeypatch.delitem(__import__("sys").modules, "bank", raising=False)
+    sys.modules.pop("bank", None)
+    yield
+    sys.modules.pop("bank", None)
 
 
 def test_functions_of_a_file_are_actors_with_ports(bank: Path) -> None:

@@ -14,7 +14,7 @@ from rich.console import Console
 
 from epicycle.actors import Actor, InputPort, OutputPort, Parameter, array_parameter
 from epicycle.runner.catalogue.reference import TypeReference, describe, parts_of
-from epicycle.runner.catalogue.types import built_in
+from epicycle.runner.catalogue.types import built_in, installed
 from epicycle.runner.cli import main
 from epicycle.runner.show import detail
 
@@ -82,7 +82,7 @@ def test_everything_has_a_doc(reference: TypeReference) -> None:
 @pytest.mark.parametrize("kind", ["actors", "aspects"])
 def test_list_has_a_line_for_each_type(kind: str, capsys: pytest.CaptureFixture[str]) -> None:
     text = printed(capsys, "list", kind)
-    known = getattr(built_in(), kind)
+    known = getattr(installed(), kind)
     listed = [line.split()[0] for line in text.splitlines() if line.startswith("  ") and not line.startswith("   ")]
     assert sorted(listed) == sorted(known)
     assert {each["name"] for each in json.loads(printed(capsys, "list", kind, "--json"))} == set(known)
