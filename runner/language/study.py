@@ -11,6 +11,7 @@ from epicycle.actors import did_you_mean
 
 from ..catalogue.packaged import find, is_path, unreadable
 from ..text.document import Entry, Mapping, Node, Scalar, parse, read
+from ..text.kinds import OF_STUDY
 from ..text.limits import MAX_SEED
 from ..text.problems import POISON, Poison, Position, Problems
 from ..text.reading import NodeReader, Text, is_empty
@@ -195,7 +196,7 @@ def read_study(
     seed: int | None = None,
 ) -> Study:
     """The study of a file; raises ``ModelError`` with everything that is wrong with its contents."""
-    problems = Problems()
+    problems = Problems(OF_STUDY)
     path = find(str(name), "study", problems)
     node = None if path is None else read(path, problems)
     problems.raise_if_any()
@@ -218,7 +219,7 @@ def study_of_text(
 
     ``lender``: file and text of the study that its claims are from.
     """
-    problems = Problems()
+    problems = Problems(OF_STUDY)
     node = parse(text, str(path), problems)
     problems.raise_if_any()
     assert node is not None, "a text that cannot be read is a problem"

@@ -3,17 +3,40 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from pathlib import Path
+from types import MappingProxyType
 
 from epicycle.actors import ParameterError, did_you_mean, irregular, read_regular
 
 from .problems import Position
 
 COMMAND_LINE = "command line"  # the file of a position in an option
+
+
+_opened: ContextVar[Mapping[Path, str]] = ContextVar("opened", default=MappingProxyType({}))
+
+
+@contextmanager
+def opened(texts: Mapping[Path, str]) -> Iterator[None]:
+    """Texts that are read in place of what files hold, such as those of an editor; by their resolved paths."""
+    token = _opened.set(texts)
+    try:
+        yield
+    finally:
+        _opened.reset(token)
+
+
+def opened_text(path: Path) -> str | None:
+    """The text that is open in place of a file, if there is one."""
+    texts = _opened.get()
+    try:
+        return texts.get(path.resolve()) if texts else None
+    except (OSError, RuntimeError, ValueError):  # endless links, too long a name
+        return None
 
 
 @dataclass
