@@ -261,6 +261,12 @@ class _Reader:
         return _UnreadableError(f"unreadable unit '{self._text}': {reason}")
 
 
+def units_like(unit: str) -> tuple[str, ...]:
+    """Units that people often write for what a unit measures, itself first; raises ``UnitError``."""
+    dimension = parse_unit(unit).dimension
+    return tuple(dict.fromkeys([unit, *(each for each in _SUGGESTED if parse_unit(each).dimension == dimension)]))
+
+
 def _meant(name: str) -> str | None:
     return _MEANT.get(name.casefold()) or nearest(name, _SUGGESTED)
 

@@ -11,6 +11,7 @@ from epicycle.actors import did_you_mean
 
 from ..catalogue.packaged import find, is_path, unreadable
 from ..text.document import Entry, Mapping, Node, Scalar, parse, read
+from ..text.files import opened_text
 from ..text.kinds import OF_STUDY
 from ..text.limits import MAX_SEED
 from ..text.problems import POISON, Poison, Position, Problems
@@ -202,7 +203,7 @@ def read_study(
     problems.raise_if_any()
     assert path is not None
     assert node is not None
-    text = path.read_text(encoding="utf-8")
+    text = opened_text(path) or path.read_text(encoding="utf-8")
     return _StudyReader(problems, path).changed(node, text, set, types, replications, seed)
 
 

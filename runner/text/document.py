@@ -24,7 +24,7 @@ from yaml.events import (
 
 from epicycle.actors import MAX_DEPTH, did_you_mean, irregular, open_regular
 
-from .files import note_file, opened_text
+from .files import note_file, note_text, opened_text
 from .kinds import FILE, KEY, SIZE, SYNTAX, Kind
 from .problems import Position, Problems
 from .scalars import SCALAR_TAGS, TAG_PREFIX, Value, resolve, short
@@ -74,12 +74,13 @@ Node: TypeAlias = Scalar | Sequence | Mapping
 def read(path: Path, problems: Problems, shown_as: str | None = None) -> Node | None:
     """Read a YAML file; None if it cannot be parsed. `shown_as` is its name in messages."""
     name = str(path) if shown_as is None else shown_as
-    if (text := opened_text(path)) is not None:
-        note_file(path, text.encode("utf-8", "surrogatepass"))
-        return parse(text, name, problems)
-    with problems.looking_for(FILE):
-        text = _text_of(path, name, problems)
-    return None if text is None else parse(text, name, problems)
+    if (text := opened_text(path)) is None:
+        with problems.looking_for(FILE):
+            text = _text_of(path, name, problems)
+    if text is None:
+        return None
+    note_text(path, name, text)
+    return parse(text, name, problems)
 
 
 def _text_of(path: Path, name: str, problems: Problems) -> str | None:

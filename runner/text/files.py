@@ -8,7 +8,6 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from pathlib import Path
-from types import MappingProxyType
 
 from epicycle.actors import ParameterError, did_you_mean, irregular, read_regular
 
@@ -17,26 +16,42 @@ from .problems import Position
 COMMAND_LINE = "command line"  # the file of a position in an option
 
 
-_opened: ContextVar[Mapping[Path, str]] = ContextVar("opened", default=MappingProxyType({}))
+@dataclass
+class Opened:
+    """Texts read in place of files, by their resolved paths, and everything that is read, by its name in messages."""
+
+    texts: Mapping[Path, str]
+    read: dict[str, tuple[Path, str]] = field(default_factory=dict)
+
+
+_opened: ContextVar[Opened | None] = ContextVar("opened", default=None)
 
 
 @contextmanager
-def opened(texts: Mapping[Path, str]) -> Iterator[None]:
-    """Texts that are read in place of what files hold, such as those of an editor; by their resolved paths."""
-    token = _opened.set(texts)
+def opened(texts: Mapping[Path, str]) -> Iterator[Opened]:
+    """Texts that are read in place of files, such as those of an editor."""
+    found = Opened(texts)
+    token = _opened.set(found)
     try:
-        yield
+        yield found
     finally:
         _opened.reset(token)
 
 
 def opened_text(path: Path) -> str | None:
     """The text that is open in place of a file, if there is one."""
-    texts = _opened.get()
+    if (found := _opened.get()) is None:
+        return None
     try:
-        return texts.get(path.resolve()) if texts else None
+        return found.texts.get(path.resolve())
     except (OSError, RuntimeError, ValueError):  # endless links, too long a name
         return None
+
+
+def note_text(path: Path, name: str, text: str) -> None:
+    """Keep a text that was read for whoever opened others."""
+    if (found := _opened.get()) is not None:
+        found.read[name] = (path, text)
 
 
 @dataclass

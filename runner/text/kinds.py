@@ -126,11 +126,7 @@ MISSING_PARAMETER = _kind(
     "E0303",
     "a missing parameter",
     """A parameter without a default has no value.""",
-    _with(
-        actors="actors:\n  clock: {type: Clock, period: 1 s}\n  gain: {type: Gain}",
-        model="model: example\ncomposites:\n  Gain:\n    inputs: [input]\n    parameters: {factor: }\n"
-        "    actors: {scale: {type: Scale, factor: '${factor}'}}\n    connections: [input -> scale.input]",
-    ),
+    _with(actors="actors:\n  clock: {type: Clock}\n  gain: {type: Scale, factor: 2}"),
 )
 VALUE = _kind(
     "E0304",
@@ -295,7 +291,7 @@ OF_STUDY = _kind(
     "E0802",
     "a wrong study",
     """A study varies, measures or asks something that its model does not have.""",
-    "study: example\nmodel: mm1\nreplications: 2\nvary: {laod: [0.5, 0.9]}",
+    "study: example\nmodel: mm1\nreplications: 2\nvary: {load: [0.5, 0.5]}",
 )
 CODE = _kind(
     "E0901",
