@@ -17,7 +17,7 @@ GROUPS = {
     "make many runs": (studies.study, studies.status, studies.report, searching.compare),
     "search": (searching.search, searching.rare),
     "work with recorded data": (recording.recording,),
-    "write models": (new.new, describe.validate, describe.describe, describe.graph, describe.list_),
+    "write models": (new.new, describe.validate, describe.diff, describe.describe, describe.graph, describe.list_),
     "set up a shell": (completion.completion,),
 }
 COMMANDS = tuple(each for group in GROUPS.values() for each in group)

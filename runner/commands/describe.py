@@ -7,10 +7,10 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..calls import picturing, running
+from ..calls import differing, picturing, running
 from ..declare.commands import arguments, declared
 from ..printing import columns, complain, console, tell, tell_json, tell_json_text
-from .options import BAD_INPUT, DONE, JSON, TYPES, command, load, option, own_types, taken
+from .options import BAD_INPUT, DONE, FAILED, JSON, TYPES, command, load, of_call, option, own_types, taken
 
 if TYPE_CHECKING:
     from ..build.model import Model
@@ -144,6 +144,16 @@ def _write(text: str, write: Callable[[Path], None], path: Path | None) -> int:
         write(path)
         tell(f"wrote {path}")
     return DONE
+
+
+@of_call(differing.diff, JSON, imports=("build",))
+def diff(options: argparse.Namespace) -> int:
+    found = differing.diff(**arguments(differing.diff, options))
+    if options.json:
+        tell_json(found.to_dict(), indent=2)
+    else:
+        tell(str(found))
+    return FAILED if found else DONE
 
 
 # -- lists ------------------------------------------------------------------------------------------------------------

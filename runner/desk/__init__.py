@@ -6,6 +6,7 @@ there, ``fix`` and ``rename`` changes of the text.
 """
 
 from .changes import Edit, RenameError, apply, fix, fix_all, rename, texts_after
+from .comparing import Change, Difference, contents, difference
 from .completion import Suggestion, complete
 from .kinds_page import page
 from .knowledge import Knowledge
@@ -15,6 +16,8 @@ from .problem_data import as_data, of_problems, report
 from .reading import Reading, read
 
 __all__ = [
+    "Change",
+    "Difference",
     "Edit",
     "Knowledge",
     "Reading",
@@ -24,7 +27,9 @@ __all__ = [
     "apply",
     "as_data",
     "complete",
+    "contents",
     "definition",
+    "difference",
     "fix",
     "fix_all",
     "hover",
