@@ -39,7 +39,7 @@ class Editor:
         """Open or change a text; the problems that the server tells of."""
         uri = path.resolve().as_uri()
         version = self._versions[uri] = self._versions.get(uri, 0) + 1
-        told = self._told[uri] = asyncio.get_running_loop().create_future()
+        told = self.expect(path)
         if uri not in self.texts:
             document = lsp.TextDocumentItem(uri, "yaml", version, text)
             self.client.text_document_did_open(lsp.DidOpenTextDocumentParams(document))
@@ -49,6 +49,11 @@ class Editor:
             self.client.text_document_did_change(lsp.DidChangeTextDocumentParams(identifier, [change]))
         self.texts[uri] = text
         return await asyncio.wait_for(told, PATIENCE)
+
+    def expect(self, path: Path) -> asyncio.Future[list[lsp.Diagnostic]]:
+        """What the server will tell of a text next."""
+        told = self._told[path.resolve().as_uri()] = asyncio.get_running_loop().create_future()
+        return told
 
     def at(self, path: Path, line: int, column: int) -> dict[str, Any]:
         """A place in a text, as parameters of requests."""
@@ -85,8 +90,8 @@ async def editor() -> AsyncIterator[Editor]:
     client.initialized(lsp.InitializedParams())
     try:
         yield found
-        await client.shutdown_async(None)
-        client.exit(None)
     finally:
-        await client.stop()
+        await asyncio.wait_for(client.shutdown_async(None), PATIENCE)
+        client.exit(None)
+        await asyncio.wait_for(client.stop(), PATIENCE)
     assert found.log == []
