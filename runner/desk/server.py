@@ -79,7 +79,7 @@ class Server(LanguageServer):
         self.text_document_publish_diagnostics(lsp.PublishDiagnosticsParams(uri, []))
 
     def plan(self, path: Path) -> None:
-        """Tell of the problems of a text when nobody has typed for a moment."""
+        """Report the problems of a text when nobody has typed for a moment."""
         if (task := self.waiting.pop(path, None)) is not None:
             task.cancel()
         self.waiting[path] = asyncio.get_running_loop().create_task(self._later(path))
@@ -204,7 +204,7 @@ def _overlap(one: lsp.Range, other: lsp.Range) -> bool:
 
 
 def make_server(version: str, types: tuple[type, ...] = ()) -> Server:
-    """A server with all that it can do."""
+    """A server with everything that the desk offers."""
     server = Server(version, types)
 
     @server.feature(lsp.TEXT_DOCUMENT_DID_OPEN)
