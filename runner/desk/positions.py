@@ -22,9 +22,10 @@ class Positions:
 
     def to_client(self, line: int, column: int) -> tuple[int, int]:
         """Line and column of the protocol for ours, all from 0; YAML does not count a byte order mark."""
-        line = min(line, len(self._ours) - 1)
-        offset = self._ours[line] + column + (line == 0 and self.text.startswith(BOM))
-        there = bisect_right(self._theirs, min(offset, len(self.text))) - 1
+        offset = len(self.text)  # what is missing there may be said to be missing behind the end
+        if line < len(self._ours):
+            offset = min(self._ours[line] + column + (line == 0 and self.text.startswith(BOM)), offset)
+        there = bisect_right(self._theirs, offset) - 1
         units = self.text[self._theirs[there] : offset].encode(self._codec, "surrogatepass")
         return there, len(units) // self._size
 

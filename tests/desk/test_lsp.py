@@ -185,13 +185,15 @@ def validated(path: Path) -> list[Problem]:
         return [*error.problems]
 
 
-def expected(problem: Problem, path: Path) -> tuple[str, str, int, int]:
+def expected(problem: Problem, path: Path, text: str) -> tuple[str, str, int, int]:
     """A problem as an editor shows it: its code, text, and where it begins."""
     message, at = "\n".join([problem.message, *(f"help: {each}" for each in problem.help)]), problem.position
     if at is None or at.file != str(path):
         return problem.kind.code, f"{at}: {message}" if at else message, 0, 0
-    units = len(at.source[: at.column - 1].encode("utf-16-le", "surrogatepass")) // 2
-    return problem.kind.code, message, at.line - 1, units
+    line, before, lines = at.line - 1, at.source[: at.column - 1], text.split("\n")
+    if line >= len(lines):  # behind the end
+        line, before = len(lines) - 1, lines[-1]
+    return problem.kind.code, message, line, len(before.encode("utf-16-le", "surrogatepass")) // 2
 
 
 def edit_at_random(folder: Path, number: int, seed: int) -> None:
@@ -210,7 +212,7 @@ def edit_at_random(folder: Path, number: int, seed: int) -> None:
             errors = [each for each in found if each.severity == lsp.DiagnosticSeverity.Error] or found
             told = [(each.code, each.message, each.range.start.line, each.range.start.character) for each in errors]
             path.write_text(text, encoding="utf-8")
-            assert told == [expected(each, path) for each in validated(path)], text
+            assert told == [expected(each, path, text) for each in validated(path)], text
             path.write_text((MODELS / path.name).read_text(encoding="utf-8"), encoding="utf-8")
             lines = text.split("\n")
             line = draw.randrange(len(lines))
