@@ -7,6 +7,7 @@ from epicycle.runner import Results as Results
 from epicycle.runner import Simulation as Simulation
 from epicycle.runner import StudyResults as StudyResults
 from epicycle.runner import open_study as open_study
+from epicycle.runner.calls.differing import diff as diff
 from epicycle.runner.calls.picturing import draw as draw
 from epicycle.runner.calls.recording import disturb as disturb
 from epicycle.runner.calls.recording import fit as fit
@@ -18,6 +19,7 @@ from epicycle.runner.calls.searching import rare as rare
 from epicycle.runner.calls.searching import search as search
 from epicycle.runner.calls.studying import compare as compare
 from epicycle.runner.calls.studying import study as study
+from epicycle.runner.desk import Difference as Difference
 from epicycle.runner.recorded.channel import Fit as Fit
 from epicycle.runner.recorded.disturbed import Disturbed as Disturbed
 from epicycle.runner.search.calibration import Calibration as Calibration

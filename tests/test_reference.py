@@ -21,6 +21,7 @@ FILES = (
     "actors/constructors.pyi",
     "aspects/constructors.pyi",
     "docs/api.md",
+    "docs/problems.md",
 )
 
 
@@ -28,13 +29,14 @@ def texts() -> dict[str, str]:
     """What the files should hold: Epicycle's own types, whatever else is installed."""
     from epicycle.runner.catalogue.figure import own_figures
     from epicycle.runner.catalogue.types import built_in
+    from epicycle.runner.desk import page
     from epicycle.runner.language.schema import json_schema, schema_text
     from epicycle.runner.show import markdown
     from epicycle.runner.show.report import own_study_figures
 
     own, figures, of_studies = built_in(), own_figures(), own_study_figures()
     schema = schema_text(json_schema(own, figures, of_studies))
-    return dict(zip(FILES, (schema, markdown(own, figures, of_studies), *stubs().values(), api()), strict=True))
+    return dict(zip(FILES, (schema, markdown(own, figures, of_studies), *stubs().values(), api(), page()), strict=True))
 
 
 def api() -> str:

@@ -44,7 +44,7 @@ from .process import Process
 from .quantity import MAX_DEPTH, Quantity, counted_in_si, is_too_deep, plain
 from .random import Stream, Streams, random_stream
 from .tag import NANOSECONDS_PER_SECOND, Tag, below_nanoseconds, new_tag, to_nanoseconds, to_seconds
-from .units import UnitError, convert, in_si, parse_unit
+from .units import UnitError, convert, in_si, parse_unit, units_like
 
 __all__ = [
     "ABSENT", "MAX_DEPTH", "NANOSECONDS_PER_SECOND", "NEVER", "NO_TOKENS", "REQUIRED", "Actor", "Calendar",
@@ -57,6 +57,6 @@ __all__ = [
     "in_si", "irregular", "is_alone", "is_too_deep", "nearest", "new_tag", "new_wake", "normal_quantile",
     "normal_share", "open_regular", "parse_unit", "part_finders", "paths", "plain", "present", "random_stream",
     "read_regular", "read_table", "readable", "rounds", "shaped", "shortened", "texts_parameter", "to_nanoseconds",
-    "to_seconds", "token_type", "type_name", "unknown_parameter", "variants", "visible", "visible_character",
-    "visible_lines",
+    "to_seconds", "token_type", "type_name", "units_like", "unknown_parameter", "variants", "visible",
+    "visible_character", "visible_lines",
 ]  # fmt: skip

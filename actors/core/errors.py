@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
-from typing import Self
+from typing import ClassVar, Self
 
 Keys = tuple[str | int, ...]
 Span = tuple[int, int]
@@ -19,7 +19,8 @@ class Fault:
     """Something wrong with a value: the message, where in the value it is, and what would be right.
 
     ``keys`` lead to a part of a mapping or list; ``of_key``: the last key itself is wrong.  ``span`` is a part of the
-    text there: its offset and length.
+    text there: its offset and length.  ``kind`` is a word for what is wrong, such as ``unit``, ``meant`` what to write
+    there instead.
     """
 
     message: str
@@ -27,6 +28,8 @@ class Fault:
     of_key: bool = False
     span: Span | None = None
     help: tuple[str, ...] = ()
+    kind: str = ""
+    meant: str = ""
 
     def within(self, *keys: str | int, prefix: str = "") -> Fault:
         """The fault of something that contains the value under these keys."""
@@ -36,11 +39,22 @@ class Fault:
 class FaultError(EpicycleError):
     """What was given is wrong; ``faults`` are all that is wrong with it."""
 
+    kind: ClassVar[str] = ""  # of its faults, unless they name another
+
     def __init__(
-        self, message: str, keys: Keys = (), *, of_key: bool = False, span: Span | None = None, help: Iterable[str] = ()
+        self,
+        message: str,
+        keys: Keys = (),
+        *,
+        of_key: bool = False,
+        span: Span | None = None,
+        help: Iterable[str] = (),
+        kind: str = "",
+        meant: str = "",
     ) -> None:
         super().__init__(message)
-        self.faults: tuple[Fault, ...] = (Fault(message, tuple(keys), of_key, span, tuple(help)),)
+        fault = Fault(message, tuple(keys), of_key, span, tuple(help), kind or self.kind, meant)
+        self.faults: tuple[Fault, ...] = (fault,)
 
     @classmethod
     def several(cls, faults: Iterable[Fault]) -> Self:

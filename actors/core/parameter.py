@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .errors import Fault, FaultError
-from .messages import brief, did_you_mean, digits
+from .messages import brief, did_you_mean, digits, nearest
 from .quantity import MAX_DEPTH, Quantity, counted_in_si, is_too_deep
 from .units import UnitError, convert, in_si, quantity
 
@@ -247,7 +247,8 @@ class Parameter(Generic[T]):
                 if value in self.renamed:
                     raise ParameterError(f"{value!r} is now called {self.renamed[value]!r}")
                 if self.choices and value not in self.choices:
-                    raise ParameterError(f"{value!r} is not {self._expected()}{did_you_mean(value, self.choices)}")
+                    message = f"{value!r} is not {self._expected()}{did_you_mean(value, self.choices)}"
+                    raise ParameterError(message, kind="choice", meant=nearest(value, self.choices) or "")
                 return value
         elif isinstance(value, (int, float, np.integer, np.floating, str)) and not isinstance(value, bool):
             return self._bounded(self._number(value))
@@ -264,7 +265,7 @@ class Parameter(Generic[T]):
             elif isinstance(value, Quantity):
                 value = value.to(unit) if unit else value.si
         except UnitError as error:
-            raise ParameterError(str(error)) from None
+            raise ParameterError(str(error), kind="unit", meant=self._in_right_unit(value, error)) from None
         try:
             number = float(value)
         except OverflowError:
@@ -274,6 +275,14 @@ class Parameter(Generic[T]):
         if not number.is_integer():  # nor are nan and the infinities
             raise ParameterError(f"{brief(value)} is not {self._expected()}")
         return int(value)
+
+    def _in_right_unit(self, value: object, error: UnitError) -> str:
+        """A text with its unit as it is spelled right, or else with the parameter's; empty if it has no number."""
+        found = quantity(value) if isinstance(value, str) else None
+        if found is None or not found[1]:
+            return ""
+        number = str(value).removesuffix(found[1]).strip()
+        return f"{number} {error.faults[0].meant or self.unit}" if self.unit not in ("", "1") else ""
 
     def _read(self, text: str) -> float | None:
         """The number of a text with a unit; None if it is not one."""
@@ -357,7 +366,13 @@ class Configurable:
             if name not in declared:
                 has_guess = name not in self.refused and bool(did_you_mean(name, declared))  # which ends a sentence
                 valid = f"{'' if has_guess else ';'} valid parameters: {', '.join(declared) or 'none'}"
-                raise ParameterError(unknown_parameter(type(self), name) + valid, (name,), of_key=True)
+                raise ParameterError(
+                    unknown_parameter(type(self), name) + valid,
+                    (name,),
+                    of_key=True,
+                    kind="parameter",
+                    meant=nearest(name, declared) or "",
+                )
         faults: list[Fault] = []
         for name, parameter in declared.items():
             if name not in values:
@@ -449,7 +464,8 @@ def build_variant(base: type, value: object, unit: str = "") -> object:
     if "type" not in value:
         raise ParameterError(f"{brief(value)} has no 'type'; expected one of {valid}")
     if not isinstance(name, str) or name not in known:
-        raise ParameterError(f"{brief(name)} is not one of {valid}{did_you_mean(str(name), known)}", ("type",))
+        message = f"{brief(name)} is not one of {valid}{did_you_mean(str(name), known)}"
+        raise ParameterError(message, ("type",), kind="type", meant=nearest(str(name), known) or "")
     values = {key: item for key, item in value.items() if key != "type"}
     declared = declared_parameters(known[name])
     for key in [key for key in values if unit and key in declared]:

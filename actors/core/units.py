@@ -26,6 +26,8 @@ _NONE: Final = (0,) * len(_AXES)
 class UnitError(FaultError):
     """A unit that is unknown, or not of the required kind."""
 
+    kind = "unit"
+
 
 class _UnreadableError(UnitError):
     """Text that is no unit."""
@@ -231,7 +233,9 @@ class _Reader:
             name = self._tokens[self._next][1]
             self._next += 1
             if name not in _UNITS:
-                raise UnitError(f"unknown unit '{name}'{_did_you_mean(name)}")
+                meant = _meant(name)
+                near = "" if meant is None else f", did you mean '{meant}'?"
+                raise UnitError(f"unknown unit '{name}'{near}", meant=meant or "")
             return _UNITS[name]
         if kind == "open":
             self._next += 1
@@ -257,9 +261,14 @@ class _Reader:
         return _UnreadableError(f"unreadable unit '{self._text}': {reason}")
 
 
-def _did_you_mean(name: str) -> str:
-    meant = _MEANT.get(name.casefold()) or nearest(name, _SUGGESTED)
-    return "" if meant is None else f", did you mean '{meant}'?"
+def units_like(unit: str) -> tuple[str, ...]:
+    """Units that people often write for what a unit measures, itself first; raises ``UnitError``."""
+    dimension = parse_unit(unit).dimension
+    return tuple(dict.fromkeys([unit, *(each for each in _SUGGESTED if parse_unit(each).dimension == dimension)]))
+
+
+def _meant(name: str) -> str | None:
+    return _MEANT.get(name.casefold()) or nearest(name, _SUGGESTED)
 
 
 # --- quantities ---------------------------------------------------------------------------------------

@@ -12,7 +12,7 @@ from collections.abc import Callable, Collection, Iterator, Mapping
 from functools import lru_cache
 from typing import ParamSpec, TypeVar
 
-from ..core import Quantity, UnitError, cut, did_you_mean
+from ..core import Quantity, UnitError, cut, did_you_mean, nearest
 from .syntax import ExpressionError, free_names, parse, targets
 from .values import (
     BINARY,
@@ -81,13 +81,18 @@ def check_names(text: str, known: Collection[str]) -> None:
         for node in ast.walk(tree):
             if isinstance(node, ast.Name) and node.id in strange:
                 length = (node.end_col_offset or 0) - node.col_offset
-                raise ExpressionError(_unknown(node.id, known), offset + node.col_offset, length)
+                meant = nearest(node.id, _nameable(known)) or ""
+                raise ExpressionError(_unknown(node.id, known), offset + node.col_offset, length, meant)
+
+
+def _nameable(names: Collection[str]) -> list[str]:
+    return [*sorted(names), *CONSTANTS, *FUNCTIONS]
 
 
 def _unknown(name: str, names: Collection[str]) -> str:
     known = sorted(names)
     shown = ", ".join(known[:_MAX_NAMES_SHOWN]) + (", ..." if len(known) > _MAX_NAMES_SHOWN else "")
-    guess = did_you_mean(name, [*known, *CONSTANTS, *FUNCTIONS])
+    guess = did_you_mean(name, _nameable(names))
     return f"unknown name '{name}'{guess or ','} known names: {shown or 'none'}"
 
 

@@ -21,8 +21,10 @@ _ALLOWED: Final = (
 class ExpressionError(FaultError):
     """An expression that cannot be evaluated; `offset` and `length` locate the part at fault."""
 
-    def __init__(self, message: str, offset: int = 0, length: int = 0) -> None:
-        super().__init__(message, span=(offset, length))
+    kind = "expression"
+
+    def __init__(self, message: str, offset: int = 0, length: int = 0, meant: str = "") -> None:
+        super().__init__(message, span=(offset, length), meant=meant)
         self.args = (message, offset, length)  # what pickle rebuilds the error from
         self.offset = offset
         self.length = length

@@ -13,6 +13,7 @@ from ..graph.digraph import find_loop, in_order
 from ..graph.model_graph import ModelGraph
 from ..graph.nodes import Detour, Edge
 from ..graph.ranks import Region, dependencies
+from ..text.kinds import CONNECTION, DIRECTOR, IDLE, LOOP, PORT_TYPE, SIZE, UNCONNECTED
 from ..text.limits import RAISE_IT
 from ..text.patterns import in_general
 from ..text.problems import Problems
@@ -43,7 +44,8 @@ def check_dialects(graph: ModelGraph, problems: Problems) -> None:
         first = wanting[0][1]
         if each.director() is not first.director():
             message = f"{path} is like {each.name}, but other parts of the model are like {first.name}"
-            problems.add(message, graph.position_of(path), "a run has one director, and each of these has its own")
+            hint = "a run has one director, and each of these has its own"
+            problems.add(message, graph.position_of(path), hint, kind=DIRECTOR)
             return
 
 
@@ -59,7 +61,7 @@ def check_passages(graph: ModelGraph, problems: Problems) -> bool:
         edge = next(edge for edge in graph.outgoing(cycle[-1]) if edge.destination == cycle[0])
         message = f"a loop of composite ports with no actor in it: {' -> '.join([*cycle, cycle[0]])}"
         hint = "a composite that passes its input straight to its output cannot be connected to itself"
-        problems.add(message, edge.position, hint)
+        problems.add(message, edge.position, hint, kind=LOOP)
         return False
     # The number of wires that lead on from each port, without following them: there may be very many.
     onward: dict[str, int] = {}
@@ -70,7 +72,7 @@ def check_passages(graph: ModelGraph, problems: Problems) -> bool:
     first = max(last, key=last.__getitem__, default="")
     if first and last[first][0] > MAX_PASSAGE:
         what = f"a path through more than {MAX_PASSAGE} composite ports"
-        problems.add(f"{what}, from {first} to {last[first][1]}")
+        problems.add(f"{what}, from {first} to {last[first][1]}", kind=SIZE)
         return False
     wires = 0
     for actor in graph.actors.values():
@@ -78,7 +80,8 @@ def check_passages(graph: ModelGraph, problems: Problems) -> bool:
             wires += sum(onward.get(edge.destination, 1) for edge in graph.outgoing(port.path))
             limit = graph.limits.wires
             if wires > limit:
-                problems.add(f"the model has more than {limit:,} wires", graph.position_of(actor.path), RAISE_IT)
+                message, at = f"the model has more than {limit:,} wires", graph.position_of(actor.path)
+                problems.add(message, at, RAISE_IT, kind=SIZE)
                 return False
     return True
 
@@ -104,6 +107,7 @@ def check_types(graph: ModelGraph, problems: Problems) -> None:
                 *((f"the path: {way}",) if len(edges) > 1 else ()),
                 *((f"connected onward at {last}",) if first and last and first != last else ()),
                 about=("types", in_general(path), in_general(far)),
+                kind=PORT_TYPE,
             )
 
 
@@ -140,6 +144,7 @@ def check_connections(graph: ModelGraph, problems: Problems) -> None:
                     *_open_end(graph, port.path),
                     f"it takes {type_name(port.type)}" + (f": {port.doc}" if port.doc else ""),
                     about=("missing", in_general(port.path)),
+                    kind=UNCONNECTED,
                 )
             if not port.multi and len(graph.channels_to(port)) > 1:
                 times = Counter(wire.source.path for wire in wires)
@@ -155,6 +160,7 @@ def check_connections(graph: ModelGraph, problems: Problems) -> None:
                     "connect only one of them, or send through an actor that merges them",
                     "if they form one channel, write {from: [...], to: ..., shared: true}",
                     about=("several", in_general(port.path)),
+                    kind=CONNECTION,
                 )
 
 
@@ -231,7 +237,8 @@ def _add_loop(graph: ModelGraph, ways: list[list[Edge]], problems: Problems) -> 
         hints.append(f"give one of these connections a delay, preferably the one that leads back: {best}")
     loop = " -> ".join([*actors, actors[0]])
     about = ("loop", *map(in_general, actors))
-    problems.add(f"a loop without delay: {loop}", blamed.position, *map(_step, ways), *hints, about=about)
+    message = f"a loop without delay: {loop}"
+    problems.add(message, blamed.position, *map(_step, ways), *hints, about=about, kind=LOOP)
 
 
 def _step(way: list[Edge]) -> str:
@@ -299,6 +306,7 @@ def check_reach(graph: ModelGraph, problems: Problems) -> None:
             graph.position_of(first),
             *((f"nor can the actors that it feeds: {_some(sorted(behind, key=order.__getitem__))}",) if behind else ()),
             about=("idle", in_general(first)),
+            kind=IDLE,
         )
 
 

@@ -11,7 +11,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from itertools import chain
 
-from epicycle.actors import OutputPort, accepts, declared_parameters, did_you_mean, type_name
+from epicycle.actors import OutputPort, accepts, declared_parameters, type_name
 from epicycle.aspects import Aspect, CompositeAspect, FiringTime, Request
 
 from ..graph.acts import connection_place
@@ -108,7 +108,7 @@ def _request(view: Pointcuts, inputs: list[str], pointcut: PointcutText) -> str 
         return found
     names = _names(inputs)
     hint = f"its inputs: {', '.join(names) or 'none'}"
-    return view.tell(f"{view.kind} has no input {asked.text!r}{did_you_mean(asked.text, names)}", asked, hint)
+    return view.tell(f"{view.kind} has no input {asked.text!r}", asked, hint, near=(asked.text, names))
 
 
 def _only(

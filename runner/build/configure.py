@@ -13,7 +13,8 @@ from ..language.values import Locals, Values
 from ..text.document import Entry
 from ..text.document import Mapping as MappingNode
 from ..text.files import data_file
-from ..text.problems import POISON, Poison, Position, Problems
+from ..text.kinds import MISSING_PARAMETER, UNKNOWN_PARAMETER
+from ..text.problems import POISON, Fix, Poison, Position, Problems, instead
 
 T = TypeVar("T")
 Chosen: TypeAlias = tuple[Entry, Locals]  # a value, and what it may use
@@ -32,8 +33,10 @@ def as_meant(
     result = {name: entry for name, entry in given.items() if name in valid}
     for name in (each for each in given if each not in valid):
         hint = f"valid parameters: {', '.join(valid) or 'none'}"
-        problems.add(unknown(name), given[name].key.position, hint, scope=scope)
-        if (meant := nearest(name, valid)) is not None:
+        meant, at = nearest(name, valid), given[name].key.position
+        fix = None if meant is None else instead(at, name, meant)
+        problems.add(unknown(name), at, hint, scope=scope, kind=UNKNOWN_PARAMETER, fix=fix)
+        if meant is not None:
             result.setdefault(meant, given[name])
     return result
 
@@ -106,4 +109,5 @@ def tell_missing(
     who: str, name: str, about: Iterable[str], position: Position, problems: Problems, scope: str
 ) -> Poison:
     hints = [f"{name}: {each}" for each in about if each]
-    return problems.add(f"{who} needs a value for {name!r}", position, *hints, scope=scope)
+    message, fix = f"{who} needs a value for {name!r}", Fix(position, "", name)
+    return problems.add(message, position, *hints, scope=scope, kind=MISSING_PARAMETER, fix=fix)

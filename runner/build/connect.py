@@ -7,7 +7,7 @@ from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import product
 
-from epicycle.actors import Actor, FaultError, counted, declared_ports, did_you_mean, has_own_ports
+from epicycle.actors import Actor, FaultError, counted, declared_ports, has_own_ports
 
 from ..graph.model_graph import ModelGraph
 from ..graph.nodes import Edge
@@ -15,6 +15,7 @@ from ..language.models import CompositeText
 from ..language.places import ConnectionText, Endpoint
 from ..language.values import Locals, Values
 from ..text.document import Scalar
+from ..text.kinds import CONNECTION, SIZE, UNKNOWN_PORT, Kind
 from ..text.limits import RAISE_IT
 from ..text.problems import POISON, Poison, Problems
 from ..text.reading import split, within
@@ -185,7 +186,8 @@ class Wiring:
             in_pairs = source.several and target.several and not connection.to_all
             count = len(source.ports) * (1 if in_pairs else len(target.ports))
             if self.graph.connections + len(edges) + count > limit:
-                return [*edges, self._problem(f"the model has more than {limit:,} connections", source.text, RAISE_IT)]
+                message = f"the model has more than {limit:,} connections"
+                return [*edges, self._problem(message, source.text, RAISE_IT, kind=SIZE)]
             if in_pairs and len(source.ports) != len(target.ports):
                 one, other = self._label(source.text), self._label(target.text)
                 wrong = self._problem(
@@ -216,8 +218,15 @@ class Wiring:
     def _label(self, text: Endpoint) -> str:
         return f"{self.path}.{text.text}" if self.path else text.text
 
-    def _problem(self, message: str, text: Endpoint, *hints: str) -> Poison:
-        return self.problems.add(message, text.position, *hints, scope=self.path)
+    def _problem(
+        self,
+        message: str,
+        text: Endpoint,
+        *hints: str,
+        kind: Kind = CONNECTION,
+        near: tuple[str, Iterable[str]] = ("", ()),
+    ) -> Poison:
+        return self.problems.add(message, text.position, *hints, scope=self.path, kind=kind, near=near)
 
     def _delay(self, connection: ConnectionText, names: dict[str, object]) -> int | None:
         if connection.delay is None:
@@ -237,9 +246,10 @@ class Wiring:
         if member is None:
             if name not in inside.names:  # otherwise its own problem has been reported
                 gone = None if inside.text is None else inside.text.removed.get(name)
-                message = f"{inside.name} has no actor {name!r}{did_you_mean(name, inside.names)}"
-                hint = f"valid actors: {', '.join(inside.names) or 'none'}"
-                self._problem(message, text, hint, *((f"it is removed at {gone}",) if gone is not None else ()))
+                message = f"{inside.name} has no actor {name!r}"
+                hints = [f"valid actors: {', '.join(inside.names) or 'none'}"]
+                hints += [f"it is removed at {gone}"] if gone is not None else []
+                self._problem(message, text, *hints, kind=UNKNOWN_PORT, near=(name, inside.names))
             return POISON
         has_port = self._has_port(name, member, port, wanted, text)
         found = self._instances(name, index, member, port, text, names)
@@ -261,7 +271,7 @@ class Wiring:
             return [f"{self.path}.{port}"]
         where = self.inside.name
         kind, ends = ("input", "from") if wanted == "output" else ("output", "to")
-        hints = [f"its own {kind} ports: {', '.join(own) or 'none'}"]
+        hints, near = [f"its own {kind} ports: {', '.join(own) or 'none'}"], ("", list[str]())
         if port in other:
             message = f"{port!r} is an {'output' if kind == 'input' else 'input'} of {where}: inside it, tokens "
             message += "go to it and cannot come from it" if ends == "from" else "come from it and cannot go to it"
@@ -271,9 +281,9 @@ class Wiring:
             index = "[*]" if member.array else ""
             hints = [f"{wanted} ports: {', '.join(f'{port}{index}.{each}' for each in member.ports(wanted)) or 'none'}"]
         else:
-            message = f"{where} has no {kind} port {port!r} of its own{did_you_mean(port, list(own))}"
+            message, near = f"{where} has no {kind} port {port!r} of its own", (port, list(own))
             hints.append("a port of an actor is written 'actor.port'")
-        return self._problem(message, text, *hints)
+        return self._problem(message, text, *hints, kind=UNKNOWN_PORT, near=near)
 
     def _instances(
         self, name: str, index: str | None, member: Member, port: str, text: Endpoint, names: dict[str, object]
@@ -315,16 +325,17 @@ class Wiring:
             return True
         if not member.is_known:
             return member.count == 0  # otherwise the reason why it could not be made is reported
+        near = "", list[str]()
         if port in member.ports("input" if wanted == "output" else "output"):
             direction, ends = ("an input", "come from it") if wanted == "output" else ("an output", "go to it")
             message = f"{path}.{port} is {direction} of {member.kind}, so nothing can {ends}"
         else:
-            message = f"{path}: {member.kind} has no {wanted} port {port!r}{did_you_mean(port, valid)}"
+            message, near = f"{path}: {member.kind} has no {wanted} port {port!r}", (port, valid)
         hints = [f"valid {wanted} ports: {', '.join(valid) or 'none'}"]
         if self.inside.text is not None and self.inside.text.extends is not None:
             at = self.inside.text.actors[name].type.position  # which may be far from the connection
             hints.append(f"{path} is declared as a {member.kind} at {at}")
-        self._problem(message, text, *hints)
+        self._problem(message, text, *hints, kind=UNKNOWN_PORT, near=near)
         return False
 
 

@@ -13,6 +13,7 @@ from ..catalogue.types import CatalogueError, figure_types
 from ..language.values import Locals, Values
 from ..text.document import Mapping
 from ..text.faults import place_in
+from ..text.kinds import UNKNOWN_TYPE
 from ..text.patterns import select
 from ..text.problems import Poison, Problems
 from .configure import configure
@@ -37,8 +38,9 @@ def made_figure(
         return Values(problems).blame(f"figure {name}", error, written.position, Locals())
     if cls is None:
         kind = f"figure {'of a study of type' if of_study else 'type'} {type_name!r}"
-        message = f"figure {name}: there is no {kind}{did_you_mean(type_name, list(known))}"
-        return problems.add(message, written.position, f"valid types: {', '.join(sorted(known))}")
+        message, hint = f"figure {name}: there is no {kind}", f"valid types: {', '.join(sorted(known))}"
+        near = type_name, list(known)
+        return problems.add(message, written.position, hint, kind=UNKNOWN_TYPE, near=near)
     where = f"figure {name}", written.position
     return configure(cls, written.entries, Locals(), *where, Values(problems), make=cls, evaluated=values)
 

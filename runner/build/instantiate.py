@@ -6,13 +6,13 @@ what is computed from it is not checked; a part that cannot be made is a gap in 
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import cache, partial
 from typing import Any
 
-from epicycle.actors import Actor, FaultError, Parameter, did_you_mean
+from epicycle.actors import Actor, FaultError, Parameter
 
 from ..catalogue.dialect import Dialect
 from ..catalogue.port_types import read_type, token_types
@@ -25,6 +25,7 @@ from ..language.ports import PortText
 from ..language.settings import Settings
 from ..language.values import Locals, Values
 from ..text.document import Entry
+from ..text.kinds import CLASS, CONNECTION, DIRECTOR, MODE, NAME, SIZE, TAKEN, UNKNOWN_TYPE, Kind
 from ..text.limits import RAISE_IT
 from ..text.problems import POISON, Poison, Position
 from .composite_aspect import as_actor
@@ -122,10 +123,12 @@ class Instantiator:
         wiring = Wiring(inside, self.graph, self.values, self.problems)
         for name, member in others:
             wiring.check_ports(name, member, composite.connections)
-        for connection in composite.connections:
-            make(wiring.resolve(connection, names) if connection else [POISON], self.graph)
+        with self.problems.looking_for(CONNECTION):
+            for connection in composite.connections:
+                make(wiring.resolve(connection, names) if connection else [POISON], self.graph)
         if composite.machine is not None:
-            self._modes(path, composite, names, within)
+            with self.problems.looking_for(MODE):
+                self._modes(path, composite, names, within)
         self.aspects += ((path, part, names) for part in composite.aspects.values())
 
     def _modes(self, path: str, composite: CompositeText, names: Names, within: tuple[str, ...]) -> None:
@@ -142,7 +145,8 @@ class Instantiator:
                 made[mode] = full
             elif kind is not None:
                 message = f"{full}: {part.type.text} is an actor, but a refinement must be a composite"
-                self._tell(message, part.type.position, path, "write a composite class that contains that actor")
+                hint = "write a composite class that contains that actor"
+                self._tell(message, part.type.position, path, hint, kind=MODE)
         if made:
             graph.domains[path].machine, graph.domains[path].refinements = machine, made
         connect_modes(path, composite, self.known.composites, self.graph, self.problems)
@@ -210,17 +214,20 @@ class Instantiator:
         if found is POISON or "${" in wanted:
             return None
         if found is None:
-            near = did_you_mean(wanted, [*known.composites, *known.catalogue.actors])
-            hints = known.valid_types("actor", wanted)
-            self._tell(f"{path}: there is no actor type {wanted!r}{near}", part.type.position, path, *hints)
+            near = wanted, [*known.composites, *known.catalogue.actors]
+            hints, message = known.valid_types("actor", wanted), f"{path}: there is no actor type {wanted!r}"
+            self._tell(message, part.type.position, path, *hints, kind=UNKNOWN_TYPE, near=near)
         elif part.inherit:
             message = f"{path}: {wanted} cannot inherit, as it is a type of a dialect"
-            self._tell(message, part.inherit[0].position, path, "write what it takes as 'name: ${name}'")
+            hint = "write what it takes as 'name: ${name}'"
+            self._tell(message, part.inherit[0].position, path, hint, kind=TAKEN)
         elif wanted in within:
             way = " -> ".join([*within[within.index(wanted) :], wanted])
-            self._tell(f"{path}: composite {wanted} contains itself: {way}", part.type.position, path)
+            message = f"{path}: composite {wanted} contains itself: {way}"
+            self._tell(message, part.type.position, path, kind=CLASS)
         elif len(within) >= MAX_DEPTH:
-            self._tell(f"{path}: composites are nested deeper than {MAX_DEPTH} levels", part.type.position, "")
+            message = f"{path}: composites are nested deeper than {MAX_DEPTH} levels"
+            self._tell(message, part.type.position, "", kind=SIZE)
         else:
             return found
         return None
@@ -232,8 +239,16 @@ class Instantiator:
             self._like[dialect] = self.known.like(dialect)
         return self._like[dialect]
 
-    def _tell(self, message: str, position: Position | None, scope: str, *hints: str) -> None:
-        self.problems.add(message, position, *hints, scope=scope)
+    def _tell(
+        self,
+        message: str,
+        position: Position | None,
+        scope: str,
+        *hints: str,
+        kind: Kind,
+        near: tuple[str, Iterable[str]] = ("", ()),
+    ) -> None:
+        self.problems.add(message, position, *hints, scope=scope, kind=kind, near=near)
 
     def _count(self, path: str, part: PartText, names: Names) -> int | Poison:
         """The number of instances."""
@@ -251,7 +266,7 @@ class Instantiator:
         if self.cost > most:
             if self._trial is None:
                 message = f"{path}: the model has more than {most:,} actors and composites"
-                self._tell(message, part.position, "", RAISE_IT)
+                self._tell(message, part.position, "", RAISE_IT, kind=SIZE)
             raise TooLargeError
 
     def _kinds(self, part: PartText) -> set[str]:
@@ -274,7 +289,7 @@ class Instantiator:
         if isinstance(kind, CompositeText) and kind.director is None:
             message = f"{path}: {kind.name} has no priority, because its actors fire one by one"
             hint = f"give the actors inside a priority, or give {kind.name} its own director: 'director: {{}}'"
-            self._tell(message, part.priority.position, path, hint)
+            self._tell(message, part.priority.position, path, hint, kind=DIRECTOR)
             return 0
         return self.values.value(part.priority, Locals(path, names), f"{path}: priority") or 0
 
@@ -361,7 +376,11 @@ class Instantiator:
         if is_port or part.name in composite.actors or full in graph.components:
             clash = "a port" if is_port else "an actor"
             self._tell(
-                f"{full!r} is the name of both {clash} and an aspect that is a model", part.position, "", "rename one"
+                f"{full!r} is the name of both {clash} and an aspect that is a model",
+                part.position,
+                "",
+                "rename one",
+                kind=NAME,
             )
             return None
         if self.resolver.is_enabled(full, part, Locals(path, names)):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from epicycle.actors import counted_in_si, plain
@@ -21,6 +22,7 @@ from ..language.usage import check_usage
 from ..language.values import Locals, Values
 from ..text.document import Mapping as MappingNode
 from ..text.files import noting
+from ..text.kinds import ASPECT, CLASS, FIGURE, ODD, OUTPUT, OUTSIDE, VALUE
 from ..text.limits import NORMAL, Limits
 from ..text.problems import POISON, Problems
 from .acts import acts_of
@@ -57,55 +59,101 @@ def load_model(
     classes, which the model may name besides the installed ones. ``max_actors`` is the limit for actors and composites,
     and a fifth of the limit for connections.  ``Model.warnings`` holds what is odd but not wrong.
     """
-    problems, limits = Problems(), Limits(max_actors)
-    settings = [each for file in _several(overrides) for each in read_overrides(Path(file), problems)]
-    settings += settings_of(set, problems)
-    changes = [*map("without {}".format, without_aspects := list(without_aspects)), *(aspects := list(aspects))]
-    given = list(settings)
-    types = list(types)
-    with without_collection(), noting() as noted:
-        # What the files declare.
-        text, declared = read_model(str(name), problems)
-        catalogue = installed().with_types(types)
-        disturbances = load_disturbances(map(str, _several(disturb)), problems)
-        for disturbance in disturbances:
-            declared = joined(declared, disturbance.composites, COMPOSITE_THERE, problems)
-        around = Surroundings(inherit(declared, catalogue.actors, problems, limits), catalogue, problems)
-        composites = around.composites
-        text = settled = around.model(text)
-        check_usage(text, declared, composites, catalogue.actors, problems)
-        # What is changed from outside; settings of disturbances come first, because the last one wins.
-        text, set_by_them = add_disturbances(text, disturbances, problems)
-        text, settings = only_acts(text, set_by_them + settings, problems)
-        for change in without_aspects:
-            text = without(text, change, problems)
-        for change in aspects:
-            text = change_aspect(text, change, problems)
-        if text is not settled:  # something has come from outside
-            text = around.model(text)
-        # What results.
-        known = PartTypes(composites, catalogue)
-        resolver = ParameterResolver(Settings(settings, limits), problems)
-        model = build(text, known, resolver, limits)
-        if model.figures:
-            figures_of(model, problems)
-        problems.raise_if_any()
-        model.warnings = problems.warnings
-        model.is_checked = True
-        model.origin = Origin(noted, given, changes, types)
-        return model
+    loading = Loading()
+    loading.passes(
+        name,
+        set=set,
+        overrides=overrides,
+        aspects=aspects,
+        without_aspects=without_aspects,
+        disturb=disturb,
+        types=types,
+        max_actors=max_actors,
+    )
+    loading.problems.raise_if_any()
+    assert loading.model is not None, "what cannot be made is a problem"
+    return loading.model
 
 
-def build(text: ModelText, known: PartTypes, resolver: ParameterResolver, limits: Limits) -> Model:
-    """The model that declarations describe, built in passes; it is valid only if there are no problems afterwards."""
+@dataclass
+class Loading:
+    """What the passes have made of a file so far, and the problems that they have found.
+
+    The model is valid only if there are none.  A pass that cannot continue raises them as a ``ModelError``.
+    """
+
+    problems: Problems = field(default_factory=Problems)
+    text: ModelText | None = None
+    known: PartTypes | None = None
+    model: Model | None = None
+
+    def passes(
+        self,
+        name: str | Path,
+        *,
+        set: Iterable[str | Setting] | Mapping[str, object] = (),
+        overrides: str | Path | Iterable[str | Path] = (),
+        aspects: Iterable[str] = (),
+        without_aspects: Iterable[str] = (),
+        disturb: str | Path | Iterable[str | Path] = (),
+        types: Iterable[type] = (),
+        max_actors: int = NORMAL.actors,
+    ) -> None:
+        """Read, change and check a model, with the changes of ``load_model``."""
+        problems, limits, types = self.problems, Limits(max_actors), list(types)
+        with problems.looking_for(OUTSIDE):
+            settings = [each for file in _several(overrides) for each in read_overrides(Path(file), problems)]
+            settings += settings_of(set, problems)
+        changes = [*map("without {}".format, without_aspects := list(without_aspects)), *(aspects := list(aspects))]
+        given = list(settings)
+        with without_collection(), noting() as noted:
+            # What the files declare.
+            text, declared = read_model(str(name), problems)
+            self.text = text
+            catalogue = installed().with_types(types)
+            with problems.looking_for(OUTSIDE):
+                disturbances = load_disturbances(map(str, _several(disturb)), problems)
+                for disturbance in disturbances:
+                    declared = joined(declared, disturbance.composites, COMPOSITE_THERE, problems)
+            with problems.looking_for(CLASS):
+                around = Surroundings(inherit(declared, catalogue.actors, problems, limits), catalogue, problems)
+                composites = around.composites
+                text = settled = around.model(text)
+                check_usage(text, declared, composites, catalogue.actors, problems)
+            # What is changed from outside; settings of disturbances come first, because the last one wins.
+            with problems.looking_for(OUTSIDE):
+                text, set_by_them = add_disturbances(text, disturbances, problems)
+                text, settings = only_acts(text, set_by_them + settings, problems)
+                for change in without_aspects:
+                    text = without(text, change, problems)
+                for change in aspects:
+                    text = change_aspect(text, change, problems)
+                if text is not settled:  # something has come from outside
+                    text = around.model(text)
+            # What results.
+            self.text, self.known = text, PartTypes(composites, catalogue)
+            resolver = ParameterResolver(Settings(settings, limits), problems)
+            self.model = Model(text.root.name, doc=text.root.doc)
+            with problems.looking_for(VALUE):
+                build(text, self.known, resolver, limits, self.model)
+            if self.model.figures:
+                with problems.looking_for(FIGURE):
+                    figures_of(self.model, problems)
+            self.model.warnings = problems.warnings
+            self.model.is_checked = not problems.found
+            self.model.origin = Origin(noted, given, changes, types)
+
+
+def build(text: ModelText, known: PartTypes, resolver: ParameterResolver, limits: Limits, model: Model) -> None:
+    """Make the model that declarations describe, in passes; it is valid only if there are no problems afterwards."""
     problems, values, root = resolver.problems, resolver.values, text.root
-    model = Model(root.name, doc=root.doc)
     # Without a composite, nothing needs the types of all packages.
     for name in sorted(known.composites.keys() & known.catalogue.actors.keys() if known.composites else ()):
         composite = known.composites[name]
         at = composite.position if composite else None
         # Not an error: a model stays valid when a later version adds an actor with that name.
-        problems.warn(f"composite {name!r} hides the actor type with the same name", at, "rename it if you need both")
+        message = f"composite {name!r} hides the actor type with the same name"
+        problems.warn(message, at, "rename it if you need both", kind=ODD)
     values.of_model = root.parameters
     names = resolver.parameters("", root, {}, {}, None)
     made = Instantiator(known, resolver, ModelGraph(limits))
@@ -118,11 +166,13 @@ def build(text: ModelText, known: PartTypes, resolver: ParameterResolver, limits
         woven = weave_all(made)
         resolver.check_unused(made.graph)
         check(made.graph, problems)
-        check_processors(woven, problems)
-        if text.exactly is not None:
-            model.exactly = acts_of(text.exactly, woven, problems)
+        with problems.looking_for(ASPECT):
+            check_processors(woven, problems)
+            if text.exactly is not None:
+                model.exactly = acts_of(text.exactly, woven, problems)
         model.adopt(made.graph, woven)
-        model.output = OutputReader(made.graph, values, problems).read(text, names)
+        with problems.looking_for(OUTPUT):
+            model.output = OutputReader(made.graph, values, problems).read(text, names)
         # Numbers without units are in the units that the model declares.
         model.parameters = {
             name: plain(value) if root.parameters[name].unit else counted_in_si(value) for name, value in names.items()
@@ -130,7 +180,6 @@ def build(text: ModelText, known: PartTypes, resolver: ParameterResolver, limits
         model.declared = dict(root.parameters)
         model.figures = _figures(text, values, names)
     try_classes(known, made.classes, values, limits, problems)
-    return model
 
 
 def _figures(text: ModelText, values: Values, names: dict[str, object]) -> dict[str, DeclaredFigure]:

@@ -73,8 +73,8 @@ class Looks(View):
         if found and not fitting:
             self.tell(f"{name}: {found[0]} is an input port, but an output port is needed", position)
         elif not found and not self.graph.excuses(self._full(pattern) + ("" if of_ports else ".*")):
-            near = paths.did_you_mean(pattern, self.scope, lambda path: not of_ports or self._sends(path))
-            self.tell(f"{name}: {pattern!r} matches no {parameter.selects}{near}", position)
+            near = paths.near(pattern, self.scope, lambda path: not of_ports or self._sends(path))
+            self.tell(f"{name}: {pattern!r} matches no {parameter.selects}", position, near=near)
         elif len(fitting) > 1 and parameter.is_single:
             self.tell(f"{name}: {pattern!r} selects {fitting[0]} and {fitting[1]}, but must select one", position)
         return fitting
@@ -94,8 +94,8 @@ class Looks(View):
         if self._full(reference) in self.ports:
             self.tell(f"{name}: {reference} is an input port, but an output port is needed", position)
         else:
-            near = self.ports.did_you_mean(reference, self.scope, self._sends)
-            self.tell(f"{name}: {reference!r} names no output port{near}", position)
+            near = self.ports.near(reference, self.scope, self._sends)
+            self.tell(f"{name}: {reference!r} names no output port", position, near=near)
         return reference, ()
 
     def _check_given(
@@ -113,9 +113,8 @@ class Looks(View):
             if isinstance(source.type, type) and dataclasses.is_dataclass(source.type):
                 names = [each.name for each in dataclasses.fields(source.type)]
                 if fields[0] not in names:
-                    near = did_you_mean(fields[0], names)
-                    message = f"{name}: {reference}: {source.type.__name__} has no field {fields[0]!r}{near}"
-                    self.tell(message, position, f"its fields: {', '.join(names)}")
+                    message = f"{name}: {reference}: {source.type.__name__} has no field {fields[0]!r}"
+                    self.tell(message, position, f"its fields: {', '.join(names)}", near=(fields[0], names))
                     return False
         return True
 

@@ -9,6 +9,7 @@ from epicycle.actors import did_you_mean
 from ..graph.model_graph import ModelGraph
 from ..graph.nodes import Gap
 from ..language.models import CompositeText
+from ..text.kinds import ODD
 from ..text.problems import Poison, Problems
 
 
@@ -90,4 +91,4 @@ def connect_modes(
     machine.handed = tuple(dict.fromkeys(handed))
     for port, said in composite.inputs.items():
         if port not in read:
-            problems.warn(f"{path}: no mode reads the input {port!r} of {name}", said.position)
+            problems.warn(f"{path}: no mode reads the input {port!r} of {name}", said.position, kind=ODD)

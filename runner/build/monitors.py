@@ -64,8 +64,8 @@ def _selected(looks: Looks, spread: Spread, place: Position) -> list[str]:
     except TooManyError as error:
         looks.problems.stop(f"{what}: {error}", place, RAISE_IT)
     if not found and not looks.graph.excuses(f"{pattern}.*"):
-        near = holders.did_you_mean(pattern)
-        looks.problems.add(f"{what}: {pattern!r} matches no actor, composite or output port{near}", place)
+        near = holders.near(pattern)
+        looks.problems.add(f"{what}: {pattern!r} matches no actor, composite or output port", place, near=near)
     return found
 
 

@@ -19,6 +19,7 @@ from ..language.monitors import MonitorText
 from ..language.values import Locals, Values
 from ..temporal import Requirement
 from ..text.document import Entry, Node, Scalar, plain
+from ..text.kinds import MONITOR
 from ..text.limits import MAX_SEED, RAISE_IT
 from ..text.patterns import PathIndex, PatternError, TooManyError
 from ..text.problems import POISON, Poison, Position, Problems
@@ -56,8 +57,9 @@ class OutputReader:
                 setattr(self.found, "stop_time" if key == "stop" else "seed", value)
         for metric in text.metrics:
             self.metric(metric, local)
-        for monitor in text.monitors:
-            self.monitor(monitor, local)
+        with self.problems.looking_for(MONITOR):
+            for monitor in text.monitors:
+                self.monitor(monitor, local)
         self.check_formulas()
         return self.found
 
@@ -139,10 +141,10 @@ class OutputReader:
             sorter.add(name, *formula.names)
             for each in formula.names:
                 if each not in names:
-                    near = did_you_mean(each, [other for other in names if other != name])
+                    near = each, [other for other in names if other != name]
                     hint = f"metrics of the model: {', '.join(other for other in names if other != name) or 'none'}"
-                    message = f"metric {name}: there is no metric {each!r}{near}"
-                    self.problems.add(message, within(source.position, each), hint)
+                    message = f"metric {name}: there is no metric {each!r}"
+                    self.problems.add(message, within(source.position, each), hint, near=near)
         try:
             sorter.prepare()
         except CycleError as error:
@@ -185,15 +187,10 @@ class OutputReader:
             self.problems.stop(f"{what}: {error}", text.position, RAISE_IT)
         if found or self.graph.excuses(text.text):
             return found
-        guess = self._outputs.did_you_mean(text.text)
+        message, hints = f"{what}: {text.text!r} matches no output port", self._outputs.advice(text.text)
         if text.text in self.graph.ports:
-            self.problems.add(
-                f"{what}: {text.text} is an input port, but an output port is needed{guess}", text.position
-            )
-        else:
-            self.problems.add(
-                f"{what}: {text.text!r} matches no output port{guess}", text.position, *self._outputs.advice(text.text)
-            )
+            message, hints = f"{what}: {text.text} is an input port, but an output port is needed", ()
+        self.problems.add(message, text.position, *hints, near=self._outputs.near(text.text))
         return []
 
 

@@ -12,6 +12,7 @@ from ..graph.model_graph import ModelGraph
 from ..language.places import PointcutText
 from ..language.values import Locals, Values
 from ..text.document import Node
+from ..text.kinds import Kind
 from ..text.patterns import PathIndex
 from ..text.problems import Poison, Position, Problems
 from ..text.reading import Text
@@ -65,13 +66,18 @@ class View:
         return f"{self.scope}.{text}" if self.scope else text
 
     def tell(
-        self, message: str, where: PointcutText | Text | Position | None, *hints: str, about: tuple[str, ...] = ()
+        self,
+        message: str,
+        where: PointcutText | Text | Position | None,
+        *hints: str,
+        about: tuple[str, ...] = (),
+        kind: Kind | None = None,
+        near: tuple[str, Iterable[str]] = ("", ()),
     ) -> Poison:
         """Report a problem of the aspect or monitor."""
         position = where.position if isinstance(where, (PointcutText, Text)) else where
-        return self.problems.add(
-            f"{self.called} {self.name}: {message}", position, *hints, scope=self.scope, about=about
-        )
+        said = f"{self.called} {self.name}: {message}"
+        return self.problems.add(said, position, *hints, scope=self.scope, about=about, kind=kind, near=near)
 
     def blame(self, error: FaultError, where: Node | Position) -> Poison:
         """Report what is wrong with a node, or with something at a position."""

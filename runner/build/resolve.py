@@ -15,6 +15,7 @@ from ..language.parts import PartText
 from ..language.settings import Setting, Settings
 from ..language.values import OUTSIDE, Locals, Values
 from ..text.document import Entry, Scalar
+from ..text.kinds import OUTSIDE as FROM_OUTSIDE
 from ..text.limits import RAISE_IT
 from ..text.patterns import TooManyError
 from ..text.problems import POISON, Poison, Position, Problems
@@ -127,7 +128,8 @@ class ParameterResolver:
         owner, _, last = setting.path.rpartition(".")
         beside = [path.rpartition(".")[2] for path in known if path.rpartition(".")[0] == owner]
         if last in _NO_PARAMETERS and last not in beside:
-            self.problems.add(f"{setting.path!r} matches no parameter", setting.position, _NO_PARAMETERS[last])
+            message = f"{setting.path!r} matches no parameter"
+            self.problems.add(message, setting.position, _NO_PARAMETERS[last], kind=FROM_OUTSIDE)
             return
         # One that differs only in indices, else the nearest one of the same owner, else the nearest of all.
         alike = [path for path in known if _INDEX.sub("", path) == _INDEX.sub("", setting.path)]
@@ -137,7 +139,8 @@ class ParameterResolver:
         meant = meant or nearest(setting.path, known)
         near = "" if meant is None else f", did you mean {meant!r}?"
         valid = (f"valid parameters {f'of {owner}' if owner else 'here'}: {', '.join(beside)}",) if beside else ()
-        self.problems.add(f"{setting.path!r} matches no parameter{near}", setting.position, *(() if near else valid))
+        message = f"{setting.path!r} matches no parameter{near}"
+        self.problems.add(message, setting.position, *(() if near else valid), kind=FROM_OUTSIDE)
 
 
 def _in_terms_of(pattern: str, path: str) -> str:

@@ -10,6 +10,7 @@ from ..graph.model_graph import ModelGraph
 from ..language.models import CompositeText
 from ..language.settings import Settings
 from ..language.values import Locals, Values
+from ..text.kinds import ODD
 from ..text.limits import RAISE_IT, Limits
 from ..text.problems import POISON, Problems
 from .checks import check
@@ -54,7 +55,7 @@ def try_classes(known: PartTypes, used: Collection[str], values: Values, limits:
         )
         why = f"checking all such classes takes more than {most:,} actors and composites"
         message = f"{names} not fully checked: the model has no instance of such a class, and {why}"
-        problems.warn(message, composites[untried[0]].position, RAISE_IT)
+        problems.warn(message, composites[untried[0]].position, RAISE_IT, kind=ODD)
 
 
 def _try(composite: CompositeText, made: Instantiator) -> bool:

@@ -11,13 +11,14 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 
-from epicycle.actors import declared_parameters, did_you_mean, nearest
+from epicycle.actors import declared_parameters, nearest
 from epicycle.aspects import Aspect
 
 from ..graph.acts import connection_place
 from ..graph.nodes import is_within
 from ..graph.woven import WovenAspect
 from ..language.places import PointcutText
+from ..text.kinds import NO_PLACE
 from ..text.patterns import PathIndex, PatternError, in_general
 from ..text.problems import POISON, Poison, Position
 from .looks import Looks, PlaceOf, unknown_inputs
@@ -60,7 +61,7 @@ class Pointcuts(View):
         if pointcuts and not is_somewhere and is_sound and POISON not in at:
             only_out = all(pointcut.exclude for pointcut in pointcuts)
             nowhere = "'at' has only exclusions" if only_out else "'at' excludes everything that it selects"
-            self.tell(nowhere, pointcuts[0])
+            self.tell(nowhere, pointcuts[0], kind=NO_PLACE)
         return places
 
     # -- ports, connections and parameters ------------------------------------------------------------------------
@@ -139,7 +140,8 @@ class Pointcuts(View):
         if said is not None and not having:
             names = sorted({each for path in actors for each in declared_parameters(type(self.graph.actors[path]))})
             hint = f"their parameters: {', '.join(names) or 'none'}"
-            return self.tell(f"no {_asked(pointcut)} has a parameter {name!r}{did_you_mean(name, names)}", said, hint)
+            message = f"no {_asked(pointcut)} has a parameter {name!r}"
+            return self.tell(message, said, hint, kind=NO_PLACE, near=(name, names))
         if not having:
             return None
         found = [f"{path}.{name}" for path in having if pointcut.exclude or self._can_alter(path, name, pointcut)]
@@ -180,14 +182,14 @@ class Pointcuts(View):
             return found
         if self.graph.excuses(full):
             return POISON
-        near = self.ports.did_you_mean(pointcut.text, self.scope, self._fits)
+        near = self.ports.near(pointcut.text, self.scope, self._fits)
         advice = self.ports.advice(pointcut.text, self.scope, self._fits)
-        message = f"{pointcut.text!r} matches no port{near}"
-        return self.tell(message, pointcut, *advice, *self._parameter_meant(full))
+        hints = (*advice, *self._parameter_meant(full))
+        return self.tell(f"{pointcut.text!r} matches no port", pointcut, *hints, kind=NO_PLACE, near=near)
 
     def _no_pattern(self, pointcut: PointcutText, error: PatternError, example: str) -> Poison:
         several = (f"for several pointcuts, write a list: {example}",) if example and "," in pointcut.text else ()
-        return self.tell(f"{pointcut.text!r} is not a pointcut: {error}", pointcut, *several)
+        return self.tell(f"{pointcut.text!r} is not a pointcut: {error}", pointcut, *several, kind=NO_PLACE)
 
     def _chosen(self, pointcut: PointcutText) -> list[str] | Poison:
         """The ports of the actors and composites of a type, or with a tag."""
@@ -206,9 +208,9 @@ class Pointcuts(View):
         found = [path for path in ports if path.rpartition(".")[2] == pointcut.port.text]
         if not found:
             names = sorted({path.rpartition(".")[2] for path in ports})
-            near = did_you_mean(pointcut.port.text, names)
-            message = f"no {_asked(pointcut)} has a port {pointcut.port.text!r}{near}"
-            return self.tell(message, pointcut.port, f"their ports: {', '.join(names) or 'none'}")
+            hint = f"their ports: {', '.join(names) or 'none'}"
+            message, near = f"no {_asked(pointcut)} has a port {pointcut.port.text!r}", (pointcut.port.text, names)
+            return self.tell(message, pointcut.port, hint, kind=NO_PLACE, near=near)
         return found
 
     def _chosen_owners(self, pointcut: PointcutText) -> set[str] | Poison:
@@ -228,8 +230,9 @@ class Pointcuts(View):
         if self.graph.may_hold(wanted.text, self.scope):
             return POISON
         what = "types" if pointcut.type is not None else "tags"
-        message = f"there is no {_asked(pointcut)}{did_you_mean(wanted.text, sorted(known | self.graph.missing_kinds))}"
-        return self.tell(message, wanted, f"{what} here: {', '.join(sorted(known)) or 'none'}")
+        hint = f"{what} here: {', '.join(sorted(known)) or 'none'}"
+        near = wanted.text, sorted(known | self.graph.missing_kinds)
+        return self.tell(f"there is no {_asked(pointcut)}", wanted, hint, kind=NO_PLACE, near=near)
 
     def _connections(self, pointcuts: Sequence[PointcutText]) -> tuple[list[Found], list[Ends]]:
         """The single connections that pointcuts of the form ``a.out -> b.in`` select."""
@@ -265,8 +268,8 @@ class Pointcuts(View):
             return found
         if self.graph.excuses(left) or self.graph.excuses(right):
             return POISON
-        near = did_you_mean(connection_place(left, right), map(str, self.graph.edges))
-        return self.tell(f"{pointcut.text!r} matches no connection{near}", pointcut)
+        near = connection_place(left, right), map(str, self.graph.edges)
+        return self.tell(f"{pointcut.text!r} matches no connection", pointcut, kind=NO_PLACE, near=near)
 
     def _fits(self, port: str) -> bool:
         """Whether the aspect can attach to a port."""
@@ -323,7 +326,8 @@ class Pointcuts(View):
         inside = (path.removeprefix(self._full("")) for path in index.inside(self.scope))
         near = sorted(path for path in inside if path.count(".") == text.count("."))
         hint = f"actors and composites at this depth: {', '.join(near) or 'none'}"
-        return self.tell(f"{text!r} matches no actor{index.did_you_mean(text, self.scope)}", pointcut, hint)
+        around = index.near(text, self.scope)
+        return self.tell(f"{text!r} matches no actor", pointcut, hint, kind=NO_PLACE, near=around)
 
 
 def bind(view: View, aspect: Aspect, places: Places, place_of: PlaceOf, position: Position) -> WovenAspect:

@@ -7,7 +7,7 @@ from collections.abc import Mapping as AnyMapping
 from dataclasses import replace
 from functools import partial
 
-from epicycle.actors import Actor, EpicycleError, declared_parameters, did_you_mean
+from epicycle.actors import Actor, EpicycleError, declared_parameters
 from epicycle.aspects import (
     Aspect,
     CompositeAspect,
@@ -25,6 +25,7 @@ from ..language.places import PointcutText
 from ..language.values import Locals
 from ..text.document import Mapping
 from ..text.faults import place_in
+from ..text.kinds import ASPECT, NO_PLACE, UNKNOWN_TYPE
 from ..text.limits import RAISE_IT
 from ..text.patterns import TooManyError
 from ..text.problems import POISON, Position, Problems
@@ -37,6 +38,11 @@ from .weave import Places, Pointcuts, bind
 
 def weave_all(made: Instantiator) -> list[WovenAspect]:
     """Attach all aspects, now that all ports exist, in the order in which tokens meet them."""
+    with made.problems.looking_for(ASPECT):
+        return _weave_all(made)
+
+
+def _weave_all(made: Instantiator) -> list[WovenAspect]:
     graph, problems, paths, found = made.graph, made.problems, Paths(made.graph), list[WovenAspect]()
     for scope, part, names in made.aspects:
         name = f"{scope}.{part.name}" if scope else part.name
@@ -68,7 +74,8 @@ def _declared(
     given = {key: entry for key, entry in part.values.items() if not is_model or key in OWN}
     aspect = resolver.configured(cls, replace(part, values=given), Locals(name, names), f"aspect {name}", cls)
     if not part.at:
-        problems.add(f"aspect {name} has no 'at'", part.position, "add 'at:' with ports or patterns", scope=scope)
+        hint = "add 'at:' with ports or patterns"
+        problems.add(f"aspect {name} has no 'at'", part.position, hint, scope=scope, kind=NO_PLACE)
     own = name if is_model and graph.is_composite(name) else ""
     pointcuts = Pointcuts(paths, name, scope, problems, cls, own)
     is_enabled = bool(own) if is_model else resolver.is_enabled(name, part, Locals(scope, names))
@@ -99,9 +106,9 @@ def _type(made: Instantiator, name: str, scope: str, part: PartText) -> type[Asp
     if (inner := known.composites.get(wanted)) is not None:
         return None if inner is POISON else _model_type(made, name, scope, part, cls)
     if cls is None:
-        near = did_you_mean(wanted, [*known.catalogue.aspects, *known.composites])
-        message = f"aspect {name}: there is no aspect type {wanted!r}{near}"
-        made.problems.add(message, part.type.position, *known.valid_types("aspect", wanted), scope=scope)
+        near = wanted, [*known.catalogue.aspects, *known.composites]
+        message, hints = f"aspect {name}: there is no aspect type {wanted!r}", known.valid_types("aspect", wanted)
+        made.problems.add(message, part.type.position, *hints, scope=scope, kind=UNKNOWN_TYPE, near=near)
         return None
     for pointcut in (each for each in part.at if each):
         for key, said in (("request", pointcut.request), ("time", pointcut.time)):

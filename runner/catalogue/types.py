@@ -47,6 +47,8 @@ def _words(base: type) -> str:
 class CatalogueError(FaultError):
     """A type that is not available, or an ambiguous name."""
 
+    kind = "type"
+
     def __init__(self, message: str, *help: str) -> None:
         super().__init__(message, help=help)
         self.args = (message, *help)  # what pickle rebuilds the error from

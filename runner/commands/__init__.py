@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ..printing import complain, tell
-from . import completion, describe, new, recording, running, searching, studies
+from . import completion, describe, editor, new, recording, running, searching, studies
 from .offered import offered_commands
 from .options import BAD_INPUT, BROKEN, DONE, FAILED, JSON, TYPES, Command, command, option, own_types, several
 
@@ -17,7 +17,15 @@ GROUPS = {
     "make many runs": (studies.study, studies.status, studies.report, searching.compare),
     "search": (searching.search, searching.rare),
     "work with recorded data": (recording.recording,),
-    "write models": (new.new, describe.validate, describe.describe, describe.graph, describe.list_),
+    "write models": (
+        new.new,
+        describe.validate,
+        describe.diff,
+        describe.describe,
+        describe.graph,
+        describe.list_,
+        editor.lsp,
+    ),
     "set up a shell": (completion.completion,),
 }
 COMMANDS = tuple(each for group in GROUPS.values() for each in group)

@@ -7,14 +7,15 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..calls import picturing, running
+from ..calls import differing, picturing, running
 from ..declare.commands import arguments, declared
 from ..printing import columns, complain, console, tell, tell_json, tell_json_text
-from .options import DONE, TYPES, command, load, option, own_types, taken
+from .options import BAD_INPUT, DONE, FAILED, JSON, TYPES, command, load, of_call, option, own_types, taken
 
 if TYPE_CHECKING:
     from ..build.model import Model
     from ..catalogue.types import Catalogue
+    from ..study.plan.plan import Plan
 
 # -- models -----------------------------------------------------------------------------------------------------------
 
@@ -23,12 +24,18 @@ if TYPE_CHECKING:
     "check a model or a study",
     taken(running.load),
     option("--strict", action="store_true", help="treat warnings as errors"),
+    JSON,
     imports=("build",),
 )
 def validate(options: argparse.Namespace) -> int:
-    """Check a model, or a study with everything it varies, without running it."""
+    """Check a model, or a study with everything it varies, without running it.
+
+    --json prints every problem with its code, which docs/problems.md explains, and the change that would remove it.
+    """
     from epicycle.actors import EpicycleError
 
+    if options.json:
+        return _validate_for_programs(options)
     if _is_study(options.model):
         return _validate_study(options)
     model = load(options, strict=options.strict)
@@ -39,6 +46,26 @@ def validate(options: argparse.Namespace) -> int:
         complain(f"warning: {told}")
     tell(f"{options.model} is valid: {model.extent}")
     return DONE
+
+
+def _validate_for_programs(options: argparse.Namespace) -> int:
+    """Print what is wrong as JSON."""
+    from ..desk import of_problems, read, report
+    from ..text.problems import ModelError
+
+    if _is_study(options.model):
+        try:
+            _plan(options)
+            found = of_problems(())
+        except ModelError as error:
+            found = of_problems(error.problems, error.more)
+    else:
+        given = arguments(running.load, options)
+        types = own_types(options)
+        found = report(read(given.pop("model"), **{**given, "types": types}))
+    is_good = found["valid"] and not (options.strict and found["problems"])
+    tell_json({**found, "valid": is_good}, indent=2)
+    return DONE if is_good else BAD_INPUT
 
 
 def _is_study(name: str) -> bool:
@@ -53,7 +80,19 @@ def _is_study(name: str) -> bool:
 
 def _validate_study(options: argparse.Namespace) -> int:
     """Load the model at every level that the study varies."""
-    from epicycle.actors import EpicycleError, counted
+    from epicycle.actors import counted
+
+    plan = _plan(options)
+    tell(
+        f"{options.model} is valid: {counted(plan.conditions, 'condition')} of "
+        f"{counted(plan.replications, 'replication')}, {counted(plan.size, 'run')}"
+    )
+    return DONE
+
+
+def _plan(options: argparse.Namespace) -> Plan:
+    """The plan of a study that is valid."""
+    from epicycle.actors import EpicycleError
 
     from ..language.study import read_study
     from ..show.report import check_figures
@@ -65,11 +104,7 @@ def _validate_study(options: argparse.Namespace) -> int:
     given = arguments(running.load, options)
     plan = Plan.made(read_study(options.model, set=given.get("set", ()), types=map(Path, given.get("types", ()))))
     check_figures(plan)
-    tell(
-        f"{options.model} is valid: {counted(plan.conditions, 'condition')} of "
-        f"{counted(plan.replications, 'replication')}, {counted(plan.size, 'run')}"
-    )
-    return DONE
+    return plan
 
 
 @command(
@@ -109,6 +144,16 @@ def _write(text: str, write: Callable[[Path], None], path: Path | None) -> int:
         write(path)
         tell(f"wrote {path}")
     return DONE
+
+
+@of_call(differing.diff, JSON, imports=("build",))
+def diff(options: argparse.Namespace) -> int:
+    found = differing.diff(**arguments(differing.diff, options))
+    if options.json:
+        tell_json(found.to_dict(), indent=2)
+    else:
+        tell(str(found))
+    return FAILED if found else DONE
 
 
 # -- lists ------------------------------------------------------------------------------------------------------------

@@ -8,6 +8,7 @@ from typing import TypeVar
 
 from ..catalogue.packaged import find
 from ..text.document import Mapping, Node, read
+from ..text.kinds import FILE, FORM
 from ..text.problems import POISON, Problems
 from ..text.reading import NodeReader
 from .acts import ACTS, ActText, acts
@@ -64,14 +65,18 @@ def load_disturbance(name: str, problems: Problems) -> Disturbance | None:
     """A disturbance by its name or path; None if it cannot be read at all."""
     path = find(name, "disturbance", problems)
     node = None if path is None else read(path, problems)
-    return None if node is None else _declared(node, problems)
+    if node is None:
+        return None
+    with problems.looking_for(FORM):
+        return _declared(node, problems)
 
 
 def _declared(node: Node, problems: Problems) -> Disturbance | None:
     """What a file declares; anything malformed is reported and left out."""
     if isinstance(node, Mapping) and "model" in node.entries and "disturbance" not in node.entries:
         hint = "a disturbance begins with a line like 'disturbance: my_disturbance'"
-        problems.add(f"{node.position.file} is a model, not a disturbance", node.entries["model"].key.position, hint)
+        message, at = f"{node.position.file} is a model, not a disturbance", node.entries["model"].key.position
+        problems.add(message, at, hint, kind=FILE)
         return None
     reader = NodeReader(problems)
     entries = DISTURBANCE.entries(reader, node, "the disturbance")

@@ -17,6 +17,7 @@ from epicycle.actors import FaultError, MappingParameter, Parameter, to_nanoseco
 from ..catalogue.reference import as_written, is_part, shown
 from ..text.document import Entry, Node, Scalar
 from ..text.faults import blame
+from ..text.kinds import MISSING_KEY
 from ..text.problems import POISON, Poison, Position
 from ..text.reading import NodeReader, is_empty
 
@@ -237,7 +238,7 @@ class Record:
                     found[each.name or key] = value
             elif each.missing:
                 message, *hints = (said.format(what=what, key=key) for said in each.missing)
-                found[each.name or key] = reader.problems.add(message, at, *hints)
+                found[each.name or key] = reader.problems.add(message, at, *hints, kind=MISSING_KEY)
         return found
 
     def read(self, reader: NodeReader, node: Node, what: str, at: Position | None = None) -> dict[str, Any] | Poison:

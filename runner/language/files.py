@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from epicycle.actors import did_you_mean, irregular
+from epicycle.actors import irregular
 
 from ..catalogue.packaged import find, is_path, model_folders, packaged_files, packaged_ones, unreadable
 from ..text.document import Mapping, plain, read
+from ..text.kinds import CLASS, FILE
 from ..text.problems import Problems
 from ..text.reading import Text
 from .inheritance import extended
@@ -26,8 +27,8 @@ def named_file(said: Text, folder: Path, kind: str, problems: Problems, who: str
     if (reason := unreadable(path)) == "":
         return path
     if reason is None:
-        guess = did_you_mean(said.text, list(known))
-        problems.add(f"{who}there is no {kind} {said.text!r}{guess}", said.position, packaged_ones(kind))
+        near = said.text, list(known)
+        problems.add(f"{who}there is no {kind} {said.text!r}", said.position, packaged_ones(kind), near=near)
     else:
         problems.add(f"{who}the {kind} {said.text!r} {reason}", said.position)
     return None
@@ -35,6 +36,11 @@ def named_file(said: Text, folder: Path, kind: str, problems: Problems, who: str
 
 def read_model(name: str, problems: Problems) -> tuple[ModelText, dict[str, CompositeText]]:
     """What a model's file declares, and the composite classes of it and of everything it includes."""
+    with problems.looking_for(FILE):
+        return _read_model(name, problems)
+
+
+def _read_model(name: str, problems: Problems) -> tuple[ModelText, dict[str, CompositeText]]:
     path, text = find(name, "model", problems), None
     node = None if path is None else read(path, problems)
     if isinstance(node, Mapping) and "study" in node.entries:
@@ -46,8 +52,9 @@ def read_model(name: str, problems: Problems) -> tuple[ModelText, dict[str, Comp
     if path is None or not text:
         return problems.whole(None)
     found = _bases(text, path, problems)
-    for base, _ in found[1:]:
-        text = extended(base, text, problems)
+    with problems.looking_for(CLASS):
+        for base, _ in found[1:]:
+            text = extended(base, text, problems)
     return text, _composites(found, problems)
 
 
@@ -83,7 +90,11 @@ def _is_below(path: Path, folder: Path) -> bool:
 
 def read_library(file: str | Path, problems: Problems) -> dict[str, CompositeText]:
     """The composite classes of a file, at its path or among the packaged ones, and of everything it includes."""
-    path = Path(file)
+    with problems.looking_for(FILE):
+        return _read_library(Path(file), problems)
+
+
+def _read_library(path: Path, problems: Problems) -> dict[str, CompositeText]:
     candidates = (path, *(folder / path for folder in model_folders()))
     path = next((each for each in candidates if each.is_file()), path)
     node, text = read(path, problems), None
@@ -106,7 +117,7 @@ def _composites(files: list[tuple[ModelText, Path]], problems: Problems) -> dict
             if name in composites and (homes[name] == root or not _is_copy(composite, composites[name])):
                 first = composites[name].position
                 hint = f"the first definition is at {first.file}:{first.line}"
-                problems.add(f"composite {name!r} is defined twice", composite.position, hint)
+                problems.add(f"composite {name!r} is defined twice", composite.position, hint, kind=CLASS)
             composites.setdefault(name, composite)
             homes.setdefault(name, root)
         for include in current.include:
@@ -129,10 +140,9 @@ def _composites(files: list[tuple[ModelText, Path]], problems: Problems) -> dict
                 return composites
             if not exists:
                 names = [str(path.relative_to(where.parent)) for path in _beside(target, where)]
-                kind = f"does not exist{did_you_mean(include.text, names)}"
-                if target.exists():
-                    kind = f"is {irregular(target)}"
-                problems.add(f"the included file {include.text!r} {kind}", include.position)
+                kind = f"is {irregular(target)}" if target.exists() else "does not exist"
+                near = include.text, () if target.exists() else names
+                problems.add(f"the included file {include.text!r} {kind}", include.position, near=near)
                 continue
             node = read(target, problems, str(where.parent / include.text))
             inner = library_of(node, problems) if node is not None else None

@@ -185,8 +185,9 @@ class _Heir:
             before = old.get(name)
             if before is None and (part.removes or not part.type.text):
                 what = "to remove" if part.removes else "to change"
+                near = did_you_mean(name, list(old))
                 self._problem(
-                    f"{self.base.name} has no {kind} {name!r} {what}{did_you_mean(name, list(old))}",
+                    f"{self.base.name} has no {kind} {name!r} {what}{near}",
                     part.position,
                     f"its {kind}s: {', '.join(old) or 'none'}" + ("" if part.removes else "; a new one needs a type"),
                 )

@@ -9,6 +9,7 @@ from epicycle.actors import Parameter, declared_parameters
 
 from ..catalogue.metrics import TAKES, MetricSpec, take_fault
 from ..text.document import Entry
+from ..text.kinds import CHOICE, MISSING_KEY
 from ..text.problems import POISON, Poison, Position
 from ..text.reading import NodeReader, Text
 from .fields import AT, TEXTS, Field, Record, about, named, node_as, one_or_more, ref, schema_of
@@ -67,10 +68,10 @@ def _metric(reader: NodeReader, name: str, entry: Entry) -> MetricText | Poison:
     ports = said.get("of", ())
     if ports == ():
         hint = "add 'of: actor.port', or 'from: delivered / sent' over other metrics"
-        ports = reader.problems.add(f"{what} has no port", entry.key.position, hint)
+        ports = reader.problems.add(f"{what} has no port", entry.key.position, hint, kind=MISSING_KEY)
     take = reader.text(said["take"], "take") if "take" in said else "last"
     if take is not POISON and (fault := take_fault(name, take)):
-        take = reader.problems.add(fault.message, entries["take"].value.position, *fault.help)
+        take = reader.problems.add(fault.message, entries["take"].value.position, *fault.help, kind=CHOICE)
     if ports is POISON or take is POISON:
         return POISON
     return MetricText(

@@ -9,6 +9,8 @@ from epicycle.actors import Parameter
 
 from ..catalogue.like import LIKE, dialects
 from ..text.document import Entry, Mapping, Node, Scalar
+from ..text.kinds import CLASS, FORM, UNKNOWN_KEY
+from ..text.kinds import NAME as NOT_A_NAME
 from ..text.limits import MAX_SEED
 from ..text.problems import POISON, Poison, Position, Problems
 from ..text.reading import NodeReader, Text
@@ -177,13 +179,14 @@ def composite(
     inputs, outputs = said.get("inputs", {}), said.get("outputs", {})
     for port in outputs.values():
         if port.name in inputs:
-            problems.add(f"port {port.name!r} is declared twice", port.position)
+            problems.add(f"port {port.name!r} is declared twice", port.position, kind=NOT_A_NAME)
     for actor in said.get("actors", {}).values():
         if actor.name in inputs or actor.name in outputs:
-            problems.add(f"{actor.name!r} is the name of both an actor and a port", actor.position, "rename one")
+            message = f"{actor.name!r} is the name of both an actor and a port"
+            problems.add(message, actor.position, "rename one", kind=NOT_A_NAME)
     for each in connections:
         if each and each.removes is not None and not derived:
-            problems.add(f"{name} extends no class, so it has no connection to remove", each.removes)
+            problems.add(f"{name} extends no class, so it has no connection to remove", each.removes, kind=CLASS)
     kept = tuple(each for each in connections if derived or not (each and each.removes))
     written = tuple(entry.value for entry in entries.values())
     wrong = (POISON,) if len(problems) > before else ()
@@ -248,7 +251,7 @@ def _model_director(reader: NodeReader, node: Node, what: str) -> dict[str, Entr
         for key in [key for key in ("start", "drift") if key in node.entries]:
             message = f"{what} has no {key!r}: the time of a run begins at 0 and has no drift"
             hint = "give it to the director of a composite, which has local time"
-            reader.problems.add(message, node.entries[key].key.position, hint)
+            reader.problems.add(message, node.entries[key].key.position, hint, kind=UNKNOWN_KEY)
         node = replace(node, entries={key: each for key, each in node.entries.items() if key not in ("start", "drift")})
     return MODEL_DIRECTOR.entries(reader, node, what)
 
@@ -295,6 +298,11 @@ _OF_FILE = Record("", {key: each for key, each in MODEL.keys.items() if key not 
 
 def model_of(node: Node, problems: Problems) -> ModelText | Poison:
     """The declarations of a model file: one with the key ``model``."""
+    with problems.looking_for(FORM):
+        return _model(node, problems)
+
+
+def _model(node: Node, problems: Problems) -> ModelText | Poison:
     reader = NodeReader(problems)
     entries = MODEL.entries(reader, node, "the model")
     if entries is POISON:
@@ -309,7 +317,8 @@ def model_of(node: Node, problems: Problems) -> ModelText | Poison:
 
 def library_of(node: Node, problems: Problems) -> ModelText | Poison:
     """The declarations of a file of composite classes."""
-    read = LIBRARY.read(NodeReader(problems), node, "an included file")
+    with problems.looking_for(FORM):
+        read = LIBRARY.read(NodeReader(problems), node, "an included file")
     if read is POISON:
         return POISON
     said = sound(read)

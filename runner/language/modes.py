@@ -8,6 +8,7 @@ from typing import Any
 from epicycle.actors import declared_parameters
 
 from ..text.document import Entry, Mapping
+from ..text.kinds import MISSING_KEY, MODE
 from ..text.problems import POISON, Poison, Position
 from ..text.reading import NodeReader, Text
 from .fields import AT, Field, Schema, names_of, node_as, one_or_more, ref
@@ -43,7 +44,8 @@ def machine_of(
     for key in ("actors", "connections"):
         if key in entries:
             hint = "move them into the refinement of a mode, or into a composite around this one"
-            reader.problems.add(f"{name} has modes, so it cannot have {key}", entries[key].key.position, hint)
+            message = f"{name} has modes, so it cannot have {key}"
+            reader.problems.add(message, entries[key].key.position, hint, kind=MODE)
     refinements: dict[str, PartText] = {}
     modes = machine.get("modes")
     if modes is not None and isinstance(modes.value, Mapping):
@@ -73,7 +75,8 @@ def _refinement(reader: NodeReader, mode: str, entry: Entry) -> PartText | Poiso
     values = dict(entry.value.entries) if isinstance(entry.value, Mapping) else {}
     said = values.pop("type", None) if isinstance(entry.value, Mapping) else entry
     if said is None:
-        return reader.problems.add(f"the refinement of {mode!r} has no type", entry.key.position, "add 'type: ...'")
+        message = f"the refinement of {mode!r} has no type"
+        return reader.problems.add(message, entry.key.position, "add 'type: ...'", kind=MISSING_KEY)
     kind: Text | Poison = AT.read(reader, said.value, f"the refinement of {mode!r}")
     taken = reader.texts(values.pop("inherit").value, "inherit") if "inherit" in values else ()
     return POISON if kind is POISON else PartText(mode, entry.key.position, kind, values, inherit=taken or ())

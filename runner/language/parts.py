@@ -9,8 +9,9 @@ from epicycle.aspects import Aspect
 
 from ..catalogue.figure import Figure
 from ..text.document import Entry, Mapping, Node, Scalar
+from ..text.kinds import MISSING_KEY
 from ..text.limits import NORMAL
-from ..text.problems import POISON, Poison, Position
+from ..text.problems import POISON, Fix, Poison, Position
 from ..text.reading import NAME, SURE, NodeReader, Text, is_empty
 from .fields import AT, TEXTS, Computed, Reader, Record, computed_as, keyed, named, one_or_more, ref, sound
 from .places import POINTCUTS, PointcutText
@@ -93,7 +94,9 @@ def part(
         meant = None if kind_entry is not None else nearest("type", values, SURE)
         near = f", did you mean 'type' by {meant!r}?" if meant is not None else ""
         at = entry.key if meant is None else values[meant].key
-        return problems.add(f"{kind} {name!r} has no type{near}", at.position, *(() if near else ("add 'type: ...'",)))
+        fix = Fix(at.position, "type") if meant is not None else None
+        hints = () if near else ("add 'type: ...'",)
+        return problems.add(f"{kind} {name!r} has no type{near}", at.position, *hints, kind=MISSING_KEY, fix=fix)
     type_name = Text("", entry.key.position)
     if kind_entry is not None:
         said_type: Text | Poison = AT.read(reader, kind_entry.value, f"the type of {name!r}")

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from epicycle.aspects import FiringTime, FiringTimeParameter
 
 from ..text.document import Mapping, Node, Scalar, Sequence
+from ..text.kinds import MISSING_KEY
 from ..text.problems import POISON, Poison, Position
 from ..text.reading import NodeReader, Text, inside, is_empty, split
 from .fields import (
@@ -147,7 +148,7 @@ def connection(reader: NodeReader, node: Node, what: str = "") -> ConnectionText
     said = CONNECTION.values(reader, entries, "a connection", node.position)
     for key in ("from", "to"):
         if said.get(CONNECTION.keys[key].name, ()) == ():
-            said[key] = problems.add(f"the connection has no {key!r}", node.position)
+            said[key] = problems.add(f"the connection has no {key!r}", node.position, kind=MISSING_KEY)
     return POISON if POISON in said.values() else ConnectionText(position=node.position, **said)
 
 

@@ -11,6 +11,7 @@ from epicycle.actors.expression import CONSTANTS, FUNCTIONS
 
 from ..text.document import Entry, Mapping, Node, Scalar
 from ..text.faults import blame
+from ..text.kinds import NAME as NOT_A_NAME
 from ..text.problems import POISON, Poison, Position
 from ..text.reading import NAME, NodeReader, Text, is_empty
 from .fields import (
@@ -59,10 +60,10 @@ def _ports(reader: NodeReader, node: Node, what: str) -> dict[str, PortText]:
     ports: dict[str, PortText] = {}
     for port in found:
         if not NAME.match(port.name):
-            reader.problems.add(f"{port.name!r} is not a port name", port.position)
+            reader.problems.add(f"{port.name!r} is not a port name", port.position, kind=NOT_A_NAME)
             continue
         if port.name in ports:
-            reader.problems.add(f"port {port.name!r} is declared twice", port.position)
+            reader.problems.add(f"port {port.name!r} is declared twice", port.position, kind=NOT_A_NAME)
         ports[port.name] = port
     return ports
 
@@ -177,7 +178,7 @@ def _parameter(reader: NodeReader, name: str, entry: Entry) -> ParameterText:
     if name in _NO_PARAMETERS or iskeyword(name):
         meaning = "the index of an instance in its array" if name == "index" else "something else"
         message = f"a parameter cannot be called {name!r}: in expressions, that name means {meaning}"
-        reader.problems.add(message, entry.key.position, "give it another name")
+        reader.problems.add(message, entry.key.position, "give it another name", kind=NOT_A_NAME)
     if not isinstance(entry.value, Mapping):
         says_nothing = is_empty(entry.value) and not (isinstance(entry.value, Scalar) and entry.value.text)
         return ParameterText(name, entry.key.position, entry.value, given=() if says_nothing else ("value",))

@@ -14,6 +14,7 @@ from epicycle.actors.expression import ExpressionError, Formula
 from ..text.document import Entry, Node, Scalar, Sequence, parse
 from ..text.document import Mapping as MappingNode
 from ..text.faults import blame
+from ..text.kinds import OF_STUDY
 from ..text.problems import POISON, Poison, Position, Problems
 from ..text.reading import NodeReader, Text, inside
 from .claims import ALWAYS, FALLS, FORMS, GREATER, LESS, RISES, Claim, Guideline, Questions, Selection, shown_level
@@ -98,7 +99,7 @@ class QuestionReader(NodeReader):
 
     def borrowed(self, node: Scalar, file: str, text: str) -> tuple[Node, Mapping[str, str]] | None:
         """The claims of another study, and what it varies."""
-        problems = Problems()
+        problems = Problems(OF_STUDY)
         tree = parse(text, file, problems)
         factors = {} if tree is None else self.factors_of(tree, Path(file), problems)
         claims = tree.entries.get("claims") if isinstance(tree, MappingNode) else None

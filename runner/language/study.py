@@ -11,6 +11,8 @@ from epicycle.actors import did_you_mean
 
 from ..catalogue.packaged import find, is_path, unreadable
 from ..text.document import Entry, Mapping, Node, Scalar, parse, read
+from ..text.files import opened_text
+from ..text.kinds import OF_STUDY
 from ..text.limits import MAX_SEED
 from ..text.problems import POISON, Poison, Position, Problems
 from ..text.reading import NodeReader, Text, is_empty
@@ -195,13 +197,13 @@ def read_study(
     seed: int | None = None,
 ) -> Study:
     """The study of a file; raises ``ModelError`` with everything that is wrong with its contents."""
-    problems = Problems()
+    problems = Problems(OF_STUDY)
     path = find(str(name), "study", problems)
     node = None if path is None else read(path, problems)
     problems.raise_if_any()
     assert path is not None
     assert node is not None
-    text = path.read_text(encoding="utf-8")
+    text = opened_text(path) or path.read_text(encoding="utf-8")
     return _StudyReader(problems, path).changed(node, text, set, types, replications, seed)
 
 
@@ -218,7 +220,7 @@ def study_of_text(
 
     ``lender``: file and text of the study that its claims are from.
     """
-    problems = Problems()
+    problems = Problems(OF_STUDY)
     node = parse(text, str(path), problems)
     problems.raise_if_any()
     assert node is not None, "a text that cannot be read is a problem"

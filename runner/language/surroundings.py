@@ -20,7 +20,6 @@ from epicycle.actors import (
     MappingParameter,
     Parameter,
     declared_parameters,
-    did_you_mean,
     found_variants,
 )
 
@@ -28,6 +27,7 @@ from ..catalogue.reference import as_written, is_part
 from ..catalogue.types import Catalogue, CatalogueError, figure_types
 from ..text.document import Entry, Node, Scalar, plain
 from ..text.document import Mapping as MappingNode
+from ..text.kinds import TAKEN, UNIT
 from ..text.problems import POISON, Poison, Position, Problems
 from ..text.program import node_of
 from ..text.reading import NodeReader, Text
@@ -161,7 +161,8 @@ class Surroundings:
                 if text.text not in names:
                     message = f"{owner.name}: {asked.name} inherits {text.text!r}, but {who} has no such parameter"
                     hint = f"parameters of {who}: {', '.join(names) or 'none'}"
-                    self.problems.add(message + did_you_mean(text.text, names), text.position, hint)
+                    near = text.text, names
+                    self.problems.add(message, text.position, hint, kind=TAKEN, near=near)
                     break
             else:
                 yield text.text, text.position
@@ -171,17 +172,18 @@ class Surroundings:
         chooser = _ALONE.fullmatch(part.type.text)
         if chooser is None or key != "actors":
             message = f"{owner.name}: the type of {part.name} cannot be computed"
-            self.problems.add(message, part.type.position, "a parameter may choose that of an actor: 'type: ${name}'")
+            hint = "a parameter may choose that of an actor: 'type: ${name}'"
+            self.problems.add(message, part.type.position, hint, kind=TAKEN)
             return {}
         name = chooser[1]
         message, declared = f"{owner.name}: {name!r} chooses the type of {part.name}, but ", owner.parameters.get(name)
         if declared is None:
             hint = f"parameters of {owner.name}: {', '.join(owner.parameters) or 'none'}"
-            message += f"{owner.name} has no such parameter{did_you_mean(name, owner.parameters)}"
-            self.problems.add(message, part.type.position, hint)
+            message += f"{owner.name} has no such parameter"
+            self.problems.add(message, part.type.position, hint, kind=TAKEN, near=(name, owner.parameters))
         elif not declared.choices and declared.value is not POISON:
             hint = f"write '{name}: {{choices: [FirstType, SecondType]}}', or 'choices: {{first: FirstType, ...}}'"
-            self.problems.add(f"{message}it has no choices", declared.position, hint)
+            self.problems.add(f"{message}it has no choices", declared.position, hint, kind=TAKEN)
         return {} if declared is None else declared.choices
 
     def _known(self, key: str, kind: str) -> Mapping[str, Known] | None:
@@ -236,7 +238,7 @@ class Surroundings:
         if "unit" in said and len(units) > 1:
             told = " and ".join(f"{name} in {unit}" for unit, name in sorted(units.items()))
             message = f"{owner.name}: parameter {parameter.name!r} has no unit of its own, and is taken by {told}"
-            self.problems.add(message, parameter.position, f"write '{parameter.name}: {{unit: ...}}'")
+            self.problems.add(message, parameter.position, f"write '{parameter.name}: {{unit: ...}}'", kind=UNIT)
             said["value"] = POISON
         elif "value" not in parameter.given:
             said |= _default(found, parameter.position)

@@ -10,6 +10,7 @@ from epicycle.actors.expression import ExpressionError, names_in
 
 from ..catalogue.types import CatalogueError
 from ..text.document import Node, Scalar, Sequence
+from ..text.kinds import UNUSED
 from ..text.problems import POISON, Poison, Problems
 from .models import CompositeText, ModelText
 from .parts import PartText
@@ -77,6 +78,7 @@ def _add_unused(
             f"{composite.name}: nothing uses the parameter {name!r}",
             composite.parameters[name].position,
             *(hints or [f"write ${{{name}}} where its value belongs, or remove it"]),
+            kind=UNUSED,
         )
 
 

@@ -20,8 +20,9 @@ from epicycle.actors.expression import Budget, BudgetError, ExpressionError, che
 from ..text.document import Mapping as MappingNode
 from ..text.document import Node, Scalar, Sequence
 from ..text.faults import blame
+from ..text.kinds import EXPRESSION
 from ..text.patterns import in_general
-from ..text.problems import POISON, Poison, Position, Problems
+from ..text.problems import POISON, Fix, Poison, Position, Problems
 from ..text.reading import inside
 from .fields import Computed
 from .ports import ParameterText
@@ -86,7 +87,9 @@ class Values:
         except ExpressionError as error:
             part = node.text[error.offset :][: error.length] or " "
             at = inside(node, node.text, error.offset, part)
-            self._tell(label, error.message, at, local, *self._unseen(node.value, local))
+            meant = error.faults[0].meant
+            fix = Fix(at, meant) if meant and at is not node.position else None
+            self._tell(label, error.message, at, local, *self._unseen(node.value, local), fix=fix)
             if self.budget.is_spent:
                 self.problems.raise_if_any()
             return POISON
@@ -113,9 +116,12 @@ class Values:
             return ("a value set from outside cannot use names of the model: write the value itself",)
         return (f"a composite knows only its own parameters: declare {unseen[0]!r} there and pass its value",)
 
-    def _tell(self, label: str, message: str, position: Position, local: Locals, *hints: str) -> Poison:
+    def _tell(
+        self, label: str, message: str, position: Position, local: Locals, *hints: str, fix: Fix | None = None
+    ) -> Poison:
         about = (in_general(label), "") if local.is_outside else ()  # a setting may be wrong for all of an array
-        return self.problems.add(f"{label}: {message}", position, *hints, scope=local.path, about=about)
+        said = f"{label}: {message}"
+        return self.problems.add(said, position, *hints, scope=local.path, about=about, kind=EXPRESSION, fix=fix)
 
     def blame(self, label: str, error: Exception, where: Node | Position, local: Locals, *hints: str) -> Poison:
         """Report what is wrong with a node, or with something at a position; or how code of a class failed."""

@@ -24,7 +24,8 @@ from yaml.events import (
 
 from epicycle.actors import MAX_DEPTH, did_you_mean, irregular, open_regular
 
-from .files import note_file
+from .files import note_file, note_text, opened_text
+from .kinds import FILE, KEY, SIZE, SYNTAX, Kind
 from .problems import Position, Problems
 from .scalars import SCALAR_TAGS, TAG_PREFIX, Value, resolve, short
 
@@ -73,6 +74,17 @@ Node: TypeAlias = Scalar | Sequence | Mapping
 def read(path: Path, problems: Problems, shown_as: str | None = None) -> Node | None:
     """Read a YAML file; None if it cannot be parsed. `shown_as` is its name in messages."""
     name = str(path) if shown_as is None else shown_as
+    if (text := opened_text(path)) is None:
+        with problems.looking_for(FILE):
+            text = _text_of(path, name, problems)
+    if text is None:
+        return None
+    note_text(path, name, text)
+    return parse(text, name, problems)
+
+
+def _text_of(path: Path, name: str, problems: Problems) -> str | None:
+    """What a file holds; None, and a problem, if it cannot be read."""
     try:
         if not path.exists():
             _add_missing(path, name, problems)
@@ -86,15 +98,14 @@ def read(path: Path, problems: Problems, shown_as: str | None = None) -> Node | 
         problems.add(f"cannot read {name}: {getattr(error, 'strerror', None) or error}")
         return None
     if len(data) > MAX_BYTES:
-        problems.add(_too_large(name))
+        problems.add(_too_large(name), kind=SIZE)
         return None
     note_file(path, data)
     try:
-        text = data.decode("utf-8")
+        return data.decode("utf-8")
     except UnicodeDecodeError as error:
         _add_undecodable(data, error.start, name, problems)
         return None
-    return parse(text, name, problems)
 
 
 def parse(text: str, name: str, problems: Problems, shown_as: str | None = None) -> Node | None:
@@ -103,9 +114,10 @@ def parse(text: str, name: str, problems: Problems, shown_as: str | None = None)
     `name` is the file in messages, `shown_as` the line that contains a text of one line.
     """
     if len(text) > MAX_BYTES:
-        problems.add(_too_large(name))
+        problems.add(_too_large(name), kind=SIZE)
         return None
-    return _Builder(text.removeprefix("\ufeff"), name, problems, shown_as).build()
+    with problems.looking_for(SYNTAX):
+        return _Builder(text.removeprefix("\ufeff"), name, problems, shown_as).build()
 
 
 def plain(node: Node) -> object:
@@ -127,7 +139,7 @@ def _add_missing(path: Path, name: str, problems: Problems) -> None:
         problems.add(f"there is no file {name}: there is no folder {folder}")
         return
     names = [entry.name for entry in itertools.islice(folder.iterdir(), 10_000)]
-    problems.add(f"there is no file {name}" + did_you_mean(path.name, names))
+    problems.add(f"there is no file {name}", near=(path.name, names))
 
 
 def _add_undecodable(data: bytes, offset: int, name: str, problems: Problems) -> None:
@@ -231,7 +243,7 @@ class _Builder:
             for event in yaml.parse(self._text[:_BEGINNING], Loader=yaml.SafeLoader):
                 depth += isinstance(event, CollectionStartEvent) - isinstance(event, CollectionEndEvent)
                 if depth > MAX_DEPTH:
-                    self._problems.add(f"nested deeper than {MAX_DEPTH} levels", self._span(event))
+                    self._problems.add(f"nested deeper than {MAX_DEPTH} levels", self._span(event), kind=SIZE)
                     return True
         except yaml.YAMLError:
             pass
@@ -279,7 +291,7 @@ class _Builder:
         is_mapping = isinstance(event, MappingStartEvent)
         self._count(1, position)
         if len(self._stack) >= MAX_DEPTH:
-            self._stop(f"nested deeper than {MAX_DEPTH} levels", position)
+            self._stop(f"nested deeper than {MAX_DEPTH} levels", position, SIZE)
         expected, kind = ("map", "mapping") if is_mapping else ("seq", "list")
         if event.tag is not None and event.tag != TAG_PREFIX + expected:
             self._add_tag(event.tag, f"a {kind}", self._span(event, with_properties=True))
@@ -309,7 +321,7 @@ class _Builder:
         node, weight, height = known
         self._count(weight, position)
         if len(self._stack) + height > MAX_DEPTH:
-            self._stop(f"nested deeper than {MAX_DEPTH} levels by the alias *{name}", position)
+            self._stop(f"nested deeper than {MAX_DEPTH} levels by the alias *{name}", position, SIZE)
         # Problems of the node itself are reported where it is used, those inside it where it is written.
         self._add(dataclasses.replace(node, position=position), weight, height)
 
@@ -345,18 +357,18 @@ class _Builder:
         if not isinstance(key, Scalar):
             kind = "mapping" if isinstance(key, Mapping) else "list"
             hint = "quote a text that starts with '{' or '['"
-            self._problems.add(f"a key must be text, but this one is a {kind}", at, hint)
+            self._problems.add(f"a key must be text, but this one is a {kind}", at, hint, kind=KEY)
         elif not isinstance(key.value, str):
             shown = short(key.text)
             kind = shown if key.text else "empty"
-            self._problems.add(f"a key must be text, but this one is {kind}", at, f"quote it: '{shown}'")
+            self._problems.add(f"a key must be text, but this one is {kind}", at, f"quote it: '{shown}'", kind=KEY)
         elif key.value == "<<" and key.plain:
             hint = "write the entries out, or use a composite class"
-            self._problems.add("YAML 1.2 has no merge keys (<<)", at, hint)
+            self._problems.add("YAML 1.2 has no merge keys (<<)", at, hint, kind=KEY)
         elif key.value in frame.entries:
             first = frame.entries[key.value].key.position.line
             message = f"duplicate key {short(key.value)!r}: first on line {first}, again on line {at.line}"
-            self._problems.add(message, at)
+            self._problems.add(message, at, kind=KEY)
         else:
             return key
         return None
@@ -401,10 +413,10 @@ class _Builder:
     def _count(self, nodes: int, position: Position) -> None:
         self._nodes += nodes
         if self._nodes > MAX_NODES:
-            self._stop(f"more than {MAX_NODES:,} values, aliases counted at each use", position)
+            self._stop(f"more than {MAX_NODES:,} values, aliases counted at each use", position, SIZE)
 
-    def _stop(self, message: str, position: Position) -> NoReturn:
-        self._problems.add(message, position)
+    def _stop(self, message: str, position: Position, kind: Kind = SYNTAX) -> NoReturn:
+        self._problems.add(message, position, kind=kind)
         raise _StopError
 
     def _add_tag(self, tag: str, kind: str, position: Position) -> None:

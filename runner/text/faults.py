@@ -7,8 +7,9 @@ from typing import Any
 from epicycle.actors import EpicycleError, Fault, FaultError
 
 from .document import Mapping, Node, Scalar, Sequence
+from .kinds import CODE, OF_FAULTS, VALUE, Kind
 from .patterns import in_general
-from .problems import POISON, Poison, Position, Problems
+from .problems import POISON, Fix, Poison, Position, Problems
 from .program import describe, raised_at
 from .reading import inside
 
@@ -43,11 +44,12 @@ def blame(
     scope: str = "",
     *more: str,
     in_all: bool = False,
+    kind: Kind = VALUE,
 ) -> Poison:
     """Add what is wrong with a node, or with something at a position, or how the code of a user's class failed.
 
     ``label`` is its name in messages, ``more`` further help; ``in_all``: what is wrong for all of an array is reported
-    once.
+    once.  ``kind`` is for faults that name none.
     """
     at = where if isinstance(where, Position) else where.position
     if isinstance(where, Scalar) and where.giver:
@@ -55,15 +57,19 @@ def blame(
 
     def tell(message: str, place: Position, *hints: str, number: int = 0, **of_user: Any) -> None:
         about = (in_general(label), str(number)) if in_all else ()
+        of_user.setdefault("kind", kind)
         problems.add(f"{label}: {message}", place, *hints, *more, scope=scope, about=about, **of_user)
 
     if isinstance(error, FaultError):
         for number, fault in enumerate(error.faults):
             place = at if isinstance(where, Position) else place_in(where, fault)
-            tell(fault.message, place, *fault.help, number=number)
+            fix = Fix(place, fault.meant) if fault.meant and place.file else None
+            of_fault = OF_FAULTS.get(fault.kind, kind)
+            tell(fault.message, place, *fault.help, number=number, kind=of_fault, fix=fix)
     elif isinstance(error, EpicycleError):
         tell(str(error), at)
     else:
         told = str(error) if isinstance(error, ValueError) else ""
-        tell(told or describe(error), at, raised=raised_at(error), cause=error)
+        of_error = kind if told else CODE
+        tell(told or describe(error), at, raised=raised_at(error), cause=error, kind=of_error)
     return POISON

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
@@ -14,6 +14,44 @@ from epicycle.actors import ParameterError, did_you_mean, irregular, read_regula
 from .problems import Position
 
 COMMAND_LINE = "command line"  # the file of a position in an option
+
+
+@dataclass
+class Opened:
+    """Texts read in place of files, by their resolved paths, and everything that is read, by its name in messages."""
+
+    texts: Mapping[Path, str]
+    read: dict[str, tuple[Path, str]] = field(default_factory=dict)
+
+
+_opened: ContextVar[Opened | None] = ContextVar("opened", default=None)
+
+
+@contextmanager
+def opened(texts: Mapping[Path, str]) -> Iterator[Opened]:
+    """Texts that are read in place of files, such as those of an editor."""
+    found = Opened(texts)
+    token = _opened.set(found)
+    try:
+        yield found
+    finally:
+        _opened.reset(token)
+
+
+def opened_text(path: Path) -> str | None:
+    """The text that is open in place of a file, if there is one."""
+    if (found := _opened.get()) is None:
+        return None
+    try:
+        return found.texts.get(path.resolve())
+    except (OSError, RuntimeError, ValueError):  # endless links, too long a name
+        return None
+
+
+def note_text(path: Path, name: str, text: str) -> None:
+    """Keep a text that was read for whoever opened others."""
+    if (found := _opened.get()) is not None:
+        found.read[name] = (path, text)
 
 
 @dataclass

@@ -9,7 +9,7 @@ import re
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from functools import cached_property, lru_cache
 
-from epicycle.actors import FaultError, did_you_mean
+from epicycle.actors import FaultError, nearest
 
 from .limits import NORMAL, Limits
 
@@ -198,14 +198,14 @@ class PathIndex:
         """The given paths in their order here."""
         return sorted(paths, key=self._place.__getitem__)
 
-    def did_you_mean(self, pattern: str, scope: str = "", fits: Callable[[str], bool] = _always) -> str:
-        """Of the paths that fit, the one that a pattern without matches probably means, as the end of a message."""
+    def near(self, pattern: str, scope: str = "", fits: Callable[[str], bool] = _always) -> tuple[str, Iterable[str]]:
+        """A pattern without matches, and the paths that fit, of which it may mean one: for ``Problems.add``."""
         near: Iterable[str] = (path for path in self.inside(scope) if fits(path))
         start = f"{scope}." if scope else ""
         near = (path.removeprefix(start) for path in near)
         if "[*]" in pattern:
             near = dict.fromkeys(map(in_general, near))
-        return did_you_mean(pattern, near)
+        return pattern, near
 
     def advice(self, pattern: str, scope: str = "", fits: Callable[[str], bool] = _always) -> tuple[str, ...]:
         """What to write instead of a pattern without matches: the ports at the place that it names."""
@@ -221,7 +221,7 @@ class PathIndex:
                 return (f"that is an actor, not a port: write {written}",)
             if names:
                 return (f"valid ports of {holder}: {', '.join(names)}",)
-        if self.did_you_mean(pattern, scope, fits):
+        if nearest(*self.near(pattern, scope, fits)):
             return ()
         firsts = (path.removeprefix(start).partition(".")[0] for path in self.inside(scope) if fits(path))
         holders = list(dict.fromkeys(map(in_general, firsts)))

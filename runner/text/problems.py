@@ -1,12 +1,16 @@
 """Problems of a model, reported so that they can be fixed: where, what, and what would be right."""
 
+import re
 import unicodedata
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
 from enum import Enum
 from typing import Final, Literal, NoReturn, TypeVar
 
-from epicycle.actors import EpicycleError, shortened, visible, visible_character
+from epicycle.actors import EpicycleError, nearest, shortened, visible, visible_character
+
+from .kinds import OTHER, SIZE, Kind
 
 MAX_PROBLEMS = 100
 MAX_SOURCE_WIDTH = 120
@@ -46,6 +50,18 @@ class Position:
 
 
 @dataclass(frozen=True, slots=True)
+class Fix:
+    """What a program may write to remove a problem: a text in place of what is there.
+
+    With a ``key``, it is a value for that key, which is missing in the mapping of which the place is the name.
+    """
+
+    position: Position
+    text: str
+    key: str = ""
+
+
+@dataclass(frozen=True, slots=True)
 class Problem:
     """One problem, its place, and what may help."""
 
@@ -54,6 +70,8 @@ class Problem:
     help: tuple[str, ...] = ()
     severity: str = "error"  # or "warning"
     raised: Position | None = None  # the line of a user's program that raised an exception
+    kind: Kind = OTHER
+    fix: Fix | None = None
 
     def __str__(self) -> str:
         head = f"{self.severity}: {visible(shortened(self.message))}"
@@ -91,9 +109,12 @@ class Problems:
     A problem in an array is reported for the first instance: ``about`` identifies it in all instances, although the
     message names one.  A fault of a composite class is reported for its first use: ``scope`` is the path of the
     instance that has it, and a problem at one place is reported for the first of them.
+
+    ``kind`` is that of problems for which no other is given: what the present pass looks for.
     """
 
-    def __init__(self) -> None:
+    def __init__(self, kind: Kind = OTHER) -> None:
+        self.kind = kind
         self._kept: dict[object, Problem] = {}
         self._warnings: dict[object, Problem] = {}
         self._count = 0
@@ -118,10 +139,26 @@ class Problems:
         """What is odd but not wrong, so far."""
         return tuple(self._warnings.values())
 
-    def warn(self, message: str, position: Position | None = None, *hints: str, about: tuple[str, ...] = ()) -> None:
+    @contextmanager
+    def looking_for(self, kind: Kind) -> Iterator[None]:
+        """A pass that looks for a kind of problems."""
+        outer, self.kind = self.kind, kind
+        try:
+            yield
+        finally:
+            self.kind = outer
+
+    def warn(
+        self,
+        message: str,
+        position: Position | None = None,
+        *hints: str,
+        kind: Kind,
+        about: tuple[str, ...] = (),
+    ) -> None:
         """Note something that may be intended but probably is not; it does not count as a problem."""
         if len(self._warnings) < MAX_PROBLEMS:
-            warning = Problem(message, position, hints, "warning")
+            warning = Problem(message, position, hints, "warning", kind=kind)
             self._warnings.setdefault((about, position) if about else warning, warning)
 
     def add(
@@ -133,12 +170,20 @@ class Problems:
         about: tuple[str, ...] = (),
         raised: Position | None = None,
         cause: BaseException | None = None,
+        kind: Kind | None = None,
+        near: tuple[str, Iterable[str]] = ("", ()),
+        fix: Fix | None = None,
     ) -> Poison:
         """Note a problem; each hint becomes a line of help.  One too many raises all problems as a ModelError.
 
-        ``cause`` is an exception in a user's code, and ``raised`` where it comes from.
+        ``cause`` is an exception in a user's code, and ``raised`` where it comes from.  ``near`` is a wrong name and
+        the right ones: the nearest of them ends the message, and is a ``fix``.
         """
-        problem = Problem(message, position, hints, raised=raised)
+        name, candidates = near
+        if name and (meant := nearest(name, candidates)) is not None:
+            message += f", did you mean {meant!r}?"
+            fix = fix or instead(position, name, meant)
+        problem = Problem(message, position, hints, raised=raised, kind=kind or self.kind, fix=fix)
         key = (about, position) if about else problem
         if key in self._kept:
             return POISON
@@ -158,8 +203,8 @@ class Problems:
             raise self._error() from self._cause
 
     def stop(self, message: str, position: Position | None, *hints: str, scope: str = "") -> NoReturn:
-        """Note a problem after which nothing can continue, and raise all as one ModelError."""
-        self.add(message, position, *hints, scope=scope)
+        """Note that a model is too large to continue, and raise all problems as one ModelError."""
+        self.add(message, position, *hints, scope=scope, kind=SIZE)
         raise self._error() from self._cause
 
     def whole(self, made: T | Poison | None) -> T:
@@ -178,6 +223,17 @@ class Problems:
             return -1, 0, 0
         files = list(dict.fromkeys(each.position.file for each in self.found if each.position is not None))
         return files.index(at.file), at.line, at.column
+
+
+def instead(at: Position | None, wrong: str, right: str) -> Fix | None:
+    """One name in place of another that is at a place; None if it is not there, or there twice."""
+    if at is None:
+        return None
+    start = at.column - 1
+    found = [*re.finditer(rf"(?<!\w){re.escape(wrong)}(?!\w)", at.source[start : start + at.length])]
+    if len(found) != 1:
+        return None
+    return Fix(replace(at, column=at.column + found[0].start(), length=len(wrong)), right)
 
 
 def told_raised(at: Position) -> list[str]:

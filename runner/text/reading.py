@@ -6,9 +6,11 @@ import re
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
-from epicycle.actors import did_you_mean, nearest
+from epicycle.actors import nearest
 
 from .document import Entry, Mapping, Node, Scalar, Sequence
+from .kinds import NAME as NOT_A_NAME
+from .kinds import UNKNOWN_KEY
 from .problems import POISON, Poison, Position, Problems
 
 SURE = 0.75  # how similar a key must be to the valid one that it is read as
@@ -42,7 +44,8 @@ class NodeReader:
                 known[key] = entry
             else:
                 hint = f"valid keys: {', '.join(valid)}"
-                self.problems.add(f"{what} has no key {key!r}{did_you_mean(key, valid)}", entry.key.position, hint)
+                said, at = f"{what} has no key {key!r}", entry.key.position
+                self.problems.add(said, at, hint, kind=UNKNOWN_KEY, near=(key, valid))
                 # Continue as if it were spelled correctly; otherwise it would seem to be missing as well.  But only if
                 # there is no doubt; otherwise its value would be checked as something else.
                 if (meant := nearest(key, valid, SURE)) is not None and meant not in node.entries:
@@ -60,7 +63,7 @@ class NodeReader:
             if NAME.match(name):
                 found.append((name, entry))
             else:
-                self.problems.add(f"{name!r} is not a name", entry.key.position, NAMES_HAVE)
+                self.problems.add(f"{name!r} is not a name", entry.key.position, NAMES_HAVE, kind=NOT_A_NAME)
         return found
 
     def items(self, node: Node, what: str) -> tuple[Node, ...] | Poison:
@@ -90,7 +93,7 @@ class NodeReader:
     def name(self, node: Node, what: str) -> str | Poison:
         text = self.text(node, what)
         if text is not POISON and not NAME.match(text):
-            return self.problems.add(f"{what} {text!r} is not a name", node.position, NAMES_HAVE)
+            return self.problems.add(f"{what} {text!r} is not a name", node.position, NAMES_HAVE, kind=NOT_A_NAME)
         return text
 
 

@@ -25,6 +25,7 @@ from ...language.study import RESERVED, Study, study_of_text
 from ...language.study_metric import StudyMetric
 from ...text.document import plain
 from ...text.files import Noted, noting
+from ...text.kinds import OF_STUDY
 from ...text.problems import ModelError, Problems
 from ..provenance import version_of
 from .columns import Column, check_metric, columns_of
@@ -94,7 +95,7 @@ class Plan:
 
         Raises ``ModelError`` with all problems in any of them.
         """
-        problems = Problems()
+        problems = Problems(OF_STUDY)
         read = _Read()
         firsts = [0] * len(study.dimensions)
         sources = _tried(study, firsts, read, problems)
@@ -172,7 +173,7 @@ class Plan:
         if wrong := [name for name, is_wrong in unlike.items() if is_wrong]:
             found = ", ".join(map(repr, wrong))
             raise EpicycleError(f"the manifest of {study.name} is damaged: {found} does not match the study's text")
-        problems = Problems()
+        problems = Problems(OF_STUDY)
         study.questions.check(names, problems)
         problems.raise_if_any()
         columns = {name: Column(**said) for name, said in manifest["columns"].items()}
@@ -369,7 +370,7 @@ def _load(study: Study, level: Level) -> Model:
     )
     if study.stop is not None:
         model.stop = study.stop
-    problems = Problems()
+    problems = Problems(OF_STUDY)
     for name, text in study.monitors.items():
         try:
             model.monitor(name, text.text)

@@ -1,0 +1,46 @@
+"""The desk: what an editor asks about a model while somebody writes it.
+
+Functions of a text and a place in it, on top of the passes that load a model: ``read`` gives what is wrong and what is
+known so far, ``complete`` what may be written, ``hover``, ``definition``, ``references`` and ``symbols`` what stands
+there, ``fix`` and ``rename`` changes of the text.
+"""
+
+from .changes import Edit, RenameError, apply, fix, fix_all, rename, texts_after
+from .comparing import Change, Difference, contents, difference
+from .completion import Suggestion, complete
+from .kinds_page import page
+from .knowledge import Knowledge
+from .meaning import Symbol, definition, hover, path_of, references, symbols
+from .places import lines_of
+from .problem_data import as_data, of_problems, report
+from .reading import Reading, read
+
+__all__ = [
+    "Change",
+    "Difference",
+    "Edit",
+    "Knowledge",
+    "Reading",
+    "RenameError",
+    "Suggestion",
+    "Symbol",
+    "apply",
+    "as_data",
+    "complete",
+    "contents",
+    "definition",
+    "difference",
+    "fix",
+    "fix_all",
+    "hover",
+    "lines_of",
+    "of_problems",
+    "page",
+    "path_of",
+    "read",
+    "references",
+    "rename",
+    "report",
+    "symbols",
+    "texts_after",
+]

@@ -1,0 +1,199 @@
+"""Changes of texts: what removes a problem, and another name for something, in all files that use it."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from epicycle.actors import EpicycleError, Parameter
+
+from ..language.ports import ParameterText
+from ..text.document import Mapping as MappingNode
+from ..text.document import Node
+from ..text.problems import Position, Problem
+from ..text.reading import NAME, NAMES_HAVE
+from .knowledge import Knowledge
+from .names import MODEL, Name
+from .reading import NO_TEXTS, Reading, Texts, read
+
+_PLAIN = re.compile(r"[A-Za-z0-9_.+*/^%° -]+\Z")
+
+
+@dataclass(frozen=True)
+class Edit:
+    """A text in place of a stretch of one line of a file; line and columns count from 0."""
+
+    path: Path
+    line: int
+    start: int
+    end: int
+    text: str
+
+
+class RenameError(EpicycleError):
+    """A name that cannot be changed, or not into that one."""
+
+
+def apply(text: str, edits: Iterable[Edit]) -> str:
+    """A text with changes, of which no two overlap."""
+    lines = re.split("(\r\n|[\n\r\x85\u2028\u2029])", text)
+    for edit in sorted(edits, key=lambda each: (each.line, each.start), reverse=True):
+        place = 2 * edit.line
+        lines[place] = lines[place][: edit.start] + edit.text + lines[place][edit.end :]
+    return "".join(lines)
+
+
+# -- fixes ------------------------------------------------------------------------------------------------------------
+
+
+def fix(knowledge: Knowledge, problem: Problem) -> Edit | None:
+    """The change that a problem asks for, if a program may make it."""
+    found = problem.fix
+    if found is None or (at := found.position).file not in knowledge.reading.files:
+        return None
+    path = knowledge.reading.files[at.file][0]
+    if found.key:
+        return _missing(knowledge, at, found.key, path)
+    text = at.source[at.column - 1 : at.column - 1 + at.length]
+    quote = text[:1] if text[:1] in "'\"" and text[-1:] == text[:1] else ""
+    new = found.text if not quote or _PLAIN.match(found.text) is None else f"{quote}{found.text}{quote}"
+    return Edit(path, at.line - 1, at.column - 1, at.column - 1 + at.length, new)
+
+
+def fix_all(knowledge: Knowledge) -> list[Edit]:
+    """The changes that all problems ask for, the first one at each place."""
+    found: dict[tuple[Path, int, int], Edit] = {}
+    for problem in knowledge.reading.problems:
+        if (edit := fix(knowledge, problem)) is not None:
+            found.setdefault((edit.path, edit.line, edit.start), edit)
+    return list(found.values())
+
+
+def _missing(knowledge: Knowledge, at: Position, key: str, path: Path) -> Edit | None:
+    """A value for a parameter that has none, after the type of the part."""
+    found = _part_at(knowledge.reading.nodes.get(at.file), at)
+    if found is None:
+        return None
+    keys, part = found
+    value = sample(knowledge.parameter(keys[0], (*keys[1:], key)))
+    if value is None or "type" not in part.entries:
+        return None
+    said = part.entries["type"]
+    behind, start = said.value.position, part.position
+    line, end = behind.line - 1, behind.column - 1 + behind.length
+    is_flow = start.source[start.column - 1 : start.column] == "{"
+    indent = " " * (said.key.position.column - 1)
+    return Edit(path, line, end, end, f", {key}: {value}" if is_flow else f"\n{indent}{key}: {value}")
+
+
+def _part_at(root: Node | None, at: Position) -> tuple[tuple[str, ...], MappingNode] | None:
+    """The mapping of an actor or aspect whose name is at a position, its class, its section and name."""
+    if not isinstance(root, MappingNode):
+        return None
+    owners = {MODEL: root}
+    if "composites" in root.entries and isinstance(inner := root.entries["composites"].value, MappingNode):
+        owners |= {name: e.value for name, e in inner.entries.items() if isinstance(e.value, MappingNode)}
+    for owner, mapping in owners.items():
+        for section in ("actors", "aspects"):
+            parts = mapping.entries[section].value if section in mapping.entries else None
+            for name, entry in parts.entries.items() if isinstance(parts, MappingNode) else ():
+                if entry.key.position == at and isinstance(entry.value, MappingNode):
+                    return (owner, section, name), entry.value
+    return None
+
+
+def sample(parameter: Parameter[Any] | ParameterText | None) -> str | None:
+    """A value that a parameter takes; None if only its author can know one."""
+    if parameter is None or (isinstance(parameter, Parameter) and parameter.shape is not None):
+        return None
+    if parameter.choices:
+        return str(next(iter(parameter.choices)))
+    kind = parameter.type if isinstance(parameter, Parameter) else float
+    if kind is bool:
+        return "true"
+    if kind not in (int, float, int | float):
+        return None
+    low, high = parameter.min, parameter.max
+    if isinstance(low, str) or isinstance(high, str):
+        return None
+    value = 1 if (low is None or low <= 1) and (high is None or high >= 1) else low if low is not None else high
+    unit = parameter.unit if parameter.unit not in ("", "1") else ""
+    return f"{value:g} {unit}".rstrip() if isinstance(value, (int, float)) else None
+
+
+# -- names ------------------------------------------------------------------------------------------------------------
+
+
+def rename(knowledge: Knowledge, line: int, column: int, new: str, texts: Texts = NO_TEXTS) -> list[Edit]:
+    """Give what stands at a line and column another name, wherever it is used; raises ``RenameError``.
+
+    The model afterwards must be what it was before: as many actors, connections, and places of aspects.
+    """
+    reading, names = knowledge.reading, knowledge.names
+    use = names.at(knowledge.file, line, column)
+    if use is None:
+        raise RenameError("there is no name here that can be changed")
+    name, *others = sorted(use.names, key=str)
+    if others:
+        raise RenameError(f"{name.name!r} stands for several things here: {_owners(use.names)}")
+    if not NAME.match(new):
+        raise RenameError(f"{new!r} is not a name: {NAMES_HAVE}")
+    beside = ("actor", "port", "aspect") if name.kind in ("actor", "port", "aspect") else (name.kind,)
+    owners = [each for each in names.classes if name.owner in names.bases(each)]
+    if any(names.name_of(each, kind, new) for each in owners for kind in beside):
+        raise RenameError(f"there is already {'an' if new[0] in 'aeiou' else 'a'} {new!r} there")
+    edits = []
+    for each in names.of(name):
+        at = each.position
+        if len(each.names) > 1:
+            raise RenameError(f"{at}: the name stands for several things: {_owners(each.names)}; change it by hand")
+        path = reading.files[at.file][0] if at.file in reading.files else Path(at.file)
+        edits.append(Edit(path, at.line - 1, at.column - 1, at.column - 1 + at.length, new))
+    edits = list(dict.fromkeys(edits))
+    _check(reading, edits, name, texts)
+    return edits
+
+
+def _owners(names: Iterable[Name]) -> str:
+    return " and ".join(sorted(f"{each.kind} {each.name!r} of {each.owner or 'the model'}" for each in names))
+
+
+def _check(reading: Reading, edits: list[Edit], name: Name, texts: Texts) -> None:
+    """Raise ``RenameError`` if the model would be another one."""
+    changed: dict[Path, str] = dict(texts)
+    for path, text in dict(reading.files.values()).items():
+        if mine := [each for each in edits if each.path == path]:
+            changed[path.resolve()] = apply(text, mine)
+    after = read(reading.path, changed, reading.types)
+    if _shape(after) != _shape(reading):
+        new = [each for each in after.problems if each.severity == "error"]
+        why = str(new[0]) if new and reading.is_valid else "the model would be another one"
+        raise RenameError(f"{name.name!r} is also used where it cannot be changed by a program: {why}")
+
+
+def _shape(reading: Reading) -> object:
+    """What a new name must not change."""
+    problems = sorted((each.kind.code, each.position.line if each.position else 0) for each in reading.problems)
+    model = reading.loading.model
+    if model is None:
+        return problems
+    kinds: dict[str, int] = {}
+    for each in model.graph.components.values():
+        kinds[each.kind] = kinds.get(each.kind, 0) + 1
+    aspects = [len(each.places) for each in model.aspects]
+    output = model.output
+    ports = [len(each.ports) for each in output.metrics]
+    counts = (sorted(kinds.values()), len(list(model.graph.edges)), aspects, len(output.recorded), ports)
+    return problems, counts, len(output.monitors), len(model.parameters)
+
+
+def texts_after(reading: Reading, edits: Iterable[Edit]) -> Mapping[Path, str]:
+    """The texts of a model's files after changes, by path."""
+    found: dict[Path, list[Edit]] = {}
+    for each in edits:
+        found.setdefault(each.path, []).append(each)
+    texts = dict(reading.files.values())
+    return {path: apply(texts[path], each) for path, each in found.items()}

@@ -1,0 +1,223 @@
+"""What may be written at a place."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from epicycle.actors import units_like
+from epicycle.actors.expression import FUNCTIONS
+
+from ..catalogue.packaged import packaged_models
+from ..text.document import Mapping
+from .knowledge import Keys, Knowledge, Known, owner_of
+from .names import MODEL
+from .places import Place, lines_of, place_at
+from .reading import NO_TEXTS, Texts, read
+from .schema import allowed, applying, language
+
+_WORD = re.compile(r"[\w*]*(?:\[[^\]]*\]?)?\Z")
+_PATH = re.compile(r"!?\s*((?:[\w*]+(?:\[[^\]\s]*\])?\.)*)[\w*\[\]]*\Z")
+_QUANTITY = re.compile(r"\s*[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?(\s*)([^\s\d]*)\Z")
+_ENDS = re.compile(r"->|=>|,|\[(?![\d*.])")
+_AT_OUTPUTS = frozenset({"output"})
+_ANYWHERE = frozenset({"input", "output"})
+_OF_PORTS = {"of", "record", "stop_when", "property", "signals", "robots", "obstacle"}
+
+
+@dataclass(frozen=True)
+class Suggestion:
+    """Something that may be written: it takes the place of so many characters before the cursor.
+
+    ``kind`` is key, type, actor, port, parameter, value, unit, path, function or file.
+    """
+
+    text: str
+    kind: str
+    what: str = ""
+    doc: str = ""
+    replaces: int = 0
+
+
+def complete(
+    path: Path, line: int, column: int, texts: Texts = NO_TEXTS, types: tuple[type, ...] = ()
+) -> list[Suggestion]:
+    """What may be written in a file at a line and column, which count from 0."""
+    text = texts.get(path.resolve())
+    if text is None:
+        text = path.read_text(encoding="utf-8", errors="replace")
+    place = place_at(text, line, column)
+    if place is None:
+        return []
+    knowledge = Knowledge(read(path, {**texts, path.resolve(): place.text}, types))
+    follows = lines_of(text)[line][column:]
+    found = list(_keys(place, knowledge, follows) if place.is_key else _values(place, knowledge))
+    if not place.is_key and lines_of(text)[line][:column].strip() == place.before:  # perhaps a first key
+        found += _keys(place, knowledge, follows)
+    return list({(each.text, each.kind): each for each in found}.values())
+
+
+# -- keys -------------------------------------------------------------------------------------------------------------
+
+
+def _keys(place: Place, knowledge: Knowledge, follows: str) -> Iterator[Suggestion]:
+    root, mapping = language(knowledge.reading.types), place.mapping() if place.is_key else None
+    there = set(mapping.entries) if mapping is not None else set()
+    ending = "" if re.match(r"\w*\s*:", follows) else ": "
+    found: dict[str, tuple[str, str]] = {}
+    for each in allowed(root, place.around[0], place.keys):
+        for key, said in each.get("properties", {}).items():
+            if isinstance(said, dict) and key not in found:
+                doc = next(
+                    (each["description"] for each in applying(root, [said], place.around[-1]) if "description" in each),
+                    "",
+                )
+                found[key] = "", doc
+    owner, keys = owner_of(place.keys)
+    if len(keys) == 2 and keys[0] in ("actors", "aspects"):
+        for kind in knowledge.names.inner(owner, str(keys[1])):
+            for name, parameter in knowledge.composite_parameters(kind).items():
+                found[name] = f"parameter of {kind}", parameter.doc
+    for key, (what, doc) in found.items():
+        if key not in there:
+            yield Suggestion(key + ending, "key", what, doc, len(place.before))
+
+
+# -- values -----------------------------------------------------------------------------------------------------------
+
+
+def _values(place: Place, knowledge: Knowledge) -> Iterator[Suggestion]:
+    owner, keys = owner_of(place.keys)
+    before = place.before
+    named = [key for key in keys if isinstance(key, str)]
+    if before.rfind("${") > before.rfind("}"):
+        yield from _names(owner, before, knowledge)
+    elif keys[:1] == ("connections",):
+        yield from _ends(owner, keys, before, knowledge, place)
+    elif named[-1:] == ["type"]:
+        yield from _types(owner, keys, before, knowledge, place)
+    elif named[-1:] in (["extends"], ["include"]):
+        yield from _files(owner, named[-1], before, knowledge)
+    elif named[-1:] == ["inherit"]:
+        names = ["all", *knowledge.names.declared(owner, "parameter")]
+        yield from (Suggestion(each, "parameter", replaces=len(before)) for each in names)
+    else:
+        yield from _plain(owner, keys, before, knowledge, place)
+
+
+def _names(owner: str, before: str, knowledge: Knowledge) -> Iterator[Suggestion]:
+    """Inside of an expression."""
+    word = re.search(r"\w*\Z", before)
+    length = 0 if word is None else len(word[0])
+    model = knowledge.reading.loading.model
+    values = model.parameters if model is not None and owner == MODEL else {}
+    for name in knowledge.names.declared(owner, "parameter"):
+        said = model.declared[name].doc if model is not None and owner == MODEL and name in model.declared else ""
+        yield Suggestion(name, "parameter", f"= {values[name]}" if name in values else "", said, length)
+    yield Suggestion("index", "parameter", "the index of an instance in its array", "", length)
+    yield from (Suggestion(name, "function", replaces=length) for name in sorted(FUNCTIONS))
+
+
+def _ends(owner: str, keys: Keys, before: str, knowledge: Knowledge, place: Place) -> Iterator[Suggestion]:
+    """The ends of a connection."""
+    named = [key for key in keys if isinstance(key, str)]
+    if named[-1:] == ["delay"]:
+        yield from _units("s", before)
+        return
+    if named[-1:] in (["all"], ["shared"]):
+        yield from (Suggestion(each, "value", replaces=len(before)) for each in ("true", "false"))
+        return
+    is_source = named[-1] == "from" if named[-1] in ("from", "to") else not re.search("->|=>", before)
+    direction = "output" if is_source else "input"
+    part = _ENDS.split(before)[-1].lstrip()
+    actor, dot, port = part.rpartition(".")
+    if dot:
+        name = actor.partition("[")[0]
+        yield from _known(knowledge.ports_of(owner, name, direction), "port", len(port))
+        return
+    for name, entry in knowledge.names.declared(owner, "actor").items():
+        if not any(knowledge.ports_of(owner, name, direction)) and knowledge.names.types_of(owner, name):
+            continue
+        is_array = isinstance(entry.value, Mapping) and "count" in entry.value.entries
+        kind = ", ".join(knowledge.names.types_of(owner, name))
+        yield Suggestion(f"{name}[*]" if is_array else name, "actor", kind, "", len(part))
+    # Seen from inside, tokens come from an own input.
+    own = knowledge.own_ports(owner, "input" if is_source else "output") if owner != MODEL else ()
+    yield from _known(own, "port", len(part))
+
+
+def _types(owner: str, keys: Keys, before: str, knowledge: Knowledge, place: Place) -> Iterator[Suggestion]:
+    section = str(keys[0])
+    if len(keys) == 3 and section in ("actors", "aspects"):
+        for name in knowledge.names.classes:
+            if name:
+                yield Suggestion(name, "type", "composite", knowledge.of_type(name, section), len(before))
+    yield from _chosen(place, knowledge, "type")
+    if "at" in keys:  # of a pointcut
+        graph = knowledge.graph
+        kinds = dict.fromkeys(each.kind for each in graph.components.values()) if graph is not None else ()
+        yield from (Suggestion(kind, "type", replaces=len(before)) for kind in kinds)
+
+
+def _files(owner: str, key: str, before: str, knowledge: Knowledge) -> Iterator[Suggestion]:
+    if key == "extends" and owner != MODEL:
+        classes = (each for each in knowledge.names.classes if each not in ("", owner))
+        yield from (Suggestion(each, "type", "composite", replaces=len(before)) for each in classes)
+        return
+    folder, own = knowledge.reading.path.parent, knowledge.reading.path
+    for each in sorted((*folder.glob("*.yaml"), *folder.glob("*/*.yaml")))[:200]:
+        if each != own:
+            yield Suggestion(each.relative_to(folder).as_posix(), "file", replaces=len(before))
+    if key == "extends":
+        yield from (Suggestion(each, "file", "a packaged model", replaces=len(before)) for each in packaged_models())
+
+
+def _plain(owner: str, keys: Keys, before: str, knowledge: Knowledge, place: Place) -> Iterator[Suggestion]:
+    yield from _chosen(place, knowledge, "value")
+    yield from _units(knowledge.unit_of(owner, keys), before)
+    parameter = knowledge.parameter(owner, keys)
+    choices: Iterable[Any] = getattr(parameter, "choices", ()) or ()
+    yield from (Suggestion(str(each), "value", replaces=len(before)) for each in choices)
+    named = [key for key in keys if isinstance(key, str)]
+    at = "at" in named[2:] and keys[0] == "aspects"
+    if at and named[-1] == "port":
+        return
+    directions = _AT_OUTPUTS
+    if at:
+        kind = next(iter(knowledge.names.types_of(owner, named[1])), "")
+        cls: Any = knowledge.type_called(kind, "aspects")
+        directions = frozenset() if cls is not None and not cls.at_ports else getattr(cls, "stands_at", _ANYWHERE)
+    elif not _OF_PORTS & set(named) and "." not in before:
+        return
+    tail = re.split(r"->|[\s,(\[](?![\d*])", before)[-1]
+    if (found := _PATH.match(tail)) is not None:
+        start = found[1]
+        word = tail[found.end(1) :]
+        yield from _known(knowledge.next_names(owner, start, frozenset(directions)), "path", len(word))
+
+
+def _units(unit: str, before: str) -> Iterator[Suggestion]:
+    if unit and (found := _QUANTITY.match(before)) is not None:
+        gap = "" if found[1] else " "
+        for each in units_like(unit):
+            yield Suggestion(f"{gap}{each}", "unit", "the parameter's unit" if each == unit else "", "", len(found[2]))
+
+
+def _chosen(place: Place, knowledge: Knowledge, kind: str) -> Iterator[Suggestion]:
+    """The values that the schema lists."""
+    root = language(knowledge.reading.types)
+    for each in allowed(root, place.around[0], place.keys):
+        docs = each.get("enumDescriptions", ())
+        for number, value in enumerate(each.get("enum", ())):
+            doc = docs[number] if number < len(docs) else ""
+            yield Suggestion(str(value), kind, "", doc, len(place.before))
+        kinds = each["type"] if isinstance(each.get("type"), list) else [each.get("type")]
+        if "boolean" in kinds and "number" not in kinds:
+            yield from (Suggestion(said, kind, "", "", len(place.before)) for said in ("true", "false"))
+
+
+def _known(found: Iterable[Known], kind: str, replaces: int) -> Iterator[Suggestion]:
+    return (Suggestion(each.name, kind, each.what, each.doc, replaces) for each in found)

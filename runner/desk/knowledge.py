@@ -1,0 +1,200 @@
+"""What a text and the installed types say of what stands at a place: types, ports, parameters, paths."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from epicycle.actors import Parameter, counted, declared_parameters, declared_ports, has_own_ports, type_name
+
+from ..catalogue.metrics import MetricSpec
+from ..catalogue.reference import doc_of, first_sentence
+from ..catalogue.types import Catalogue, CatalogueError, figure_types, installed
+from ..graph.model_graph import ModelGraph
+from ..language.ports import ParameterText
+from ..temporal import Requirement
+from ..text.patterns import PatternError, in_general, select
+from .names import MODEL, Names
+from .reading import Reading
+
+Keys = tuple[str | int, ...]
+_OF_KEYS: dict[Keys, str] = {("run", "stop"): "s"}  # units of what is no parameter
+
+
+@dataclass(frozen=True)
+class Known:
+    """A name that may stand somewhere, and what it is."""
+
+    name: str
+    what: str
+    doc: str = ""
+
+
+class Knowledge:
+    """What is known while a text is read; the text is ``file``, which may be one that the model includes."""
+
+    def __init__(self, reading: Reading, file: Path | None = None) -> None:
+        self.reading = reading
+        self.names = Names(reading)
+        known = reading.files.items()
+        wanted = (reading.path if file is None else file).resolve()
+        self.file = next((name for name, (path, _) in known if path.resolve() == wanted), reading.name)
+
+    @property
+    def text(self) -> str:
+        return self.reading.files[self.file][1] if self.file in self.reading.files else ""
+
+    @cached_property
+    def catalogue(self) -> Catalogue:
+        return installed().with_types(self.reading.types)
+
+    @property
+    def graph(self) -> ModelGraph | None:
+        model = self.reading.loading.model
+        return None if model is None else model.graph
+
+    # -- types ----------------------------------------------------------------------------------------------------
+
+    def type_called(self, name: str, section: str) -> type | None:
+        """The class of an actor, aspect or figure type; None if there is none."""
+        types: Mapping[str, type] = self.catalogue.actors
+        if section != "actors":
+            types = self.catalogue.aspects if section == "aspects" else figure_types()
+        try:
+            return types.get(name)
+        except CatalogueError:
+            return None
+
+    def composite_parameters(self, name: str) -> Mapping[str, ParameterText]:
+        """The parameters of a composite class, with what their takers say of them."""
+        known = self.reading.loading.known
+        found = None if known is None else known.composites.get(name)
+        return found.parameters if found else {}
+
+    def parameter(self, owner: str, keys: Keys) -> Parameter[Any] | ParameterText | None:
+        """The parameter of which the value is at the end of some keys of a class."""
+        if len(keys) < 3 or not isinstance(name := keys[2], str):
+            return None
+        section, part = str(keys[0]), str(keys[1])
+        if section in ("metrics", "monitors"):
+            return declared_parameters(MetricSpec if section == "metrics" else Requirement).get(name)
+        for kind in self._types(owner, section, part):
+            if section in ("actors", "aspects") and kind in self.names.classes:
+                found: Parameter[Any] | ParameterText | None = self.composite_parameters(kind).get(name)
+            else:
+                cls = self.type_called(kind, section)
+                found = None if cls is None else declared_parameters(cls).get(name)
+            if found is not None:
+                return found
+        return None
+
+    def _types(self, owner: str, section: str, part: str) -> list[str]:
+        if section in ("actors", "aspects"):
+            return self.names.types_of(owner, part)
+        entry = self.names.declared(owner, section.removesuffix("s")).get(part)
+        entries = getattr(entry.value, "entries", {}) if entry is not None else {}
+        return [entries["type"].value.text] if "type" in entries and hasattr(entries["type"].value, "text") else []
+
+    def unit_of(self, owner: str, keys: Keys) -> str:
+        """The unit of a value; empty if it is no number."""
+        if keys[:1] == ("connections",) and keys[-1:] == ("delay",):
+            return "s"
+        if keys in _OF_KEYS:
+            return _OF_KEYS[keys]
+        found = self.parameter(owner, keys)
+        return "" if found is None or found.unit in ("", "1") else found.unit
+
+    # -- ports ----------------------------------------------------------------------------------------------------
+
+    def ports_of(self, owner: str, actor: str, direction: str) -> Iterator[Known]:
+        """The ports of an actor of a class."""
+        for kind in self.names.types_of(owner, actor):
+            if kind in self.names.classes:
+                yield from self.own_ports(kind, direction)
+            elif (cls := self.type_called(kind, "actors")) is not None:
+                for name, port in declared_ports(cls).items():
+                    if port.direction == direction:
+                        yield Known(name, type_name(port.type), port.doc)
+                if has_own_ports(cls):
+                    yield from self._ports_of_instance(owner, actor, direction, declared_ports(cls))
+
+    def own_ports(self, owner: str, direction: str) -> Iterator[Known]:
+        """The ports of a class."""
+        for name in self.names.ports(owner, direction):
+            entry = self.names.declared(owner, "port").get(name)
+            said = getattr(entry.value, "text", "") if entry is not None and entry.key is not entry.value else ""
+            inner = getattr(entry.value, "entries", {}) if entry is not None else {}
+            texts = {key: getattr(each.value, "text", "") for key, each in inner.items()}
+            yield Known(name, texts.get("type", said), texts.get("doc", ""))
+
+    def _ports_of_instance(self, owner: str, actor: str, direction: str, but: Mapping[str, Any]) -> Iterator[Known]:
+        graph = self.graph
+        for scope in self.scopes(owner) if graph is not None else ():
+            assert graph is not None
+            for path in (f"{scope}{actor}", f"{scope}{actor}[0]"):
+                if path in graph.actors:
+                    made = graph.actors[path]
+                    ports = made.inputs if direction == "input" else made.outputs
+                    yield from (Known(n, type_name(p.type), p.doc) for n, p in ports.items() if n not in but)
+                    return
+
+    # -- paths ----------------------------------------------------------------------------------------------------
+
+    def scopes(self, owner: str) -> list[str]:
+        """What the paths inside the instances of a class begin with."""
+        if owner == MODEL:
+            return [""]
+        found = self.graph.components.items() if self.graph is not None else ()
+        return [f"{path}." for path, each in found if each.kind == owner]
+
+    def next_names(self, owner: str, start: str, directions: frozenset[str]) -> Iterator[Known]:
+        """What may follow a pattern, which is empty or ends with a dot: components and ports, and what they match."""
+        graph, scope = self.graph, next(iter(self.scopes(owner)), None)
+        if graph is None or scope is None:
+            return
+        holders = [path for path in graph.components if path.startswith(scope) and path + "." != scope]
+        if start:
+            try:
+                chosen = select(scope + start[:-1], holders)
+            except PatternError:
+                return
+        else:
+            chosen = [scope[:-1]] if scope else [""]
+        parts: dict[str, str] = {}
+        ports: dict[str, int] = {}
+        inside = {f"{path}." if path else "" for path in chosen}
+        for path, component in graph.components.items():
+            if path and _before_last(path) in inside:
+                parts.setdefault(in_general(path.rpartition(".")[2]), component.kind)
+        for path in graph.ports:
+            if _before_last(path) in inside and graph.direction(path) in directions:
+                ports[path.rpartition(".")[2]] = ports.get(path.rpartition(".")[2], 0) + 1
+        yield from (Known(name, kind) for name, kind in parts.items())
+        for name, number in ports.items():
+            yield Known(name, f"matches {counted(number, 'port')}")
+        if not start and parts:
+            yield Known("*", f"matches {counted(len(parts), 'name')}")
+
+    # -- words ----------------------------------------------------------------------------------------------------
+
+    def of_type(self, name: str, section: str) -> str:
+        """What a type is, in a sentence."""
+        if name in self.names.classes and name:
+            texts = (each.entries["doc"].value for each in self.names.classes[name].mappings if "doc" in each.entries)
+            return first_sentence(next((getattr(each, "text", "") for each in texts), ""))
+        cls = self.type_called(name, section)
+        return "" if cls is None else first_sentence(doc_of(cls))
+
+
+def _before_last(path: str) -> str:
+    return path[: path.rfind(".") + 1]
+
+
+def owner_of(keys: Keys) -> tuple[str, Keys]:
+    """The class that keys of a file lead into, and the rest of them."""
+    if keys[:1] == ("composites",) and len(keys) > 1:
+        return str(keys[1]), keys[2:]
+    return MODEL, keys

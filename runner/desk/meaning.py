@@ -1,0 +1,178 @@
+"""What stands at a place means: its description, where it is declared, where it is used; and the outline of a file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from epicycle.actors import declared_ports, type_name
+
+from ..catalogue.reference import as_written, shown
+from ..language.files import named_file
+from ..shown import short
+from ..text.document import Mapping, Node, Scalar, Sequence
+from ..text.patterns import in_general
+from ..text.problems import Position, Problems
+from ..text.reading import Text
+from .knowledge import Keys, Knowledge, owner_of
+from .names import MODEL, SECTIONS, Name, Use
+from .places import place_at
+from .schema import allowed, language
+
+
+@dataclass(frozen=True)
+class Symbol:
+    """Something that a file declares, and what is in it."""
+
+    name: str
+    kind: str
+    position: Position
+    inside: tuple[Symbol, ...] = ()
+
+
+def definition(knowledge: Knowledge, line: int, column: int) -> list[Position]:
+    """Where what stands at a line and column of the file is declared; they count from 0."""
+    names = knowledge.names
+    if (use := names.at(knowledge.file, line, column)) is not None:
+        return [each.position for each in _uses(knowledge, use) if each.declares]
+    place = place_at(knowledge.text, line, column)
+    keys = [key for key in place.keys if isinstance(key, str)] if place is not None and not place.is_key else []
+    if place is None or keys not in (["extends"], ["include"]):
+        return []
+    said = Text(place.whole, Position(knowledge.file, line + 1, column + 1, 0, ""))
+    folder = Path(knowledge.file).parent
+    path = named_file(said, folder, "model", Problems()) if keys == ["extends"] else folder / place.whole
+    return [Position(str(path), 1, 1, 0, "")] if path is not None and path.is_file() else []
+
+
+def references(knowledge: Knowledge, line: int, column: int) -> list[Position]:
+    """Where what stands at a line and column stands elsewhere, its declaration included."""
+    use = knowledge.names.at(knowledge.file, line, column)
+    return [] if use is None else [each.position for each in _uses(knowledge, use)]
+
+
+def _uses(knowledge: Knowledge, use: Use) -> list[Use]:
+    found = {each.position: each for name in use.names for each in knowledge.names.of(name)}
+    return list(found.values())
+
+
+# -- descriptions -----------------------------------------------------------------------------------------------------
+
+
+def hover(knowledge: Knowledge, line: int, column: int) -> str:
+    """What stands at a line and column, in Markdown; empty if that is nothing."""
+    use = knowledge.names.at(knowledge.file, line, column)
+    parts = [_of_name(knowledge, name) for name in sorted(use.names, key=str)] if use is not None else []
+    place = place_at(knowledge.text, line, column)
+    if place is not None and not any(each.kind in ("actor", "port") for each in (use.names if use else ())):
+        parts += _of_place(knowledge, (*place.keys, place.whole) if place.is_key else place.keys, place.around[0])
+    return "\n\n".join(dict.fromkeys(each for each in parts if each))
+
+
+def _of_name(knowledge: Knowledge, name: Name) -> str:
+    names = knowledge.names
+    inside = f" of {name.owner}" if name.owner != MODEL else ""
+    if name.kind in ("actor", "aspect"):
+        types = names.types_of(name.owner, name.name)
+        said = [f"**{name.name}**: {name.kind}{inside}, {' or '.join(f'`{each}`' for each in types)}"]
+        said += [knowledge.of_type(each, f"{name.kind}s") for each in types]
+        return "\n\n".join([*said, *_places(knowledge, name)])
+    if name.kind == "port":
+        direction = "input" if name.name in names.ports(name.owner, "input") else "output"
+        found = next((each for each in knowledge.own_ports(name.owner, direction) if each.name == name.name), None)
+        words = [each for each in (found.what, found.doc) if each] if found is not None else []
+        return ": ".join([f"**{name.name}**: {direction}{inside}", *words])
+    if name.kind == "parameter":
+        return _of_parameter(knowledge, name)
+    if name.kind == "composite":
+        ports = ", ".join((*names.ports(name.name, "input"), "→", *names.ports(name.name, "output")))
+        return f"**{name.name}**: composite, {ports}\n\n{knowledge.of_type(name.name, 'actors')}".rstrip()
+    model = knowledge.reading.loading.model
+    metrics = model.output.metrics if model is not None else []
+    takes = next((f": {each.takes}" for each in metrics if each.name == name.name and name.kind == "metric"), "")
+    return f"**{name.name}**: {name.kind}{takes}"
+
+
+def _places(knowledge: Knowledge, name: Name) -> Iterator[str]:
+    """Where an aspect attaches."""
+    model = knowledge.reading.loading.model
+    if name.kind == "aspect" and model is not None:
+        for scope in knowledge.scopes(name.owner)[:1]:
+            for each in model.aspects:
+                if each.name == f"{scope}{name.name}":
+                    yield "at " + ", ".join(dict.fromkeys(f"`{in_general(place)}`" for place in each.places))
+
+
+def _of_parameter(knowledge: Knowledge, name: Name) -> str:
+    model = knowledge.reading.loading.model
+    found = knowledge.composite_parameters(name.owner).get(name.name)
+    text = f"**{name.name}**: parameter" + (f" of {name.owner}" if name.owner != MODEL else "")
+    if name.owner == MODEL and model is not None and name.name in model.parameters:
+        found, value = model.declared[name.name], model.parameters[name.name]
+        at = found.position
+        origin = f"from `{found.source}`" if "value" not in found.given and found.source else f"line {at.line}"
+        text += f" = `{short(value)}` ({origin})"
+    if found is None:
+        return text
+    limits = [
+        f"{key} {shown(as_written(value))}"
+        for key in ("min", "above", "max")
+        if (value := getattr(found, key)) is not None
+    ]
+    limits += [f"one of {', '.join(found.choices)}"] if found.choices else []
+    unit = [f"in {found.unit}"] if found.unit not in ("", "1") else []
+    return "\n\n".join(each for each in (text, ", ".join([*unit, *limits]), found.doc) if each)
+
+
+def _of_place(knowledge: Knowledge, keys: Keys, root: Node) -> Iterator[str]:
+    """What the language says of the value under some keys, and which value it has."""
+    known = language(knowledge.reading.types)
+    found = (each["description"] for each in allowed(known, root, keys) if "description" in each)
+    yield next(found, "")
+    owner, inner = owner_of(keys)
+    if len(inner) < 3 or inner[0] not in ("actors", "aspects"):
+        return
+    section, part, key = str(inner[0]), str(inner[1]), inner[2]
+    if key == "type":
+        for kind in knowledge.names.types_of(owner, part):
+            yield f"`{kind}`: {knowledge.of_type(kind, section)}"
+            if (cls := knowledge.type_called(kind, section)) is not None and section == "actors":
+                for port in declared_ports(cls).values():
+                    yield f"- {port.direction} `{port.name}` ({type_name(port.type)}): {port.doc}".rstrip(": ")
+    elif section == "actors" and knowledge.graph is not None:
+        for scope in knowledge.scopes(owner)[:1]:
+            actors = knowledge.graph.actors
+            made = actors.get(f"{scope}{part}") or actors.get(f"{scope}{part}[0]")
+            if made is not None and isinstance(key, str) and hasattr(made, key):
+                unit = knowledge.unit_of(owner, inner)
+                yield f"value of `{made.path}`: `{shown(as_written(getattr(made, key)))}`" + (
+                    f" {unit}" if unit else ""
+                )
+
+
+# -- the outline ------------------------------------------------------------------------------------------------------
+
+
+def symbols(node: Node | None) -> list[Symbol]:
+    """What a file declares, section by section."""
+    if not isinstance(node, Mapping):
+        return []
+    found = []
+    for key, entry in node.entries.items():
+        inside: list[Symbol] = []
+        if key in SECTIONS and isinstance(entry.value, Mapping):
+            for name, each in entry.value.entries.items():
+                inner = tuple(symbols(each.value)) if key == "composites" else ()
+                inside.append(Symbol(name, SECTIONS[key], each.key.position, inner))
+        elif key in SECTIONS and isinstance(entry.value, Sequence):
+            ports = (each for each in entry.value.items if isinstance(each, Scalar))
+            inside += (Symbol(each.text, SECTIONS[key], each.position) for each in ports)
+        found.append(Symbol(key, "section", replace(entry.key.position), tuple(inside)))
+    return found
+
+
+def path_of(knowledge: Knowledge, position: Position) -> Path:
+    """The file of a position."""
+    known = knowledge.reading.files.get(position.file)
+    return Path(position.file) if known is None else known[0]

@@ -1,0 +1,122 @@
+"""Where one is in a text, half-written or not: the keys that lead there, and what is written beside it.
+
+A mark is put at the place, and what is open there is closed, until the text can be parsed; the place is where the mark
+is found among the nodes.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+from ..text.document import Mapping, Node, Scalar, Sequence, parse
+from ..text.problems import Problems
+
+MARK = "epicycle_mark_here"
+_CLOSING = {"{": "}", "[": "]"}
+_QUOTED = re.compile(r"'(?:[^']|'')*'|\"(?:[^\"\\]|\\.)*\"|(?<![^\s])#.*")
+
+
+@dataclass(frozen=True)
+class Place:
+    """A place in a text.
+
+    ``keys`` lead to the value, or to the mapping of the key that is written there (``is_key``); ``before`` is what the
+    value or key has before the place, ``whole`` all of it.  ``around`` are the nodes along the keys, outermost first.
+    """
+
+    keys: tuple[str | int, ...]
+    is_key: bool
+    before: str
+    whole: str
+    around: tuple[Node, ...]
+    text: str  # as it was parsed, with the mark
+
+    def mapping(self, depth: int = 1) -> Mapping | None:
+        """The mapping that is so many levels around, if it is one."""
+        node = self.around[-depth] if len(self.around) >= depth else None
+        return node if isinstance(node, Mapping) else None
+
+
+def lines_of(text: str) -> list[str]:
+    """The lines of a text, as positions count them."""
+    return re.split("\r\n|[\n\r\x85\u2028\u2029]", text)
+
+
+def place_at(text: str, line: int, column: int) -> Place | None:
+    """The place at a line and column, which count from 0; None if the text is too broken to say."""
+    lines = lines_of(text)
+    if line >= len(lines):
+        return None
+    here = lines[line]
+    column = min(column, len(here))
+    # The word under the cursor belongs to the place.
+    end = column + len(re.match(r"\w*", here[column:])[0])  # type: ignore[index]
+    for tried in _attempts(lines, line, column, end):
+        if (root := parse(tried, "", Problems())) is not None and (found := _marked(root, tried)) is not None:
+            return found
+    return None
+
+
+def _attempts(lines: list[str], line: int, column: int, end: int) -> Iterator[str]:
+    """The text with the mark, as it is and completed in several ways."""
+    start, rest, above, below = lines[line][:column], lines[line][column:], lines[:line], lines[line + 1 :]
+    word, closing = lines[line][column:end], _closing(start)
+    indent = start[: len(start) - len(start.lstrip())]
+    for here in (
+        f"{start}{MARK}{rest}",
+        f"{start}{MARK}: {rest}",
+        f"{start} {MARK}{rest}",
+        f"{start}{MARK}{word}{closing}",
+        f"{start}{MARK}{word}: {closing}",
+        f"{start} {MARK}{closing}",
+        f"{start}{MARK}",
+        f"{start}{MARK}: ",
+    ):
+        yield "\n".join([*above, here, *below])
+        yield "\n".join([*above, here, *(each for each in below if _is_outside(each, indent))])
+        yield "\n".join([*above, here])
+        yield "\n".join([*above, here]) + _closing("\n".join([*above, start]))
+
+
+def _is_outside(line: str, indent: str) -> bool:
+    """Whether a line belongs to nothing that is written at this indentation or deeper."""
+    return not line.strip() or len(line) - len(line.lstrip()) < len(indent)
+
+
+def _closing(text: str) -> str:
+    """The brackets and the quote that a text leaves open, closed."""
+    left = _QUOTED.sub("", text)
+    quote = next((each for each in left if each in "'\""), "") if re.search(r"(?:^|[\s,\[{:])['\"]", left) else ""
+    if quote:
+        left = left[: left.index(quote)]
+    open_ones: list[str] = []
+    for each in left:
+        if each in _CLOSING:
+            open_ones.append(_CLOSING[each])
+        elif open_ones and each == open_ones[-1]:
+            open_ones.pop()
+    return quote + "".join(reversed(open_ones))
+
+
+def _marked(root: Node, text: str) -> Place | None:
+    waiting: list[tuple[Node, tuple[str | int, ...], tuple[Node, ...]]] = [(root, (), ())]
+    while waiting:
+        node, keys, around = waiting.pop()
+        if isinstance(node, Scalar):
+            if MARK in node.text:
+                return _place(keys, False, node.text, around, text)
+        elif isinstance(node, Sequence):
+            waiting += ((item, (*keys, number), (*around, node)) for number, item in enumerate(node.items))
+        else:
+            for key, entry in node.entries.items():
+                if MARK in key:
+                    return _place(keys, True, key, (*around, node), text)
+                waiting.append((entry.value, (*keys, key), (*around, node)))
+    return None
+
+
+def _place(keys: tuple[str | int, ...], is_key: bool, marked: str, around: tuple[Node, ...], text: str) -> Place:
+    before, _, after = marked.partition(MARK)
+    return Place(keys, is_key, before, before + after, around, text)

@@ -1,0 +1,101 @@
+"""A text under work, read by the passes that load a model: what is wrong with it, and what is known of it so far."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+from epicycle.actors import EpicycleError
+
+from ..build.load import Loading
+from ..catalogue.packaged import is_path, packaged_models
+from ..language.disturbance import load_disturbance
+from ..language.files import read_library
+from ..language.models import LIBRARY
+from ..language.study import read_study
+from ..text.document import Mapping as MappingNode
+from ..text.document import Node, parse
+from ..text.document import read as read_node
+from ..text.files import opened
+from ..text.kinds import FILE
+from ..text.problems import ModelError, Problem, Problems
+
+Texts = Mapping[Path, str]
+NO_TEXTS: Texts = MappingProxyType({})
+
+
+@dataclass(frozen=True)
+class Reading:
+    """What is known of a file.
+
+    ``problems`` are those that ``epicycle validate`` reports, with the warnings behind; ``more`` means that there are
+    others.  ``files`` are the texts that it is made of, by their names in messages, with their paths.
+    """
+
+    path: Path
+    problems: tuple[Problem, ...]
+    more: bool
+    loading: Loading
+    files: Mapping[str, tuple[Path, str]]
+    types: tuple[type, ...] = ()
+    nodes: Mapping[str, Node] = field(default_factory=dict)
+
+    @property
+    def is_valid(self) -> bool:
+        return all(each.severity != "error" for each in self.problems)
+
+    @property
+    def name(self) -> str:
+        """The file's name in messages."""
+        return str(self.path)
+
+
+def read(name: str | Path, texts: Texts = NO_TEXTS, types: Iterable[type] = (), **changes: Any) -> Reading:
+    """Read a model, a study, a disturbance, or a file of composite classes; never raises because of what it holds.
+
+    ``texts`` are read in place of files, by their resolved paths; ``types`` are classes that the model may name, and
+    ``changes`` those of ``load_model``.
+    """
+    is_file = isinstance(name, Path) or is_path(name)
+    path = Path(name) if is_file else packaged_models().get(str(name), Path(name))
+    types, loading = tuple(types), Loading()
+    found, more = list[Problem](), False
+    with opened(texts) as known:
+        try:
+            if is_file:
+                _passes(path, types, loading, changes)
+            else:
+                loading.passes(name, types=types, **changes)
+                loading.problems.raise_if_any()
+        except ModelError as error:
+            found, more = list(error.problems), error.more
+        except EpicycleError as error:
+            found = [Problem(str(error), kind=FILE)]
+    nodes = {name: parse(text, name, Problems()) for name, (_, text) in known.read.items()}
+    return Reading(
+        path,
+        (*found, *loading.problems.warnings),
+        more,
+        loading,
+        known.read,
+        types,
+        {name: node for name, node in nodes.items() if node is not None},
+    )
+
+
+def _passes(path: Path, types: tuple[type, ...], loading: Loading, changes: dict[str, Any]) -> None:
+    """Raises what is wrong with the file as ``ModelError``."""
+    node, problems = read_node(path, Problems()), loading.problems
+    keys = node.entries.keys() if isinstance(node, MappingNode) else set[str]()
+    if "study" in keys:
+        read_study(path)
+    elif "disturbance" in keys and "model" not in keys:
+        load_disturbance(f"./{path}" if path.parent == Path() else str(path), problems)
+    elif "composites" in keys and keys <= LIBRARY.keys.keys():
+        read_library(path, problems)
+    else:
+        loading.passes(path, types=types, **changes)
+    problems.raise_if_any()

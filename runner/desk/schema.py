@@ -1,0 +1,79 @@
+"""What the language allows at a place: the JSON Schema of model files, followed along the keys that lead there."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from functools import cache
+from typing import Any
+
+from ..catalogue.types import figure_types, installed, load_all
+from ..language.schema import json_schema
+from ..text.document import Mapping, Node, Scalar, Sequence
+
+Schema = dict[str, Any]
+
+
+@cache
+def language(types: tuple[type, ...]) -> Schema:
+    """The schema with all types that are installed, and others."""
+    catalogue, _ = installed().with_types(types).loaded()
+    return json_schema(catalogue, load_all(figure_types())[0], {})
+
+
+def allowed(root: Schema, node: Node, keys: Iterable[str | int]) -> list[Schema]:
+    """The schemas of the value at the end of some keys; without those that what is written rules out."""
+    found, here = [root], node
+    for key in keys:
+        inner: Node = Scalar(None, "", True, here.position)
+        if isinstance(here, Mapping) and key in here.entries:
+            inner = here.entries[str(key)].value
+        elif isinstance(here, Sequence) and isinstance(key, int) and key < len(here.items):
+            inner = here.items[key]
+        found = [below for each in applying(root, found, here) for below in _below(each, key)]
+        here = inner
+    return list(applying(root, found, here))
+
+
+def applying(root: Schema, schemas: Iterable[Schema], node: Node) -> Iterator[Schema]:
+    """Schemas and those that they consist of, as far as they apply to a node."""
+    waiting = list(schemas)
+    while waiting:
+        each = waiting.pop(0)
+        if "$ref" in each:
+            waiting.append({**root["$defs"][each["$ref"].rpartition("/")[2]], **_described(each)})
+            continue
+        yield each
+        waiting += [*each.get("allOf", ()), *each.get("anyOf", ())]
+        if "if" in each:
+            branch = each.get("then" if _holds(root, each["if"], node) else "else")
+            waiting += [branch] if isinstance(branch, dict) else []
+
+
+def _described(schema: Schema) -> Schema:
+    return {"description": schema["description"]} if "description" in schema else {}
+
+
+def _below(schema: Schema, key: str | int) -> Iterator[Schema]:
+    if isinstance(key, int):
+        found = schema.get("items")
+    else:
+        found = schema.get("properties", {}).get(key, schema.get("additionalProperties"))
+    if isinstance(found, dict):
+        yield found
+
+
+def _holds(root: Schema, condition: Schema, node: Node) -> bool:
+    """Whether a node fulfils a condition of the few forms that the schema uses."""
+    if "$ref" in condition:
+        return _holds(root, root["$defs"][condition["$ref"].rpartition("/")[2]], node)
+    if "not" in condition:
+        return not _holds(root, condition["not"], node)
+    entries = node.entries if isinstance(node, Mapping) else {}
+    if any(key not in entries for key in condition.get("required", ())):
+        return False
+    for key, wanted in condition.get("properties", {}).items():
+        value = entries[key].value if key in entries else None
+        said = value.value if isinstance(value, Scalar) else None
+        if value is not None and "const" in wanted and said != wanted["const"]:
+            return False
+    return "type" not in condition or condition["type"] != "object" or isinstance(node, Mapping)
