@@ -209,6 +209,8 @@ def test_completion_knows_composites_and_what_they_declare(tmp_path: Path) -> No
 def test_a_place_in_a_broken_text_is_none_or_completed(tmp_path: Path) -> None:
     path = tmp_path / "m.yaml"
     assert complete(path, 5, 0, {path.resolve(): "model: m"}) == []
+    assert "model: " in {each.text for each in complete(path, 0, 2, {path.resolve(): "mo"})}
+    assert "model: " in {each.text for each in complete(path, 0, 0, {path.resolve(): ""})}
     assert complete(path, 0, 3, {path.resolve(): "\x00{{{"}) == []
 
 
