@@ -10,10 +10,13 @@ import re
 from collections.abc import Iterator
 from dataclasses import dataclass
 
+import yaml
+
 from ..text.document import Mapping, Node, Scalar, Sequence, parse
 from ..text.problems import Problems
 
 MARK = "epicycle_mark_here"
+_LOADER: type[yaml.CSafeLoader] | type[yaml.SafeLoader] = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 _CLOSING = {"{": "}", "[": "]"}
 _QUOTED = re.compile(r"'(?:[^']|'')*'|\"(?:[^\"\\]|\\.)*\"|(?<![^\s])#.*")
 
@@ -54,9 +57,20 @@ def place_at(text: str, line: int, column: int) -> Place | None:
     # The word under the cursor belongs to the place.
     end = column + len(re.match(r"\w*", here[column:])[0])  # type: ignore[index]
     for tried in _attempts(lines, line, column, end):
-        if (root := parse(tried, "", Problems())) is not None and (found := _marked(root, tried)) is not None:
+        root = parse(tried, "", Problems()) if _is_yaml(tried) else None
+        if root is not None and (found := _marked(root, tried)) is not None:
             return found
     return None
+
+
+def _is_yaml(text: str) -> bool:
+    """Whether a text can be parsed; it takes longer to say why not."""
+    try:
+        for _ in yaml.parse(text, Loader=_LOADER):
+            pass
+    except (yaml.YAMLError, ValueError):
+        return False
+    return True
 
 
 def _attempts(lines: list[str], line: int, column: int, end: int) -> Iterator[str]:
@@ -105,6 +119,8 @@ def _marked(root: Node, text: str) -> Place | None:
     while waiting:
         node, keys, around = waiting.pop()
         if isinstance(node, Scalar):
+            if MARK in node.text and not around:  # all of the text: it may become the first key
+                return _place(keys, True, node.text, (Mapping({}, node.position),), text)
             if MARK in node.text:
                 return _place(keys, False, node.text, around, text)
         elif isinstance(node, Sequence):

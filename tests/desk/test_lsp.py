@@ -166,15 +166,13 @@ def mutant(text: str, draw: random.Random) -> str:
         case 3:
             return "\n".join([*lines[: line + 1], *lines[line:]])
         case 4:
-            words = [*re.finditer(r"\w+", text)]
+            words = [*re.finditer(r"\w+|\Z", text)]
             one, other = draw.choice(words), draw.choice(words)
             return text[: one.start()] + other[0] + text[one.end() :]
         case 5:
             return text[:at]
         case _:
-            word = draw.choice([*re.finditer(r"\w\w+", text)])
-            place = draw.randrange(word.start(), word.end() - 1)
-            return text[:place] + text[place + 1] + text[place] + text[place + 2 :]
+            return text[:at] + text[at + 1 : at + 2] + text[at : at + 1] + text[at + 2 :]
 
 
 def validated(path: Path) -> list[Problem]:
