@@ -2,7 +2,7 @@
 
 ``processes``: functions and programs written for SimPy.  ``learning``: models as environments of Gymnasium and
 PettingZoo.  ``bags``: recordings of ROS 2.  ``fmi``:
-FMUs.  Bridges use Epicycle's public interface only.
+FMUs.  ``systems``: systems of python-control.  Bridges use Epicycle's public interface only.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from .fmi import FMU
     from .learning import Agent, AgentError, GymEnv, ZooEnv, deploy
     from .processes import Environment, Process, process
+    from .systems import linear
 
 __all__ = [
     "FMU",
@@ -31,6 +32,7 @@ __all__ = [
     "bag",
     "deploy",
     "gym",
+    "linear",
     "lockstep",
     "process",
     "zoo",
@@ -41,6 +43,7 @@ _HOMES = {
     "environments": ("gym", "zoo"),
     "fmi": ("FMU",),
     "learning": ("Agent", "AgentError", "GymEnv", "ZooEnv", "deploy"),
+    "systems": ("linear",),
     "processes": ("Environment", "Process", "process"),
 }
 

@@ -133,10 +133,10 @@ class FMU(Actor):
         self._waiting: dict[str, Any] = {}  # values for inputs
         self._event, self._ends, self._following = False, False, math.inf
         given = {name: self._value(name, value) for name, value in self.values.items()}
-        self._slave.start(given, self._time)
+        self._call("start", given, self._time)
         self._ticking: list[str] = []
         if self._has_events:
-            self._after(self._slave.settle(self._clocks))
+            self._after(self._call("settle", self._clocks))
         self._saved_at = self._time
         self._first = True
         self._wake = self.wake_in(0.0)
@@ -145,6 +145,15 @@ class FMU(Actor):
         if self._slave is not None:
             self._slave.close()
             self._slave = None
+
+    def _call(self, name: str, *given: Any) -> Any:
+        """Call a function of the FMU; what it fails with names the file."""
+        try:
+            return getattr(self._slave, name)(*given)
+        except FMUError:
+            raise
+        except Exception as error:  # of FMPy, and of ctypes
+            raise FMUError(f"{self.file}: {' '.join(str(error).split())}") from None
 
     def _after(self, told: tuple[list[str], float | None, bool]) -> None:
         """What an event has brought."""
@@ -163,12 +172,12 @@ class FMU(Actor):
         if not (self._reached(now) or self._first):
             return
         if self._has_events and (self._event or self._waiting or now >= self._to(self._following)):
-            self._after(self._slave.event(self._waiting, self._clocks))
+            self._after(self._call("event", self._waiting, self._clocks))
         elif self._waiting:
-            self._slave.put(self._waiting)
+            self._call("put", self._waiting)
         self._waiting, self._event, self._first = {}, False, False
         for port, name in self._readable.items():
-            self.outputs[port].send(self._slave.get([name])[name])
+            self.outputs[port].send(self._call("get", [name])[name])
         for port, name in self._output_of.items():
             if name in self._ticking:
                 self.outputs[port].send(True)
@@ -197,17 +206,17 @@ class FMU(Actor):
         if there > now:  # it has run ahead, and a token has come
             if not self._can_go_back:
                 return False
-            self._slave.restore()
+            self._call("restore")
             self._time, self._event, self._ends = self._saved_at, False, False
         elif not self._varies and now < self._next:
             return False
-        while self._to(self._time) < now:
+        while self._to(self._time) < now and not self._ends:
             self._advance(to_seconds(now))
         return True
 
     def _advance(self, until: float) -> None:
         before = self._time
-        self._time, event, ends = self._slave.step(before, until)
+        self._time, event, ends = self._call("step", before, until)
         self._event, self._ends = self._event or event, self._ends or ends
         if self._time <= before and not (event or ends):
             raise FMUError(f"{self.file} does not advance from {before:g} s")
@@ -217,7 +226,7 @@ class FMU(Actor):
         target = min(self._next, self._to(self._following))
         if self._has_events:
             if self._can_go_back and self._input_of:
-                self._slave.save()
+                self._call("save")
                 self._saved_at = self._time
             self._advance(to_seconds(int(target)))
             target = self._to(self._time)

@@ -16,12 +16,14 @@ from pathlib import Path
 from typing import Any
 
 import fmpy
-from fmpy.fmi2 import FMU2Slave
+from fmpy.fmi1 import FMICallException
+from fmpy.fmi2 import FMU2Slave, fmi2LastSuccessfulTime, fmi2Terminated
 from fmpy.fmi3 import FMU3Slave
 
 from epicycle.actors import EpicycleError
 
 CLOCK = "Clock"
+DISCARD = 2  # the status of a step that has not been completed
 BEGIN_LIMIT = 30.0  # s until a process has started
 # What FMPy calls the functions for each type of variables, in version 2 and 3.
 TYPES: Mapping[str, tuple[str, type]] = {
@@ -123,7 +125,14 @@ class Slave:
     def step(self, time: float, until: float) -> tuple[float, bool, bool]:
         """Go on; the time that was reached, whether there is an event, and whether it ends the simulation."""
         if not self.is_new:
-            self._fmu.doStep(time, until - time)
+            try:
+                self._fmu.doStep(time, until - time)
+            except FMICallException as error:
+                if error.status != DISCARD:
+                    raise
+                # It has come only so far, perhaps because it ends the simulation.
+                last = float(self._fmu.getRealStatus(fmi2LastSuccessfulTime))
+                return last, False, bool(self._fmu.getBooleanStatus(fmi2Terminated))
             return until, False, False
         event, ends, early, last = self._fmu.doStep(time, until - time)
         return (last if early else until), bool(event), bool(ends)

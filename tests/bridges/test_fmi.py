@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import zipfile
 from pathlib import Path
 from typing import Any
@@ -162,3 +163,32 @@ def test_a_token_that_is_no_number_is_reported(stair: Path) -> None:
         ran(stair, {"in": (0.5, [float("nan")])})
     line = str(caught.value).splitlines()[0]
     assert line == "fmu failed in fire() at (0.5 s, 1): fmu.in got nan, which is not a finite number"
+
+
+REFERENCE = os.environ.get("EPICYCLE_REFERENCE_FMUS")  # a folder with 2.0/*.fmu and 3.0/*.fmu of the Reference-FMUs
+
+
+@pytest.mark.skipif(REFERENCE is None, reason="EPICYCLE_REFERENCE_FMUS names no folder with the Reference-FMUs")
+@pytest.mark.parametrize("version", ["2.0", "3.0"])
+def test_the_reference_fmus(version: str) -> None:
+    folder = Path(REFERENCE or "") / version
+    step = {"step": 5.0} if version == "3.0" else {}
+    stairs = changes(ran(folder / "Stair.fmu", stop=20.0, **step), "fmu.counter")
+    assert [value for _, value in stairs] == list(range(1, 11))
+    if version == "3.0":
+        assert [time for time, _ in stairs] == [float(number) for number in range(10)]
+        ball = ran(folder / "BouncingBall.fmu", stop=3.0, step=3.0)
+        times = [
+            float(time) for time, speed in zip(ball["fmu.v"].times, ball["fmu.v"].values, strict=True) if speed > 1
+        ]
+        assert times[0] == 0.453  # as the FMU itself says, of whose internal steps of 1 ms it is one
+    else:
+        assert [round(time, 9) for time, _ in stairs] == [
+            0.0,
+            *(pytest.approx(each, abs=0.21) for each in range(1, 10)),
+        ]
+    circle = ran(folder / "VanDerPol.fmu", stop=20.0)
+    assert float(circle["fmu.x0"].values[-1]) == pytest.approx(2.0148418861546133, abs=1e-9)
+    name = "Float64_continuous"
+    through = ran(folder / "Feedthrough.fmu", {f"{name}_input": (0.25, [0.1, 1 / 3])}, stop=1.0)
+    assert [each for each in changes(through, f"fmu.{name}_output") if each[0]] == [(0.25, 0.1), (0.5, 1 / 3)]
