@@ -1,7 +1,8 @@
 """What others have, as parts of a model, and models as parts of what others have.
 
 ``processes``: functions and programs written for SimPy.  ``learning``: models as environments of Gymnasium and
-PettingZoo.  ``bags``: recordings of ROS 2.  Bridges use Epicycle's public interface only.
+PettingZoo.  ``bags``: recordings of ROS 2.  ``fmi``:
+FMUs.  ``systems``: systems of python-control.  Bridges use Epicycle's public interface only.
 """
 
 from __future__ import annotations
@@ -11,15 +12,19 @@ from typing import TYPE_CHECKING, Any
 from .extras import needed
 
 if TYPE_CHECKING:
-    from .bags import Bag, bag, lockstep
+    from .bags import Bag, BagFolder, bag, lockstep
     from .environments import gym, zoo
+    from .fmi import FMU
     from .learning import Agent, AgentError, GymEnv, ZooEnv, deploy
     from .processes import Environment, Process, process
+    from .systems import linear
 
 __all__ = [
+    "FMU",
     "Agent",
     "AgentError",
     "Bag",
+    "BagFolder",
     "Environment",
     "GymEnv",
     "Process",
@@ -27,15 +32,18 @@ __all__ = [
     "bag",
     "deploy",
     "gym",
+    "linear",
     "lockstep",
     "process",
     "zoo",
 ]
 
 _HOMES = {
-    "bags": ("Bag", "bag", "lockstep"),
+    "bags": ("Bag", "BagFolder", "bag", "lockstep"),
     "environments": ("gym", "zoo"),
+    "fmi": ("FMU",),
     "learning": ("Agent", "AgentError", "GymEnv", "ZooEnv", "deploy"),
+    "systems": ("linear",),
     "processes": ("Environment", "Process", "process"),
 }
 

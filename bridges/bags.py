@@ -357,6 +357,8 @@ def lockstep(
     names = {port_of(topic): topic for topic in (file.topics if chosen is None else chosen)}
     kinds = dict(outputs) if isinstance(outputs, Mapping) else dict.fromkeys(outputs, "any value")
     for name, each in kinds.items():
+        if name in names:
+            raise EpicycleError(f"output {name!r} has the name of the topic {names[name]}: choose another one")
         if each not in KINDS:
             raise EpicycleError(f"output {name} sends {each!r}{did_you_mean(each, KINDS)}; valid: {', '.join(KINDS)}")
     ports: dict[str, Any] = {name: InputPort[Any](doc=f"messages of {topic}") for name, topic in names.items()}

@@ -10,6 +10,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
+import tomllib
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
@@ -26,6 +27,16 @@ class Blocker:
 sys.meta_path.insert(0, Blocker())
 """
 METADATA = "Metadata-Version: 2.1\nName: epicycle\nVersion: 0.1.0\n"
+
+
+def _offered() -> str:
+    """The entry points of what is no plug-in, as they stand in an installation."""
+    groups = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]["entry-points"]
+    lines: list[str] = []
+    for group, points in groups.items():
+        kept = [f"{name} = {value}" for name, value in points.items() if value.startswith("epicycle.bridges")]
+        lines += [f"\n[{group}]", *kept] if kept else []
+    return "\n".join([*lines, ""])
 
 
 def copied(to: Path) -> dict[str, str]:
@@ -46,7 +57,8 @@ def copied(to: Path) -> dict[str, str]:
     info = to / "links" / "epicycle-0.1.0.dist-info"
     info.mkdir()
     (info / "METADATA").write_text(METADATA, "utf-8")
-    (info / "entry_points.txt").write_text("[console_scripts]\nepicycle = epicycle.runner.cli:main\n", "utf-8")
+    points = "[console_scripts]\nepicycle = epicycle.runner.cli:main\n" + _offered()
+    (info / "entry_points.txt").write_text(points, "utf-8")
     (to / "links" / "sitecustomize.py").write_text(f"PLUGINS = {PLUGINS!r}\n{BLOCKER}", "utf-8")
     settings = {key: value for key, value in os.environ.items() if not key.startswith("EPICYCLE_")}
     return {**settings, "PYTHONPATH": str(to / "links")}

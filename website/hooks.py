@@ -33,7 +33,7 @@ def on_startup(*, command: str, dirty: bool) -> None:
     package.mkdir(parents=True)
     for name in ("__init__.py", "__init__.pyi"):
         (package / name).symlink_to(ROOT / "api" / name)
-    for folder in ("actors", "aspects", "ptolemy", "runner"):
+    for folder in ("actors", "aspects", "bridges", "ptolemy", "runner"):
         (package / folder).symlink_to(ROOT / folder, target_is_directory=True)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Callable, Iterator
+from importlib.metadata import entry_points
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -296,12 +297,16 @@ def describe(options: argparse.Namespace) -> int:
     and monitors, recorded ports, figures and aspects, and the packaged disturbances that fit it; or, with --aspects,
     the aspects at its ports, in the order in which a token meets them.
 
-    Describe a type of actors, aspects or their parts: its ports and parameters.
+    Describe a type of actors, aspects or their parts: its ports and parameters; or a file from elsewhere, such as the
+    variables of an FMU (*.fmu), or the topics of a recording of ROS 2.
     """
     from epicycle.actors import EpicycleError
 
     from ..catalogue.packaged import is_path, packaged_models
 
+    if (said := _from_elsewhere(Path(options.model))) is not None:
+        tell(said)
+        return DONE
     changed = [each for each in arguments(running.load, options) if each not in ("model", "types")]
     if is_path(options.model) or options.model in packaged_models():
         if options.like is not None:
@@ -310,6 +315,16 @@ def describe(options: argparse.Namespace) -> int:
     if options.weaving or changed:
         raise EpicycleError(f"{options.model} is no model, and --aspects and changes are for models")
     return _describe_type(options)
+
+
+def _from_elsewhere(path: Path) -> str | None:
+    """What an installed package says of a file that is no model; it offers a function for the ending of its name."""
+    kind = "folder" if (path / "metadata.yaml").is_file() else path.suffix.lower().lstrip(".")
+    if kind not in ("", "yaml", "yml"):
+        for point in entry_points(group="epicycle.described", name=kind):
+            said: str = point.load()(path)
+            return said
+    return None
 
 
 def _weaving(options: argparse.Namespace) -> int:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import resource
+import subprocess
+import sys
 import time
 from itertools import islice
 from pathlib import Path
@@ -153,6 +155,42 @@ def test_damaged_content_is_named(walk: Path) -> None:
     assert str(caught.value).startswith(
         f"{walk} is not a recording of ROS 2: a message of /robot/numbers at {START + 4_900_000_001} ns is not a "
         "geometry_msgs/msg/TwistStamped: "
+    )
+
+
+def test_stamps_that_are_not_in_order_are_reported(tmp_path: Path) -> None:
+    from mcap.writer import Writer
+
+    path = tmp_path / "mixed.mcap"
+    with path.open("wb") as file:
+        writer = Writer(file, use_chunking=False)
+        writer.start(profile="ros2")
+        schema = writer.register_schema("std_msgs/msg/Float64", "ros2msg", b"float64 data\n")
+        channel = writer.register_channel("/x", "cdr", schema)
+        for moment in (5, 3):
+            writer.add_message(channel, moment, b"\x00\x01\x00\x00" + bytes(8), moment)
+        writer.finish()
+    with pytest.raises(ActorError) as caught:
+        epicycle.run(lockstep(path, lambda topic, message: message.data, outputs=["y"]))
+    assert str(caught.value).splitlines()[0] == (
+        f"bag failed in fire() at (0 s, 1): {path} is not a recording of ROS 2: a message of /x at 3 ns comes after "
+        "one at 5 ns"
+    )
+    with pytest.raises(epicycle.EpicycleError) as refused:
+        lockstep(path, lambda topic, message: message.data, outputs=["x"])
+    assert str(refused.value) == "output 'x' has the name of the topic /x: choose another one"
+
+
+def test_without_the_package_the_message_says_what_to_install(tmp_path: Path) -> None:
+    (tmp_path / "m.yaml").write_text("model: m\nactors: {bag: {type: Bag, file: a.mcap}}\n")
+    program = (
+        "import sys; sys.modules['rosbags'] = None\nimport epicycle\n"
+        "try:\n    epicycle.load('m.yaml')\nexcept epicycle.EpicycleError as error:\n    print(error)\n"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True, cwd=tmp_path)
+    needs = "Bag needs the package rosbags, which is not installed: pip install 'epicycle[ros]'"
+    assert done.stdout.splitlines()[0] == (
+        "m.yaml:2:22: error: bag: actor 'Bag' of the package 'epicycle' cannot be loaded: EpicycleError: " + needs
     )
 
 

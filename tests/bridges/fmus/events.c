@@ -1,0 +1,163 @@
+/* An FMU of FMI 3 for tests: a stair, a vessel that fills with what flows in, and a feedthrough; and mistakes. */
+#include <stdbool.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+#include <unistd.h>
+
+typedef struct {
+    double time, level, flow, period, next, in;
+    int32_t counter, fills, mistake;
+    bool full, event;
+} Model;
+enum { OK, WARNING, DISCARD, ERROR };
+enum { PERIOD = 1, FLOW, IN, OUT, LEVEL, COUNTER, FILLS, FULL, MISTAKE };
+
+const char *fmi3GetVersion(void) { return "3.0"; }
+
+void *fmi3InstantiateCoSimulation(const char *name, const char *token, const char *path, bool visible, bool logging,
+                                  bool events, bool early, const uint32_t *required, size_t n, void *environment,
+                                  void *log, void *update) {
+    Model *m = calloc(1, sizeof(Model));
+    m->period = 1.0;
+    return m;
+}
+int fmi3EnterInitializationMode(Model *m, bool t, double tolerance, double start, bool s, double stop) {
+    m->time = start;
+    m->next = start + m->period;
+    return OK;
+}
+int fmi3ExitInitializationMode(Model *m) { return OK; }
+int fmi3EnterEventMode(Model *m) { return OK; }
+int fmi3EnterStepMode(Model *m) { return OK; }
+int fmi3UpdateDiscreteStates(Model *m, bool *again, bool *ends, bool *nominals, bool *values, bool *defined,
+                             double *next) {
+    if (m->time >= m->next - 1e-12) {
+        m->counter += 1;
+        m->next += m->period;
+    }
+    if (m->full) {
+        m->full = false;
+        m->fills += 1;
+        m->level = 0;
+    }
+    *again = *nominals = *values = false;
+    *ends = m->counter >= 10;
+    *defined = true;
+    *next = m->next;
+    return OK;
+}
+int fmi3DoStep(Model *m, double t, double h, bool no, bool *event, bool *ends, bool *early, double *last) {
+    double end = t + h;
+    *event = *ends = *early = false;
+    if (m->mistake == 1) abort();
+    if (m->mistake == 2) sleep(600);
+    if (m->mistake == 3) return ERROR;
+    if (m->flow > 0 && t + (1 - m->level) / m->flow <= end) {
+        end = t + (1 - m->level) / m->flow;
+        *event = *early = m->full = true;
+        m->level = 1;
+    } else
+        m->level += m->flow * h;
+    m->time = *last = end;
+    return OK;
+}
+int fmi3GetFloat64(Model *m, const uint32_t *vr, size_t n, double *v, size_t nv) {
+    double all[] = {0, m->period, m->flow, m->in, m->mistake == 4 ? 0.0 / 0.0 : m->in, m->level};
+    v[0] = all[vr[0]];
+    return OK;
+}
+int fmi3SetFloat64(Model *m, const uint32_t *vr, size_t n, const double *v, size_t nv) {
+    if (vr[0] == PERIOD) m->period = v[0];
+    if (vr[0] == FLOW) m->flow = v[0];
+    if (vr[0] == IN) m->in = v[0];
+    return OK;
+}
+int fmi3GetInt32(Model *m, const uint32_t *vr, size_t n, int32_t *v, size_t nv) {
+    v[0] = vr[0] == COUNTER ? m->counter : vr[0] == FILLS ? m->fills : m->mistake;
+    return OK;
+}
+int fmi3SetInt32(Model *m, const uint32_t *vr, size_t n, const int32_t *v, size_t nv) {
+    m->mistake = v[0];
+    return OK;
+}
+int fmi3GetClock(Model *m, const uint32_t *vr, size_t n, bool *v) {
+    v[0] = m->full;
+    return OK;
+}
+int fmi3GetFMUState(Model *m, void **state) {
+    if (!*state) *state = malloc(sizeof(Model));
+    memcpy(*state, m, sizeof(Model));
+    return OK;
+}
+int fmi3SetFMUState(Model *m, void *state) {
+    memcpy(m, state, sizeof(Model));
+    return OK;
+}
+int fmi3FreeFMUState(Model *m, void **state) {
+    free(*state);
+    *state = NULL;
+    return OK;
+}
+int fmi3Terminate(Model *m) { return OK; }
+void fmi3FreeInstance(Model *m) { free(m); }
+
+/* What a library must have, and nobody calls here. */
+#define NOT_HERE(name) int name(void) { return ERROR; }
+NOT_HERE(fmi3ActivateModelPartition)
+NOT_HERE(fmi3CompletedIntegratorStep)
+NOT_HERE(fmi3DeserializeFMUState)
+NOT_HERE(fmi3EnterConfigurationMode)
+NOT_HERE(fmi3EnterContinuousTimeMode)
+NOT_HERE(fmi3EvaluateDiscreteStates)
+NOT_HERE(fmi3ExitConfigurationMode)
+NOT_HERE(fmi3GetAdjointDerivative)
+NOT_HERE(fmi3GetBinary)
+NOT_HERE(fmi3GetBoolean)
+NOT_HERE(fmi3GetContinuousStateDerivatives)
+NOT_HERE(fmi3GetContinuousStates)
+NOT_HERE(fmi3GetDirectionalDerivative)
+NOT_HERE(fmi3GetEventIndicators)
+NOT_HERE(fmi3GetFloat32)
+NOT_HERE(fmi3GetInt16)
+NOT_HERE(fmi3GetInt64)
+NOT_HERE(fmi3GetInt8)
+NOT_HERE(fmi3GetIntervalDecimal)
+NOT_HERE(fmi3GetIntervalFraction)
+NOT_HERE(fmi3GetNominalsOfContinuousStates)
+NOT_HERE(fmi3GetNumberOfContinuousStates)
+NOT_HERE(fmi3GetNumberOfEventIndicators)
+NOT_HERE(fmi3GetNumberOfVariableDependencies)
+NOT_HERE(fmi3GetOutputDerivatives)
+NOT_HERE(fmi3GetShiftDecimal)
+NOT_HERE(fmi3GetShiftFraction)
+NOT_HERE(fmi3GetString)
+NOT_HERE(fmi3GetUInt16)
+NOT_HERE(fmi3GetUInt32)
+NOT_HERE(fmi3GetUInt64)
+NOT_HERE(fmi3GetUInt8)
+NOT_HERE(fmi3GetVariableDependencies)
+NOT_HERE(fmi3InstantiateModelExchange)
+NOT_HERE(fmi3InstantiateScheduledExecution)
+NOT_HERE(fmi3Reset)
+NOT_HERE(fmi3SerializeFMUState)
+NOT_HERE(fmi3SerializedFMUStateSize)
+NOT_HERE(fmi3SetBinary)
+NOT_HERE(fmi3SetBoolean)
+NOT_HERE(fmi3SetClock)
+NOT_HERE(fmi3SetContinuousStates)
+NOT_HERE(fmi3SetDebugLogging)
+NOT_HERE(fmi3SetFloat32)
+NOT_HERE(fmi3SetInt16)
+NOT_HERE(fmi3SetInt64)
+NOT_HERE(fmi3SetInt8)
+NOT_HERE(fmi3SetIntervalDecimal)
+NOT_HERE(fmi3SetIntervalFraction)
+NOT_HERE(fmi3SetShiftDecimal)
+NOT_HERE(fmi3SetShiftFraction)
+NOT_HERE(fmi3SetString)
+NOT_HERE(fmi3SetTime)
+NOT_HERE(fmi3SetUInt16)
+NOT_HERE(fmi3SetUInt32)
+NOT_HERE(fmi3SetUInt64)
+NOT_HERE(fmi3SetUInt8)

@@ -1,0 +1,194 @@
+"""FMUs as actors: events at their own times, feedthrough, and what is wrong with them."""
+
+from __future__ import annotations
+
+import os
+import zipfile
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+pytest.importorskip("fmpy")
+
+from epicycle.actors import Clock, EpicycleError, ParameterError
+from epicycle.bridges import FMU
+from epicycle.runner import ActorError, Model, Results, Simulation
+from epicycle.runner.cli import main
+from tests.bridges.made_fmus import decay, events
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return tmp_path_factory.mktemp("fmus")
+
+
+@pytest.fixture(scope="module")
+def stair(folder: Path) -> Path:
+    return events(folder)
+
+
+def ran(
+    file: Path, tokens: dict[str, tuple[float, list[Any]]] | None = None, stop: float = 4.0, **given: Any
+) -> Results:
+    """A run of an FMU; ``tokens`` are those of a clock for each input, with its period, from then on."""
+    model = Model("test", stop=stop)
+    fmu = model.add(FMU("fmu", file=file, **given))
+    for name, (period, values) in (tokens or {}).items():
+        clock = model.add(Clock(f"clock_{name}", period=period, offset=period, values=values, cycles=len(values)))
+        model.connect(clock.output, fmu.inputs[name])
+    model.record(*fmu.outputs.values())
+    return Simulation(model).run()
+
+
+def changes(results: Results, port: str) -> list[tuple[float, Any]]:
+    """When a signal changes, and to what."""
+    found: list[tuple[float, Any]] = []
+    for time, value in zip(results[port].times, results[port].values, strict=True):
+        if not found or value != found[-1][1]:
+            found.append((float(time), value))
+    return found
+
+
+@pytest.mark.parametrize("apart", [False, True])
+def test_time_events_are_at_their_times_whatever_the_step(stair: Path, apart: bool) -> None:
+    for step in (0.3, 7.0):
+        results = ran(stair, stop=20.0, step=step, apart=apart)
+        assert changes(results, "fmu.counter") == [(float(number), number) for number in range(11)]
+        assert (results.stopped, results.end) == ("fmu: the FMU ends the simulation", 10.0)
+    assert changes(ran(stair, values={"period": "500 ms"}), "fmu.counter")[:3] == [(0.0, 0), (0.5, 1), (1.0, 2)]
+
+
+def test_state_events_are_at_their_times_and_clocks_tick(stair: Path) -> None:
+    results = ran(stair, {"flow": (0.25, [0.8])}, step=1.0, values={"period": 100})
+    assert changes(results, "fmu.fills") == [(0.0, 0), (1.5, 1), (2.75, 2), (4.0, 3)]  # each 1 / 0.8 s after 0.25 s
+    assert list(results["fmu.full"].times) == [1.5, 2.75, 4.0]
+    assert results["fmu.full"].values.all()
+
+
+def test_a_token_takes_back_what_has_run_ahead(stair: Path) -> None:
+    results = ran(stair, {"flow": (0.25, [0.8]), "in": (0.6, [3.5])}, step=10.0, values={"period": 100})
+    assert changes(results, "fmu.fills") == [(0.0, 0), (1.5, 1), (2.75, 2), (4.0, 3)]
+    assert changes(results, "fmu.out") == [(0.0, 0.0), (0.6, 3.5)]
+
+
+def test_without_states_to_save_tokens_act_from_the_next_communication_on(folder: Path, tmp_path: Path) -> None:
+    results = ran(events(tmp_path, back="false"), {"in": (0.6, [3.5])}, step=0.5, values={"period": 100})
+    assert changes(results, "fmu.out") == [(0.0, 0.0), (1.0, 3.5)]
+
+
+def test_feedthrough_is_exact_and_within_the_tag(stair: Path) -> None:
+    values = [0.1, 1 / 3, -1e300, 5e-324]
+    results = ran(stair, {"in": (0.25, values)}, values={"period": 100})
+    assert [each for each in changes(results, "fmu.out") if each[0] > 0] == [
+        (0.25 * (number + 1), value) for number, value in enumerate(values)
+    ]
+
+
+def test_an_fmu_of_version_2(folder: Path) -> None:
+    file = decay(folder)
+    results = ran(file, stop=1.0, step=0.1)
+    expected, x = [1.0], 1.0
+    for _ in range(10):
+        x += 0.1 * (0.0 - 0.5 * x)
+        expected.append(x)
+    assert [float(each) for each in results["fmu.x"].values] == pytest.approx(expected, abs=1e-12)
+    faster = ran(file, {"u": (0.5, [2.0])}, stop=1.0, step=0.1, values={"rate": 1.0})
+    assert faster["fmu.x"].values[5] == pytest.approx(0.9**5, abs=1e-9)
+    assert faster["fmu.x"].values[-1] > 0.8
+
+
+def test_the_digest_of_a_run_has_that_of_the_fmu(stair: Path, tmp_path: Path) -> None:
+    results = ran(stair)
+    assert results["fmu.fmu"].values[0].startswith("sha256:")
+    assert ran(stair).digest == results.digest
+    other = tmp_path / "events.fmu"
+    other.write_bytes(stair.read_bytes())
+    with zipfile.ZipFile(other, "a") as archive:
+        archive.writestr("documentation/more.txt", "more")
+    assert ran(other).digest != results.digest
+
+
+def test_describe(stair: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["describe", str(stair)]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0] == "events: FMI 3.0 for co-simulation"
+    assert lines[2].split() == ["variable", "causality", "type", "unit", "start", "port"]
+    assert lines[3].split() == ["period", "parameter", "Float64", "s", "1"]
+    assert lines[4].split() == ["flow", "input", "Float64", "0", "flow"]
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"perid": 2}, "fmu: values: events.fmu has no 'perid', did you mean 'period'?"),
+        ({"level": 2}, "fmu: values: level is an output of events.fmu, not a parameter or an input"),
+        ({"period": True}, "fmu: values: period of events.fmu is of type Float64, not true"),
+        ({"mistake": 1.5}, "fmu: values: mistake of events.fmu is of type Int32, not 1.5"),
+    ],
+)
+def test_wrong_values_are_reported(stair: Path, values: dict[str, Any], message: str) -> None:
+    with pytest.raises(ParameterError) as caught:
+        FMU("fmu", file=stair, values=values)
+    assert f"fmu: {str(caught.value).removeprefix('fmu: ')}" == message
+
+
+def test_what_cannot_run_is_reported(stair: Path, tmp_path: Path) -> None:
+    broken = tmp_path / "broken.fmu"
+    broken.write_text("no archive")
+    with pytest.raises(EpicycleError) as caught:
+        FMU("fmu", file=broken)
+    assert str(caught.value) == f"{broken} is not an FMU: File is not a zip file"
+    with pytest.raises(EpicycleError) as caught:
+        FMU("fmu", file=events(tmp_path, "x86_64-windows"))
+    assert str(caught.value) == f"{tmp_path / 'events.fmu'} has no binary for x86_64-linux; it has: none"
+
+
+@pytest.mark.parametrize(
+    ("mistake", "reason"),
+    [
+        (1, "its process ended in step, with SIGABRT"),
+        (2, "step takes longer than 1 s; its process was ended"),
+        (3, "fmi3DoStep failed with status 3 (error)."),
+    ],
+)
+def test_an_fmu_that_fails_ends_a_run_with_a_message(stair: Path, mistake: int, reason: str) -> None:
+    with pytest.raises(ActorError) as caught:
+        ran(stair, apart=True, limit=1.0, values={"mistake": mistake})
+    assert str(caught.value).splitlines()[0] == f"fmu failed in fire() at (0 s, 1): {stair}: {reason}"
+
+
+def test_a_token_that_is_no_number_is_reported(stair: Path) -> None:
+    with pytest.raises(ActorError) as caught:
+        ran(stair, {"in": (0.5, [float("nan")])})
+    line = str(caught.value).splitlines()[0]
+    assert line == "fmu failed in fire() at (0.5 s, 1): fmu.in got nan, which is not a finite number"
+
+
+REFERENCE = os.environ.get("EPICYCLE_REFERENCE_FMUS")  # a folder with 2.0/*.fmu and 3.0/*.fmu of the Reference-FMUs
+
+
+@pytest.mark.skipif(REFERENCE is None, reason="EPICYCLE_REFERENCE_FMUS names no folder with the Reference-FMUs")
+@pytest.mark.parametrize("version", ["2.0", "3.0"])
+def test_the_reference_fmus(version: str) -> None:
+    folder = Path(REFERENCE or "") / version
+    step = {"step": 5.0} if version == "3.0" else {}
+    stairs = changes(ran(folder / "Stair.fmu", stop=20.0, **step), "fmu.counter")
+    assert [value for _, value in stairs] == list(range(1, 11))
+    if version == "3.0":
+        assert [time for time, _ in stairs] == [float(number) for number in range(10)]
+        ball = ran(folder / "BouncingBall.fmu", stop=3.0, step=3.0)
+        times = [
+            float(time) for time, speed in zip(ball["fmu.v"].times, ball["fmu.v"].values, strict=True) if speed > 1
+        ]
+        assert times[0] == 0.453  # as the FMU itself says, of whose internal steps of 1 ms it is one
+    else:
+        assert [round(time, 9) for time, _ in stairs] == [
+            0.0,
+            *(pytest.approx(each, abs=0.21) for each in range(1, 10)),
+        ]
+    circle = ran(folder / "VanDerPol.fmu", stop=20.0)
+    assert float(circle["fmu.x0"].values[-1]) == pytest.approx(2.0148418861546133, abs=1e-9)
+    name = "Float64_continuous"
+    through = ran(folder / "Feedthrough.fmu", {f"{name}_input": (0.25, [0.1, 1 / 3])}, stop=1.0)
+    assert [each for each in changes(through, f"fmu.{name}_output") if each[0]] == [(0.25, 0.1), (0.5, 1 / 3)]
