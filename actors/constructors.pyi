@@ -287,7 +287,7 @@ class InertialSensor(_InertialSensor):
 
 class Inform(_Inform):
     """Eq. (5): the information of range measurements at the end of the horizon, minus a penalty for distance."""
-    def __init__(self, *, range: _Number = ..., penalty: _Number = ..., variance: _Number = ..., unit: Literal['nat', 'bit'] = ..., joint: bool = ...) -> None: ...
+    def __init__(self, *, range: _Number = ..., penalty: _Number = ..., variance: _Number = ..., across: _Number | None = ..., unit: Literal['nat', 'bit'] = ..., joint: bool = ...) -> None: ...
 
 class Inhibit(_Inhibit):
     """Passes on tokens unless an `inhibit` token comes with them; the opposite of a `Sampler`."""

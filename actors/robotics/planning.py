@@ -112,6 +112,9 @@ class Inform(Objective):
     range = Parameter(float, 30.0, unit="m", min=0, doc="Dmax: distances from the target beyond this are penalised")
     penalty = Parameter(float, 0.001, min=0, doc="gamma: the penalty for each metre too far, at each step")
     variance = Parameter(float, 2.0, unit="m^2", above=0, doc="eta: variance of the predicted ranges")
+    across = Parameter(
+        float, None, unit="m^2", above=0, doc="variance of the predicted directions, as lengths (default: ranges alone)"
+    )
     unit = Parameter(str, NAT, choices=(NAT, BIT), doc="unit of the information, relative to the penalty")
     joint = Parameter(
         bool, True, doc="whether to count what all robots measure together, or only what this one measures"
@@ -124,15 +127,18 @@ class Inform(Objective):
         heavy = np.array([not _is_zero(each) for each in beliefs.weights], dtype=bool)  # the others have no logarithm
         for points, target in zip(beliefs.samples_by_target, beliefs.targets, strict=False):
             points, weights = points[heavy], beliefs.weights[heavy]
-            others = misfit(points, ends, self.variance) if len(ends) else np.zeros((len(points), len(points)))
-            information = mutual_information(trajectory.positions[-1], points, weights, self.variance, others)
+            eta = self.variance, self.across
+            others = misfit(points, ends, *eta) if len(ends) else np.zeros((len(points), len(points)))
+            information = mutual_information(
+                trajectory.positions[-1], points, weights, self.variance, others, self.across
+            )
             too_far = f6(trajectory.positions, target, self.range, trajectory.positive)
             total = total - information + (self._gamma * too_far).sum()
         return total
 
     def pose(self, problem: HorizonProblem, points: Array, weights: Array, peers: Sequence[str] = ()) -> HorizonProblem:
         others = problem.peer_mean if self.joint else problem.peer_mean[:0]
-        return problem.to_inform(points, weights, others, self.variance, self._gamma, self.range)
+        return problem.to_inform(points, weights, others, self.variance, self._gamma, self.range, self.across)
 
     @property
     def _gamma(self) -> float:

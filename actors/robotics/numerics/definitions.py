@@ -148,22 +148,30 @@ def out_of_reach(positions: Any, obstacle: Any, reach: Any) -> Any:
     return _norm(obstacle - positions) - reach
 
 
-def misfit(points: Any, robots: Any, variance: Any) -> Any:
+def misfit(points: Any, robots: Any, variance: Any, across: Any = None) -> Any:
     """Eq. (5), (M, M): -log PDF(z_i; z_j, eta) for ranges of sigma points (M, d) from robots (n, d), of variance eta.
 
-    Without the constant of the normal density, which shifts the information but not the optimum.
+    Without the constant of the normal density, which shifts the information but not the optimum.  With ``across``,
+    m^2, robots also measure the direction, as in eq. (1): two points at the ranges z_i and z_j whose directions differ
+    by an angle are 2 sqrt(z_i z_j) sin(angle / 2) apart across the line of sight, which is what their difference in
+    range leaves of their distance.
     """
     z = measured_range(points[:, np.newaxis], robots)  # (M, n)
     difference = z[:, np.newaxis] - z
-    return (difference * difference).sum(axis=-1) / (2.0 * variance)
+    along = difference * difference
+    if across is None:
+        return along.sum(axis=-1) / (2.0 * variance)
+    offset = points[:, np.newaxis] - points
+    apart = (offset * offset).sum(axis=-1)
+    return (along / (2.0 * variance) + (apart[..., np.newaxis] - along) / (2.0 * across)).sum(axis=-1)
 
 
-def mutual_information(own: Any, points: Any, weights: Any, variance: Any, others: Any) -> Any:
+def mutual_information(own: Any, points: Any, weights: Any, variance: Any, others: Any, across: Any = None) -> Any:
     """I of eq. (5), nat, of the ranges from ``own`` (d,) and from other robots, whose ``misfit`` is ``others`` (M, M).
 
     The sigma points (M, d) at the end of the horizon have the ``weights`` (M,), all of them positive.
     """
-    density = np.exp(-misfit(points, own[np.newaxis], variance) - others)  # PDF(z_i; z_j, eta)
+    density = np.exp(-misfit(points, own[np.newaxis], variance, across) - others)  # PDF(z_i; z_j, eta)
     return -(weights * np.log((weights * density).sum(axis=1))).sum()
 
 

@@ -129,18 +129,34 @@ class HorizonProblem(NamedTuple):
         return self._replace(objective=REACH_GOAL, goal=np.array(goal).reshape(-1, np.shape(goal)[-1]))
 
     def to_inform(
-        self, points: Array, weights: Array, others: Array, variance: float, gamma: float, reach: float
+        self,
+        points: Array,
+        weights: Array,
+        others: Array,
+        variance: float,
+        gamma: float,
+        reach: float,
+        across: float | None = None,
     ) -> HorizonProblem:
         """The same problem with the objective of eq. (5), in which ``others`` (n, N, d) also measure at their ends.
 
-        Of several targets, one after the other in ``points`` (T M, d), it is the sum.
+        Of several targets, one after the other in ``points`` (T M, d), it is the sum.  With ``across``, the variance of
+        directions, what two points differ by across the line of sight is the rest of their distance, which no robot's
+        place changes: it counts as a constant, and ranges by as much more as they say more.
         """
         size = len(weights)
+        if across is not None:
+            variance = math.inf if variance == across else 1.0 / (1.0 / variance - 1.0 / across)
         if len(points) == size:
             distance = pairwise_distance(points, others, variance)
         else:
             each = [pairwise_distance(points[i : i + size], others, variance) for i in range(0, len(points), size)]
             distance = np.concatenate(each)
+        if across is not None:
+            robots, targets = len(others) + 1, points.reshape(-1, size, points.shape[1])
+            offsets = (targets[:, :, np.newaxis] - targets[:, np.newaxis]).reshape(-1, size, points.shape[1])
+            for c in range(points.shape[1]):
+                distance = distance + robots * offsets[:, :, c] * offsets[:, :, c] / (2.0 * across)
         return self._replace(
             objective=INFORM,
             sigma_positions=points,

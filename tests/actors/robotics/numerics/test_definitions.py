@@ -178,6 +178,30 @@ def test_mutual_information(random: np.random.Generator, kappa: float) -> None:
         assert expected == pytest.approx(-written, abs=1e-9)
 
 
+@pytest.mark.parametrize(("along", "across"), [(0.04, 4.0), (2.0, 2.0), (4.0, 0.5)])
+def test_information_of_ranges_and_directions(random: np.random.Generator, along: float, across: float) -> None:
+    """What the kernels are given for the whole ellipse of eq. (1) is what the definition says, in polar coordinates."""
+    for _ in range(20):
+        points, weights = ukf.sigma_points(random.normal(scale=2.0, size=4), spread(random, 4), 1.0)
+        points = np.ascontiguousarray(points[:, :2])
+        others, own = random.normal(scale=10.0, size=(2, 2)), random.normal(scale=10.0, size=2)
+        exponent = np.zeros((len(points), len(points)))
+        for robot in (own, *others):
+            seen = points - robot
+            z, bearing = np.linalg.norm(seen, axis=1), np.arctan2(seen[:, 1], seen[:, 0])
+            turn = bearing[:, np.newaxis] - bearing
+            chord = 4.0 * z[:, np.newaxis] * z * np.sin(turn / 2.0) ** 2
+            exponent += (z[:, np.newaxis] - z) ** 2 / (2.0 * along) + chord / (2.0 * across)
+        written = -(weights * np.log((weights * np.exp(-exponent)).sum(axis=1))).sum()
+        misfit = definitions.misfit(points, others, along, across)
+        assert definitions.mutual_information(own, points, weights, along, misfit, across) == pytest.approx(written)
+        posed = inform_problem(random).to_inform(
+            points, weights, others[:, np.newaxis], along, 0.0, 30.0, across=across
+        )
+        given = (tuple(own.tolist()), points, weights, posed.others_distance, posed.measurement_variance)
+        assert negative_information(*given)[0] == pytest.approx(-written, abs=1e-12)
+
+
 @numba.njit
 def excess(gamma: float, g: float, mu: float) -> tuple[float, float]:
     return smoothed(gamma, g, mu)
