@@ -321,8 +321,10 @@ def test_what_is_too_much_to_draw_is_told(
 @pytest.mark.slow
 @pytest.mark.parametrize(("until", "events"), [(3.0, 20_000), (125.0, 1_000_000)])
 def test_two_thousand_actors_and_a_million_events_fit_into_a_page(
-    until: float, events: int, tmp_path: Path, opened: Open
+    until: float, events: int, tmp_path: Path, opened: Open, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    monkeypatch.setattr(drawing, "FEW", 40)  # every replica is a box of its own
+    monkeypatch.setattr(drawing, "MOST_BOXES", 3_000)
     model = lines(tmp_path / "lines.yaml", count=40, length=49)
     path = written(tmp_path / "page.html", (str(model), {}), until=until)
     start = time.perf_counter()
