@@ -87,7 +87,7 @@ def test_packaged_studies_are_valid(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["validate", "table_1"]) == 0
     assert capsys.readouterr().out == "table_1 is valid: 60 conditions of 100 replications, 6,000 runs\n"
     assert main(["validate", "readings"]) == 0
-    assert capsys.readouterr().out == "readings is valid: 1,500 conditions of 10 replications, 15,000 runs\n"
+    assert capsys.readouterr().out == "readings is valid: 1,680 conditions of 10 replications, 16,800 runs\n"
     assert main(["validate", "waiting_time"]) == 0
     assert capsys.readouterr().out == "waiting_time is valid: 5 conditions of 10 replications, 50 runs\n"
 
