@@ -241,4 +241,4 @@ def test_random_edits(tmp_path: Path) -> None:
 
 
 def test_a_few_random_edits(tmp_path: Path) -> None:
-    edit_at_random(tmp_path, 12, seed=2)
+    edit_at_random(tmp_path, 6, seed=2)
