@@ -212,6 +212,8 @@ def edit_at_random(folder: Path, number: int, seed: int) -> None:
             path.write_text(text, encoding="utf-8")
             assert told == [expected(each, path, text) for each in validated(path)], text
             path.write_text((MODELS / path.name).read_text(encoding="utf-8"), encoding="utf-8")
+            if count % 3:
+                continue
             lines = text.split("\n")
             line = draw.randrange(len(lines))
             await ask(vim, vim.at(path, line, draw.randrange(len(lines[line]) + 1)), path, text)
@@ -239,4 +241,4 @@ def test_random_edits(tmp_path: Path) -> None:
 
 
 def test_a_few_random_edits(tmp_path: Path) -> None:
-    edit_at_random(tmp_path, 12, seed=2)
+    edit_at_random(tmp_path, 6, seed=2)
