@@ -152,7 +152,12 @@ class Reader:
         return "\n".join(line.rstrip() for line in printed.getvalue().splitlines()) + "\n"
 
 
-@pytest.mark.parametrize("path", TUTORIALS, ids=[path.stem for path in TUTORIALS])
+LONG = ("08_a_study", "09_many_machines", "17_recorded_robot")
+
+
+@pytest.mark.parametrize(
+    "path", [pytest.param(each, id=each.stem, marks=[pytest.mark.slow] * (each.stem in LONG)) for each in TUTORIALS]
+)
 def test_a_tutorial_shows_what_comes_out(path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(tmp_path)

@@ -52,7 +52,13 @@ def run_of_a_study() -> str:
     return run[:12]
 
 
-@pytest.mark.parametrize(("before", "now"), LINES, ids=[before for before, _ in LINES])
+@pytest.mark.parametrize(
+    ("before", "now"),
+    [
+        pytest.param(*line, id=line[0], marks=[pytest.mark.slow] * (place % 3 > 0))  # each takes a second or two
+        for place, line in enumerate(LINES)
+    ],
+)
 def test_each_line(before: str, now: str, capsys: pytest.CaptureFixture[str]) -> None:
     if before.startswith("epicycle."):
         name = before.removeprefix("epicycle.").partition("(")[0]

@@ -67,7 +67,10 @@ def test_only_what_no_model_can_show_has_no_example() -> None:
 BAD = sorted(each for each in FOLDER.glob("*.yaml") if each.stem != "no_model_but_parts")
 
 
-@pytest.mark.parametrize("path", BAD, ids=[each.stem for each in BAD])
+@pytest.mark.parametrize(
+    "path",
+    [pytest.param(each, id=each.stem, marks=[pytest.mark.slow] * (place % 8 > 0)) for place, each in enumerate(BAD)],
+)
 def test_problems_are_those_of_validate(path: Path) -> None:
     try:
         expected = (*(), *load_model(path).warnings)

@@ -106,6 +106,7 @@ def test_a_dialogue_over_a_model_of_300_lines(tmp_path: Path) -> None:
     dialogue(talk)
 
 
+@pytest.mark.slow
 def test_a_change_of_an_included_text_is_seen(tmp_path: Path) -> None:
     path = folder_with_model(tmp_path)
     library = tmp_path / "robots" / "mobile_robot.yaml"
@@ -124,6 +125,7 @@ def test_a_change_of_an_included_text_is_seen(tmp_path: Path) -> None:
     dialogue(talk)
 
 
+@pytest.mark.slow
 def test_a_file_of_others_is_left_alone(tmp_path: Path) -> None:
     async def talk(vim: Editor) -> None:
         assert await vim.write(tmp_path / "compose.yaml", "services: {web: {image: x}}\n") == []

@@ -296,6 +296,7 @@ def test_a_line_of_sight_ends_when_nothing_more_is_seen(tmp_path: Path) -> None:
     assert blank[-1] <= results_of(recording).end * 1e9
 
 
+@pytest.mark.slow
 def test_a_trail_is_drawn_anew_some_times_and_the_body_draws_the_rest(tmp_path: Path) -> None:
     recording = circling(tmp_path, "0.01")
     file, places = mcap(recording, tmp_path), results_of(recording)["body.state"]["position"].tolist()

@@ -149,6 +149,7 @@ def test_clicks_on_bodies_and_actors_select_what_they_did(wifi: Path, opened: Op
     assert page.words().startswith("collision_avoidance")
 
 
+@pytest.mark.slow
 def test_clicks_on_aspects_select_what_they_did(wifi: Path, opened: Open) -> None:
     page = opened(wifi, 2000, 1400)
     page.do("""
@@ -202,6 +203,7 @@ run: {stop: 5 s}
 """
 
 
+@pytest.mark.slow
 def test_noise_loses_nothing_and_who_gets_nothing_never_fires(tmp_path: Path, opened: Open) -> None:
     model = tmp_path / "all_lost.yaml"
     model.write_text(ALL_LOST)
@@ -217,6 +219,7 @@ def test_noise_loses_nothing_and_who_gets_nothing_never_fires(tmp_path: Path, op
     assert "fired without it" not in words  # it has never fired
 
 
+@pytest.mark.slow
 def test_monitors_say_when_they_broke_and_lead_there(tmp_path: Path, opened: Open) -> None:
     model = tmp_path / "m.yaml"
     model.write_text(
