@@ -14,7 +14,7 @@ from .extras import needed
 if TYPE_CHECKING:
     from .bags import Bag, BagFolder, bag, lockstep
     from .environments import gym, zoo
-    from .fmi import FMU
+    from .fmi import FMU, trust
     from .learning import Agent, AgentError, GymEnv, ZooEnv, deploy
     from .processes import Environment, Process, process
     from .systems import linear
@@ -35,13 +35,14 @@ __all__ = [
     "linear",
     "lockstep",
     "process",
+    "trust",
     "zoo",
 ]
 
 _HOMES = {
     "bags": ("Bag", "BagFolder", "bag", "lockstep"),
     "environments": ("gym", "zoo"),
-    "fmi": ("FMU",),
+    "fmi": ("FMU", "trust"),
     "learning": ("Agent", "AgentError", "GymEnv", "ZooEnv", "deploy"),
     "systems": ("linear",),
     "processes": ("Environment", "Process", "process"),

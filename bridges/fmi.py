@@ -21,6 +21,7 @@ from epicycle.actors import (
     to_nanoseconds,
     to_seconds,
 )
+from epicycle.runner.catalogue import given_programs, types_of_file
 
 from .slaves import CLOCK, TYPES, Apart, FMUError, Slave, described, digest_of, runnable
 
@@ -34,6 +35,12 @@ def port_of(variable: str) -> str:
     return f"_{name}" if name[0].isdigit() else name
 
 
+def trust(path: str | Path) -> Path:
+    """Let an FMU run, as ``--types`` does; the path.  Raises ``TypesError`` if it cannot be read."""
+    types_of_file(Path(path))
+    return Path(path)
+
+
 class FMU(Actor):
     """An FMU for co-simulation: its inputs and outputs are ports, its parameters are given values.
 
@@ -43,7 +50,8 @@ class FMU(Actor):
     a token at an input ticks it, an output sends true when it ticks.
 
     At each communication all outputs are sent.  The output ``fmu`` sends, once, the digest of the file, which so is
-    part of that of the run.  What an FMU computes is outside of the promise of bits: another machine may give others.
+    part of that of the run.  An FMU is a program: it runs only if its file was named (``--types``), or ``trust`` was
+    called.  What an FMU computes is outside of the promise of bits: another machine may give others.
     """
 
     is_source: ClassVar[bool] = True
@@ -120,6 +128,11 @@ class FMU(Actor):
 
     def initialize(self) -> None:
         self.wrapup()
+        if digest_of(self.file) not in given_programs():
+            raise FMUError(
+                f"{self.file} is a program, and nobody has said that it may run\n"
+                f"   help: if you trust it, add --types {self.file}; in Python, types=[...] or trust(...)"
+            )
         variables, co = self._variables, self._about.coSimulation
         self._slave = Apart(str(self.file), self.limit) if self.apart else Slave(str(self.file))
         self._has_events = bool(self._about.fmiVersion != "2.0" and co.hasEventMode)

@@ -32,7 +32,7 @@ ASPECTS = repeated(
     "add an aspect, or replace the one with that name, after --disturb", "NAME=TYPE,KEY=VALUE,...", flag="--aspect"
 )
 WITHOUT = repeated("remove an aspect, after --disturb", "NAME", flag="--without")
-TYPES = repeated("a Python file with your own actors and aspects, whose code is run", "FILE")
+TYPES = repeated("a Python file with your own actors and aspects, or an FMU, whose code is run", "FILE")
 SEED = option("seed of all random streams (default: the model's)", "N", seed)
 UNTIL = option("stop time, such as 30 or '500 ms' (default: the model's)", "TIME")
 JOBS = option("processes at a time (default: one per core)", "N", COUNT)

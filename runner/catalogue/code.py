@@ -1,4 +1,4 @@
-"""The Python files that run when types of the user's own are loaded."""
+"""The files whose code runs when types of the user's own are loaded."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pathlib import Path
 
 from epicycle.actors import read_regular
 
-from .types import TypesError
+from .types import PROGRAM, TypesError
 
 
 def code_of(types: Iterable[Path]) -> dict[str, str]:
@@ -24,6 +24,12 @@ def code_of(types: Iterable[Path]) -> dict[str, str]:
     found: dict[str, str] = {}
     for each in types:
         file = each.resolve()
+        if file.suffix == PROGRAM:
+            try:
+                found[str(file)] = hashlib.sha256(read_regular(file)).hexdigest()
+            except OSError as error:
+                raise TypesError(f"--types {each}: {error.strerror or error}") from error
+            continue
         finder = ModuleFinder(path=[str(file.parent), *own], excludes=["epicycle"])
         try:
             finder.run_script(str(file))

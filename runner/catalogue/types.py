@@ -10,10 +10,11 @@ name is taken, or two packages offer it, ``package.Name`` selects one.  Parts go
 
 from __future__ import annotations
 
+import hashlib
 import re
 import sys
 from collections import ChainMap
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
@@ -26,7 +27,16 @@ from typing import Any, Generic, TypeVar
 
 import epicycle.actors
 import epicycle.aspects
-from epicycle.actors import Actor, Configurable, EpicycleError, FaultError, ParameterError, Process, part_finders
+from epicycle.actors import (
+    Actor,
+    Configurable,
+    EpicycleError,
+    FaultError,
+    ParameterError,
+    Process,
+    part_finders,
+    read_regular,
+)
 from epicycle.aspects import Aspect, CompositeAspect, CompositeExecutionAspect, JoinPointAspect
 
 from ..text.files import note_package
@@ -330,6 +340,16 @@ def given_functions() -> Mapping[str, Callable[..., Any]]:
     return MappingProxyType(_functions)
 
 
+PROGRAM = ".fmu"  # the ending of a file that is a program, which an actor runs
+
+_programs: set[str] = set()
+
+
+def given_programs() -> Collection[str]:
+    """The SHA-256 of each program that the user has named (``types_of_file``): no other one may run."""
+    return frozenset(_programs)
+
+
 class TypesError(EpicycleError):
     """A file that provides no types."""
 
@@ -337,8 +357,15 @@ class TypesError(EpicycleError):
 def types_of_file(path: Path) -> list[type]:
     """The actors, aspects and parts that a Python file defines; its code is run, as by ``import``.
 
-    Its functions for SimPy become known, too (``given_functions``).  Raises ``TypesError``.
+    Its functions for SimPy become known, too (``given_functions``).  An FMU has no types: naming it lets it run
+    (``given_programs``).  Raises ``TypesError``.
     """
+    if path.suffix == PROGRAM:
+        try:
+            _programs.add(hashlib.sha256(read_regular(path)).hexdigest())
+        except OSError as error:
+            raise TypesError(f"--types {path}: {error.strerror or error}") from None
+        return []
     module = _imported(path)
     found = [
         each
@@ -365,7 +392,7 @@ def types_of_file(path: Path) -> list[type]:
 
 def _imported(path: Path) -> ModuleType:
     if path.suffix != ".py" or not path.stem.isidentifier():
-        raise TypesError(f"--types {path}: expected a Python file such as my_actors.py")
+        raise TypesError(f"--types {path}: expected a Python file such as my_actors.py, or an FMU")
     if reason := unreadable(path):
         raise TypesError(f"--types {path}: this {reason}")
     if reason is None:

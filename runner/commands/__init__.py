@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ..printing import complain, tell
-from . import completion, describe, editor, new, recording, running, searching, studies
+from . import completion, describe, editor, listing, new, recording, running, searching, studies
 from .offered import offered_commands
 from .options import BAD_INPUT, BROKEN, DONE, FAILED, JSON, TYPES, Command, command, option, own_types, several
 
@@ -23,7 +23,7 @@ GROUPS = {
         describe.diff,
         describe.describe,
         describe.graph,
-        describe.list_,
+        listing.list_,
         editor.lsp,
     ),
     "set up a shell": (completion.completion,),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import zipfile
 from pathlib import Path
@@ -12,8 +13,11 @@ import pytest
 pytest.importorskip("fmpy")
 
 from epicycle.actors import Clock, EpicycleError, ParameterError
-from epicycle.bridges import FMU
+from epicycle.bridges import FMU, fmi, trust
 from epicycle.runner import ActorError, Model, Results, Simulation
+from epicycle.runner.catalogue import types
+from epicycle.runner.catalogue.code import code_of
+from epicycle.runner.catalogue.types import TypesError
 from epicycle.runner.cli import main
 from tests.bridges.made_fmus import decay, events
 
@@ -33,7 +37,7 @@ def ran(
 ) -> Results:
     """A run of an FMU; ``tokens`` are those of a clock for each input, with its period, from then on."""
     model = Model("test", stop=stop)
-    fmu = model.add(FMU("fmu", file=file, **given))
+    fmu = model.add(FMU("fmu", file=trust(file), **given))
     for name, (period, values) in (tokens or {}).items():
         clock = model.add(Clock(f"clock_{name}", period=period, offset=period, values=values, cycles=len(values)))
         model.connect(clock.output, fmu.inputs[name])
@@ -48,6 +52,35 @@ def changes(results: Results, port: str) -> list[tuple[float, Any]]:
         if not found or value != found[-1][1]:
             found.append((float(time), value))
     return found
+
+
+def test_an_fmu_of_somebody_runs_only_if_it_is_named(
+    folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(types, "_programs", set())
+    monkeypatch.chdir(tmp_path)
+    started: list[object] = []
+    monkeypatch.setattr(fmi, "Slave", started.append)
+    file = events(tmp_path)
+    Path("plant.yaml").write_text(
+        f"model: plant\nactors: {{pump: {{type: FMU, file: {file.name}}}}}\nrun: {{stop: 2}}\n"
+    )
+    assert main(["validate", "plant.yaml"]) == 0
+    capsys.readouterr()
+    assert main(["run", "plant.yaml"]) != 0
+    where, why = "error: pump failed in initialize() at (0 s, 1)", "is a program, and nobody has said that it may run"
+    assert capsys.readouterr().err.splitlines()[1:3] == [
+        f"{where}: {file.name} {why}",
+        f"   help: if you trust it, add --types {file.name}; in Python, types=[...] or trust(...)",
+    ]
+    assert started == []
+    monkeypatch.undo()
+    monkeypatch.chdir(tmp_path)
+    assert main(["run", "plant.yaml", "--types", file.name]) == 0
+    digest = hashlib.sha256(file.read_bytes()).hexdigest()
+    assert code_of([file]) == {str(file.resolve()): digest}  # which seals a study's folder, as the code of types does
+    with pytest.raises(TypesError, match=r"^--types gone.fmu: No such file or directory$"):
+        trust("gone.fmu")
 
 
 @pytest.mark.parametrize("apart", [False, True])

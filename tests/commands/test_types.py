@@ -89,8 +89,8 @@ def test_without_types_the_model_is_wrong(capsys: pytest.CaptureFixture[str]) ->
     ("file", "text", "message"),
     [
         ("gone_of_mine.py", None, "there is no such file"),
-        ("of_mine.txt", "", "expected a Python file such as my_actors.py"),
-        ("of-mine.py", "", "expected a Python file such as my_actors.py"),
+        ("of_mine.txt", "", "expected a Python file such as my_actors.py, or an FMU"),
+        ("of-mine.py", "", "expected a Python file such as my_actors.py, or an FMU"),
         (
             "none_of_mine.py",
             "from epicycle.actors import Clock",
