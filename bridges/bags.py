@@ -106,6 +106,9 @@ class BagFile:
                         found |= get_types_from_msg(text, kind)
                     elif text:
                         found |= get_types_from_idl(re.sub(r"^(=+\nIDL: .*|=+)$", "", text, flags=re.M))
+                named = repr([(kind, fields, [each[:2] for each in told]) for kind, (told, fields) in found.items()])
+                if re.search("['\"]", re.sub(r"'[A-Za-z_][A-Za-z0-9_/]*'", "", named)):
+                    raise self.error("a type of messages, or a field, has a name that is none")  # and would become code
                 if found:
                     own.register(found)
                     self._store = own

@@ -16,7 +16,7 @@ pytest.importorskip("rosbags")
 reading = pytest.importorskip("mcap.reader")
 
 import epicycle  # noqa: E402
-from epicycle.bridges import Bag, bag, lockstep  # noqa: E402
+from epicycle.bridges import Bag, bag, bags, lockstep  # noqa: E402
 from epicycle.runner import ActorError, Model, Simulation  # noqa: E402
 from epicycle.runner.recorded import RecordingError  # noqa: E402
 from tests.bridges.made_bags import START, made  # noqa: E402
@@ -238,3 +238,18 @@ def test_a_million_messages(tmp_path: Path) -> None:
     assert summary.statistics.message_count == done.passed.delivered["/x"]
     assert 890_000 < summary.statistics.message_count < 910_000
     assert found == sorted(found)
+
+
+@pytest.mark.parametrize(
+    ("kind", "field"),
+    [("a/msg/X(print('run'))", "x"), ("a/msg/X", "x: print('run')"), ('a/msg/X"', "x"), ("a/msg/X\n", "x")],
+)
+def test_names_in_a_recording_are_never_code(
+    kind: str, field: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    """Whatever the library's grammar admits."""
+    types = {kind: ([], [(field, (1, ("int32", 0)))])}
+    monkeypatch.setattr(bags, "get_types_from_msg", lambda text, name: types)
+    with pytest.raises(RecordingError, match=r"a type of messages, or a field, has a name that is none$"):
+        _ = bag(made(tmp_path / "recorded")).store
+    assert capsys.readouterr().out == ""
