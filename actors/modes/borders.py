@@ -46,7 +46,10 @@ class Borders:
             origin = self._trajectory.time, self._trajectory.fraction
         self._mode, self._flow, self._all, self._entered, self._seen = mode, flow, comparisons, now, now
         self._open = {}
-        self._begin(origin, now)
+        if comparisons or flow:
+            self._begin(origin, now)
+        else:
+            self._watched, self._deadlines, self.truths, self._trajectory = [], {}, {}, None
 
     def _begin(self, origin: tuple[int, float], now: int) -> None:
         known = [each for each in self._all if each.names <= self._known.keys()]
@@ -96,6 +99,9 @@ class Borders:
     def advance(self, now: int) -> bool:
         """Bring variables and comparisons up to date; return whether a comparison changes now."""
         self._passed, trajectory = {}, self._trajectory
+        if trajectory is None and not self._deadlines:
+            self._seen = now
+            return False
         has_changed = any(self._seen < time <= now for time in self._deadlines.values())
         self._seen = now
         self._judge_times(now)
@@ -130,6 +136,8 @@ class Borders:
 
     def next_time(self, now: int) -> int | None:
         """When to check again: when a comparison changes or, if none is known to change, where the search ends."""
+        if not self._all:
+            return None
         looks = [time for time in self._deadlines.values() if now < time < NEVER]
         if self._trajectory is not None and self._watched:
             looks.append(self._trajectory.next_look(now))

@@ -2,26 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Collection, Mapping
 from typing import Any
 
-from ..core import ABSENT, EpicycleError
+from ..core import EpicycleError
 from ..expression import UNDECIDED, ExpressionError, Formula, evaluate, operand
 
 
-def is_true(guard: Formula, value_of: Callable[[str], Any]) -> bool:
-    """Whether a guard holds, over the tokens of names; one that uses a name whose token is ``ABSENT`` does not."""
-    tokens = [value_of(name) for name in guard.names]
+def is_true(guard: Formula, tokens: dict[str, Any]) -> bool:
+    """Whether a guard holds, over the tokens by name; one that uses a name that is not among them does not."""
     try:
-        found = guard.function(*tokens)  # which cannot decide about what is absent
+        found = guard.of(tokens)  # which cannot decide about what is absent
     except UNDECIDED:
-        known = {name: operand(token) for name, token in zip(guard.names, tokens, strict=True) if token is not ABSENT}
+        known = {name: operand(tokens[name]) for name in guard.names if name in tokens}
         try:
             found = evaluate(guard.source, _Silent(known, set(guard.names) - known.keys()))
         except _SilentError:
             return False
         except ExpressionError as error:
-            if len(known) == len(tokens):
+            if len(known) == len(guard.names):
                 return bool(guard.decided(known))  # raises an error that shows the values, too
             raise EpicycleError(f"{guard.source!r}: {error}") from None
     if not isinstance(found, (bool, int, float)):

@@ -7,7 +7,6 @@ from collections.abc import Collection
 from typing import Any, ClassVar, Final, Protocol
 
 from ..core import (
-    ABSENT,
     EpicycleError,
     InputPort,
     MappingParameter,
@@ -24,7 +23,7 @@ from ..expression import UNDECIDED, Formula, operand
 from ..integration import STEPPERS
 from ..trajectory import number_of
 from .borders import Borders
-from .condition import TIMES, Condition, condition_of, type_of
+from .condition import TIMES, Comparison, Condition, condition_of, type_of
 from .guard import is_true
 from .modal import Chart, ModalActor, Rule
 from .text import Action, ModesParameter, TransitionsParameter
@@ -158,6 +157,7 @@ class StateMachine(ModalActor):
         final = [name for name, mode in self.modes.items() if mode.final]
         self._chart = Chart(tuple(self.modes), self.initial, final, rules)
         self._inputs = [name for name in self.inputs if name != "trigger"]
+        self._set = frozenset(self.variables)
         for name in self.held:
             _check_name(("held", name), name, "input", self._inputs)
         for name, mode in self.modes.items():
@@ -165,6 +165,7 @@ class StateMachine(ModalActor):
                 _check_name(("modes", name, "flow", variable), variable, "variable", self.variables)
         numbers = {*self.held, *self.variables}
         self._conditions: dict[str, dict[Rule, Condition]] = {}
+        self._comparisons: dict[str, tuple[Comparison, ...]] = {}
         for name, mode in self.modes.items():
             moving, taken = {*mode.flow, *TIMES}, 0
             found = self._conditions[name] = {}
@@ -172,8 +173,17 @@ class StateMachine(ModalActor):
                 if rule.guard is not None:
                     found[rule] = condition_of(rule.guard, moving, numbers, taken)
                     taken += len(found[rule].comparisons)
+            self._comparisons[name] = tuple(each for one in found.values() for each in one.comparisons)
         rules = [rule for leaving in self._chart.leaving.values() for rule in leaving]
         self.is_preemptive = any(rule.preemptive for rule in rules)
+        read = [each for rule in rules for each in (rule.guard, rule.delay, rule.probability) if each is not None]
+        read += [formula for each in self.transitions for _, formula in each.do]
+        read += [formula for _, formula in self._at_borders()]
+        self._asked_of = tuple(
+            (name, name.removesuffix(_PRESENT))
+            for name in dict.fromkeys(name for formula in read for name in formula.names)
+            if name.endswith(_PRESENT) and name not in self.inputs
+        )
 
     # -- the run --------------------------------------------------------------------------------------------------
 
@@ -186,6 +196,7 @@ class StateMachine(ModalActor):
         self._known |= {name: value for name, value in self.held.items() if value is not None}
         self._queues: dict[str, deque[Any]] = {name: deque() for name in self._inputs}
         self._tokens: dict[str, Any] = {}  # of the present reaction
+        self._scope: dict[str, Any] = {}  # what names mean in it
         self._entered = self.context.time
         self._borders = Borders(
             self._known,
@@ -201,15 +212,18 @@ class StateMachine(ModalActor):
         """Check preemptive transitions before the refinement of the mode fires; return whether one was taken."""
         self._prepare()
         if self._is_to_react:
+            self._look()
             self.react(self._chart.phases[:1])
         return self._reacted == self.tag
 
     def _prepare(self) -> None:
         self.take_tokens()
-        if self._prepared != self.tag:
-            self._prepared = self.tag
+        tag = self.tag
+        if self._prepared != tag:
+            self._prepared = tag
             self._has_changed = self._borders.advance(self.context.time)
-        self._hold_tokens()
+        if self.held and self._tokens:
+            self._hold_tokens()
 
     @property
     def _is_to_react(self) -> bool:
@@ -217,9 +231,24 @@ class StateMachine(ModalActor):
         is_told = bool(self._tokens) or self.is_asked or self.error is not None
         return is_told or self._has_changed or self.is_called
 
+    def _look(self) -> None:
+        """Gather what names mean: a token, a variable or held input, a comparison, or a time."""
+        tokens = self._tokens
+        self._scope = {
+            "mode_time": to_seconds(self.context.time - self._entered),
+            "time": self.now,
+            **{name: port in tokens for name, port in self._asked_of},
+            **self._borders.truths,
+            **self._known,
+            **tokens,
+        }
+        if self.catches:
+            self._scope.setdefault("error", self.error or "")
+
     def fire(self) -> None:
         self._prepare()
         if self._is_to_react:
+            self._look()
             self.react(self._chart.phases)
             if self.error is not None and self.refinements is not None:
                 self.refinements.raise_failure()
@@ -232,9 +261,15 @@ class StateMachine(ModalActor):
             self._tell()
         self._tokens = {}
         self.rests()
-        if self._wake is not None and not self.is_due(self._wake):
-            self._wake.cancel()
-        time = self._borders.next_time(self.context.time)
+        self._watch(self._borders.next_time(self.context.time))
+
+    def _watch(self, time: int | None) -> None:
+        """Be woken when a comparison changes."""
+        wake = self._wake
+        if wake is not None and not self.is_due(wake):
+            if wake.time == time:
+                return
+            wake.cancel()
         self._wake = None if time is None else self.context.wake(self, time)
 
     def rests(self) -> None:
@@ -250,12 +285,13 @@ class StateMachine(ModalActor):
 
     def take_tokens(self) -> None:
         """Take the first waiting token of each input, unless that was done before the refinement fired."""
-        for name in self._inputs:
-            if name not in self._tokens:
-                queue = self._queues[name]
-                queue.extend(self.inputs[name].tokens)
+        tokens = self._tokens
+        for name, queue in self._queues.items():
+            if name not in tokens:
+                if (port := self.inputs[name]).present:
+                    queue.extend(port.tokens)
                 if queue:
-                    self._tokens[name] = queue.popleft()
+                    tokens[name] = queue.popleft()
 
     def _hold_tokens(self) -> None:
         changed = {name: operand(self._tokens[name]) for name in self.held if name in self._tokens}
@@ -280,13 +316,17 @@ class StateMachine(ModalActor):
             self.refinements.change(rule.target, history=rule.history)
 
     def enters(self, mode: str) -> None:
-        self._act(self.modes[mode].entry)
+        declared = self.modes[mode]
+        if declared.entry:
+            if "error" in self._scope:  # which a transition has handled
+                self._scope["error"] = ""
+            self._act(declared.entry)
         self._entered = self.context.time
         self._enter_borders(mode)
+        self._look()
 
     def _enter_borders(self, mode: str) -> None:
-        comparisons = [each for one in self._conditions[mode].values() for each in one.comparisons]
-        self._borders.enter(mode, self.modes[mode].flow, comparisons, self._entered)
+        self._borders.enter(mode, self.modes[mode].flow, self._comparisons[mode], self._entered)
 
     def leaves(self, mode: str) -> None:
         self._act(self.modes[mode].exit)
@@ -296,20 +336,20 @@ class StateMachine(ModalActor):
 
     def _act(self, actions: tuple[Action, ...]) -> None:
         for name, formula in actions:
-            if name not in self.variables:
-                self.outputs[name].send(self._result(name, formula))
-            else:
+            if name in self._set:
                 self.sets(name, formula)
+            elif formula.source in self._tokens:
+                self.outputs[name].send(self._tokens[formula.source])  # unchanged
+            else:
+                self.outputs[name].send(self._result(formula))
 
     def sets(self, name: str, formula: Formula) -> None:
         """Called by an action that sets a variable."""
-        self._known[name] = self._result(name, formula)
+        self._known[name] = self._scope[name] = self._result(formula)
 
-    def _result(self, name: str, formula: Formula) -> Any:
-        if formula.source in self._tokens and name not in self.variables:
-            return self._tokens[formula.source]  # unchanged
+    def _result(self, formula: Formula) -> Any:
         try:
-            return formula.function(*[self._value(name) for name in formula.names])
+            return formula.of(self._scope)
         except UNDECIDED:
             return formula.decided(self._values(formula))
 
@@ -327,38 +367,19 @@ class StateMachine(ModalActor):
             return True
         condition = self._conditions[self._current][rule].formula
         try:
-            return is_true(condition, self._value)
+            return is_true(condition, self._scope)
         except EpicycleError:
-            return is_true(rule.guard, self._value)  # which reports the error in the model's terms
+            return is_true(rule.guard, self._scope)  # which reports the error in the model's terms
 
-    def holds_alone(self, rule: Rule) -> bool:
-        tokens, self._tokens = self._tokens, {}
-        try:
-            return super().holds_alone(rule)
-        finally:
-            self._tokens = tokens
+    def goes_on(self) -> bool:
+        if self._tokens:
+            self._tokens = {}
+            self._look()
+        return super().goes_on()
 
     def _values(self, formula: Formula) -> dict[str, Any]:
         """The present values of the names in an expression, without inputs that have no token."""
-        found = {name: self._value(name) for name in formula.names}
-        return {name: operand(value) for name, value in found.items() if value is not ABSENT}
-
-    def _value(self, name: str) -> Any:
-        if name in self._tokens:
-            return self._tokens[name]
-        if name in self._known:
-            return self._known[name]
-        if name in self._borders.truths:
-            return self._borders.truths[name]
-        if name == "time":
-            return self.now
-        if name == "error" and self.catches:
-            return self.error or ""
-        if name == "mode_time":
-            return to_seconds(self.context.time - self._entered)
-        if name.endswith(_PRESENT):
-            return name.removesuffix(_PRESENT) in self._tokens
-        return ABSENT
+        return {name: operand(self._scope[name]) for name in formula.names if name in self._scope}
 
 
 def _check_name(keys: tuple[str, ...], name: str, kind: str, known: Collection[str]) -> None:

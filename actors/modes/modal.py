@@ -254,7 +254,7 @@ class ModalActor(Actor):
     @property
     def is_called(self) -> bool:
         """Whether a delay ends now, or a reaction has requested another."""
-        return any(map(self.is_due, (self._again, *self._timers.values())))
+        return self.is_due(self._again) or (bool(self._timers) and any(map(self.is_due, self._timers.values())))
 
     def fire(self) -> None:
         self.react(self._chart.phases)
@@ -295,8 +295,9 @@ class ModalActor(Actor):
 
     def finish(self) -> None:
         """Send the new mode, and request another reaction if it can continue from there without a token."""
-        self._timers = {rule: None if self.is_due(wake) else wake for rule, wake in self._timers.items()}
-        if self.is_due(self._again):
+        if self._timers:
+            self._timers = {rule: None if self.is_due(wake) else wake for rule, wake in self._timers.items()}
+        if self._again is not None and self.is_due(self._again):
             self._again = None
         self._drawn, self._number = {}, None
         if self._is_new:
@@ -317,10 +318,11 @@ class ModalActor(Actor):
         return wake is None or self.is_due(wake)
 
     def _is_enabled(self, rule: Rule) -> bool:
-        if rule.error != (self.error is not None):
+        if rule.error != (self.error is not None) or (rule.delay is not None and not self._is_open(rule)):
             return False
-        is_asked = not rule.on or any(map(self.is_present, rule.on))
-        return self._is_open(rule) and is_asked and self.holds(rule) and self._is_drawn(rule)
+        if rule.on and not any(map(self.is_present, rule.on)):
+            return False
+        return (rule.guard is None or self.holds(rule)) and (rule.probability is None or self._is_drawn(rule))
 
     def _is_drawn(self, rule: Rule) -> bool:
         """Whether the number drawn in this firing selects a transition; always true without a probability."""
@@ -340,10 +342,12 @@ class ModalActor(Actor):
         return self._drawn[rule]
 
     def _choose(self, rules: Sequence[Rule]) -> Rule | None:
+        if not rules:
+            return None
         enabled = [rule for rule in rules if not rule.otherwise and self._is_enabled(rule)]
         enabled = enabled or [rule for rule in rules if rule.otherwise and self._is_enabled(rule)]
-        if not enabled:
-            return None
+        if len(enabled) < 2:
+            return enabled[0] if enabled else None
         first = min(rule.priority for rule in enabled)
         enabled = [rule for rule in enabled if rule.priority == first]
         if len(enabled) == 1:
@@ -364,10 +368,11 @@ class ModalActor(Actor):
         self._enter(rule.target)
 
     def _enter(self, mode: str) -> None:
-        for wake in self._timers.values():
-            if wake is not None:
-                wake.cancel()
-        self._timers = {}
+        if self._timers:
+            for wake in self._timers.values():
+                if wake is not None:
+                    wake.cancel()
+            self._timers = {}
         self._drawn, self._number = {}, None
         self._current, self._is_new = mode, True
         self.enters(mode)
