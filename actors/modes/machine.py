@@ -158,6 +158,7 @@ class StateMachine(ModalActor):
         self._chart = Chart(tuple(self.modes), self.initial, final, rules)
         self._inputs = [name for name in self.inputs if name != "trigger"]
         self._set = frozenset(self.variables)
+        self._catches = self.catches
         for name in self.held:
             _check_name(("held", name), name, "input", self._inputs)
         for name, mode in self.modes.items():
@@ -242,7 +243,7 @@ class StateMachine(ModalActor):
             **self._known,
             **tokens,
         }
-        if self.catches:
+        if self._catches:
             self._scope.setdefault("error", self.error or "")
 
     def fire(self) -> None:
