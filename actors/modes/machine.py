@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Collection
+from math import inf
 from typing import Any, ClassVar, Final, Protocol
 
 from ..core import (
@@ -23,9 +24,10 @@ from ..expression import UNDECIDED, Formula, operand
 from ..integration import STEPPERS
 from ..trajectory import number_of
 from .borders import Borders
+from .chart import Chart, Rule
 from .condition import TIMES, Comparison, Condition, condition_of, type_of
 from .guard import is_true
-from .modal import Chart, ModalActor, Rule
+from .modal import ModalActor
 from .text import Action, ModesParameter, TransitionsParameter
 
 _PRESENT: Final = "_is_present"
@@ -60,12 +62,12 @@ class StateMachine(ModalActor):
             - idle -> heating when temperature <= 18 do heater = true
 
     A transition is ``a, b -> c``, followed by ``else``, ``immediate``, ``nondeterministic``, ``priority 2`` or
-    ``probability 0.1``, then ``on`` inputs of which one must have a token, ``after`` a time since the entry, ``when`` a
-    guard, ``do`` actions; or a mapping with these keys.  Expressions are in the language of ``${...}``.  Names in them
-    are variables, ``time`` (s), ``mode_time`` (s since the mode was entered), or else input ports.  A guard that uses
-    an input without a token does not hold; ``x_is_present`` states whether ``x`` has one, and inputs in ``held`` keep
-    their latest.  An action sets a variable, or sends from an output port of that name.  If several tokens arrive
-    together at one input, each gets its own reaction, at the following microsteps.
+    ``probability 0.1`` or ``rate 3``, then ``on`` inputs of which one must have a token, ``after`` a time since the
+    entry, ``when`` a guard, ``do`` actions; or a mapping with these keys.  Expressions are in the language of
+    ``${...}``.  Names in them are variables, ``time`` (s), ``mode_time`` (s since the mode was entered), or else input
+    ports.  A guard that uses an input without a token does not hold; ``x_is_present`` states whether ``x`` has one, and
+    inputs in ``held`` keep their latest.  An action sets a variable, or sends from an output port of that name.  If
+    several tokens arrive together at one input, each gets its own reaction, at the following microsteps.
 
     In a mode with ``flow``, variables follow differential equations, as in an ``ODE``.  In a guard, a comparison over
     them, or over times, is an event at the nanosecond at which it changes.  If its transition moves a variable off the
@@ -98,7 +100,7 @@ class StateMachine(ModalActor):
         actions = [*(each for one in self.transitions for each in one.do), *self._at_borders()]
         read = [formula for _, formula in actions]
         for one in self.transitions:
-            read += [each for each in (one.when, one.after, one.probability) if each is not None]
+            read += [each for each in (one.when, one.after, one.probability, one.rate) if each is not None]
         read += [formula for mode in self.modes.values() for formula in mode.flow.values()]
         ports: dict[str, InputPort[Any] | OutputPort[Any]] = {}
         for name in self.variables:
@@ -150,7 +152,7 @@ class StateMachine(ModalActor):
             Rule(
                 each.from_, each.to, each.on, each.when, each.after, each.probability, each.do or None,
                 each.priority, each.else_, each.immediate, each.nondeterministic,
-                each.preemptive, each.history, each.error, place,
+                each.preemptive, each.history, each.error, each.rate, place,
             )
             for place, each in enumerate(self.transitions)
         ]  # fmt: skip
@@ -177,7 +179,7 @@ class StateMachine(ModalActor):
             self._comparisons[name] = tuple(each for one in found.values() for each in one.comparisons)
         rules = [rule for leaving in self._chart.leaving.values() for rule in leaving]
         self.is_preemptive = any(rule.preemptive for rule in rules)
-        read = [each for rule in rules for each in (rule.guard, rule.delay, rule.probability) if each is not None]
+        read = [each for rule in rules for each in (rule.guard, rule.delay, rule.probability, rule.rate) if each]
         read += [formula for each in self.transitions for _, formula in each.do]
         read += [formula for _, formula in self._at_borders()]
         self._asked_of = tuple(
@@ -281,7 +283,7 @@ class StateMachine(ModalActor):
     @property
     def next_time(self) -> int | None:
         """When (ns) it must fire next without a token."""
-        wakes = (self._wake, self._again, *self._timers.values())
+        wakes = (self._wake, self._again, self._first, *self._timers.values())
         return min((wake.time for wake in wakes if wake is not None and not self.is_due(wake)), default=None)
 
     def take_tokens(self) -> None:
@@ -374,9 +376,23 @@ class StateMachine(ModalActor):
 
     def goes_on(self) -> bool:
         if self._tokens:
-            self._tokens = {}
-            self._look()
+            self._look_ahead()
         return super().goes_on()
+
+    def race(self) -> None:
+        self._look_ahead()
+        super().race()
+
+    def _look_ahead(self) -> None:
+        """Gather what names mean while no token comes."""
+        self._tokens = {}
+        self._look()
+
+    def rate_of(self, rule: Rule) -> float:
+        found = number_of(rule.rate, self._values(rule.rate), f"{rule} rate")
+        if not 0.0 <= found < inf:
+            raise EpicycleError(f"{rule}: {found:g} is not a rate, which is a number >= 0")
+        return found
 
     def _values(self, formula: Formula) -> dict[str, Any]:
         """The present values of the names in an expression, without inputs that have no token."""

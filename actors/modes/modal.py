@@ -6,7 +6,9 @@ A machine is in one mode.  It reacts once per tag at which it fires:
 
 1. A transition that leaves the mode is *enabled* if its delay is over, one of its trigger ports has a token, and its
    guard holds.  An ``otherwise`` transition is enabled if no other one is.  Of the transitions with a ``probability``,
-   one is drawn: their probabilities divide the range from 0 to 1, one after the other.
+   one is drawn: their probabilities divide the range from 0 to 1, one after the other.  Transitions with a ``rate``
+   race: each whose guard holds comes after an exponentially distributed time of its own, and the first is taken if
+   nothing else is enabled.
 2. Of the enabled transitions, only those with the lowest ``priority`` count.  If there are several, all must be
    nondeterministic, and one is drawn; otherwise, the run ends with an error.
 3. The transition is taken: the exit actions of the mode, its own actions, the entry actions of its target.
@@ -24,123 +26,19 @@ Source: E. A. Lee and S. Tripakis, "Modal Models in Ptolemy" (2010); Ptolemy: ``
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from math import fsum
 from typing import Any, Final, TypeVar
 
-from ..core import Actor, EpicycleError, Fault, OutputPort, Parameter, ParameterError, Tag, Wake, did_you_mean
+from ..core import Actor, EpicycleError, OutputPort, Parameter, ParameterError, Tag, Wake, did_you_mean
+from .chart import Chart, Rule
 
 MOST_IMMEDIATE: Final = 1_000
 _ROUNDING: Final = 1e-9  # of probabilities that add up to 1
-ALL: Final = "*"
 
 Method = Callable[[Any], None]
 M = TypeVar("M", bound=Method)
-
-
-@dataclass(frozen=True, eq=False)
-class Rule:
-    """One transition.
-
-    ``guard``, ``delay``, ``probability`` and ``act`` are in the form that the modal actor uses; None means that there
-    is none.
-    """
-
-    sources: tuple[str, ...]
-    target: str
-    on: tuple[str, ...] = ()
-    guard: Any = None
-    delay: Any = None
-    probability: Any = None
-    act: Any = None
-    priority: int = 0
-    otherwise: bool = False
-    immediate: bool = False
-    nondeterministic: bool = False
-    preemptive: bool = False
-    history: bool = False
-    error: bool = False
-    place: int = 0  # index among the transitions, for messages
-
-    def __str__(self) -> str:
-        return f"{', '.join(self.sources)} -> {self.target}"
-
-
-class Chart:
-    """The modes of a machine and the transitions that leave each; raises ``ParameterError`` if they do not fit."""
-
-    def __init__(
-        self, modes: Sequence[str], initial: str | None, final: Collection[str], rules: Sequence[Rule]
-    ) -> None:
-        if not modes:
-            raise ParameterError("modes: expected at least one")
-        self.modes = tuple(modes)
-        self.initial = self._known("initial", modes[0] if initial is None else initial, "initial")
-        self.final = frozenset(self._known("final", mode, "final") for mode in final)
-        self.leaving: dict[str, tuple[Rule, ...]] = dict.fromkeys(modes, ())
-        faults: list[Fault] = []
-        for rule in rules:
-            try:
-                self._known(str(rule), rule.target, "transitions", rule.place)
-                for mode in self._sources(rule):
-                    self.leaving[mode] += (rule,)
-            except ParameterError as error:
-                faults += error.faults
-        if faults:
-            raise ParameterError.several(faults)
-        self.immediate = self._those(lambda rule: rule.immediate)
-        self.phases = self._those(lambda rule: rule.preemptive), self._those(lambda rule: not rule.preemptive)
-        self._check_reach()
-        for mode, leaving in self.leaving.items():
-            self._check_clear(mode, leaving)
-
-    def _those(self, of_a_kind: Callable[[Rule], bool]) -> dict[str, tuple[Rule, ...]]:
-        return {mode: tuple(filter(of_a_kind, leaving)) for mode, leaving in self.leaving.items()}
-
-    def _known(self, where: str, mode: str, *keys: str | int) -> str:
-        if mode not in self.modes:
-            near = did_you_mean(mode, self.modes)
-            raise ParameterError(f"{where}: there is no mode {mode!r}{near}; modes: {', '.join(self.modes)}", keys)
-        return mode
-
-    def _sources(self, rule: Rule) -> list[str]:
-        if rule.sources == (ALL,):
-            return [mode for mode in self.modes if mode != rule.target and mode not in self.final]
-        for mode in rule.sources:
-            if self._known(str(rule), mode, "transitions", rule.place) in self.final:
-                raise ParameterError(
-                    f"{rule}: {mode!r} is final; no transition can leave it", ("transitions", rule.place)
-                )
-        return list(rule.sources)
-
-    def _check_reach(self) -> None:
-        reached, waiting = {self.initial}, [self.initial]
-        while waiting:
-            for rule in self.leaving[waiting.pop()]:
-                if rule.target not in reached:
-                    reached.add(rule.target)
-                    waiting.append(rule.target)
-        if lost := [mode for mode in self.modes if mode not in reached]:
-            message = f"{lost[0]!r} is never entered: no transitions lead there from {self.initial!r}"
-            raise ParameterError(message, ("modes", lost[0]), of_key=True)
-
-    @staticmethod
-    def _check_clear(mode: str, leaving: Sequence[Rule]) -> None:
-        """Reject transitions that are certain to be enabled together with no preference between them."""
-        seen: dict[object, Rule] = {}
-        for rule in leaving:
-            if rule.probability is not None:  # at most one of them is drawn
-                continue
-            same = (
-                rule.priority, rule.otherwise, rule.on, rule.guard, rule.delay, rule.preemptive, rule.error
-            )  # fmt: skip
-            first = seen.setdefault(same, rule)
-            if first is not rule and not (first.nondeterministic and rule.nondeterministic):
-                raise ParameterError(
-                    f"in {mode!r}, {first} and {rule} are always enabled together: give one a priority (the lower one "
-                    "goes first), or make both nondeterministic",
-                    ("transitions", rule.place),
-                )
 
 
 class ModalActor(Actor):
@@ -201,6 +99,10 @@ class ModalActor(Actor):
         """The probability of a transition that would otherwise be enabled."""
         return float(rule.probability(self) if callable(rule.probability) else rule.probability)
 
+    def rate_of(self, rule: Rule) -> float:
+        """How often (1/s) a transition comes while its guard holds."""
+        return float(rule.rate(self) if callable(rule.rate) else rule.rate)
+
     def act(self, rule: Rule) -> None:
         """The actions of a transition."""
         getattr(self, rule.act)()
@@ -245,6 +147,8 @@ class ModalActor(Actor):
         self._drawn: dict[Rule, bool] = {}  # in this firing, by transition with a probability
         self._number: float | None = None  # the random number for them, and the range used up
         self._used = 0.0
+        self._rates: dict[Rule, float] = {}  # of the transitions that race, and when the first one comes
+        self._first: Wake | None = None
         self.error: str | None = None  # of the failed refinement of the mode
 
     def is_due(self, wake: Wake | None) -> bool:
@@ -253,8 +157,9 @@ class ModalActor(Actor):
 
     @property
     def is_called(self) -> bool:
-        """Whether a delay ends now, or a reaction has requested another."""
-        return self.is_due(self._again) or (bool(self._timers) and any(map(self.is_due, self._timers.values())))
+        """Whether a delay ends now, a race is over, or a reaction has requested another."""
+        is_called = self.is_due(self._again) or self.is_due(self._first)
+        return is_called or (bool(self._timers) and any(map(self.is_due, self._timers.values())))
 
     def fire(self) -> None:
         self.react(self._chart.phases)
@@ -272,6 +177,8 @@ class ModalActor(Actor):
         rule = None
         for phase in phases:
             rule = rule or self._choose(phase[self._current])
+        if rule is None and phases is chart.phases and self.is_due(self._first) and self.error is None:
+            rule = self._winner()
         self.follow(rule)
 
     def begins(self) -> None:
@@ -300,15 +207,38 @@ class ModalActor(Actor):
         if self._again is not None and self.is_due(self._again):
             self._again = None
         self._drawn, self._number = {}, None
+        if self._rates or self._chart.racing[self._current]:
+            self.race()
         if self._is_new:
             self._is_new = False
             self.mode.send(self._current)
             if self.goes_on() and self._again is None:
                 self._again = self.wake_in(0)
 
+    def race(self) -> None:
+        """Draw when the first of the transitions with rates comes, if that is open: rates have no memory."""
+        rates = {rule: self.rate_of(rule) for rule in self._chart.racing[self._current] if self.holds(rule)}
+        if rates == self._rates and not self._is_new and not self.is_due(self._first):
+            return
+        if self._first is not None:
+            self._first.cancel()
+        self._rates, self._first, total = rates, None, fsum(rates.values())
+        if total > 0.0:
+            self._first = self.wake_in(self.random_stream("rate").exponential(1.0 / total))
+
+    def _winner(self) -> Rule:
+        """The transition that wins the race, which is over now."""
+        place = self.random_stream("rate").random() * fsum(self._rates.values())
+        for rule, rate in self._rates.items():
+            place -= rate
+            if place < 0.0:
+                return rule
+        return max(self._rates, key=self._rates.__getitem__)  # where rounding has left something over
+
     def holds_alone(self, rule: Rule) -> bool:
         """Whether a transition would be enabled at the next microstep, if no token came."""
-        return not (rule.otherwise or rule.on or rule.error) and self._is_open(rule) and self.holds(rule)
+        waits = rule.otherwise or rule.on or rule.error or rule.rate is not None
+        return not waits and self._is_open(rule) and self.holds(rule)
 
     def _is_open(self, rule: Rule) -> bool:
         """Whether the delay of a transition is over."""
@@ -398,18 +328,19 @@ def transition(
     nondeterministic: bool = False,
     preemptive: bool = False,
     probability: float | Callable[[Any], float] | None = None,
+    rate: float | Callable[[Any], float] | None = None,
 ) -> Callable[[M], M]:
     """Declare a method of a ``ModalActor`` as the actions of a transition.
 
     ``source`` is a mode, several, or ``"*"`` for all but the target; ``on`` lists inputs of which one must have a
     token; ``when`` is a function of the actor that returns whether the transition can be taken; ``after`` is the time
-    since the entry: s, a text with a unit, or a function of the actor.  ``probability`` is a number, or a function of
-    the actor.  A method may serve several transitions.
+    since the entry: s, a text with a unit, or a function of the actor.  ``probability`` and ``rate`` (1/s) are numbers,
+    or functions of the actor.  A method may serve several transitions.
     """
     delay = Parameter(float, unit="s", min=0).convert(after) if isinstance(after, (str, int, float)) else after
     rule = Rule(
         _texts(source), target, _texts(on), when, delay, probability, None,
-        priority, otherwise, immediate, nondeterministic, preemptive,
+        priority, otherwise, immediate, nondeterministic, preemptive, rate=rate,
     )  # fmt: skip
 
     def mark(method: M) -> M:

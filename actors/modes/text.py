@@ -15,9 +15,10 @@ _QUOTED: Final = re.compile(r"'[^']*'|\"[^\"]*\"")
 _ARROW: Final = re.compile(r"\s*(?P<sources>[^>]+?)\s*->\s*(?P<target>[^\s;]+)(?P<rest>(\s.*)?)", re.DOTALL)
 _FLAG: Final = re.compile(
     r"\s*(?:(?P<flag>else|immediate|nondeterministic|preemptive|history|error)|priority\s+(?P<priority>-?\d+)"
-    r"|probability\s+(?P<probability>\S+))(?=\s|$)"
+    r"|(?P<number>probability|rate)\s+(?P<value>\S+))(?=\s|$)"
 )
 _CLAUSE: Final = re.compile(r"(?<![\w.])(on|after|when|do)(?![\w.])")
+_DIVISION: Final = re.compile(r"[\s\d.eE+-]*[*/]")
 _ASSIGNMENT: Final = re.compile(r"\s*(?P<name>[A-Za-z_]\w*)\s*=(?!=)(?P<formula>.*)", re.DOTALL)
 _FORM: Final = "'a -> b on PORT after TIME when CONDITION do NAME = VALUE; ...'"
 
@@ -25,17 +26,26 @@ _TRUTHS: Final[dict[Any, Any]] = {"true": True, "false": False}  # as YAML write
 Action = tuple[str, Formula]
 
 
-class _DelayParameter(FormulaParameter):
-    """A time, or an expression for a time in s."""
+class _QuantityParameter(FormulaParameter):
+    """A quantity that is at least 0, or an expression for one in its unit."""
+
+    def __init__(self, what: str, unit: str, doc: str) -> None:
+        super().__init__(None, doc=doc)
+        self.what, self.of_unit = what, unit
 
     def describe_type(self) -> str:
-        return "time or expression"
+        return f"{self.what} or expression"
 
     def convert(self, value: object) -> Formula | None:
-        if not isinstance(value, (str, Formula)) or (isinstance(value, str) and quantity(value) is not None):
-            given = Parameter(float, unit="s", min=0.0, optional=self.optional).convert(value)
+        if not isinstance(value, (str, Formula)) or _has_unit(value):
+            given = Parameter(float, unit=self.of_unit, min=0.0, optional=self.optional).convert(value)
             return None if given is None else Formula(repr(given))
         return super().convert(value)
+
+
+def _has_unit(value: str | Formula) -> bool:
+    """Whether a text is a number with a unit; ``3 / x`` is an expression."""
+    return isinstance(value, str) and quantity(value) is not None and not _DIVISION.match(value)
 
 
 class _ActionsParameter(Parameter[Any]):
@@ -125,9 +135,10 @@ class Transition(Configurable):
     from_ = texts_parameter(doc="the modes that it leaves; * for all but its target")
     to = Parameter(str, doc="the mode that it enters")
     on = texts_parameter((), doc="inputs of which one must have a token")
-    after = _DelayParameter(None, doc="time after the entry from which it may be taken, in s")
+    after = _QuantityParameter("time", "s", "time after the entry from which it may be taken, in s")
     when = FormulaParameter(None, doc="the guard")
     probability = FormulaParameter(None, doc="probability that it is enabled when it would otherwise be")
+    rate = _QuantityParameter("rate", "1/s", "how often it comes while its guard holds: after an exponential time")
     do = _ActionsParameter("actions when it is taken: sends outputs and sets variables, one after the other")
     priority = Parameter(int, 0, doc="if several are enabled, the lowest is taken")
     else_ = Parameter(bool, False, doc="whether it is enabled only if no other is")
@@ -225,9 +236,9 @@ def _clauses(text: str) -> tuple[dict[str, object], dict[str, Span]]:
     places: dict[str, Span] = {}
     start = arrow.start("rest")
     while (flag := _FLAG.match(text, start)) is not None:
-        if flag["probability"] is not None:
-            said["probability"] = flag["probability"]
-            places["probability"] = flag.start("probability"), len(flag["probability"])
+        if flag["number"] is not None:
+            said[flag["number"]] = flag["value"]
+            places[flag["number"]] = flag.start("value"), len(flag["value"])
         elif flag["priority"] is not None:
             said["priority"] = int(flag["priority"])
         else:
