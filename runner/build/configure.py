@@ -7,7 +7,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, TypeAlias, TypeVar
 
-from epicycle.actors import Parameter, declared_parameters, nearest, unknown_parameter
+from epicycle.actors import Configurable, Parameter, declared_parameters, found_variants, nearest, unknown_parameter
 
 from ..language.values import Locals, Values
 from ..text.document import Entry
@@ -86,11 +86,24 @@ def configure(
             try:
                 declared[name].convert(found[name])
             except Exception as error:
-                values.blame(f"{label}.{name}", error, entry.value, known)
+                hints = _taken_by(declared, name, found[name])
+                values.blame(f"{label}.{name}", error, entry.value, known, *hints)
                 told = True
     if failure is not None and not told:
         values.blame(label, failure, MappingNode({name: entry for name, (entry, _) in chosen.items()}, position), local)
     return POISON
+
+
+def _taken_by(declared: Mapping[str, Parameter[Any]], name: str, value: object) -> list[str]:
+    """Which other parameters take such a part: a distribution that is given as a number, say."""
+    kind = value.get("type") if isinstance(value, Mapping) else None
+    bases = {each: other.type for each, other in declared.items() if each != name and isinstance(other.type, type)}
+    takers = [
+        each
+        for each, base in bases.items()
+        if issubclass(base, Configurable) and isinstance(kind, str) and kind in found_variants(base, kind)
+    ]
+    return [f"{kind} is a value of {each!r}: {each}: {{type: {kind}, ...}}" for each in takers]
 
 
 def _value(parameter: Parameter[Any], entry: Entry, local: Locals, label: str, values: Values) -> Any:

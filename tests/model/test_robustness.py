@@ -181,3 +181,21 @@ def test_limits_are_raised_by_who_wants_a_larger_model(tmp_path: Path) -> None:
     assert (len(model.graph.actors), model.graph.connections) == (41, 110)
     assert main(["validate", str(path), "--max-actors", "41"]) == 0
     assert main(["validate", str(path), "--max-actors", "40"]) == 2
+
+
+def test_a_part_that_another_parameter_takes(tmp_path: Path) -> None:
+    told = said(
+        "model: m\n"
+        "actors:\n"
+        "  b: {type: Server, service_time: {type: Exponential, mean: 1 s}}\n"
+        "  c: {type: Server, service_time: {type: [1]}}\n",
+        tmp_path,
+    )
+    assert told.startswith(
+        "m.yaml:3:35: error: b.service_time: {'type': 'Exponential', 'mean': '1 s'} is not a number in s >= 0\n"
+        "    3 |   b: {type: Server, service_time: {type: Exponential, mean: 1 s}}\n"
+        "      |                                   ^^^^^^^^^^^^^^^^^^^^^^^^^^^^^^\n"
+        "   help: Exponential is a value of 'distribution': distribution: {type: Exponential, ...}\n"
+        "\n"
+        "m.yaml:4:35: error: c.service_time: {'type': [1]} is not a number in s >= 0\n"
+    )
