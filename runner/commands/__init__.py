@@ -13,7 +13,7 @@ from .offered import offered_commands
 from .options import BAD_INPUT, BROKEN, DONE, FAILED, JSON, TYPES, Command, command, option, own_types, several
 
 GROUPS = {
-    "look at one run": (running.run, running.view, searching.explain),
+    "look at one run": (running.run, running.view, searching.explain, searching.what_if),
     "make many runs": (studies.study, studies.status, studies.report, searching.compare),
     "search": (searching.search, searching.rare),
     "work with recorded data": (recording.recording,),
