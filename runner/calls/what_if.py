@@ -49,9 +49,9 @@ def what_if(
 ) -> WhatIf:
     """Change something from a tag of a run on, and show both futures: where they part, and what comes of it.
 
-    Before the tag, both are the same run, bit for bit. ``set``, ``disturb`` and the other options of ``load`` change the
-    model of both from the start. The folder gets the facts as JSON, and a page with both futures, in which the first
-    firing that changes is marked.
+    Before the tag, both are the same run, bit for bit.  ``set``, ``disturb`` and the other options of ``load`` change
+    the model of both from the start.  The folder gets the facts as JSON, and a page with both futures, in which the
+    first firing that changes is marked.
 
     >>> epicycle.what_if("collision_avoidance", "12 s", disturb="wifi_burst", let_through="wifi_loss").first
     """

@@ -73,8 +73,8 @@ class WhatIf(Answer):
             reason = (
                 "Both futures have the same log"
                 if not self.changes
-                else "It makes no difference: both futures have the same log; what an actor reads only at its start does "
-                "not change later"
+                else "It makes no difference: both futures have the same log; what an actor reads only at its start "
+                "does not change later"
             )
             return [*said, f"{reason}."]
         if self.first is not None:
@@ -82,7 +82,8 @@ class WhatIf(Answer):
         names = [*self.affected][:_FEW]
         more = f" and {len(self.affected) - _FEW:,} more" if len(self.affected) > _FEW else ""
         whom = f": {', '.join(names)}{more}" if names else ""
-        said.append(f"{len(self.affected):,} of {counted(self.actors, 'actor')} do something else{whom}.")
+        do = "does" if len(self.affected) == 1 else "do"
+        said.append(f"{len(self.affected):,} of {counted(self.actors, 'actor')} {do} something else{whom}.")
         for name, verdict in self.before.monitors.items():
             if (other := self.after.monitors[name]).holds != verdict.holds:
                 said.append(f"Monitor {name}: {_verdict(verdict)} as it was, {_verdict(other)} instead.")
@@ -189,7 +190,8 @@ def future_of(
     firing, record = first_firing(recordings), difference(recordings)
     if firing is not None and firing.tag < at:
         raise EpicycleError(
-            f"two runs of {model.name} differ at {firing.tag}, before {at}: something depends on more than model and seed"
+            f"two runs of {model.name} differ at {firing.tag}, before {at}: "
+            "something depends on more than model and seed"
         )
     found = WhatIf(
         model.name,

@@ -6,7 +6,7 @@ import copy
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 from epicycle.actors import EpicycleError, ParameterError, Tag, declared_parameters, did_you_mean, to_nanoseconds
 from epicycle.aspects import ClockAspect, ExecutionAspect, JoinPoint, PortAspect
@@ -14,7 +14,7 @@ from epicycle.aspects import ClockAspect, ExecutionAspect, JoinPoint, PortAspect
 from ..build.model import Model
 from ..desk import difference
 from ..engine import Interventions, Simulation
-from ..graph.acts import Act, ActName
+from ..graph.acts import Act
 from ..graph.woven import WovenAspect
 from ..language.settings import settings_of
 from ..shown import short
@@ -44,6 +44,20 @@ def what_if(
     model: Model, at: Tag, changes: Changes, *, seed: int | None, until: float | None, progress: bool = True
 ) -> WhatIf:
     """Run a model as it is, and with changes from a tag on; raises ``EpicycleError``."""
+    fork = forked(model, at, changes, seed=seed, until=until)
+    return future_of(model, fork.model, fork.acts, at, fork.words, seed=seed, until=until, progress=progress)
+
+
+class Fork(NamedTuple):
+    """What makes the run with changes: a model, the rules for acts of aspects, and the changes in words."""
+
+    model: Model
+    acts: Interventions
+    words: list[str]
+
+
+def forked(model: Model, at: Tag, changes: Changes, *, seed: int | None = None, until: float | None = None) -> Fork:
+    """The model with changes from a tag on; raises ``EpicycleError``."""
     other, words, always = copy.copy(model), list[str](), set[str]()
 
     def weave(aspect: _Then, places: Mapping[str, Any]) -> None:
@@ -71,7 +85,7 @@ def what_if(
         ends=dict.fromkeys(changes.remove, at),
         always=frozenset(always),
     )
-    return future_of(model, other, rules, at, words, seed=seed, until=until, progress=progress)
+    return Fork(other, rules, words)
 
 
 def tag_of(given: float | str | Tag) -> Tag:
@@ -112,8 +126,9 @@ def _parameters(model: Model, change: Iterable[str] | Mapping[str, object]) -> d
         declared = {} if actor is None else declared_parameters(type(actor))
         if each.section != "actors" or each.fact not in declared:
             raise EpicycleError(
-                f"{', '.join(each.path for each in settings)} cannot change during a run: it changes the model, not only "
-                f"parameters of its actors ({str(each)[2:]})\n   help: compare two runs from the start: epicycle compare"
+                f"{', '.join(each.path for each in settings)} cannot change during a run: it changes more than "
+                f"parameters of actors: {each.section} {str(each)[2:]}\n"
+                "   help: compare it from the start, with epicycle compare"
             )
         path = f"{each.path}.{each.fact}"
         _check_alterable(model, path)

@@ -34,7 +34,9 @@ def difference(recordings: Sequence[Recording]) -> dict[str, Any] | None:
         "records": [each.kept_record(record) for each in recordings],
         "texts": [said(each, record) for each in recordings],
         "firings": [NOTHING if n is None else each.kept_firing(n) for each, n in zip(recordings, numbers, strict=True)],
-        "fired": [] if firing is None else [f"{firing.tag} {firing.actor} {each}" for each in fired(recordings, firing)],
+        "fired": []
+        if firing is None
+        else [f"{firing.tag} {firing.actor} {each}" for each in fired(recordings, firing)],
     }
 
 
@@ -49,16 +51,12 @@ def first_firing(recordings: Sequence[Recording]) -> FirstFiring | None:
     number = _first(one.hashes, other.hashes)
     if number is None:
         return None
-    there = [each if number < len(each) else None for each in (one, other)]
-    heads = [None if each is None else _head(rec, number) for each, rec in zip(there, recordings, strict=False)]
-    if heads[0] == heads[1] and heads[0] is not None:
+    heads = {n: _head(each, number) for n, each in enumerate(recordings[:2]) if number < len(each.fired)}
+    if len(heads) == 2 and heads[0] == heads[1]:
         return FirstFiring(heads[0][1], heads[0][0], (number, number))
     # Only one of them has this firing: the one that comes first, or that the other run does not have at this tag.
-    which = min(
-        (n for n in (0, 1) if heads[n] is not None),
-        key=lambda n: (heads[n][0], _comes(recordings[1 - n], number, heads[n])),
-    )  # type: ignore[index]
-    tag, actor = heads[which]  # type: ignore[misc]
+    which = min(heads, key=lambda n: (heads[n][0], _comes(recordings[1 - n], number, heads[n])))
+    tag, actor = heads[which]
     return FirstFiring(actor, tag, (number, None) if which == 0 else (None, number))
 
 

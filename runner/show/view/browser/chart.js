@@ -25,6 +25,11 @@ class Chart extends Timeline {
     if (y < RULER + ROW || y > this.height - ROW) this.scrollBy(y - this.height / 2);
   }
 
+  // Scrolls to the lane of an actor, before the first drawing.
+  reveal(actor) {
+    this.scroll = Math.max(0, ((this.rows().at.get(actor) ?? 0) - 3) * ROW);
+  }
+
   // The actors with a lane, by its position.
   rows() {
     const { run, cone, selection } = this.state;

@@ -45,6 +45,7 @@ async function main() {
     state.activate(changed);
     state.show(run.times[tag] - half / 2, run.times[tag] + half * 1.5);
     state.setTag(tag);
+    chart.reveal(run.firing_actor[run.firstChange]);
   }
   let before = performance.now();
   const frame = (now) => {
