@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ..printing import complain, tell
-from . import completion, describe, editor, listing, new, recording, running, searching, studies
+from . import agents, completion, describe, editor, listing, new, recording, running, searching, studies
 from .offered import offered_commands
 from .options import BAD_INPUT, BROKEN, DONE, FAILED, JSON, TYPES, Command, command, option, own_types, several
 
@@ -25,6 +25,7 @@ GROUPS = {
         describe.graph,
         listing.list_,
         editor.lsp,
+        agents.mcp,
     ),
     "set up a shell": (completion.completion,),
 }

@@ -132,15 +132,16 @@ class Simulation(Tabled):
         until: float | None = None,
         progress: Callable[[float], None] | None = None,
         pace: Pace | None = None,
+        most: int | None = None,
     ) -> Results:
         """Run to the end and return the results; an exception in an actor is raised as ``ActorError``.
 
         ``until`` is the stop time (s, default: the model's), ``progress`` is called with the time now and then, and
-        ``pace`` limits the run to the wall clock.
+        ``pace`` limits the run to the wall clock.  A run that is not over after ``most`` tags ends there.
         """
         self._refuse_over()
         stop = self.model.output.stop_time if until is None else to_nanoseconds(until)
-        self._run.advance(stop, progress=progress, pace=pace)
+        self._run.advance(stop, most=most, progress=progress, pace=pace)
         return self._run.finish()
 
     def advance(self, until: float) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -13,6 +14,7 @@ from epicycle.actors import ParameterError, did_you_mean, irregular, read_regula
 
 from .problems import Position
 
+FOLDER = "EPICYCLE_FOLDER"  # the variable that names the only folder whose files the command line may name
 COMMAND_LINE = "command line"  # the file of a position in an option
 
 
@@ -94,7 +96,7 @@ def data_file(name: Path, position: Position) -> Path:
 
     A name in a YAML file means a file in or below the folder of that YAML file, so that a model can be moved with its
     data and cannot read anything else.  A name on the command line comes from the user: it is relative to the working
-    directory and may lead anywhere.
+    directory and may lead anywhere, unless the environment names a folder for it.
     """
     folder = Path(position.file).parent
     target = name if position.file == COMMAND_LINE else folder / name
@@ -103,6 +105,8 @@ def data_file(name: Path, position: Position) -> Path:
             raise ParameterError(
                 f"{str(name)!r} cannot be read: a file named in a model must be in or below the folder of its YAML file"
             )
+        if (root := os.environ.get(FOLDER)) and not target.resolve().is_relative_to(Path(root).resolve()):
+            raise ParameterError(f"{str(name)!r} cannot be read: it is not in the folder {root}")
         if target.is_file():
             if _noted.get() is not None:
                 note_file(target, read_regular(target))

@@ -282,24 +282,3 @@ def test_the_command_says_what_came_of_it(line: Path, tmp_path: Path, capsys: py
     assert found["first_firing"]["actor"] == "gain"
     assert found["metrics"]["what if"]["heard"] == found["metrics"]["as it was"]["heard"] + 1
     assert "First firing that changes" in (out / "what_if.html").read_text("utf-8")
-
-
-@pytest.mark.slow
-def test_a_lost_plan_is_let_through_by_one_command(
-    tmp_path: Path, browser: Any, capsys: pytest.CaptureFixture[str]
-) -> None:
-    told = ["what-if", "collision_avoidance", "--disturb", "wifi_burst", "--at", "3", "--until", "5"]
-    told += ["--let-through", "wifi_loss@main.peer_plan", "--out", str(tmp_path)]
-    assert main(told) == 0
-    said = capsys.readouterr().out
-    assert "The first firing that changes is main.controller at (3.40497088 s, 1)." in said
-    tab = browser.new_page(viewport={"width": 1400, "height": 900})
-    tab.goto((tmp_path / "what_if.html").as_uri())
-    tab.wait_for_selector("#page[data-ready]")
-    assert "main.controller at (3.40497088 s, 1)" in tab.locator(".details .story").nth(1).inner_text()
-    tab.locator("button.changed").last.click()
-    assert tab.locator(".details h2").first.inner_text() == "main.controller"
-    assert "fired at 3.40497088 s" in tab.locator(".details").inner_text()
-    marked = tab.evaluate("() => epicycle.state.runs.map((run) => run.firstChange)")
-    assert [number >= 0 for number in marked] == [False, True]
-    tab.close()
