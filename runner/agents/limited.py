@@ -13,7 +13,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..text.files import FOLDER
+from epicycle.actors import FOLDERS
+
+from ..catalogue.packaged import model_folders
 
 _TEXT = "model.yaml"  # the name in messages of a model that came as a text
 
@@ -44,7 +46,7 @@ class LimitedCall:
     def facts(self, command: str, names: Sequence[str], *options: str, good: Sequence[int] = (0,)) -> Any:
         """What a command prints as JSON."""
         with tempfile.TemporaryDirectory(prefix="epicycle-") as out:
-            words = [each.replace("{out}", out) for each in options]
+            words = [each.replace("{out}", f"{out}/found") for each in options]
             text = self._answer(out, command, names, [*words, "--json", *self.types], good)
         if len(text) > self.limits.answer:
             raise ToolError(
@@ -68,7 +70,9 @@ class LimitedCall:
                 raise ToolError(f"an argument is longer than {self.limits.argument:,} characters, or is no text")
         code, told, complained = self._run(words, out)
         if code not in good or not (told or not good):
-            raise ToolError(self._shown(complained or told, out) or f"the command ended with {code}")
+            said = self._shown(complained or told, out)
+            said = said[said.rfind("error: ") :] if said.startswith("usage: ") else said
+            raise ToolError(said[: self.limits.answer] or f"the command ended with {code}")
         return self._shown(told, out)
 
     def _named(self, name: str, out: str, number: int) -> str:
@@ -83,19 +87,22 @@ class LimitedCall:
 
     def inside(self, name: str) -> str:
         """The name of a file, if it is in the folder, or of what is packaged; raises ``ToolError``."""
-        if "/" not in name and os.sep not in name and not (self.folder / name).exists():
-            return name
         try:
-            is_inside = (self.folder / name).resolve().is_relative_to(self.folder)
+            path = (self.folder / name).resolve()
+            if name.replace("_", "").isalnum() and not path.exists():  # packaged, or a type
+                return name
+            is_there = path.is_relative_to(self.folder) and path.is_file()
         except (OSError, RuntimeError, ValueError):  # endless links, too long a name
-            is_inside = False
-        if not is_inside:
-            raise ToolError(f"{name[:200]!r} is not in the folder of this server")
-        return name
+            is_there = False
+        if not is_there:
+            raise ToolError(f"there is no file {name[:200]!r} in the folder of this server")
+        return str(path.relative_to(self.folder))
 
     def _run(self, words: Sequence[str], out: str) -> tuple[int, str, str]:
         streams = Path(out, ".stdout"), Path(out, ".stderr")
-        environment: Mapping[str, str] = {**os.environ, FOLDER: str(self.folder), "NO_COLOR": "1", "COLUMNS": "120"}
+        named = [each.partition("=")[2] for each in self.types]
+        folders = os.pathsep.join(str(Path(each).resolve()) for each in (self.folder, out, *model_folders(), *named))
+        environment: Mapping[str, str] = {**os.environ, FOLDERS: folders, "NO_COLOR": "1", "COLUMNS": "120"}
         with streams[0].open("wb") as told, streams[1].open("wb") as complained:
             process = subprocess.Popen(
                 words,

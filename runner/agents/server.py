@@ -9,6 +9,7 @@ from typing import Annotated, Any, Literal
 
 import anyio.to_thread
 from mcp.server.mcpserver import Image, MCPServer
+from mcp.server.mcpserver.exceptions import ResourceError
 from mcp.server.mcpserver.exceptions import ToolError as Refusal
 from pydantic import BaseModel, Field
 
@@ -112,7 +113,8 @@ def make_server(call: LimitedCall, version: str) -> MCPServer:
     ) -> str:
         """Search for a run that breaks a property, over seeds, parameters, or single faults of aspects."""
         options = [*changed(changes), *_run(seed, until), f"--break={property}", *(f"--vary={each}" for each in vary)]
-        options += [f"--runs={runs}", f"--max-faults={max_faults}", "--jobs=1", "--out={out}"]
+        options += [f"--runs={runs}", "--jobs=1", "--out={out}"]
+        options += [f"--max-faults={max_faults}"] if max_faults else []
         return await facts("search", [model], *options, good=(0, 1, 3))
 
     @server.tool(structured_output=False)
@@ -183,7 +185,10 @@ def make_server(call: LimitedCall, version: str) -> MCPServer:
     @server.resource("epicycle://reference/{name}", mime_type="application/json")
     async def reference(name: str) -> str:
         """Ports and parameters of a type of actors or aspects."""
-        return await facts("describe", [name])
+        try:
+            return await facts("describe", [name])
+        except Refusal as error:
+            raise ResourceError(str(error)) from None
 
     @server.resource("epicycle://examples", mime_type="text/plain")
     def examples() -> str:
@@ -194,7 +199,7 @@ def make_server(call: LimitedCall, version: str) -> MCPServer:
     def example(name: str) -> str:
         """The text of a packaged model."""
         if name not in packaged_models():
-            raise Refusal(f"there is no packaged model {name[:80]!r}: {', '.join(packaged_models())}")
+            raise ResourceError(f"there is no packaged model {name[:80]!r}: {', '.join(packaged_models())}")
         return packaged_models()[name].read_text(encoding="utf-8")
 
     return server

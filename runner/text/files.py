@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import hashlib
-import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from epicycle.actors import ParameterError, did_you_mean, irregular, read_regular
+from epicycle.actors import ParameterError, check_allowed, did_you_mean, irregular, read_regular
 
 from .problems import Position
 
-FOLDER = "EPICYCLE_FOLDER"  # the variable that names the only folder whose files the command line may name
 COMMAND_LINE = "command line"  # the file of a position in an option
 
 
@@ -96,7 +94,7 @@ def data_file(name: Path, position: Position) -> Path:
 
     A name in a YAML file means a file in or below the folder of that YAML file, so that a model can be moved with its
     data and cannot read anything else.  A name on the command line comes from the user: it is relative to the working
-    directory and may lead anywhere, unless the environment names a folder for it.
+    directory and may lead anywhere.
     """
     folder = Path(position.file).parent
     target = name if position.file == COMMAND_LINE else folder / name
@@ -105,9 +103,8 @@ def data_file(name: Path, position: Position) -> Path:
             raise ParameterError(
                 f"{str(name)!r} cannot be read: a file named in a model must be in or below the folder of its YAML file"
             )
-        if (root := os.environ.get(FOLDER)) and not target.resolve().is_relative_to(Path(root).resolve()):
-            raise ParameterError(f"{str(name)!r} cannot be read: it is not in the folder {root}")
         if target.is_file():
+            check_allowed(target)
             if _noted.get() is not None:
                 note_file(target, read_regular(target))
             return target
