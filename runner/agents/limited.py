@@ -21,7 +21,7 @@ _TEXT = "model.yaml"  # the name in messages of a model that came as a text
 
 
 class ToolError(Exception):
-    """What an agent is told instead of a result."""
+    """The message that an agent gets instead of a result."""
 
 
 @dataclass(frozen=True)
@@ -101,7 +101,9 @@ class LimitedCall:
     def _run(self, words: Sequence[str], out: str) -> tuple[int, str, str]:
         streams = Path(out, ".stdout"), Path(out, ".stderr")
         named = [each.partition("=")[2] for each in self.types]
-        folders = os.pathsep.join(str(Path(each).resolve()) for each in (self.folder, out, *model_folders(), *named))
+        folders = os.pathsep.join(
+            str(Path(each).resolve()) for each in [str(self.folder), out, *map(str, model_folders()), *named]
+        )
         environment: Mapping[str, str] = {**os.environ, FOLDERS: folders, "NO_COLOR": "1", "COLUMNS": "120"}
         with streams[0].open("wb") as told, streams[1].open("wb") as complained:
             process = subprocess.Popen(
@@ -129,7 +131,8 @@ class LimitedCall:
             raise ToolError(
                 f"it was ended by {signal.Signals(-code).name}: it may have needed too much memory or output"
             )
-        return code, *(each.read_text("utf-8", errors="replace") for each in streams)
+        told_text, complained_text = (each.read_text("utf-8", errors="replace") for each in streams)
+        return code, told_text, complained_text
 
     def _bound(self, process: int) -> None:
         if sys.platform == "linux":

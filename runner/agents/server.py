@@ -151,7 +151,7 @@ def make_server(call: LimitedCall, version: str) -> MCPServer:
         seed: Seed = None,
         until: Time = None,
     ) -> str:
-        """Change something from a tag of a run on: the first firing that changes, and what comes of it."""
+        """Change something from a tag of a run on: the first firing that changes, and what follows."""
         options = [
             *changed(changes),
             *_run(seed, until),

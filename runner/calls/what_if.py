@@ -47,7 +47,7 @@ def what_if(
     progress: bool = True,
     **changes: Unpack[Changes],
 ) -> WhatIf:
-    """Change something from a tag of a run on, and show both futures: where they part, and what comes of it.
+    """Change something from a tag of a run on, and show both futures: where they part, and what follows.
 
     Before the tag, both are the same run, bit for bit.  ``set``, ``disturb`` and the other options of ``load`` change
     the model of both from the start.  The folder gets the facts as JSON, and a page with both futures, in which the

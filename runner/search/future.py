@@ -1,4 +1,4 @@
-"""Two futures of a run side by side: where they part, and what comes of it."""
+"""Two futures of a run side by side: where they part, and what follows."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class First:
 
 @dataclass(repr=False)
 class WhatIf(Answer):
-    """A run as it was, and what comes of it with changes from a tag on.
+    """A run as it was, and the run with changes from a tag on.
 
     ``first`` is the first firing that changes; ``record`` the first difference of the logs, in words; ``affected`` are
     the actors that do anything else, with the times (s) at which they begin to.

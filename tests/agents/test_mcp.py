@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import sys
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
@@ -16,6 +17,8 @@ pytest.importorskip("mcp")  # the extra 'agents'
 
 from mcp import Client, StdioServerParameters
 from mcp.client.stdio import stdio_client
+
+import epicycle
 
 MODEL = """model: line
 actors:
@@ -223,3 +226,30 @@ def test_types_are_those_that_the_command_line_names(folder: Path, tmp_path: Pat
         assert (await one.told("describe", name="Mine"))["name"] == "Mine"
 
     dialogue(folder, talk, "--types", str(tmp_path / "mine.py"))
+
+
+LANGUAGE = Path("runner/agents/language.md")
+
+
+def test_the_language_names_only_what_there_is() -> None:
+    from epicycle.actors import declared_parameters
+    from epicycle.runner.catalogue.types import installed, load_all
+
+    text, catalogue = LANGUAGE.read_text("utf-8"), installed()
+    types, _ = load_all({**catalogue.actors, **catalogue.aspects})
+    named = re.findall(r"`([A-Z][A-Za-z]+)(?: \{([^`]*)\})?`", text)
+    assert len(named) == 38
+    for name, parameters in named:
+        assert name in types, name
+        known = declared_parameters(types[name])
+        assert {each.strip() for each in parameters.split(",") if parameters} <= known.keys(), name
+
+
+def test_the_models_in_the_language_can_be_loaded(tmp_path: Path) -> None:
+    blocks = re.findall(r"```yaml\n(.*?)```", LANGUAGE.read_text("utf-8"), re.DOTALL)
+    assert len(blocks) == 3
+    path = tmp_path / "model.yaml"
+    path.write_text(blocks[0], encoding="utf-8")
+    assert epicycle.run(path, progress=False).metrics["heard"] > 0
+    path.write_text(f"model: stations\n{blocks[1]}", encoding="utf-8")
+    assert "station[1].count" in epicycle.load(path).graph.actors

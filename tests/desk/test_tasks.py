@@ -28,7 +28,7 @@ def test_the_reference_solution_passes_and_a_wrong_one_fails(name: str, tmp_path
     assert not any("error:" in fault for fault in faults), faults  # it can be run, and does something else
 
 
-def test_the_words_name_no_check(name: str = "") -> None:
+def test_the_words_name_no_check() -> None:
     for task in TASKS.values():
         assert not any(text in task.words for check in task.checks for text in check.get("monitors", ())), task.name
 

@@ -19,7 +19,7 @@ FOLDER = Path(__file__).parent
 class Task:
     """A task in ``words``; each of the ``checks`` is a run: how it is made, and what must come of it.
 
-    A check says ``set``, ``disturb``, ``aspects``, ``seed`` and ``until`` of the run, ``monitors`` that must hold in it,
+    A check says ``set``, ``disturb``, ``aspects``, ``seed`` and ``until`` of the run, ``monitors`` that must hold,
     ``broken`` those that must not, ``metrics`` that are added, and what metrics, of the model or added, ``expect``: a
     value, or bounds.  ``wrong`` are a part of the solution and what makes it wrong.
     """
