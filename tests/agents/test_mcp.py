@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import subprocess
 import sys
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import asynccontextmanager
@@ -19,6 +20,7 @@ from mcp import Client, StdioServerParameters
 from mcp.client.stdio import stdio_client
 
 import epicycle
+from epicycle.runner.cli import main
 
 MODEL = """model: line
 actors:
@@ -132,6 +134,7 @@ def test_each_tool_answers(folder: Path) -> None:
     dialogue(folder, talk)
 
 
+@pytest.mark.slow
 def test_resources_are_the_language_the_reference_and_examples(folder: Path) -> None:
     async def talk(one: Assistant) -> None:
         async def read(uri: str) -> str:
@@ -219,6 +222,7 @@ def test_hostile_arguments_end_with_a_message(folder: Path, tmp_path: Path) -> N
     dialogue(folder, talk, "--seconds", "4")
 
 
+@pytest.mark.slow
 def test_types_are_those_that_the_command_line_names(folder: Path, tmp_path: Path) -> None:
     (tmp_path / "mine.py").write_text(TYPES, encoding="utf-8")
 
@@ -253,3 +257,28 @@ def test_the_models_in_the_language_can_be_loaded(tmp_path: Path) -> None:
     assert epicycle.run(path, progress=False).metrics["heard"] > 0
     path.write_text(f"model: stations\n{blocks[1]}", encoding="utf-8")
     assert "station[1].count" in epicycle.load(path).graph.actors
+
+
+def test_llms_txt_leads_to_documents() -> None:
+    docs = Path("docs")
+    links = re.findall(r"\]\(([^)]+)\)", (docs / "llms.txt").read_text("utf-8"))
+    assert len(links) > 15
+    assert [each for each in links if not (docs / each).is_file()] == []
+
+
+def test_the_command_refuses_what_it_cannot_serve(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["mcp", str(tmp_path / "nowhere")]) == 2
+    assert capsys.readouterr().err == f"error: there is no folder {tmp_path / 'nowhere'}\n"
+    assert main(["mcp", str(tmp_path), "--seconds", "0"]) == 2
+    assert capsys.readouterr().err == "error: --seconds 0: expected a number of seconds from 0 to 3600\n"
+
+
+@pytest.mark.parametrize("words", [["--help"], ["run", "--help"], ["run", "mm1", "--until", "1", "--json"]])
+def test_other_commands_import_none_of_it(words: list[str]) -> None:
+    program = (
+        "import sys\nfrom epicycle.runner.cli import main\ntry:\n    main(sys.argv[1:])\nexcept SystemExit:\n    pass\n"
+        "ours = ('mcp', 'epicycle.runner.agents', 'epicycle.runner.search.what_if', 'epicycle.runner.search.future')\n"
+        "print([each for each in ours if each in sys.modules], file=sys.stderr)"
+    )
+    done = subprocess.run([sys.executable, "-c", program, *words], capture_output=True, text=True, check=True)
+    assert done.stderr.splitlines()[-1] == "[]"
