@@ -30,8 +30,8 @@ if TYPE_CHECKING:
     from .vehicles import Pose
 
 __all__ = [
-    "ABSENT", "CORE", "CORE_MODULES", "CORE_REASON", "FORMER", "MAX_DEPTH", "NANOSECONDS_PER_SECOND", "NEVER",
-    "NO_TOKENS", "ODE", "PID", "REQUIRED", "Accumulator", "Ackermann", "Actor", "AddSubtract", "ArqReceiver",
+    "ABSENT", "CORE", "CORE_MODULES", "CORE_REASON", "FOLDERS", "FORMER", "MAX_DEPTH", "NANOSECONDS_PER_SECOND",
+    "NEVER", "NO_TOKENS", "ODE", "PID", "REQUIRED", "Accumulator", "Ackermann", "Actor", "AddSubtract", "ArqReceiver",
     "ArqSender", "Barrier", "Batch", "Beliefs", "Bernoulli", "Binomial", "BlockExpression", "BodyState",
     "BooleanSelect", "BooleanSwitch", "BroadcastChannel", "Butterworth", "Calendar", "Casadi", "Cauchy", "Changes",
     "ChannelError", "ChiSquare", "Choice", "CircularMotion", "ClearanceMonitor", "Clock", "Collect", "Commutator",
@@ -57,8 +57,9 @@ __all__ = [
     "TimedQueue", "Timer", "TrackingError", "Tracks", "Trajectory", "TransferFunction", "Triangular", "Unbatch",
     "Unicycle", "Uniform", "UnitError", "UnscentedEstimator", "Variable", "VaryingRandom", "Vehicle", "VonMises",
     "WaitingLine", "WaitingTime", "Wake", "WaypointFollower", "WaypointMotion", "abridged", "accepts", "any_parameter",
-    "array_parameter", "below_nanoseconds", "bounds_text", "brief", "convert", "counted", "counted_in_si", "cut",
-    "declared_parameters", "declared_ports", "did_you_mean", "digits", "elementary", "found_variants", "has_own_ports",
+    "array_parameter", "below_nanoseconds", "bounds_text", "brief", "check_allowed", "convert", "counted",
+    "counted_in_si", "cut", "declared_parameters", "declared_ports",
+    "did_you_mean", "digits", "elementary", "found_variants", "has_own_ports",
     "in_si", "irregular", "is_alone", "is_too_deep", "nearest", "new_tag", "new_wake", "normal_quantile",
     "normal_share", "on_entry", "on_exit", "open_regular", "parse_unit", "part_finders", "paths", "plain", "present",
     "random_stream", "read_regular", "read_table", "readable", "rounds", "shaped", "shortened", "symbolic",

@@ -19,6 +19,7 @@ from epicycle.runner.calls.searching import rare as rare
 from epicycle.runner.calls.searching import search as search
 from epicycle.runner.calls.studying import compare as compare
 from epicycle.runner.calls.studying import study as study
+from epicycle.runner.calls.what_if import what_if as what_if
 from epicycle.runner.desk import Difference as Difference
 from epicycle.runner.recorded.channel import Fit as Fit
 from epicycle.runner.recorded.disturbed import Disturbed as Disturbed
@@ -26,6 +27,7 @@ from epicycle.runner.search.calibration import Calibration as Calibration
 from epicycle.runner.search.comparing import Comparison as Comparison
 from epicycle.runner.search.explanation import Explanation as Explanation
 from epicycle.runner.search.falsification import Falsification as Falsification
+from epicycle.runner.search.future import WhatIf as WhatIf
 from epicycle.runner.search.optimum import Optimum as Optimum
 from epicycle.runner.search.spec import Break as Break
 from epicycle.runner.search.spec import Match as Match

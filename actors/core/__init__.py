@@ -5,7 +5,7 @@ from .actor import Actor, Context, declared_ports, has_own_ports
 from .authoring import ABSENT, Latest, Pending, Queues, Tally, present, rounds
 from .environment import Environment, Events, Host
 from .errors import EpicycleError, Fault, FaultError, Span
-from .files import irregular, open_regular, read_regular, read_table
+from .files import FOLDERS, check_allowed, irregular, open_regular, read_regular, read_table
 from .laws import normal_quantile, normal_share
 from .messages import (
     abridged,
@@ -47,13 +47,14 @@ from .tag import NANOSECONDS_PER_SECOND, Tag, below_nanoseconds, new_tag, to_nan
 from .units import UnitError, convert, in_si, parse_unit, units_like
 
 __all__ = [
-    "ABSENT", "MAX_DEPTH", "NANOSECONDS_PER_SECOND", "NEVER", "NO_TOKENS", "REQUIRED", "Actor", "Calendar",
-    "Configurable", "Context", "Emitter", "Environment", "EpicycleError", "Events", "Fault", "FaultError", "Host",
-    "InputPort", "Latest", "MappingParameter", "Moment", "OutputPort", "Parameter", "ParameterError", "Pending",
+    "ABSENT", "FOLDERS", "MAX_DEPTH", "NANOSECONDS_PER_SECOND", "NEVER", "NO_TOKENS", "REQUIRED", "Actor",
+    "Calendar", "Configurable", "Context", "Emitter", "Environment", "EpicycleError", "Events", "Fault", "FaultError",
+    "Host", "InputPort", "Latest", "MappingParameter", "Moment", "OutputPort", "Parameter", "ParameterError", "Pending",
     "PortError", "PortParameter", "Process", "Quantity", "Queues", "ReadyQueue", "Receiver", "Span", "Stream",
     "Streams", "Tag", "Tally", "TimedQueue", "UnitError", "Wake", "abridged", "accepts", "any_parameter",
-    "array_parameter", "below_nanoseconds", "bounds_text", "brief", "convert", "counted", "counted_in_si", "cut",
-    "declared_parameters", "declared_ports", "did_you_mean", "digits", "elementary", "found_variants", "has_own_ports",
+    "array_parameter", "below_nanoseconds", "bounds_text", "brief", "check_allowed", "convert", "counted",
+    "counted_in_si", "cut", "declared_parameters", "declared_ports",
+    "did_you_mean", "digits", "elementary", "found_variants", "has_own_ports",
     "in_si", "irregular", "is_alone", "is_too_deep", "nearest", "new_tag", "new_wake", "normal_quantile",
     "normal_share", "open_regular", "parse_unit", "part_finders", "paths", "plain", "present", "random_stream",
     "read_regular", "read_table", "readable", "rounds", "shaped", "shortened", "texts_parameter", "to_nanoseconds",

@@ -26,17 +26,29 @@ def irregular(path: str | Path) -> str:
     return _kind(os.stat(path).st_mode)
 
 
+FOLDERS = "EPICYCLE_FOLDERS"  # the variable for folders, or files, of which alone files are read
+
+
 @contextmanager
 def open_regular(path: str | Path) -> Iterator[BinaryIO]:
     """Open a file to read its bytes, without ever waiting for another process.
 
     Raises ``OSError``; for anything other than a regular file, its ``strerror`` says what it is.
     """
+    check_allowed(path)
     _check(os.stat(path), path)
     # The path may be another file by now.
     with open(path, "rb", opener=lambda name, flags: os.open(name, flags | getattr(os, "O_NONBLOCK", 0))) as file:
         _check(os.fstat(file.fileno()), path)
         yield file
+
+
+def check_allowed(path: str | Path) -> None:
+    """Raise ``OSError`` for a file outside of the folders that ``EPICYCLE_FOLDERS`` lists, if it lists any."""
+    if listed := os.environ.get(FOLDERS):
+        there = Path(path).resolve()
+        if not any(there.is_relative_to(folder) for folder in listed.split(os.pathsep)):
+            raise OSError(errno.EACCES, "it is outside of the folder that may be read", str(path))
 
 
 def read_regular(path: str | Path) -> bytes:

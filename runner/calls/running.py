@@ -7,7 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Unpack
 
-from ..declare.parameters import argument, number, option
+from ..declare.parameters import COUNT, argument, number, option
 from .changes import SEED, UNTIL, Changes, classes
 
 if TYPE_CHECKING:
@@ -101,6 +101,7 @@ def run(
         str | Path | None,
         option("folder for manifest, signals and figures (default: results/MODEL; with --json: none)", "DIR", Path),
     ] = None,
+    max_tags: Annotated[int | None, option("end the run after N tags (default: no limit)", "N", COUNT)] = None,
     progress: bool = True,
     **changes: Unpack[Changes],
 ) -> Results:
@@ -109,7 +110,8 @@ def run(
     ``set``, ``disturb`` and the other options of ``load`` change it first.  ``until`` is the stop time (s, or a text
     with a unit), ``realtime`` the seconds of model time that pass per second.  ``keep_log`` keeps the event log in
     ``results.log``, ``log`` writes it to a file (.parquet, .csv, .jsonl), ``out`` writes manifest, signals and figures
-    into a folder.  A long run shows a bar in a notebook or on a terminal, unless ``progress`` is false.
+    into a folder.  After ``max_tags`` tags the run ends.
+    A long run shows a bar in a notebook or on a terminal, unless ``progress`` is false.
 
     >>> epicycle.run("mm1", seed=3, set={"load": 0.9}).metrics["mean_wait"]
     """
@@ -127,6 +129,7 @@ def run(
         log=None if log is None else LogFile(Path(log)),
         folder=None if out is None else Path(out),
         progress=progress,
+        most=max_tags,
     )
     for error in done.failed:
         raise error

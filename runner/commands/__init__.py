@@ -8,12 +8,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ..printing import complain, tell
-from . import completion, describe, editor, listing, new, recording, running, searching, studies
+from . import agents, completion, describe, editor, listing, new, recording, running, searching, studies
 from .offered import offered_commands
 from .options import BAD_INPUT, BROKEN, DONE, FAILED, JSON, TYPES, Command, command, option, own_types, several
 
 GROUPS = {
-    "look at one run": (running.run, running.view, searching.explain),
+    "look at one run": (running.run, running.view, searching.explain, searching.what_if),
     "make many runs": (studies.study, studies.status, studies.report, searching.compare),
     "search": (searching.search, searching.rare),
     "work with recorded data": (recording.recording,),
@@ -25,6 +25,7 @@ GROUPS = {
         describe.graph,
         listing.list_,
         editor.lsp,
+        agents.mcp,
     ),
     "set up a shell": (completion.completion,),
 }

@@ -56,7 +56,7 @@ def of_call(
     """Turn a function into a command with the name, the words and the options of a call, and some more of these."""
     summary, description = words_of(call)
     given = (*first, taken(call), *options)
-    return lambda run: Command(call.__name__, summary, description, given, imports, run)
+    return lambda run: Command(call.__name__.replace("_", "-"), summary, description, given, imports, run)
 
 
 def taken(call: Callable[..., Any], *, without: Collection[str] = (), only: Collection[str] = ()) -> Option:

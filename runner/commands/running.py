@@ -96,6 +96,7 @@ def run(options: argparse.Namespace) -> int:
         folder=out or (None if options.json else _folder_of(model)),
         given=options.given,
         after=0.0,
+        most=given.get("max_tags"),
     )
     if options.json:
         tell_json(summary_object(done.results))

@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 from typing import TYPE_CHECKING, Any
 
 from ..calls import running, searching, studying
+from ..calls import what_if as calls_what_if
 from ..declare.commands import add_options, arguments, declared
 from ..printing import complain, tell, tell_json
 from ..search.spec import GOALS, Break, Goal, Match
@@ -95,6 +96,18 @@ def explain(options: argparse.Namespace) -> int:
         lambda found: INTERRUPTED if found.is_interrupted else DONE,
         page=not options.no_page,
     )
+
+
+@of_call(
+    calls_what_if.what_if,
+    option("--no-page", action="store_true", help="write no page with both futures"),
+    JSON,
+    imports=("search.what_if",),
+)
+def what_if(options: argparse.Namespace) -> int:
+    """Change a run from a tag on."""
+    given = arguments(calls_what_if.what_if, options)
+    return answer(options, lambda: calls_what_if.what_if(**given), lambda _: DONE, page=not options.no_page)
 
 
 @of_call(searching.rare, JSON, imports=("search.splitting",))

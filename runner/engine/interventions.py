@@ -8,23 +8,37 @@ token goes on at once.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Container
+from collections.abc import Container, Mapping
 from dataclasses import replace
 from typing import Any
 
-from epicycle.actors import Receiver
+from epicycle.actors import Receiver, Tag
 from epicycle.aspects import JoinPoint
 
 from ..graph.acts import Act, ActName
 from ..results import canonical
+from .director import Director
+from .errors import ActorError, LoopError
 from .receivers import AspectCall
 
 
 class Interventions:
-    """The acts of a run: those that happen, if ``exactly`` names some, and those that have been ``noted``."""
+    """The acts of a run: those that happen, if ``exactly`` names some, and those that have been ``noted``.
 
-    def __init__(self, exactly: Container[ActName] | None = None) -> None:
+    Those in ``without`` do not happen.  ``ends`` are aspects that are no longer active from a tag on.  All acts of the
+    aspects in ``always`` happen.
+    """
+
+    def __init__(
+        self,
+        exactly: Container[ActName] | None = None,
+        *,
+        without: Container[ActName] = (),
+        ends: Mapping[str, Tag] | None = None,
+        always: Container[str] = (),
+    ) -> None:
         self.exactly = exactly
+        self._without, self._ends, self._always = without, ends or {}, always
         self._noted: dict[ActName, Act] = {}
         self._passed: dict[tuple[str, str], int] = {}
 
@@ -32,6 +46,21 @@ class Interventions:
     def noted(self) -> list[Act]:
         """All acts so far, in the order in which they began."""
         return list(self._noted.values())
+
+    def anew(self) -> Interventions:
+        """The same rules, before a run."""
+        return Interventions(self.exactly, without=self._without, ends=self._ends, always=self._always)
+
+    def happens(self, name: ActName) -> bool:
+        """Whether an act is to happen."""
+        if name.aspect in self._always:
+            return True
+        return name not in self._without and (self.exactly is None or name in self.exactly)
+
+    def is_over(self, aspect: str, tag: Tag) -> bool:
+        """Whether an aspect is no longer active."""
+        end = self._ends.get(aspect)
+        return end is not None and tag >= end
 
     def next(self, aspect: str, place: str) -> ActName:
         """The name of what an aspect does next at a place."""
@@ -56,7 +85,7 @@ class Handling:
         self._point = point
         self._token = token
         self._is_untouched = False
-        self.happens = acts.exactly is None or self._name in acts.exactly
+        self.happens = acts.happens(self._name)
 
     def forward(self, token: Any) -> None:
         """The aspect lets a token continue."""
@@ -77,15 +106,29 @@ class Handling:
 
 
 class NamedCall(Receiver):
-    """An aspect at a place, whose acts have names."""
+    """An aspect at a place, whose acts have names; ``director`` has the time of the model."""
 
-    __slots__ = ("acts", "aspect_call")
+    __slots__ = ("acts", "aspect_call", "director")
 
-    def __init__(self, aspect_call: AspectCall, acts: Interventions) -> None:
+    def __init__(self, aspect_call: AspectCall, acts: Interventions, director: Director) -> None:
         self.aspect_call = aspect_call
         self.acts = acts
+        self.director = director
 
     def put(self, token: Any) -> None:
-        handling = Handling(self.acts, self.aspect_call.point, token)
-        self.aspect_call.show(token, self.aspect_call.point.during(handling))
+        call = self.aspect_call
+        if self.acts.is_over(call.point.aspect, self.director.tag):
+            self._pass_by(call, token)
+            return
+        handling = Handling(self.acts, call.point, token)
+        call.show(token, call.point.during(handling))
         handling.end()
+
+    @staticmethod
+    def _pass_by(call: AspectCall, token: Any) -> None:
+        try:
+            call.aspect.pass_by(token, call.point)
+        except (ActorError, LoopError):  # of something behind it
+            raise
+        except Exception as error:
+            raise call.point.blame(f"pass_by() at {call.point.port}", error) from error

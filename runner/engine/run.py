@@ -292,6 +292,7 @@ class Run:
             units=dict(self._units),
             outcomes=outcomes,
             figures=dict(self.model.figures),
+            program=self.model,
             monitors=verdicts,
             acts=[] if self.acts is None else self.acts.noted,
         )

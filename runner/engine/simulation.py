@@ -46,15 +46,14 @@ class Snapshot:
         has_processes = run.is_begun and any(isinstance(actor, Process) for actor in run.actors.values())
         self.run = None if has_processes else _copy(run)  # a copy that does not run
         self._keeps = run.keeps
-        self._named = run.acts is not None
-        self._exactly = None if run.acts is None else run.acts.exactly
+        self._acts = None if run.acts is None else run.acts.anew()
         self._reseeds = tuple(run.reseeds)
 
     def again(self) -> Run:
         """A run that continues from here; raises ``SnapshotError``."""
         if self.run is not None:
             return _copy(self.run)
-        acts = Interventions(self._exactly) if self._named else None
+        acts = None if self._acts is None else self._acts.anew()
         run = Run(self.model, self.seed, self._keeps, acts=acts)
         for is_begun, steps, seed in self._reseeds:
             if is_begun:
@@ -133,15 +132,16 @@ class Simulation(Tabled):
         until: float | None = None,
         progress: Callable[[float], None] | None = None,
         pace: Pace | None = None,
+        most: int | None = None,
     ) -> Results:
         """Run to the end and return the results; an exception in an actor is raised as ``ActorError``.
 
         ``until`` is the stop time (s, default: the model's), ``progress`` is called with the time now and then, and
-        ``pace`` limits the run to the wall clock.
+        ``pace`` limits the run to the wall clock.  A run that is not over after ``most`` tags ends there.
         """
         self._refuse_over()
         stop = self.model.output.stop_time if until is None else to_nanoseconds(until)
-        self._run.advance(stop, progress=progress, pace=pace)
+        self._run.advance(stop, most=most, progress=progress, pace=pace)
         return self._run.finish()
 
     def advance(self, until: float) -> bool:

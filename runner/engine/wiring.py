@@ -286,7 +286,7 @@ class Wiring:
 
     def _named(self, aspect_call: AspectCall) -> Receiver:
         """The act of an aspect on what comes to a join point, with a name if acts are to have names."""
-        return aspect_call if self.acts is None else NamedCall(aspect_call, self.acts)
+        return aspect_call if self.acts is None else NamedCall(aspect_call, self.acts, self.director)
 
     def _scheduled(self, path: str, onward: Callable[[Job], None]) -> Callable[[Job], None]:
         """``onward`` preceded by the aspects at an actor, the first declared outermost."""

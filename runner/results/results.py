@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from importlib import import_module
 from itertools import islice
 from typing import TYPE_CHECKING, Any
 
-from epicycle.actors import counted, did_you_mean, to_seconds
+from epicycle.actors import EpicycleError, counted, did_you_mean, to_seconds
 
 from ..graph.acts import Act
 from ..shown import in_time, short
@@ -52,6 +53,7 @@ class Results(Tabled):
     monitors: dict[str, Verdict] = field(default_factory=dict)
     acts: list[Act] = field(default_factory=list)  # of aspects, if they were to be noted
     figures: dict[str, Any] = field(default_factory=dict)  # as the model declares them
+    program: Any = field(default=None, compare=False)  # the model that was run
 
     @property
     def intervals(self) -> dict[str, Interval]:
@@ -82,6 +84,24 @@ class Results(Tabled):
 
     def __contains__(self, name: object) -> bool:
         return name in self.signals
+
+    def what_if(self, at: Any, **changed: Any) -> Any:
+        """The run with something changed from a tag on, beside this one: an ``epicycle.WhatIf``.
+
+        ``at`` and the rest are as for ``epicycle.what_if``, which is looked up, because it is a layer above results.
+        Raises ``EpicycleError`` if model and seed do not make this run again.
+
+        >>> results.what_if("12 s", let_through="wifi_loss").first
+        """
+        call = import_module("...calls.what_if", __name__).what_if
+        until = self.until if self.stopped == STOP_TIME else None
+        found = call(self.program, at, seed=self.seed, until=until, **changed)
+        if found.before.digest != self.digest:
+            raise EpicycleError(
+                f"{self!r} cannot be made again by its model and seed: the model was changed after it, or the run was "
+                "changed on its way"
+            )
+        return found
 
     def table(self) -> dict[str, list[Any]]:
         """All recorded signals in long form, the columns of ``signals.parquet``: a row for each leaf of each token.

@@ -44,10 +44,12 @@ def perform(
     given: Sequence[str] = (),
     progress: bool = True,
     after: float = SOON,
+    most: int | None = None,
 ) -> Done:
     """Run a model and write what is requested; ``given`` is the command, for the manifest.
 
-    The records of a run that fails are written, too.  ``keep_log`` filters the ``log``, if there is one.
+    The records of a run that fails are written, too.  ``keep_log`` filters the ``log``, if there is one.  The run ends
+    after ``most`` tags.
     """
     figures = figures_of(model, Problems())
     spec = spec_of(model, seed, until)
@@ -58,11 +60,11 @@ def perform(
     simulation = Simulation(model, seed=seed, keep_log=keep_log, log_to=None if log is None else log.add)
     if replaced:  # and the request is valid
         complain(replaced)
-    if until is None and model.endless:
+    if until is None and most is None and model.endless:
         complain(f"{model.endless}\n   help: end it with Ctrl-C, which keeps what was recorded, or run it with --until")
     with log or nullcontext(), watched(model, until, after) if progress else nullcontext() as report:
         try:
-            results = simulation.run(until=until, progress=report, pace=pace)
+            results = simulation.run(until=until, progress=report, pace=pace, most=most)
         except (ActorError, LoopError, KeyboardInterrupt) as error:
             interrupted = isinstance(error, KeyboardInterrupt)
             results = simulation.results("interrupted" if interrupted else "failed")

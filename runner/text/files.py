@@ -9,7 +9,7 @@ from contextvars import ContextVar
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from epicycle.actors import ParameterError, did_you_mean, irregular, read_regular
+from epicycle.actors import ParameterError, check_allowed, did_you_mean, irregular, read_regular
 
 from .problems import Position
 
@@ -104,6 +104,7 @@ def data_file(name: Path, position: Position) -> Path:
                 f"{str(name)!r} cannot be read: a file named in a model must be in or below the folder of its YAML file"
             )
         if target.is_file():
+            check_allowed(target)
             if _noted.get() is not None:
                 note_file(target, read_regular(target))
             return target

@@ -12,39 +12,43 @@ from typing import Any
 
 import numpy as np
 
-from epicycle.actors import shortened, to_nanoseconds
+from epicycle.actors import to_nanoseconds
 
 from ...build.model import Model
 from ...catalogue.figure import Figure
 from ...graph.model_graph import ModelGraph
 from ...html import Html, tag
 from ...results import Results, Verdict
-from ...shown import in_words, short
+from ...shown import short
 from ..sheet import PALETTE
+from .differing import comparison, difference, four
 from .drawing import drawn
 from .lanes import lanes
 from .packing import Pack
-from .recording import NOTHING, Recording
+from .recording import Recording
 from .writing import ViewError, replace_file
 
 # In this order, because each uses the ones before it.
 PARTS = ("data", "causes", "paint", "state", "space", "graph", "timeline", "lanes", "chart", "details", "main")
 
 
-def write_page(recordings: Sequence[Recording], path: Path, *, names: Sequence[str] = ()) -> None:
+def write_page(
+    recordings: Sequence[Recording], path: Path, *, names: Sequence[str] = (), story: Sequence[str] = ()
+) -> None:
     """Write the page of one run, or of two that are compared; raises ``ViewError``."""
-    replace_file(path, page_of(recordings, names=names).encode())
+    replace_file(path, page_of(recordings, names=names, story=story).encode())
 
 
-def page_of(recordings: Sequence[Recording], *, names: Sequence[str] = ()) -> str:
-    """The page as text; ``names`` distinguish the runs."""
+def page_of(recordings: Sequence[Recording], *, names: Sequence[str] = (), story: Sequence[str] = ()) -> str:
+    """The page as text; ``names`` distinguish the runs, ``story`` are sentences about both."""
     pack = Pack()
     runs = [_run(each, name, pack) for each, name in zip(recordings, [*names, "", ""], strict=False)]
     about = {
         "palette": PALETTE,
         "runs": runs,
-        "difference": _difference(recordings) if len(recordings) > 1 else None,
-        "comparison": _comparison(recordings) if len(recordings) > 1 else [],
+        "story": list(story),
+        "difference": difference(recordings) if len(recordings) > 1 else None,
+        "comparison": comparison(recordings) if len(recordings) > 1 else [],
     }
     return _document(recordings[0].model.name, pack.text(about))
 
@@ -135,7 +139,7 @@ def _metrics(recording: Recording) -> list[list[str]]:
     results, model = recording.results, recording.model
     assert results is not None
     return [
-        [each.name, results.outcomes[each.name].shown(_four), "" if each.unit == "1" else each.unit, each.measure.doc]
+        [each.name, results.outcomes[each.name].shown(four), "" if each.unit == "1" else each.unit, each.measure.doc]
         for each in model.output.metrics
     ]
 
@@ -144,7 +148,7 @@ def _monitor(recording: Recording, name: str, verdict: Verdict) -> dict[str, Any
     """What a monitor says of the run, and when (ns) it was broken first."""
     required = next(each.requirement for each in recording.model.output.monitors if each.name == name)
     unit = f" {required.unit}" if required.unit else ""
-    margin = f", robustness {_four(verdict.robustness)}{unit}"
+    margin = f", robustness {four(verdict.robustness)}{unit}"
     said = f"cannot be judged: {verdict.missing}" if verdict.missing else "holds" if verdict.holds else verdict.remark
     time = None if verdict.time is None else to_nanoseconds(verdict.time)
     return {
@@ -153,10 +157,6 @@ def _monitor(recording: Recording, name: str, verdict: Verdict) -> dict[str, Any
         "text": (said or "broken") + ("" if verdict.missing else margin),
         "time": None if verdict.holds else time,
     }
-
-
-def _four(value: Any) -> str:
-    return in_words(value, digits=4, nothing="–")
 
 
 def _port(graph: ModelGraph, path: str, name: str, numbers: Mapping[str, int]) -> dict[str, Any]:
@@ -200,46 +200,3 @@ def _marks(recording: Recording, results: Results, figure: Figure, pack: Pack) -
             }
         )
     return found
-
-
-# -- two runs ---------------------------------------------------------------------------------------------------------
-
-
-def _difference(recordings: Sequence[Recording]) -> dict[str, Any] | None:
-    """The first record in which the logs differ: its number among the kept ones, and the record in words."""
-    one, other = (each.hashes for each in recordings[:2])
-    same = next(
-        (number for number, (a, b) in enumerate(zip(one, other, strict=False)) if a != b), min(len(one), len(other))
-    )
-    if same == len(one) == len(other):
-        return None
-    return {
-        "records": [each.kept_record(same) for each in recordings],
-        "texts": [_said(each, same) for each in recordings],
-    }
-
-
-def _said(recording: Recording, record: int) -> str:
-    """A record of the log in words."""
-    number = recording.kept_record(record)
-    if number < 0:
-        return "the run has ended" if record >= recording.records else "a record that this page leaves out"
-    columns, tags, texts = recording.kept()
-    place, name = list(recording.ports)[columns["record_port"][number]]
-    event, aspect = list(recording.events)[columns["record_event"][number]], columns["record_aspect"][number]
-    by = f" by {list(recording.aspects)[aspect]}" if aspect != NOTHING else ""
-    what = f"{list(recording.places)[place]}.{name} {event}{by}: {shortened(texts[columns['record_text'][number]], 80)}"
-    return f"{tags[columns['record_tag'][number]]} {what}"
-
-
-def _comparison(recordings: Sequence[Recording]) -> list[list[str]]:
-    rows = []
-    one, other = (each.results for each in recordings[:2])
-    assert one is not None
-    assert other is not None
-    for name, value in one.metrics.items():
-        if name in other.metrics:
-            numbers = [each for each in (value, other.metrics[name]) if isinstance(each, (int, float))]
-            change = _four(float(numbers[1] - numbers[0])) if len(numbers) == 2 else ""
-            rows.append([name, one.outcomes[name].shown(_four), other.outcomes[name].shown(_four), change])
-    return rows

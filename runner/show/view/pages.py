@@ -14,7 +14,7 @@ from epicycle.actors import EpicycleError
 from ...bars import SOON
 from ...build.figures import figures_of
 from ...build.model import Model
-from ...engine import ActorError, LoopError
+from ...engine import ActorError, Interventions, LoopError
 from ...printing import complain
 from ...text.problems import Problems
 from ..watching import watched
@@ -33,14 +33,16 @@ class Page:
         recordings: Sequence[Recording],
         names: Sequence[str],
         errors: Sequence[EpicycleError | KeyboardInterrupt],
+        story: Sequence[str] = (),
     ) -> None:
         self.recordings = recordings
         self.names = names
         self.errors = errors
+        self.story = story  # sentences about both runs
 
     def save(self, path: str | Path) -> Path:
         """Write it to a file (.html)."""
-        write_page(self.recordings, Path(path), names=self.names)
+        write_page(self.recordings, Path(path), names=self.names, story=self.story)
         return Path(path)
 
     def open(self) -> Path:
@@ -53,7 +55,7 @@ class Page:
         return f"<Page of {' and '.join(self.names or [self.recordings[0].model.name])}>"
 
     def _repr_html_(self) -> str:
-        whole = html.escape(page_of(self.recordings, names=self.names))
+        whole = html.escape(page_of(self.recordings, names=self.names, story=self.story))
         look = "width: 100%; height: 80vh; border: 0"
         return f'<iframe sandbox="allow-scripts" srcdoc="{whole}" style="{look}"></iframe>'
 
@@ -64,9 +66,13 @@ def recorded(
     seed: int | Sequence[int | None] | None = None,
     until: float | Sequence[float | None] | None = None,
     names: Sequence[str] = (),
+    acts: Sequence[Interventions | None] = (),
     progress: bool = True,
 ) -> Page:
-    """The page of these models' runs; seeds and stop times apply to all, or are given for each."""
+    """The page of these models' runs; seeds and stop times apply to all, or are given for each.
+
+    ``acts`` say which acts of aspects happen in each.
+    """
     recordings, errors = [], list[EpicycleError | KeyboardInterrupt]()
     for number, model in enumerate(models):
         own_seed = seed[number] if isinstance(seed, Sequence) else seed
@@ -78,7 +84,15 @@ def recorded(
             complain(
                 f"{model.endless}\n   help: end it with Ctrl-C, which keeps what was recorded, or give a stop time"
             )
-        recordings.append(Recording(model, figures, seed=own_seed, is_compared=len(models) > 1))
+        recordings.append(
+            Recording(
+                model,
+                figures,
+                seed=own_seed,
+                is_compared=len(models) > 1,
+                acts=acts[number] if acts else None,
+            )
+        )
         with watched(model, stop, SOON) if progress else nullcontext() as report:
             try:
                 recordings[-1].run(until=stop, progress=report)

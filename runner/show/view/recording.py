@@ -17,8 +17,8 @@ from epicycle.actors import Tag
 
 from ...build.model import Model
 from ...catalogue.figure import Figure
-from ...engine import Firing, Simulation, Tracer
-from ...results import Record, Results, plain
+from ...engine import Firing, Interventions, Simulation, Tracer
+from ...results import Record, Results, canonical, plain
 from ...shown import json_line
 from ...text.patterns import select
 
@@ -73,12 +73,34 @@ class Kept(NamedTuple):
     texts: list[str]
 
 
+class Fired:
+    """All firings of a run: their tags, actors by number, and hashes of what they took and sent."""
+
+    def __init__(self) -> None:
+        self.times, self.microsteps, self.actors, self.hashes = array("q"), array("i"), array("i"), array("q")
+
+    def add(self, firing: Firing, actor: int) -> None:
+        took = [(each.port, each.channel, canonical(each.token)) for each in firing.arrivals]
+        sent = [record.encoded() for record in firing.records]
+        self.times.append(firing.tag.time)
+        self.microsteps.append(firing.tag.microstep)
+        self.actors.append(actor)
+        self.hashes.append(hash((firing.tag, firing.actor, firing.outside, *took, *sent)))
+
+    def tag(self, number: int) -> Tag:
+        return Tag(self.times[number], self.microsteps[number])
+
+    def __len__(self) -> int:
+        return len(self.hashes)
+
+
 class Recording:
     """One run of a model, recorded as it runs; ``results`` holds its results, too.
 
     ``most`` is how many firings are kept.  The log is bit for bit that of any run with this model and seed; signals
     that the model's ``figures`` show in space are recorded as well.  With ``is_compared``, there are ``hashes`` of all
-    records, to find the first one in which two runs differ.
+    records and of all firings, to find the first ones in which two runs differ.  ``acts`` say which acts of aspects
+    happen.
     """
 
     def __init__(
@@ -89,15 +111,18 @@ class Recording:
         seed: int | None = None,
         most: int = MOST,
         is_compared: bool = False,
+        acts: Interventions | None = None,
     ) -> None:
         self.model = model
         self.figures = figures
         self.hashes = array("q")
+        self.fired = Fired()
         self._is_compared = is_compared
         self.results: Results | None = None
         self.firings = self.records = 0  # in the whole run
         self.events, self.aspects = Names(), Names()
         self.places = Names()  # of actors and composites
+        self._paths: list[str] = []  # the same, in order
         self.ports = Names()  # (place, name)
         self._most = max(2, most // STRETCH)
         self._stride = 1  # one stretch in so many is kept
@@ -110,7 +135,8 @@ class Recording:
         model.output.recorded = list(
             dict.fromkeys((*recorded, *(path for each in patterns for path in select(each, outputs))))
         )
-        self._simulation = Simulation(model, seed=seed, tracer=Tracer(model.graph.actors, self._fired, self._seen))
+        tracer = Tracer(model.graph.actors, self._fired, self._seen)
+        self._simulation = Simulation(model, seed=seed, tracer=tracer, acts=acts)
         model.output.recorded = recorded
 
     def run(self, *, until: float | None = None, progress: Callable[[float], None] | None = None) -> Results:
@@ -131,6 +157,8 @@ class Recording:
             kept.add("arrival", number, self.ports[actor, arrival.port], arrival.channel, arrival.number)
         for asked in firing.wakes:
             kept.add("wake", number, NOTHING if asked is None else kept.tags[asked])
+        if self._is_compared:
+            self.fired.add(firing, actor)
         self._passing.clear()
         self.firings += 1
 
@@ -206,12 +234,25 @@ class Recording:
                 columns[name].extend(column if number is None else map(number, column))
         return Kept(columns, tags, list(texts))
 
+    def place(self, number: int) -> str:
+        """The path of an actor or composite."""
+        if len(self._paths) != len(self.places):
+            self._paths = list(self.places)
+        return self._paths[number]
+
     def kept_record(self, number: int) -> int:
         """The number of a record among the kept ones; ``MISSING`` if it was left out or does not exist."""
         records = _Renumbered()
         for stretch in self._stretches:
             records.add(stretch.record, stretch.count("record"))
         return records.number(number)
+
+    def kept_firing(self, number: int) -> int:
+        """The number of a firing among the kept ones, as ``kept_record``."""
+        firings = _Renumbered()
+        for stretch in self._stretches:
+            firings.add(stretch.firing, stretch.count("firing"))
+        return firings.number(number) if number < self.firings else MISSING
 
     def gaps(self) -> list[tuple[int, int]]:
         """The gaps between kept firings: the number of the first one after the gap, and how many are left out."""

@@ -25,6 +25,11 @@ class Chart extends Timeline {
     if (y < RULER + ROW || y > this.height - ROW) this.scrollBy(y - this.height / 2);
   }
 
+  // Scrolls to the lane of an actor, before the first drawing.
+  reveal(actor) {
+    this.scroll = Math.max(0, ((this.rows().at.get(actor) ?? 0) - 3) * ROW);
+  }
+
   // The actors with a lane, by its position.
   rows() {
     const { run, cone, selection } = this.state;
@@ -65,6 +70,7 @@ class Chart extends Timeline {
     this.arrows(begin, end, at);
     this.dots(from, to, first, last);
     this.losses(from, to, at);
+    this.firstChange(at);
     paper.restore();
     this.cursor();
   }
@@ -142,6 +148,17 @@ class Chart extends Timeline {
       this.dot(x, this.y(row), isChosen ? 6 : 4.5, cone?.ahead.has(firing) && !cone.back.has(firing) ? theme.ahead : theme.back, isChosen ? theme.ink : null);
       this.hits.push([x, this.y(row), { firing, record: NOTHING }]);
     }
+  }
+
+  // A ring around the first firing that is not the same in the other run.
+  firstChange(at) {
+    const { run } = this.state;
+    if (!(run.firstChange >= 0)) return;
+    const [x, y] = this.spot(run.firstChange, at);
+    if (Number.isNaN(y)) return;
+    this.dot(x, y, 9, "transparent", theme.loss);
+    this.text("first change", x + 12, y - 6, { size: 11, colour: theme.loss });
+    this.hits.push([x, y, { firing: run.firstChange, record: NOTHING }]);
   }
 
   losses(from, to, at) {

@@ -16,6 +16,7 @@ class Details {
 
   overview() {
     const { data, runs, active } = this.state, run = runs[active], parts = [];
+    if (data.story.length) parts.push(element("h2", { text: "What if" }), ...data.story.map((text) => element("p", { className: "story", text })));
     if (data.difference) parts.push(...this.difference());
     parts.push(element("h2", { text: run.name || run.model }));
     if (run.doc) parts.push(element("p", { text: run.doc }));
@@ -42,7 +43,15 @@ class Details {
 
   difference() {
     const { data, runs } = this.state, { difference } = data;
-    const parts = [element("h2", { text: "First difference" })];
+    const parts = [];
+    if (difference.fired.length) {
+      parts.push(element("h2", { text: "First firing that changes" }));
+      parts.push(table(runs.map((run, i) => [run.name, difference.fired[i]]), "difference fired"));
+      const there = runs.map((run, i) => i).filter((i) => runs[i].firstChange >= 0);
+      for (const i of there)
+        parts.push(button(`show it in ${runs[i].name}`, () => this.state.goTo({ run: i, firing: runs[i].firstChange, record: NOTHING }), "changed"));
+    }
+    parts.push(element("h2", { text: "First difference" }));
     parts.push(table(runs.map((run, i) => [run.name, difference.texts[i]]), "difference"));
     const place = runs[this.state.active].tagOfDifference;
     if (place !== undefined) parts.push(button("go there", () => this.state.setTag(place)));

@@ -15,6 +15,7 @@ async function main() {
   data.runs.forEach((run, i) => {
     const record = data.difference?.records[i] ?? NOTHING;
     run.tagOfDifference = record >= 0 ? run.record_tag[record] : undefined;
+    run.firstChange = data.difference?.firings[i] ?? NOTHING; // the first firing that is not the same in the other run
   });
   const state = new State(data), scrubber = new Scrubber(state), lanes = new Lanes(state), chart = new Chart(state);
   const camera = { scale: 0, extent: Space.extent(data.runs) }, hasSpace = data.runs.some((run) => run.marks.length);
@@ -38,6 +39,14 @@ async function main() {
     readTheme();
     state.changed();
   });
+  const changed = data.story.length ? data.runs.findLastIndex((run) => run.firstChange >= 0) : NOTHING;
+  if (changed >= 0) {
+    const run = data.runs[changed], tag = run.firing_tag[run.firstChange], half = Math.max(1e8, state.end / 30);
+    state.activate(changed);
+    state.show(run.times[tag] - half / 2, run.times[tag] + half * 1.5);
+    state.setTag(tag);
+    chart.reveal(run.firing_actor[run.firstChange]);
+  }
   let before = performance.now();
   const frame = (now) => {
     state.advance(Math.min(0.1, (now - before) / 1000));

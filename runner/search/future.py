@@ -1,0 +1,213 @@
+"""Two futures of a run side by side: where they part, and what follows."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, ClassVar
+
+from epicycle.actors import EpicycleError, Tag, counted
+
+from ..build.model import Model
+from ..engine import Interventions
+from ..results import Results, plain
+from ..shown import finite, short
+from ..tables import Table
+from .answer import Answer, listed
+
+if TYPE_CHECKING:
+    from ..show.view.pages import Page
+
+AS_IT_WAS, INSTEAD = "as it was", "what if"
+_FEW = 8  # actors in a sentence
+_FAILED = "failed"  # what ended a run in an error
+
+
+@dataclass(frozen=True)
+class First:
+    """The first firing that is another one, or that only one of the futures has; in words, what it does in each."""
+
+    actor: str
+    time: float  # s
+    microstep: int
+    does: tuple[str, ...]
+
+    @property
+    def tag(self) -> str:
+        return f"({self.time:.9g} s, {self.microstep})"
+
+
+@dataclass(repr=False)
+class WhatIf(Answer):
+    """A run as it was, and the run with changes from a tag on.
+
+    ``first`` is the first firing that changes; ``record`` the first difference of the logs, in words; ``affected`` are
+    the actors that do anything else, with the times (s) at which they begin to.
+    """
+
+    NAME: ClassVar[str] = "what_if"
+
+    model: str
+    seed: int
+    at: Tag
+    changes: list[str]
+    before: Results
+    after: Results
+    first: First | None
+    record: list[str]
+    affected: dict[str, float]
+    actors: int
+    error: str = ""  # that ended the other future
+    _page: Page | None = field(default=None, compare=False)
+
+    @property
+    def is_same(self) -> bool:
+        """Whether nothing has changed: the logs are equal, bit for bit."""
+        return self.before.digest == self.after.digest
+
+    def _sentences(self) -> list[str]:
+        what = f" {listed(self.changes)}." if self.changes else " nothing is changed."
+        said = [f"From {self.at.seconds:.9g} s on,{what}"]
+        if self.is_same:
+            reason = (
+                "Both futures have the same log"
+                if not self.changes
+                else "It makes no difference: both futures have the same log; what an actor reads only at its start "
+                "does not change later"
+            )
+            return [*said, f"{reason}."]
+        if self.first is not None:
+            said.append(f"The first firing that changes is {self.first.actor} at {self.first.tag}.")
+        names = [*self.affected][:_FEW]
+        more = f" and {len(self.affected) - _FEW:,} more" if len(self.affected) > _FEW else ""
+        whom = f": {', '.join(names)}{more}" if names else ""
+        do = "does" if len(self.affected) == 1 else "do"
+        said.append(f"{len(self.affected):,} of {counted(self.actors, 'actor')} {do} something else{whom}.")
+        for name, verdict in self.before.monitors.items():
+            if (other := self.after.monitors[name]).holds != verdict.holds:
+                said.append(f"Monitor {name}: {_verdict(verdict)} as it was, {_verdict(other)} instead.")
+        if self.error:
+            said.append(f"The other future ends in an error: {self.error}")
+        return said
+
+    def facts(self) -> dict[str, Any]:
+        """Everything that was found, for programs."""
+        both = {AS_IT_WAS: self.before, INSTEAD: self.after}
+        found: Any = finite(
+            {
+                "model": self.model,
+                "seed": self.seed,
+                "at": {"time": self.at.seconds, "microstep": self.at.microstep},
+                "changes": self.changes,
+                "same": self.is_same,
+                "first_firing": None if self.first is None else asdict(self.first),
+                "first_difference": dict(zip(both, self.record, strict=False)),
+                "affected": self.affected,
+                "digests": {name: each.digest for name, each in both.items()},
+                "stopped": {name: each.stopped for name, each in both.items()},
+                "metrics": {name: plain(each.metrics) for name, each in both.items()},
+                "monitors": {
+                    name: {key: asdict(verdict) for key, verdict in each.monitors.items()}
+                    for name, each in both.items()
+                },
+                "error": self.error,
+                "sentence": self.sentence,
+            }
+        )
+        assert isinstance(found, dict)
+        return found
+
+    def page(self) -> Page:
+        """A page with both futures; the first firing that changes is marked."""
+        assert self._page is not None
+        return self._page
+
+    def save(self, folder: str | Path | None = None, *, page: bool = True) -> list[Path]:
+        """Write what_if.json and, unless refused, what_if.html."""
+        [facts] = super().save(folder)
+        return [facts, *([self.page().save(facts.with_suffix(".html"))] if page else [])]
+
+    def _tables(self) -> list[Table]:
+        metrics = []
+        for name, outcome in self.before.outcomes.items():
+            unit = self.before.units.get(name, "1")
+            instead = self.after.outcomes[name]
+            row = (name, outcome.shown(short), instead.shown(short), "" if unit == "1" else unit)
+            metrics.append(row)
+        verdicts = [
+            (name, _verdict(each), _verdict(self.after.monitors[name])) for name, each in self.before.monitors.items()
+        ]
+        rows = [("first difference", *self.record)] if self.record else []
+        if self.first is not None:
+            rows.insert(0, (f"{self.first.actor} at {self.first.tag}", *self.first.does))
+        return [
+            Table(("", AS_IT_WAS, INSTEAD), rows),
+            Table(("metric", AS_IT_WAS, INSTEAD, "unit"), metrics),
+            Table(("monitor", AS_IT_WAS, INSTEAD), verdicts),
+        ]
+
+
+def _verdict(verdict: Any) -> str:
+    if verdict.holds is None:
+        return "cannot be judged"
+    if verdict.holds:
+        return "holds"
+    return "broken" if verdict.time is None else f"broken at {verdict.time:.9g} s"
+
+
+def future_of(
+    model: Model,
+    other: Model,
+    rules: Interventions,
+    at: Tag,
+    words: Sequence[str],
+    *,
+    seed: int | None,
+    until: float | None,
+    progress: bool,
+) -> WhatIf:
+    """Run a model as it is, and ``other`` by the rules; both must be the same before the tag."""
+    from ..show.view.differing import affected, difference, fired, first_firing
+    from ..show.view.pages import recorded
+
+    page = recorded(
+        [model, other],
+        seed=seed,
+        until=until,
+        names=[AS_IT_WAS, INSTEAD],
+        acts=[None, rules],
+        progress=progress,
+    )
+    if any(isinstance(each, KeyboardInterrupt) for each in page.errors):
+        raise KeyboardInterrupt
+    recordings = page.recordings
+    before, after = (each.results for each in recordings)
+    assert before is not None
+    assert after is not None
+    if before.stopped == _FAILED:
+        raise page.errors[0]
+    firing, record = first_firing(recordings), difference(recordings)
+    if firing is not None and firing.tag < at:
+        raise EpicycleError(
+            f"two runs of {model.name} differ at {firing.tag}, before {at}: "
+            "something depends on more than model and seed"
+        )
+    found = WhatIf(
+        model.name,
+        before.seed,
+        at,
+        [*words],
+        before,
+        after,
+        None
+        if firing is None
+        else First(firing.actor, firing.tag.seconds, firing.tag.microstep, tuple(fired(recordings, firing))),
+        [] if record is None else record["texts"],
+        {actor: tag.seconds for actor, tag in affected(recordings).items()},
+        len(model.graph.actors),
+        str(page.errors[0]) if page.errors else "",
+        page,
+    )
+    page.story = found._sentences()
+    return found

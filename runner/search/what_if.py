@@ -1,0 +1,265 @@
+"""What if: a run that takes another course from a tag on, beside the one that it took."""
+
+from __future__ import annotations
+
+import copy
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, ClassVar, NamedTuple
+
+from epicycle.actors import EpicycleError, ParameterError, Tag, declared_parameters, did_you_mean, to_nanoseconds
+from epicycle.aspects import ClockAspect, ExecutionAspect, JoinPoint, PortAspect
+
+from ..build.model import Model
+from ..desk import difference
+from ..engine import Interventions, Simulation
+from ..graph.acts import Act
+from ..graph.woven import WovenAspect
+from ..language.settings import settings_of
+from ..shown import short
+from ..study.run_spec import RunSpec, opened, seconds, spec_of
+from ..text.document import plain
+from ..text.patterns import PatternError, select
+from ..text.problems import Problems
+from .future import WhatIf, future_of
+
+_TAG = re.compile(r"\(?\s*(?P<time>[^,()]+?)\s*(?:,\s*(?:microstep\s+)?(?P<microstep>\d{1,9})\s*)?\)?")
+
+
+@dataclass(frozen=True)
+class Changes:
+    """What is other from a tag on: ``change`` are parameters, ``remove`` aspects, ``lose`` ports.
+
+    ``let_through`` are aspects, or ``ASPECT@PLACE``: what each does next does not happen.
+    """
+
+    change: Iterable[str] | Mapping[str, object] = ()
+    remove: Sequence[str] = ()
+    let_through: Sequence[str] = ()
+    lose: Sequence[str] = ()
+
+
+def what_if(
+    model: Model, at: Tag, changes: Changes, *, seed: int | None, until: float | None, progress: bool = True
+) -> WhatIf:
+    """Run a model as it is, and with changes from a tag on; raises ``EpicycleError``."""
+    fork = forked(model, at, changes, seed=seed, until=until)
+    return future_of(model, fork.model, fork.acts, at, fork.words, seed=seed, until=until, progress=progress)
+
+
+class Fork(NamedTuple):
+    """What makes the run with changes: a model, the rules for acts of aspects, and the changes in words."""
+
+    model: Model
+    acts: Interventions
+    words: list[str]
+
+
+def forked(model: Model, at: Tag, changes: Changes, *, seed: int | None = None, until: float | None = None) -> Fork:
+    """The model with changes from a tag on; raises ``EpicycleError``."""
+    other, words, always = copy.copy(model), list[str](), set[str]()
+
+    def weave(aspect: _Then, places: Mapping[str, Any]) -> None:
+        name = f"what_if_{len(always) + 1}"
+        while any(woven.name == name for woven in other.aspects):
+            name += "_"
+        aspect.at_tag = at
+        always.add(name)
+        other.enlist([WovenAspect(name, aspect, **{"ports": [], **places})])
+
+    for path, value in _parameters(model, changes.change).items():
+        weave(_Changed.to(value), {"parameters": [path]})
+        words.append(f"{path} is {short(value)}")
+    for name in changes.remove:
+        _check_removable(model, name)
+        words.append(f"{name} is removed")
+    for port in changes.lose:
+        weave(_Lost(), {"ports": _ports(model, port)})
+        words.append(f"the next token at {port} is lost")
+    acts = _next_acts(model, at, changes.let_through, seed, until)
+    words += [f"{act.name.aspect} lets token {act.name.token} at {act.name.place} through" for act in acts]
+    rules = Interventions(
+        model.exactly,
+        without=frozenset(act.name for act in acts),
+        ends=dict.fromkeys(changes.remove, at),
+        always=frozenset(always),
+    )
+    return Fork(other, rules, words)
+
+
+def tag_of(given: float | str | Tag) -> Tag:
+    """A tag from a time (s, or with a unit), or from a tag as traces and pages show it; raises ``EpicycleError``."""
+    if isinstance(given, Tag):
+        return given
+    found = _TAG.fullmatch(given) if isinstance(given, str) else None
+    if isinstance(given, str) and found is None:
+        raise EpicycleError(f"at {given!r}: expected a time, such as '3.2 s', or a tag: '(3.2 s, 1)'")
+    time = seconds("at", given if found is None else found["time"])
+    assert time is not None
+    return Tag(to_nanoseconds(float(time)), int(found["microstep"] or 0) if found is not None else 0)
+
+
+# -- parameters -------------------------------------------------------------------------------------------------------
+
+
+def _parameters(model: Model, change: Iterable[str] | Mapping[str, object]) -> dict[str, Any]:
+    """New values of parameters of actors, by path.
+
+    A model that can be loaded again is loaded with the changes, and the values of its actors are compared: so they may
+    be of parameters of the model, too.
+    """
+    problems = Problems()
+    settings = settings_of(change, problems)
+    problems.raise_if_any()
+    if not settings:
+        return {}
+    spec = spec_of(model, None, None)
+    if spec is None or spec.study:
+        return _given(model, {each.path: plain(each.node) for each in settings})
+    changed = opened(spec.changed(RunSpec.of("", None, None, {"set": settings}))).model
+    found = {}
+    for each in difference(model, changed).changes:
+        if each.section in ("parameters", "figures"):
+            continue
+        actor = changed.graph.actors.get(each.path)
+        declared = {} if actor is None else declared_parameters(type(actor))
+        if each.section != "actors" or each.fact not in declared:
+            raise EpicycleError(
+                f"{', '.join(each.path for each in settings)} cannot change during a run: it changes more than "
+                f"parameters of actors: {each.section} {str(each)[2:]}\n"
+                "   help: compare it from the start, with epicycle compare"
+            )
+        path = f"{each.path}.{each.fact}"
+        _check_alterable(model, path)
+        found[path] = declared[each.fact].value_in(actor)
+    return found
+
+
+def _given(model: Model, values: Mapping[str, object]) -> dict[str, Any]:
+    """The same for a model that a program has made, where values are those of actors."""
+    graph, found = model.graph, {}
+    known = [f"{path}.{name}" for path, actor in graph.actors.items() for name in declared_parameters(type(actor))]
+    for pattern, value in values.items():
+        for path in _selected("change", pattern, known, f"{model.name} has no parameter of an actor"):
+            owner, _, name = path.rpartition(".")
+            _check_alterable(model, path)
+            try:
+                found[path] = declared_parameters(type(graph.actors[owner]))[name].convert(value)
+            except ParameterError as error:
+                raise EpicycleError(f"{path}: {error}") from None
+    return found
+
+
+def _check_alterable(model: Model, path: str) -> None:
+    if path in model.graph.ports and (edges := model.graph.incoming(path)):
+        raise EpicycleError(f"{path} gets its values over a connection, from {edges[0].source}: it cannot be changed")
+
+
+def _selected(what: str, pattern: str, known: Sequence[str], unknown: str) -> list[str]:
+    try:
+        found = select(pattern, known)
+    except PatternError as error:
+        raise EpicycleError(f"{what} {pattern}: {error}") from None
+    if not found:
+        raise EpicycleError(f"{unknown} {pattern!r}{did_you_mean(pattern, known)}")
+    return found
+
+
+# -- aspects and tokens -----------------------------------------------------------------------------------------------
+
+
+def _aspect(model: Model, name: str) -> WovenAspect:
+    known = {woven.name: woven for woven in model.aspects}
+    if name not in known:
+        raise EpicycleError(
+            f"{model.name} has no aspect {name!r}{did_you_mean(name, known)}\n"
+            f"   help: its aspects: {', '.join(known) or 'none'}"
+        )
+    return known[name]
+
+
+def _check_removable(model: Model, name: str) -> None:
+    """Refuse an aspect that does more than to act on what passes it."""
+    aspect = _aspect(model, name).aspect
+    is_self_acting = isinstance(aspect, ExecutionAspect) and type(aspect).begin is not ExecutionAspect.begin
+    if isinstance(aspect, ClockAspect) or is_self_acting:
+        kind = type(aspect).__name__
+        raise EpicycleError(
+            f"{name} cannot be removed during a run: a {kind} decides at its start what it does\n"
+            f"   help: compare with a run without it from the start: epicycle view MODEL --without {name}"
+        )
+
+
+def _ports(model: Model, pattern: str) -> list[str]:
+    return _selected("lose", pattern, list(model.graph.ports), f"{model.name} has no port")
+
+
+def _next_acts(model: Model, at: Tag, names: Sequence[str], seed: int | None, until: float | None) -> list[Act]:
+    """What aspects do next, at a tag or after it; a name that is given twice means the next two acts."""
+    for each in names:
+        _aspect(model, each.partition("@")[0])
+    if not names:
+        return []
+    noted = Simulation(model, seed=seed, acts=Interventions(model.exactly)).run(until=until).acts
+    found: list[Act] = []
+    for each in names:
+        aspect, _, place = each.partition("@")
+        mine = [act for act in noted if act.name.aspect == aspect and place in ("", act.name.place)]
+        # Times are compared as they are shown, so that one can be copied.
+        left = [act for act in mine if float(f"{act.time / 1e9:.9g}") >= at.seconds and act not in found]
+        if not left:
+            last = max((act.time for act in mine), default=None)
+            when = (
+                "in the whole run"
+                if last is None
+                else f"at {at.seconds:.9g} s or later: the last time is {last / 1e9:.9g} s"
+            )
+            raise EpicycleError(f"{aspect} does nothing{' at ' + place if place else ''} {when}")
+        found.append(min(left, key=lambda act: act.time))
+    return found
+
+
+class _Then(PortAspect):
+    """An aspect that acts from a tag on."""
+
+    in_model_time: ClassVar[bool] = True
+    events: ClassVar[tuple[str, ...]] = ()
+    at_tag: Tag
+
+    def pass_token(self, token: Any, point: JoinPoint) -> None:
+        if point.tag >= self.at_tag:
+            self.act(token, point)
+        else:
+            point.forward(token)
+
+    def act(self, token: Any, point: JoinPoint) -> None:
+        raise NotImplementedError
+
+
+class _Changed(_Then):
+    """Gives a parameter another value."""
+
+    value: Any
+
+    @classmethod
+    def to(cls, value: Any) -> _Changed:
+        made = cls()
+        made.value = value
+        return made
+
+    def act(self, token: Any, point: JoinPoint) -> None:
+        point.forward(self.value)
+
+
+class _Lost(_Then):
+    """Loses one token, at one of its places."""
+
+    events: ClassVar[tuple[str, ...]] = ("dropped",)
+
+    def act(self, token: Any, point: JoinPoint) -> None:
+        if "is over" in point.shared:
+            point.forward(token)
+        else:
+            point.shared["is over"] = True
+            point.act("dropped", token)

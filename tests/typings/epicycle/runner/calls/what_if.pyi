@@ -1,0 +1,1 @@
+from runner.calls.what_if import *
