@@ -26,12 +26,12 @@ class ToolError(Exception):
 
 @dataclass(frozen=True)
 class Limits:
-    """How long a command may take (s), and how large its memory, a file, an argument and an answer may be (bytes)."""
+    """How long a command may take (s), and how large its memory, a file, its arguments and an answer may be (bytes)."""
 
     seconds: float = 60.0
     memory: int = 4 << 30
     file: int = 64 << 20
-    argument: int = 200_000
+    argument: int = 100_000
     answer: int = 400_000
 
 
@@ -65,13 +65,12 @@ class LimitedCall:
     def _answer(self, out: str, command: str, names: Sequence[str], options: Sequence[str], good: Sequence[int]) -> str:
         named = [self._named(each, out, number) for number, each in enumerate(names)]
         words = [sys.executable, "-P", "-m", "epicycle", command, *options, "--", *named]
-        for word in words:
-            if len(word) > self.limits.argument or "\0" in word:
-                raise ToolError(f"an argument is longer than {self.limits.argument:,} characters, or is no text")
+        is_text = all(map(_is_text, words))
+        if sum(map(len, words)) > self.limits.argument or not is_text:
+            raise ToolError(f"the arguments have more than {self.limits.argument:,} characters, or are no text")
         code, told, complained = self._run(words, out)
-        if code not in good or not (told or not good):
+        if code not in good or not told:
             said = self._shown(complained or told, out)
-            said = said[said.rfind("error: ") :] if said.startswith("usage: ") else said
             raise ToolError(said[: self.limits.answer] or f"the command ended with {code}")
         return self._shown(told, out)
 
@@ -143,3 +142,11 @@ class LimitedCall:
 
     def _shown(self, text: str, out: str) -> str:
         return text.replace(f"{out}/", "").strip()
+
+
+def _is_text(word: str) -> bool:
+    """Whether a process can be given a word."""
+    try:
+        return b"\0" not in word.encode()
+    except UnicodeEncodeError:  # half of a pair
+        return False

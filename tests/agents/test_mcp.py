@@ -20,6 +20,7 @@ from mcp import Client, StdioServerParameters
 from mcp.client.stdio import stdio_client
 
 import epicycle
+from epicycle.runner.agents import LimitedCall, ToolError
 from epicycle.runner.cli import main
 
 MODEL = """model: line
@@ -197,6 +198,8 @@ def test_hostile_arguments_end_with_a_message(folder: Path, tmp_path: Path) -> N
             await one.refused("run", model="a" * 300_000),
             await one.refused("run", model="model: a\n" + "x" * 300_000),
             await one.refused("run", model="\n"),
+            await one.refused("run", model=MODEL, changes={"set": {f"p{n}": 1.0 for n in range(50_000)}}),
+            await one.refused("run", model=MODEL, changes={"set": {"clock.period": {"a": ["\0"]}}}),
             await one.refused("run", model="&a [*a]\n"),
             await one.refused("compare", model="mm1", replications=10**9),
             await one.refused("search", model="mm1", property="always ((("),
@@ -220,6 +223,22 @@ def test_hostile_arguments_end_with_a_message(folder: Path, tmp_path: Path) -> N
         assert (await one.told("run", model="line.yaml"))["metrics"]["sent"] == 21  # it still answers
 
     dialogue(folder, talk, "--seconds", "4")
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["\ud83d"], f"there is no file {chr(0xD83D)!r} in the folder of this server"),
+        (["mm1", "\ud83d="], "the arguments have more than 100,000 characters, or are no text"),
+        (["mm1", "--set=a=\0"], "the arguments have more than 100,000 characters, or are no text"),
+        (["mm1", *["--set=load=0.5"] * 10_000], "the arguments have more than 100,000 characters, or are no text"),
+        (["a" * 5_000 + ".yaml"], f"there is no file {'a' * 200!r} in the folder of this server"),
+    ],
+)
+def test_what_no_process_can_be_given(folder: Path, words: list[str], message: str) -> None:
+    with pytest.raises(ToolError) as raised:
+        LimitedCall(folder).facts("run", words[:1], *words[1:])
+    assert str(raised.value) == message
 
 
 @pytest.mark.slow

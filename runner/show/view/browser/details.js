@@ -43,7 +43,10 @@ class Details {
 
   difference() {
     const { data, runs } = this.state, { difference } = data;
-    const parts = [];
+    const parts = [element("h2", { text: "First difference" })];
+    parts.push(table(runs.map((run, i) => [run.name, difference.texts[i]]), "difference"));
+    const place = runs[this.state.active].tagOfDifference;
+    if (place !== undefined) parts.push(button("go there", () => this.state.setTag(place)));
     if (difference.fired.length) {
       parts.push(element("h2", { text: "First firing that changes" }));
       parts.push(table(runs.map((run, i) => [run.name, difference.fired[i]]), "difference fired"));
@@ -51,10 +54,6 @@ class Details {
       for (const i of there)
         parts.push(button(`show it in ${runs[i].name}`, () => this.state.goTo({ run: i, firing: runs[i].firstChange, record: NOTHING }), "changed"));
     }
-    parts.push(element("h2", { text: "First difference" }));
-    parts.push(table(runs.map((run, i) => [run.name, difference.texts[i]]), "difference"));
-    const place = runs[this.state.active].tagOfDifference;
-    if (place !== undefined) parts.push(button("go there", () => this.state.setTag(place)));
     if (data.comparison.length) {
       const head = ["metric", ...runs.map((run) => run.name), "difference"];
       parts.push(table([head, ...data.comparison], "compared"));
