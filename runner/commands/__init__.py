@@ -25,6 +25,7 @@ GROUPS = {
         describe.graph,
         listing.list_,
         editor.lsp,
+        editor.studio,
     ),
     "set up a shell": (completion.completion,),
 }

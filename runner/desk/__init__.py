@@ -2,10 +2,11 @@
 
 Functions of a text and a place in it, on top of the passes that load a model: ``read`` gives what is wrong and what is
 known so far, ``complete`` what may be written, ``hover``, ``definition``, ``references`` and ``symbols`` what stands
-there, ``fix`` and ``rename`` changes of the text; ``editing`` are changes of the model as changes of its text.
+there, ``fix`` and ``rename`` changes of the text; ``editing`` are changes of the model as changes of its text,
+and ``controls`` what one may set.
 """
 
-from . import editing
+from . import controls, editing
 from .changes import Edit, RenameError, apply, fix, fix_all, rename, texts_after
 from .comparing import Change, Difference, contents, difference
 from .completion import Suggestion, complete
@@ -17,6 +18,7 @@ from .parts import EditError
 from .places import lines_of
 from .problem_data import as_data, of_problems, report
 from .reading import Reading, read
+from .session import Session
 
 __all__ = [
     "Change",
@@ -26,6 +28,7 @@ __all__ = [
     "Knowledge",
     "Reading",
     "RenameError",
+    "Session",
     "Splice",
     "Suggestion",
     "Symbol",
@@ -33,6 +36,7 @@ __all__ = [
     "as_data",
     "complete",
     "contents",
+    "controls",
     "definition",
     "difference",
     "editing",

@@ -117,7 +117,7 @@ CASES: dict[str, tuple[str, Act, list[str], list[str], list[str]]] = {
         [],
         ["  more: {type: Merge}\n"],
         [
-            "+ more: type Merge",
+            "+ more: type Merge, discard false",
         ],
     ),
     "remove an actor": (
