@@ -13,7 +13,7 @@ import re
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, TextIO
@@ -292,10 +292,16 @@ def _metrics(recording: Recording) -> list[list[Any]]:
     return found
 
 
-ASKED: dict[str, Callable[[Worker, Message], Message]] = {
-    each.__name__: each
-    for each in (Worker.read, Worker.complete, Worker.hover, Worker.colours, Worker.types, Worker.fields, Worker.edit)
-} | {"run": Worker.run}
+ASKED: Mapping[str, Callable[[Worker, Message], Message]] = {
+    "read": Worker.read,
+    "complete": Worker.complete,
+    "hover": Worker.hover,
+    "colours": Worker.colours,
+    "types": Worker.types,
+    "fields": Worker.fields,
+    "edit": Worker.edit,
+    "run": Worker.run,
+}
 
 
 def _limit() -> None:
