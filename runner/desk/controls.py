@@ -100,7 +100,8 @@ def _field(
         "low": low,
         "high": high,
         "whole": of_type is int,
-        "number": None if "${" in written else _finite(value),
+        "number": _finite(value),
+        "computed": "${" in written,
     }
 
 

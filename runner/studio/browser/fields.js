@@ -71,7 +71,7 @@ function fieldRow(field, write) {
       if (field.kind === "choice" && !field.said) input.value = field.value;
       input.placeholder = field.value || "";
       if (slider) {
-        slider.disabled = field.number === null;
+        slider.disabled = field.number === null || field.computed;
         slider.title = slider.disabled ? "an expression computes it" : "";
         if (slider.dataset.used !== "yes" && field.number !== null) slider.value = field.number;
       }

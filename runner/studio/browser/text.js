@@ -46,6 +46,7 @@ class TextEditor {
           keymap.of([
             { key: "Mod-s", preventDefault: true, run: () => (save(), true) },
             { key: "Tab", run: CM.acceptCompletion },
+            { key: "Enter", run: (view) => (trim(view), false) },
             ...CM.completionKeymap, ...CM.searchKeymap, ...CM.historyKeymap, ...CM.lintKeymap, ...CM.defaultKeymap, CM.indentWithTab,
           ]),
           EditorView.updateListener.of((update) => { if (update.docChanged) changed(); }),
@@ -107,6 +108,13 @@ class TextEditor {
     const { words } = await this.ask({ ask: "hover", text: this.text, at });
     return words ? { pos: at, above: true, create: () => ({ dom: element("div", { className: "described" }, ...formatted(words)) }) } : null;
   }
+}
+
+// A completed key ends with a space, for its value; what begins a section has none.
+function trim(view) {
+  const { main } = view.state.selection, line = view.state.doc.lineAt(main.head), before = line.text.slice(0, main.head - line.from);
+  const spaces = before.match(/: +$/) && main.empty ? before.length - before.trimEnd().length : 0;
+  if (spaces && CM.completionStatus(view.state) !== "active") view.dispatch({ changes: { from: main.head - spaces, to: main.head } });
 }
 
 // Words with **bold** and `code`, as text nodes: nothing in them becomes a tag.
