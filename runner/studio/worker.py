@@ -109,7 +109,7 @@ class Worker:
         except (EpicycleError, RenameError) as error:
             return {"error": str(error)}
         except (KeyError, TypeError, ValueError, AttributeError, IndexError) as error:
-            return {"error": f"this question is not understood ({type(error).__name__})"}
+            return {"error": f"this question cannot be read ({type(error).__name__})"}
         except MemoryError:
             return {"error": "there is not enough memory"}
 
@@ -200,7 +200,7 @@ class Worker:
         """A change of the model: the changes of the text that make it."""
         what, given = str(asked["what"]), asked["given"]
         if not isinstance(given, list) or not all(isinstance(each, (str, bool, dict)) for each in given):
-            raise EditError("this change is not understood")
+            raise EditError("this change cannot be read")
         before = self.text
         match what:
             case "connect" | "disconnect":
@@ -328,8 +328,11 @@ def main(arguments: list[str]) -> None:
     current: Message = {}
 
     def say(message: Message) -> None:
-        out.write(json.dumps({"id": current.get("id"), **message}, allow_nan=False) + "\n")
-        out.flush()
+        try:
+            out.write(json.dumps({"id": current.get("id"), **message}, allow_nan=False) + "\n")
+            out.flush()
+        except BrokenPipeError:  # the studio has ended
+            os._exit(0)
 
     _limit()
     worker = Worker(Path(path).resolve(), float(seconds), int(events), tuple(classes(files)), say)

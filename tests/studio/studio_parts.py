@@ -49,7 +49,7 @@ def served(model: Path, *options: str) -> Iterator[Served]:
     finally:
         process.terminate()
         _, complaints = process.communicate(timeout=PATIENCE)
-    assert complaints == ""
+    assert complaints == "", complaints
 
 
 class Asking:
