@@ -22,6 +22,7 @@ from epicycle.actors import EpicycleError
 
 from ..build.figures import figures_of
 from ..calls.changes import classes
+from ..collection import seldom_collecting
 from ..desk import (
     EditError,
     Knowledge,
@@ -337,11 +338,12 @@ def main(arguments: list[str]) -> None:
     _limit()
     worker = Worker(Path(path).resolve(), float(seconds), int(events), tuple(classes(files)), say)
     threading.Thread(target=_listen, args=(sys.stdin, worker), daemon=True).start()
-    while (asked := worker.waiting.get()) is not None:
-        if asked["ask"] == "stop":  # only a run in progress heeds it
-            continue
-        current = asked
-        say({**worker.answer(asked), "done": True})
+    with seldom_collecting():
+        while (asked := worker.waiting.get()) is not None:
+            if asked["ask"] == "stop":  # only a run in progress heeds it
+                continue
+            current = asked
+            say({**worker.answer(asked), "done": True})
 
 
 if __name__ == "__main__":
