@@ -1,7 +1,7 @@
 """How soon a text under work is read and drawn: `python -m benchmarks.desk [--edits 40]`.
 
-What a worker of the studio does after a change: problems, then the graph of what is valid, and the fields. Every second
-edit changes a value, the others a comment, an actor's name at its only place, or a connection.
+What a worker of the studio does after a change: problems, then the graph of what is valid, and the fields. Of four
+edits, two change a value, one a comment, and one adds an actor.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from epicycle.runner.studio.worker import Worker
 ROOT = Path(__file__).parents[1]
 ACTORS = 2_000
 GOALS = {"collision_avoidance": 0.15, f"{ACTORS:,} actors": 1.0}
-HOW = "CPU time of problems, graph and fields as JSON in the process that reads texts; median and 95th percentile of edits"
+HOW = "CPU time of problems, graph and fields as JSON in a worker; median and 95th percentile of edits"
 
 
 def pipeline() -> str:
