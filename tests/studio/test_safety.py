@@ -191,6 +191,7 @@ def test_what_is_no_question_ends_the_socket_only(said: str, studio_at: tuple[Se
         assert again.ask(ask="read", text=MODEL)["valid"] is True
 
 
+@pytest.mark.slow
 def test_a_message_that_is_too_large_ends_the_socket_only(studio_at: tuple[Served, Path]) -> None:
     studio, _ = studio_at
     with connect(studio.socket, origin=studio.origin) as page:  # type: ignore[arg-type]
@@ -202,6 +203,7 @@ def test_a_message_that_is_too_large_ends_the_socket_only(studio_at: tuple[Serve
         assert again.ask(ask="read", text="x" * 10_000_001) == {"error": "a text has at most 10 MB"}
 
 
+@pytest.mark.slow
 def test_a_model_reads_no_other_file_and_runs_no_code(studio_at: tuple[Served, Path], tmp_path: Path) -> None:
     secret, mark = tmp_path / "secret.yaml", tmp_path / "mark"
     secret.write_text("composites: {Secret: {actors: {hidden: {type: Clock, period: 1 s}}}}\n")
@@ -233,6 +235,7 @@ def test_a_model_reads_no_other_file_and_runs_no_code(studio_at: tuple[Served, P
 # -- limits, and what dies --------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_run_that_does_not_end_is_ended(studio_at: tuple[Served, Path]) -> None:
     with asking(studio_at[0]) as page:
         found = page.ask(ask="run", text=ENDLESS)
@@ -241,6 +244,7 @@ def test_a_run_that_does_not_end_is_ended(studio_at: tuple[Served, Path]) -> Non
         assert page.ask(ask="run", text=MODEL)["ended"] == ""
 
 
+@pytest.mark.slow
 def test_a_newer_run_ends_the_one_before(tmp_path: Path) -> None:
     path = tmp_path / "long.yaml"
     path.write_text(ENDLESS)
@@ -265,6 +269,7 @@ def _children(pid: int) -> list[int]:
     return [int(each) for each in found.stdout.split()]
 
 
+@pytest.mark.slow
 def test_a_worker_that_dies_takes_nothing_with_it(studio_at: tuple[Served, Path]) -> None:
     studio, _ = studio_at
     with asking(studio) as page:
@@ -281,6 +286,7 @@ def test_a_worker_that_dies_takes_nothing_with_it(studio_at: tuple[Served, Path]
         assert [page.ask(ask="read", text=MODEL) for _ in range(2)][-1]["valid"] is True
 
 
+@pytest.mark.slow
 def test_a_worker_that_dies_in_a_run_is_told_of(tmp_path: Path) -> None:
     path = tmp_path / "long.yaml"
     path.write_text(ENDLESS)
@@ -297,6 +303,7 @@ def test_a_worker_that_dies_in_a_run_is_told_of(tmp_path: Path) -> None:
         assert page.ask(ask="run", text=MODEL)["stopped"] == "stop time"
 
 
+@pytest.mark.slow
 def test_a_step_that_never_ends_is_ended(tmp_path: Path) -> None:
     types = tmp_path / "stuck.py"
     types.write_text(
@@ -316,6 +323,7 @@ def test_a_step_that_never_ends_is_ended(tmp_path: Path) -> None:
 # -- the file ---------------------------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_a_file_that_somebody_else_has_written_is_not_overwritten_unasked(tmp_path: Path) -> None:
     path = tmp_path / "mine.yaml"
     path.write_bytes(MODEL.replace("\n", "\r\n").encode())
@@ -341,6 +349,7 @@ def test_another_tab_takes_over(studio_at: tuple[Served, Path]) -> None:
         assert second.ask(ask="read", text=MODEL)["valid"] is True
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
