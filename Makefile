@@ -10,7 +10,7 @@ LINKED := $(VENV)/linked
 CORE := $(VENV)/compiled
 
 .NOTPARALLEL:
-.PHONY: help run paper test check bench fuzz mutants robust portable core cores lint reference docs wheel clean
+.PHONY: help run paper test check bench fuzz mutants robust portable core cores lint reference docs codemirror wheel clean
 
 help:
 	@echo "make run    simulate the collision avoidance example into results/collision_avoidance"
@@ -27,6 +27,7 @@ help:
 	@echo "make robust 100,000 problems beyond any scenario: does the solver answer each within its limits?"
 	@echo "make reference  regenerate docs/reference.md and models/schema.json from the declarations in the code"
 	@echo "make docs   build the site of the documents into site/ (runs every packaged model; 2 min)"
+	@echo "make codemirror  bundle the studio's text editor again (needs node and npm)"
 	@echo "make wheel  build dist/epicycle-*.whl"
 	@echo "make clean  remove everything that these made, except results/"
 
@@ -83,6 +84,9 @@ docs: $(DOCS)
 	NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs build --strict --config-file website/mkdocs.yml
 	@echo "open site/index.html"
 
+codemirror:
+	cd website/codemirror && npm ci --no-audit --no-fund && npm run build
+
 wheel: $(DEV)
 	rm -rf build dist
 	EPICYCLE_BUILD=all $(BIN)/python -m build --wheel
@@ -90,7 +94,7 @@ wheel: $(DEV)
 
 clean:
 	rm -rf $(VENV) build dist site site-parts epicycle.egg-info .mypy_cache .pytest_cache .ruff_cache .hypothesis .coverage htmlcov
-	rm -rf actors/built
+	rm -rf actors/built website/codemirror/node_modules
 	find actors aspects models $(wildcard bridges) $(wildcard ptolemy) runner tests -name __pycache__ -type d -prune -exec rm -rf {} +
 	find actors aspects runner \( -name '*.so' -o -name '*.pyd' \) -exec rm -f {} +
 

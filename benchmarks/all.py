@@ -20,7 +20,7 @@ from benchmarks.measure import pace, table
 from epicycle.actors import CORE
 
 HERE = Path(__file__).parent
-PARTS = ("controllers", "studies", "events", "written", "growth", "start")
+PARTS = ("controllers", "studies", "events", "written", "growth", "start", "desk")
 PACKAGES = ("numpy", "numba", "casadi", "scipy", "filterpy", "simpy", "networkx")
 
 

@@ -43,7 +43,7 @@ def shipped_files() -> list[Path]:
         for folder in FOLDERS
         for path in (ROOT / folder).rglob("*")
         if (
-            path.suffix in {".py", ".pyi", ".yaml", ".css", ".js", ".mplstyle", ".pxd", ".pyx", ".template"}
+            path.suffix in {".py", ".pyi", ".yaml", ".css", ".js", ".mplstyle", ".pxd", ".pyx", ".template", ".LICENSE"}
             or path.name in {"py.typed", "schema.json"}
         )
         and "__pycache__" not in path.parts

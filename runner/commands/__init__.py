@@ -26,6 +26,7 @@ GROUPS = {
         listing.list_,
         editor.lsp,
         agents.mcp,
+        editor.studio,
     ),
     "set up a shell": (completion.completion,),
 }

@@ -2,34 +2,44 @@
 
 Functions of a text and a place in it, on top of the passes that load a model: ``read`` gives what is wrong and what is
 known so far, ``complete`` what may be written, ``hover``, ``definition``, ``references`` and ``symbols`` what stands
-there, ``fix`` and ``rename`` changes of the text.
+there, ``fix`` and ``rename`` changes of the text; ``editing`` are changes of the model as changes of its text,
+and ``controls`` what one may set.
 """
 
+from . import controls, editing
 from .changes import Edit, RenameError, apply, fix, fix_all, rename, texts_after
 from .comparing import Change, Difference, contents, difference
 from .completion import Suggestion, complete
+from .editing import Splice, splices
 from .kinds_page import page
 from .knowledge import Knowledge
 from .meaning import Symbol, definition, hover, path_of, references, symbols
+from .parts import EditError
 from .places import lines_of
 from .problem_data import as_data, of_problems, report
 from .reading import Reading, read
+from .session import Session
 
 __all__ = [
     "Change",
     "Difference",
     "Edit",
+    "EditError",
     "Knowledge",
     "Reading",
     "RenameError",
+    "Session",
+    "Splice",
     "Suggestion",
     "Symbol",
     "apply",
     "as_data",
     "complete",
     "contents",
+    "controls",
     "definition",
     "difference",
+    "editing",
     "fix",
     "fix_all",
     "hover",
@@ -41,6 +51,7 @@ __all__ = [
     "references",
     "rename",
     "report",
+    "splices",
     "symbols",
     "texts_after",
 ]

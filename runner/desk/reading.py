@@ -74,7 +74,7 @@ def read(name: str | Path, texts: Texts = NO_TEXTS, types: Iterable[type] = (), 
             found, more = list(error.problems), error.more
         except EpicycleError as error:
             found = [Problem(str(error), kind=FILE)]
-    nodes = {name: parse(text, name, Problems()) for name, (_, text) in known.read.items()}
+    nodes = {name: known.nodes.get(name) or parse(text, name, Problems()) for name, (_, text) in known.read.items()}
     return Reading(
         path,
         (*found, *loading.problems.warnings),

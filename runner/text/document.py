@@ -24,7 +24,7 @@ from yaml.events import (
 
 from epicycle.actors import MAX_DEPTH, did_you_mean, irregular, open_regular
 
-from .files import note_file, note_text, opened_text
+from .files import known_nodes, note_file, note_text, opened_text
 from .kinds import FILE, KEY, SIZE, SYNTAX, Kind
 from .problems import Position, Problems
 from .scalars import SCALAR_TAGS, TAG_PREFIX, Value, resolve, short
@@ -80,7 +80,14 @@ def read(path: Path, problems: Problems, shown_as: str | None = None) -> Node | 
     if text is None:
         return None
     note_text(path, name, text)
-    return parse(text, name, problems)
+    known, before = known_nodes(), len(problems)
+    if name not in known:
+        node = parse(text, name, problems)
+        if node is None or len(problems) > before:
+            return node
+        known[name] = node
+    found: Node = known[name]
+    return found
 
 
 def _text_of(path: Path, name: str, problems: Problems) -> str | None:

@@ -8,6 +8,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
 from epicycle.actors import ParameterError, check_allowed, did_you_mean, irregular, read_regular
 
@@ -18,10 +19,14 @@ COMMAND_LINE = "command line"  # the file of a position in an option
 
 @dataclass
 class Opened:
-    """Texts read in place of files, by their resolved paths, and everything that is read, by its name in messages."""
+    """Texts read in place of files, by their resolved paths, and everything that is read, by its name in messages.
+
+    ``nodes`` are what texts without problems hold: several passes read them, but they are parsed once.
+    """
 
     texts: Mapping[Path, str]
     read: dict[str, tuple[Path, str]] = field(default_factory=dict)
+    nodes: dict[str, Any] = field(default_factory=dict)
 
 
 _opened: ContextVar[Opened | None] = ContextVar("opened", default=None)
@@ -52,6 +57,11 @@ def note_text(path: Path, name: str, text: str) -> None:
     """Keep a text that was read for whoever opened others."""
     if (found := _opened.get()) is not None:
         found.read[name] = (path, text)
+
+
+def known_nodes() -> dict[str, Any]:
+    """What texts that were read for whoever opened others hold, by name."""
+    return {} if (found := _opened.get()) is None else found.nodes
 
 
 @dataclass

@@ -223,7 +223,10 @@ class _Outliner:
                     side.append(Port(port_path, port_path.rpartition(".")[2], is_multi, self._aspects_at(port_path)))
         if box.is_composite:
             children = (child for child in self._children(path) if child == self._instances(child)[0])
-            box.children, box.links = [self.box(child) for child in children], self._links(path)
+            box.children = [self.box(child) for child in children]
+            shown = {port.path for each in (box, *box.children) for port in (*each.inputs, *each.outputs)}
+            # A part with a mistake has no ports, and no box.
+            box.links = [link for link in self._links(path) if {link.source, link.target} <= shown]
         else:
             box.aspects = self._aspects_at(path)
         return box

@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 from itertools import chain, pairwise
 from typing import Any
 
@@ -23,6 +24,8 @@ from numpy.typing import NDArray
 from .layers import Cell, Layers, Pin, Run, Runs, closing
 
 Floats = NDArray[np.float64]
+Gap = tuple[int, int, float]  # a cell, the one below it, and how far apart they are at least
+Pull = tuple[int, int, float, float]  # two cells, the offset at which the line between them is straight, and its weight
 
 BOX_GAP, LINE_GAP, PORT_GAP = 20.0, 12.0, 4.0
 APART = 6.0  # lines nearer than this look like one
@@ -45,18 +48,21 @@ def place(layers: Layers, runs: Runs) -> float:
         for one, other, weight in _pulls(run)
         if one.cell is not other.cell
     ]
-    weights = np.array([weight for *_, weight in pulls])
-    heights, bends = _shortest(len(cells), gaps, pulls, weights)
-    for _ in range(2):  # and again with small bends expensive: many bends disturb a reader more than a long line
-        heights, bends = _shortest(len(cells), gaps, pulls, weights * (1.0 + 30.0 / (1.0 + bends)))
-    for cell, y in zip(cells, heights, strict=True):
-        cell.y = float(y)
+    for cell, y in zip(cells, _heights(len(cells), tuple(gaps), tuple(pulls)), strict=True):
+        cell.y = y
     return max(cell.y + cell.height for cell in cells)
 
 
-def _shortest(
-    cells: int, gaps: list[tuple[int, int, float]], pulls: list[tuple[int, int, float, float]], weights: Floats
-) -> tuple[Floats, Floats]:
+@lru_cache(maxsize=1024)  # composites of one class are alike, and most stay as they are while somebody writes a model
+def _heights(cells: int, gaps: tuple[Gap, ...], pulls: tuple[Pull, ...]) -> tuple[float, ...]:
+    weights = np.array([weight for *_, weight in pulls])
+    heights, bends = _shortest(cells, gaps, pulls, weights)
+    for _ in range(2):  # and again with small bends expensive: many bends disturb a reader more than a long line
+        heights, bends = _shortest(cells, gaps, pulls, weights * (1.0 + 30.0 / (1.0 + bends)))
+    return tuple(map(float, heights))
+
+
+def _shortest(cells: int, gaps: tuple[Gap, ...], pulls: tuple[Pull, ...], weights: Floats) -> tuple[Floats, Floats]:
     """Solve the linear programme: the heights of the cells, and the bend of each pull."""
     from scipy.optimize import linprog
     from scipy.sparse import csr_matrix

@@ -1,17 +1,24 @@
 """Files that show a run: a page, for one or two side by side, and recordings for other viewers."""
 
+from .drawing import drawn
 from .mcap_file import require_mcap, write_mcap
-from .page import page_of, write_page
+from .page import PARTS, data_of, page_of, part, script, write_page
 from .recording import Recording
 from .rerun_file import require_rerun, write_rerun
-from .writing import ViewError
+from .writing import ViewError, replace_file
 
 __all__ = [
+    "PARTS",
     "Recording",
     "ViewError",
+    "data_of",
+    "drawn",
     "page_of",
+    "part",
+    "replace_file",
     "require_mcap",
     "require_rerun",
+    "script",
     "write_mcap",
     "write_page",
     "write_rerun",

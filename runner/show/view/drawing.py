@@ -5,9 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 from ...build.model import Model
-from ..graph import MOST_BOXES, Drawing, draw, outline
+from ..graph import MOST_BOXES, Drawing, Outline, draw, outline
 
 FEW = 8  # instances of an array that are drawn one by one
+_latest: dict[str, Drawing] = {}  # by the outline in words
 
 
 def drawn(model: Model) -> dict[str, Any]:
@@ -60,7 +61,16 @@ def _drawing(model: Model) -> tuple[Drawing, str]:
     )
     if found.size > MOST_BOXES:
         found.root.children, found.root.links, note = [], [], f"{found.size:,} boxes are too many to draw"
-    return draw(found), note
+    return _laid_out(found), note
+
+
+def _laid_out(found: Outline) -> Drawing:
+    """The drawing of an outline; that of the latest one is kept, as most changes of a text leave the graph alone."""
+    key = repr(found.root)
+    if key not in _latest:
+        _latest.clear()
+        _latest[key] = draw(found)
+    return _latest[key]
 
 
 def _rounded(*values: float) -> list[float]:

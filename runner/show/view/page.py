@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import hashlib
 from base64 import b64encode
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 from importlib.resources import files
 from pathlib import Path
@@ -28,8 +28,8 @@ from .packing import Pack
 from .recording import Recording
 from .writing import ViewError, replace_file
 
-# In this order, because each uses the ones before it.
-PARTS = ("data", "causes", "paint", "state", "space", "graph", "timeline", "lanes", "chart", "details", "main")
+# In this order, because each uses the ones before it; a program that arranges them follows.
+PARTS = ("data", "causes", "paint", "state", "space", "graph", "timeline", "lanes", "chart", "details")
 
 
 def write_page(
@@ -41,6 +41,11 @@ def write_page(
 
 def page_of(recordings: Sequence[Recording], *, names: Sequence[str] = (), story: Sequence[str] = ()) -> str:
     """The page as text; ``names`` distinguish the runs, ``story`` are sentences about both."""
+    return _document(recordings[0].model.name, data_of(recordings, names=names, story=story))
+
+
+def data_of(recordings: Sequence[Recording], *, names: Sequence[str] = (), story: Sequence[str] = ()) -> str:
+    """What the page shows, packed as text."""
     pack = Pack()
     runs = [_run(each, name, pack) for each, name in zip(recordings, [*names, "", ""], strict=False)]
     about = {
@@ -50,15 +55,22 @@ def page_of(recordings: Sequence[Recording], *, names: Sequence[str] = (), story
         "difference": difference(recordings) if len(recordings) > 1 else None,
         "comparison": comparison(recordings) if len(recordings) > 1 else [],
     }
-    return _document(recordings[0].model.name, pack.text(about))
+    return pack.text(about)
+
+
+def script(parts: Iterable[str]) -> str:
+    """The program of a page, as one function, of its parts in this folder and of others as text."""
+    return '"use strict";\n(() => {\n' + "\n".join(parts) + "})();\n"
+
+
+def part(name: str) -> str:
+    """A file of this folder's program or style."""
+    return (files(__package__) / "browser" / name).read_text(encoding="utf-8")
 
 
 def _document(title: str, data: str) -> str:
-    source = files(__package__) / "browser"
-    style = (source / "page.css").read_text(encoding="utf-8")
-    parts = "\n".join((source / f"{name}.js").read_text(encoding="utf-8") for name in PARTS)
-    script = f'"use strict";\n(() => {{\n{parts}}})();\n'
-    allowed = f"default-src 'none'; script-src '{_hash(script)}'; style-src '{_hash(style)}'; base-uri 'none'"
+    style, program = part("page.css"), script(part(f"{name}.js") for name in (*PARTS, "main"))
+    allowed = f"default-src 'none'; script-src '{_hash(program)}'; style-src '{_hash(style)}'; base-uri 'none'"
     head = tag(
         "head",
         tag("meta", charset="utf-8"),
@@ -71,7 +83,7 @@ def _document(title: str, data: str) -> str:
         "body",
         tag("div", tag("noscript", "This page shows a run of a simulation; it needs JavaScript."), id="page"),
         tag("script", Html(data), type="text/plain", id="data"),
-        tag("script", Html(script)),
+        tag("script", Html(program)),
     )
     return f"<!DOCTYPE html>\n{tag('html', head, body, lang='en')}\n"
 

@@ -148,6 +148,10 @@ class Recording:
             raise
         return self.results
 
+    def so_far(self) -> Results:
+        """The results up to now, while it runs."""
+        return self._simulation.results("not over")
+
     # -- events from the tracer -------------------------------------------------------------------------------------
 
     def _fired(self, firing: Firing) -> None:

@@ -32,6 +32,9 @@ class Graph extends View {
       },
       zoom: (factor, x, y) => this.zoom(factor, x, y),
       click: (x, y) => this.pick(x, y),
+      grab: (x, y) => this.grab?.(x, y),
+      drop: (x, y) => this.drop?.(x, y),
+      hover: (x, y) => this.hover?.(x, y),
     });
     this.canvas.addEventListener("dblclick", () => {
       this.camera.scale = 0;

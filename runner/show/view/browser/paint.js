@@ -107,8 +107,8 @@ class View {
 }
 
 // Drags, wheel and pinches of a canvas: `move(dx, dy, x, y)`, `zoom(factor, x, y)`, `click(x, y)`; a drag starts with
-// `grab(x, y)`, which may return another function to continue it.
-function gestures(canvas, { move, zoom, click, grab, hover }) {
+// `grab(x, y)`, which may return another function to continue it until `drop(x, y)`.
+function gestures(canvas, { move, zoom, click, grab, drop, hover }) {
   const held = new Map();
   let start = null, way = null, spread = 0;
   const at = (event) => {
@@ -140,6 +140,7 @@ function gestures(canvas, { move, zoom, click, grab, hover }) {
   });
   const end = (event) => {
     if (!held.delete(event.pointerId)) return;
+    if (way && event.type === "pointerup") drop?.(...at(event));
     if (start && event.type === "pointerup") click?.(...start);
     start = way = null;
   };

@@ -1,0 +1,185 @@
+"""What a person may set in a model, as fields; where a drawn wire belongs; and what is valid of a broken text."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from typing import Any
+
+from epicycle.actors import Parameter, declared_parameters
+
+from ..catalogue.reference import as_written, doc_of, first_sentence, shown
+from ..language.ports import ParameterText
+from ..text.document import Node, Scalar, plain
+from . import parts
+from .changes import sample
+from .knowledge import Knowledge
+from .names import MODEL
+from .parts import EditError
+from .places import lines_of
+from .reading import NO_TEXTS, Reading, Texts, read
+
+_ATTEMPTS = 3
+
+
+def so_far(reading: Reading, texts: Texts = NO_TEXTS) -> Reading:
+    """A reading that has a model: without the lines in which the text is no YAML, if that helps."""
+    tried, text = reading, dict(reading.files.values()).get(reading.path, "")
+    for _ in range(_ATTEMPTS):
+        at = tried.problems[0].position if tried.problems else None
+        if tried.loading.model is not None or at is None or at.file != reading.name:
+            break
+        lines = lines_of(text)
+        lines[at.line - 1] = ""
+        text = "\n".join(lines)
+        tried = read(reading.path, {**texts, reading.path.resolve(): text}, reading.types)
+    return reading if tried.loading.model is None else tried
+
+
+# -- fields -----------------------------------------------------------------------------------------------------------
+
+
+def parameters(knowledge: Knowledge) -> list[dict[str, Any]]:
+    """The parameters that the model declares in this text, as fields."""
+    model = knowledge.reading.loading.model
+    found = []
+    for name, entry in knowledge.names.declared(MODEL, "parameter").items():
+        if entry.key.position.file != knowledge.file:
+            continue
+        declared = None if model is None else model.declared.get(name)
+        said: Node | None = entry.value
+        if hasattr(entry.value, "entries"):
+            said = entry.value.entries["value"].value if "value" in entry.value.entries else None
+        value = None if model is None else model.parameters.get(name)
+        found.append(_field(name, declared, said, value))
+    return found
+
+
+def fields(knowledge: Knowledge, owner: str, section: str, name: str) -> list[dict[str, Any]]:
+    """The parameters of an actor or aspect, as fields."""
+    names = knowledge.names
+    entry = names.declared(owner, section.removesuffix("s")).get(name)
+    entries = getattr(entry.value, "entries", {}) if entry is not None else {}
+    made = _made(knowledge, owner, section, name)
+    found: dict[str, dict[str, Any]] = {}
+    for kind in names.types_of(owner, name):
+        cls = None if kind in names.classes else knowledge.type_called(kind, section)
+        declared: Mapping[str, Any] = knowledge.composite_parameters(kind) if cls is None else declared_parameters(cls)
+        for each, parameter in declared.items():
+            said = entries[each].value if each in entries else None
+            value = parameter.value_in(made) if isinstance(parameter, Parameter) and made is not None else None
+            found[each] = _field(each, parameter, said, value)
+    return list(found.values())
+
+
+def _made(knowledge: Knowledge, owner: str, section: str, name: str) -> Any:
+    """The first actor or aspect that a text makes of a part."""
+    model = knowledge.reading.loading.model
+    for scope in knowledge.scopes(owner)[:1] if model is not None else ():
+        assert model is not None
+        if section == "aspects":
+            return next((each.aspect for each in model.aspects if each.name == f"{scope}{name}"), None)
+        return model.graph.actors.get(f"{scope}{name}") or model.graph.actors.get(f"{scope}{name}[0]")
+    return None
+
+
+def _field(
+    name: str, parameter: Parameter[Any] | ParameterText | None, said: Node | None, value: Any
+) -> dict[str, Any]:
+    """A parameter: what was written, what it is, and what it may be."""
+    written = "" if said is None else said.text if isinstance(said, Scalar) else parts.written(plain(said))
+    found = {"name": name, "said": written, "value": "" if value is None else shown(as_written(value)), "kind": "text"}
+    if parameter is None:
+        return found
+    low, high = (_finite(each) for each in (parameter.min, parameter.max))
+    of_type = parameter.type if isinstance(parameter, Parameter) else type(value)
+    return found | {
+        "kind": "choice" if parameter.choices else "switch" if of_type is bool else "text",
+        "unit": "" if parameter.unit == "1" else parameter.unit,
+        "choices": list(parameter.choices),
+        "doc": parameter.doc,
+        "low": low,
+        "high": high,
+        "whole": of_type is int,
+        "number": _finite(value),
+        "computed": "${" in written,
+    }
+
+
+def _finite(value: Any) -> float | None:
+    """A number that JSON knows."""
+    is_number = isinstance(value, (int, float)) and not isinstance(value, bool)
+    return value if is_number and abs(value) < 1e300 else None
+
+
+def aspects(knowledge: Knowledge) -> Iterator[dict[str, Any]]:
+    """The aspects that the model attaches in this text, with their fields."""
+    for name, entry in knowledge.names.declared(MODEL, "aspect").items():
+        entries = getattr(entry.value, "entries", {})
+        if entry.key.position.file != knowledge.file or "type" not in entries:
+            continue
+        data: Any = plain(entry.value)
+        yield {
+            "name": name,
+            "type": str(data["type"]),
+            "at": parts.written(data.get("at", "")).strip('"'),
+            "on": data.get("enabled") is not False,
+            "fields": fields(knowledge, MODEL, "aspects", name),
+        }
+
+
+def types(knowledge: Knowledge) -> dict[str, list[dict[str, Any]]]:
+    """All types of actors and aspects, and the values that a new one needs."""
+    catalogue, _ = knowledge.catalogue.loaded()
+    found = {}
+    for section, known in (("actors", catalogue.actors), ("aspects", catalogue.aspects)):
+        found[section] = [
+            {"name": name, "doc": first_sentence(doc_of(cls)), "needs": _needed(declared_parameters(cls).values())}
+            for name, cls in known.items()
+        ]
+    return found
+
+
+def _needed(declared: Iterable[Parameter[Any]]) -> dict[str, str]:
+    """Values for parameters that need one: small ones, so that one sees what they do."""
+    found = {}
+    for each in declared:
+        if each.required and (value := sample(each)) is not None:
+            is_share = each.min == 0 and each.max == 1 and each.type is not int
+            found[each.name] = "0.1" if is_share else value
+    return found
+
+
+# -- wires ------------------------------------------------------------------------------------------------------------
+
+
+def local_ends(knowledge: Knowledge, source: str, target: str) -> tuple[str, str, str]:
+    """The class in which two ports of the graph are connected, and how it names them; raises ``EditError``.
+
+    Ports are paths of the graph; ``[*]`` is all of an array.
+    """
+    graph = knowledge.graph
+    if graph is None:
+        raise EditError("there is no graph yet")
+    owners = []
+    for each in (source, target):
+        first = each.replace("[*]", "[0]")
+        if first not in graph.ports:
+            raise EditError(f"there is no port {each}")
+        owners.append((graph.owner(first), graph.direction(first)))
+    (one, from_), (other, to) = owners
+    # Seen from inside, tokens come from an input of the composite, and go to an output.
+    scopes = (one if from_ == "input" else _before(one), other if to == "output" else _before(other))
+    if scopes[0] != scopes[1]:
+        raise EditError(f"{source} and {target} are not in one composite")
+    scope = scopes[0]
+    kind = graph.components[scope].kind if scope else MODEL
+    names = knowledge.names
+    entry = names.declared(MODEL, "composite").get(kind)
+    if scope and (entry is None or entry.key.position.file != knowledge.file):
+        raise EditError(f"{kind} is declared in another file: change it there")
+    ends = [path[len(scope) + 1 :] if scope else path for path in (source, target)]
+    return kind, ends[0], ends[1]
+
+
+def _before(path: str) -> str:
+    return path.rpartition(".")[0]

@@ -1,0 +1,130 @@
+// The run of what is written: its figures as they come, whether it is still the same run, and its views over time.
+
+class Running {
+  constructor(link, { shown }) {
+    this.link = link;
+    this.shown = shown; // told of a run that is over
+    this.latest = 0;
+    this.before = null; // the answer of the run before
+    this.now = null;
+    this.status = element("p", { className: "status", role: "status" });
+    this.bar = element("progress", { max: 1, value: 0, hidden: true });
+    this.digest = element("p", { className: "digest" });
+    this.metrics = element("table", { className: "figures" });
+    this.monitors = element("ul", { className: "monitors" });
+    this.box = element("div", { className: "run" }, this.status, this.bar, this.metrics, this.monitors, this.digest);
+  }
+
+  say(words, kind = "") {
+    this.status.textContent = words;
+    this.status.dataset.kind = kind;
+  }
+
+  async start(text) {
+    const number = ++this.latest;
+    this.say("running …", "running");
+    const found = await this.link.ask({ ask: "run", text }, (said) => {
+      if (number !== this.latest) return;
+      this.bar.hidden = said.share === null;
+      this.bar.value = said.share ?? 0;
+      this.say(`running … ${said.records.toLocaleString("en")} events`, "running");
+      this.table(said.metrics, this.now?.metrics);
+    });
+    if (number !== this.latest || found.stale) return;
+    this.bar.hidden = true;
+    if (found.error) {
+      this.box.classList.add("stale");
+      return this.say(found.error, "failed");
+    }
+    this.box.classList.remove("stale");
+    [this.before, this.now] = [this.now, found];
+    this.say(found.failed || found.ended || `${found.records.toLocaleString("en")} events in ${found.seconds.toFixed(2)} s; ended by ${found.stopped}`,
+      found.failed ? "failed" : found.ended ? "ended" : "done");
+    this.table(found.metrics, this.before?.metrics);
+    this.monitors.replaceChildren(...found.monitors.map(([name, holds, remark]) =>
+      element("li", { className: holds ? "holds" : "broken", text: `${name} ${holds ? "holds" : remark}` })));
+    const moved = this.before && (this.before.digest === found.digest ? "the same run as before" : "another run than before");
+    this.digest.replaceChildren(
+      ...(moved ? [element("b", { text: moved, className: this.before.digest === found.digest ? "same" : "moved" }), " "] : []),
+      element("code", { text: found.digest.slice(0, 16), title: `digest of the event log: ${found.digest}` }));
+    const data = await readData(found.view);
+    if (number === this.latest) this.shown(data);
+  }
+
+  // The text has changed: what is shown belongs to the one before.
+  stale(words = "") {
+    this.latest++;
+    this.bar.hidden = true;
+    this.box.classList.add("stale");
+    if (words) this.say(words, "waiting");
+  }
+
+  table(metrics, before) {
+    const old = new Map((before ?? []).map((each) => [each[0], each[4]]));
+    this.metrics.replaceChildren(...metrics.map(([name, words, unit, doc, value]) => {
+      const was = old.get(name), change = typeof was === "number" && typeof value === "number" ? value - was : 0;
+      const cell = element("td", { text: change ? `${change > 0 ? "+" : "−"}${numberText(Math.abs(change))}` : "", className: change ? "change" : "" });
+      const row = element("tr", {}, element("th", { text: name, title: doc }), element("td", { text: `${words} ${unit}`.trim() }), cell);
+      row.dataset.metric = name;
+      return row;
+    }));
+  }
+}
+
+// The views of a run over time, one of them at a time.
+class Views {
+  constructor() {
+    this.tabs = element("div", { className: "tabs" });
+    this.holder = element("div", { className: "holder" });
+    this.strip = element("div", { className: "scrub" });
+    this.time = element("output", { id: "now" });
+    this.play = button("▶", () => this.state.play(!this.state.isPlaying), "play");
+    this.play.setAttribute("aria-label", "play");
+    this.box = element("div", { className: "views" },
+      element("div", { className: "viewbar" }, button("|◀", () => this.state.setTag(0)), button("◀", () => this.state.step(-1)), this.play,
+        button("▶|", () => this.state.step(1)), this.time, this.tabs), this.strip, this.holder);
+    this.wanted = "";
+  }
+
+  show(state, data) {
+    const before = this.lanes;
+    this.state = state;
+    this.box.classList.toggle("empty", !state.run.times.length);
+    if (!state.run.times.length) {
+      this.known = null;
+      this.time.textContent = "";
+      return this.holder.replaceChildren(element("p", { className: "hint", text: "The run over time appears here." }));
+    }
+    this.lanes = new Lanes(state);
+    if (before) for (const name of before.shown) if (this.lanes.names.includes(name)) this.lanes.shown.add(name);
+    this.scrubber = new Scrubber(state);
+    const known = { signals: this.lanes, sequence: new Chart(state), details: new Details(state, this.lanes) };
+    if (data.runs.some((each) => each.marks.length)) known.space = new Space(state, 0, { scale: 0, extent: Space.extent(data.runs) });
+    this.known = known;
+    const names = ["space", "signals", "sequence", "details"].filter((name) => known[name]);
+    this.tabs.replaceChildren(...names.map((name) => {
+      const tab = button(name, () => this.choose(name), "toggle");
+      tab.dataset.view = name;
+      return tab;
+    }));
+    this.strip.replaceChildren(this.scrubber.canvas);
+    this.choose(names.includes(this.wanted) ? this.wanted : names[0], false);
+  }
+
+  choose(name, isWanted = true) {
+    if (isWanted) this.wanted = name;
+    this.name = name;
+    for (const tab of this.tabs.children) tab.setAttribute("aria-pressed", tab.dataset.view === name);
+    this.holder.replaceChildren(this.known[name].canvas ?? this.known[name].box);
+    this.state.changed();
+  }
+
+  paint() {
+    const { state } = this;
+    if (!this.known) return;
+    this.scrubber.paint();
+    this.known[this.name].paint?.();
+    this.play.textContent = state.isPlaying ? "❚❚" : "▶";
+    this.time.textContent = state.isPlaying || state.tag < 0 ? secondsText(Math.round(state.time / 1e3) * 1e3) : state.run.tagText(state.tag);
+  }
+}

@@ -1,0 +1,35 @@
+// Questions to the server, and their answers.
+
+class Link {
+  constructor(heard, ended) {
+    const address = new URL("socket", location.href);
+    address.protocol = "ws:";
+    this.socket = new WebSocket(address);
+    this.waiting = new Map();
+    this.count = 0;
+    this.socket.addEventListener("message", ({ data }) => {
+      const said = JSON.parse(data);
+      if (said.hello) return heard(said.hello);
+      const question = this.waiting.get(said.id);
+      if (!question) return;
+      if (!said.done) return question.part?.(said);
+      this.waiting.delete(said.id);
+      question.answer(said);
+    });
+    this.socket.addEventListener("close", ({ reason }) => {
+      for (const { answer } of this.waiting.values()) answer({ error: "the studio has ended" });
+      this.waiting.clear();
+      ended(reason || "the studio has ended");
+    });
+  }
+
+  // The answer to a question about a text; `part` takes what comes before it.
+  ask(question, part) {
+    if (this.socket.readyState !== WebSocket.OPEN) return Promise.resolve({ error: "the studio has ended" });
+    return new Promise((answer) => {
+      this.count++;
+      this.waiting.set(this.count, { answer, part });
+      this.socket.send(JSON.stringify({ ...question, id: this.count }));
+    });
+  }
+}
