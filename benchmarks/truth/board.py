@@ -31,7 +31,7 @@ from epicycle.runner.study.inference import mean, rate
 
 HERE = Path(__file__).parent
 ROOT = HERE.parent.parent
-SOURCES = ("stochastic",)
+SOURCES = ("stochastic", "queues")
 RESULTS = Path("results/truth")
 LEAST, MOST = 90.0, 99.0  # % of 95 % intervals that should hold the published value
 
