@@ -82,6 +82,23 @@ def test_models_load(path: Path) -> None:
     assert model.doc
 
 
+def test_what_programs_about_time_assert_holds() -> None:
+    lines = board.lines_of("superdense")
+    assert len(lines) == 20
+    assert [line.case for line in lines if not line.is_met] == []
+
+
+def test_an_assertion_that_does_not_hold_is_told(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    folder = tmp_path / "superdense"
+    folder.mkdir()
+    text = (board.HERE / "superdense" / "timers.yaml").read_text(encoding="utf-8")
+    (folder / "timers.yaml").write_text(text.replace("2 s to 2 s counter.count == 1", "2 s to 2 s counter.count == 2"))
+    monkeypatch.setattr(board, "HERE", tmp_path)
+    monkeypatch.setattr(board, "ROOT", tmp_path)
+    (line,) = board._of_check("superdense", {"check": "timers", "published": "it"}, None)
+    assert (line.ours, line.is_met) == ("end broken", False)
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("path", STUDIES, ids=lambda path: path.stem)
 def test_studies_run(path: Path, tmp_path: Path) -> None:
