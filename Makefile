@@ -10,7 +10,7 @@ LINKED := $(VENV)/linked
 CORE := $(VENV)/compiled
 
 .NOTPARALLEL:
-.PHONY: help run paper test check bench fuzz mutants robust portable core cores lint reference docs codemirror wheel clean
+.PHONY: help run paper test check bench truth fuzz mutants robust portable core cores lint reference docs codemirror wheel clean
 
 help:
 	@echo "make run    simulate the collision avoidance example into results/collision_avoidance"
@@ -22,6 +22,7 @@ help:
 	@echo "make lint   check style, formatting, portable arithmetic, prose, the order of imports, and types"
 	@echo "make check  lint and every test, including the slow ones"
 	@echo "make bench  benchmarks against peers, into benchmarks/RESULTS.md (20 min; keep the machine otherwise idle)"
+	@echo "make truth  what others have published beside what we find, into benchmarks/TRUTH.md (15 min; can be interrupted)"
 	@echo "make fuzz   50,000 mutants of valid models and 5,000 hostile inputs: does each soon give a model or a message?"
 	@echo "make mutants 200 small changes of our sources: do the quick tests notice at least 90 % of them?"
 	@echo "make robust 100,000 problems beyond any scenario: does the solver answer each within its limits?"
@@ -46,6 +47,9 @@ check: lint $(CORE)
 
 bench: $(DEV) $(CORE)
 	$(BIN)/python -m benchmarks.all
+
+truth: $(DEV) $(CORE)
+	$(BIN)/python -m benchmarks.truth
 
 fuzz: $(DEV) $(CORE)
 	$(BIN)/python -m tests.fuzz.fuzz

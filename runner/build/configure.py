@@ -7,7 +7,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, TypeAlias, TypeVar
 
-from epicycle.actors import Configurable, Parameter, declared_parameters, found_variants, nearest, unknown_parameter
+from epicycle.actors import Configurable, Parameter, declared_parameters, nearest, unknown_parameter, variants
 
 from ..language.values import Locals, Values
 from ..text.document import Entry
@@ -101,7 +101,7 @@ def _taken_by(declared: Mapping[str, Parameter[Any]], name: str, value: object) 
     takers = [
         each
         for each, base in bases.items()
-        if issubclass(base, Configurable) and isinstance(kind, str) and kind in found_variants(base, kind)
+        if issubclass(base, Configurable) and isinstance(kind, str) and kind in variants(base)
     ]
     return [f"{kind} is a value of {each!r}: {each}: {{type: {kind}, ...}}" for each in takers]
 

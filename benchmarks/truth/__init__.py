@@ -1,0 +1,1 @@
+"""The truth board: models that others have published with results."""

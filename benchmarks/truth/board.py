@@ -1,0 +1,191 @@
+"""Runs the cases of the board, and tells which published values they meet.
+
+A source is a file beside this one: ``title``, ``source``, what is ``undecided``, and ``cases``.  A case is made in one
+of four ways, each a command of Epicycle:
+
+- ``study: NAME``: replications.  A true or false is a share with Wilson's interval, a number a mean with Student's.
+- ``run: NAME``: one long run, whose metrics have intervals by batch means.
+- ``rare: NAME`` with ``monitor``, ``guide``, ``runs``: importance splitting.
+- ``check: NAME``: one run, in which all monitors must hold.
+
+``published`` has a list for each parameter that is varied and for each metric.  Every seed is fixed; the figures are
+those of Epicycle's own statistics, so that they are the same on every machine.
+"""
+
+from __future__ import annotations
+
+import shlex
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+import epicycle
+from epicycle.runner import Simulation
+from epicycle.runner.shown import rounded
+from epicycle.runner.study.inference import mean, rate
+
+HERE = Path(__file__).parent
+ROOT = HERE.parent.parent
+SOURCES = ("stochastic", "queues", "superdense")
+RESULTS = Path("results/truth")
+LEAST, MOST = 90.0, 99.0  # % of 95 % intervals that should hold the published value
+
+
+@dataclass(frozen=True)
+class Line:
+    """A published value beside ours."""
+
+    case: str
+    asked: str
+    published: str
+    ours: str
+    is_met: bool
+    command: str
+    is_interval: bool = True
+
+
+@cache
+def source(name: str) -> Mapping[str, Any]:
+    """What the file of a source says."""
+    found: Mapping[str, Any] = yaml.safe_load((HERE / f"{name}.yaml").read_text(encoding="utf-8"))
+    return found
+
+
+def lines_of(name: str, jobs: int | None = None) -> list[Line]:
+    """All cases of a source, made now unless they have been made before."""
+    kinds = {"study": _of_study, "run": _of_run, "rare": _of_rare, "check": _of_check}
+    lines: list[Line] = []
+    for case in source(name)["cases"]:
+        kind = next(each for each in kinds if each in case)
+        print(f"{name}: {kind} {case[kind]}", file=sys.stderr, flush=True)
+        lines += kinds[kind](name, case, jobs)
+    return lines
+
+
+def _of_study(name: str, case: Mapping[str, Any], jobs: int | None) -> Iterator[Line]:
+    file = HERE / name / "studies" / f"{case['study']}.yaml"
+    results = epicycle.study(file, out=ROOT / RESULTS / name / case["study"], jobs=jobs, show_progress=False)
+    if failed := results.failures():
+        raise SystemExit(f"{file}: {len(failed)} runs failed: {failed[0]}")
+    table = results.table().to_pylist()
+    for values, published in _published(case, results.factors):
+        rows = [row for row in table if all(row[key] == value for key, value in values.items())]
+        for metric, value in published.items():
+            numbers = [float(row[metric]) for row in rows if row[metric] is not None]
+            is_share = metric in case.get("shares", ()) or set(numbers) <= {0.0, 1.0}
+            found = rate(round(sum(numbers)), len(numbers)) if is_share else mean(numbers)
+            told = _told(found.value, found.low, found.high), found.low <= value <= found.high
+            yield _line(case["study"], values, metric, value, told, f"epicycle study {file.relative_to(ROOT)}")
+
+
+def _of_run(name: str, case: Mapping[str, Any], jobs: int | None) -> Iterator[Line]:
+    file = HERE / name / f"{case['run']}.yaml"
+    for values, published in _published(case):
+        settings = {**case.get("set", {}), **values}
+        found = Simulation(epicycle.load(file, set=settings)).run()
+        for metric, value in published.items():
+            interval = found.intervals[metric]
+            told = _told(found.metrics[metric], interval.low, interval.high), interval.low <= value <= interval.high
+            yield _line(
+                case["run"], values, metric, value, told, f"epicycle run {file.relative_to(ROOT)}{_sets(settings)}"
+            )
+
+
+def _of_rare(name: str, case: Mapping[str, Any], jobs: int | None) -> Iterator[Line]:
+    file, monitor, guide, runs = HERE / name / f"{case['rare']}.yaml", case["monitor"], case["guide"], case["runs"]
+    for values, published in _published(case):
+        folder = ROOT / RESULTS / name / "_".join([case["rare"], monitor, *map(str, values.values())])
+        found = epicycle.rare(file, monitor, guide=guide, runs=runs, set=values, out=folder, jobs=jobs, progress=False)
+        low, high = found.interval or (0.0, 1.0)
+        command = (
+            f"epicycle rare {file.relative_to(ROOT)} --monitor {monitor} --guide {shlex.quote(guide)} --runs {runs}"
+        )
+        for metric, value in published.items():
+            told = _told(found.probability, low, high), low <= value <= high
+            yield _line(case["rare"], values, metric, value, told, command + _sets(values))
+
+
+def _of_check(name: str, case: Mapping[str, Any], jobs: int | None) -> Iterator[Line]:
+    file = HERE / name / f"{case['check']}.yaml"
+    model = epicycle.load(file)
+    found = Simulation(model).run()
+    asked = "; ".join(each.metrics[0].measure.doc for each in model.output.monitors)
+    broken = [name for name, verdict in found.monitors.items() if verdict.holds is not True]
+    ours = f"{', '.join(broken)} broken" if broken else "holds"
+    command = f"epicycle run {file.relative_to(ROOT)} --check"
+    yield Line(case["check"], asked, case["published"], ours, not broken, command, is_interval=False)
+
+
+def _published(
+    case: Mapping[str, Any], factors: Sequence[str] | None = None
+) -> Iterator[tuple[dict[str, Any], dict[str, float]]]:
+    """What is published under each condition: the values of its parameters, and of its metrics."""
+    columns: dict[str, list[Any]] = case["published"]
+    metrics = set(case.get("metrics", ())) or {key for key in columns if key not in (factors or [_first(columns)])}
+    for place in range(len(next(iter(columns.values())))):
+        row = {key: column[place] for key, column in columns.items()}
+        yield (
+            {key: value for key, value in row.items() if key not in metrics},
+            {key: float(value) for key, value in row.items() if key in metrics and value is not None},
+        )
+
+
+def _first(columns: Mapping[str, Any]) -> str:
+    return next(iter(columns))
+
+
+def _sets(settings: Mapping[str, Any]) -> str:
+    return "".join(f" --set {shlex.quote(f'{key}={value}')}" for key, value in settings.items())
+
+
+def _told(value: float, low: float, high: float) -> str:
+    """A number with its interval, to as many digits as that deserves."""
+    width = high - low
+    if value < 1e-3:
+        return f"{value:.2g} ({low:.2g} to {high:.2g})"
+    return f"{rounded(value, width)} ({rounded(low, width)} to {rounded(high, width)})"
+
+
+def _line(
+    case: str, values: Mapping[str, Any], metric: str, value: float, told: tuple[str, bool], command: str
+) -> Line:
+    condition = ", ".join(f"{key}={each}" for key, each in values.items())
+    return Line(f"{case} {condition}".strip(), metric, f"{value:.6g}", told[0], told[1], command)
+
+
+# -- the page -----------------------------------------------------------------------------------------------------
+
+
+def section(said: Mapping[str, Any], lines: Sequence[Line]) -> str:
+    """The table of a source, misses first."""
+    head = "| case | what | published | ours (95 % interval) | met | repeat with |\n|---|---|---|---|---|---|"
+    rows = [
+        f"| {line.case} | {line.asked} | {line.published} | {line.ours} | {'yes' if line.is_met else '**no**'} | "
+        f"`{line.command}` |"
+        for line in sorted(lines, key=lambda line: line.is_met)
+    ]
+    told = [f"## {said['title']}", said["source"], f"{sum(line.is_met for line in lines)} of {len(lines)} are met."]
+    if "undecided" in said:
+        told.append(f"Not compared: {said['undecided']}")
+    told += [f"- {note}" for note in said.get("misses", ())]
+    return "\n\n".join([*told, "\n".join([head, *rows])])
+
+
+def page(found: Mapping[str, Sequence[Line]]) -> str:
+    """The whole page."""
+    lines = [line for each in found.values() for line in each]
+    intervals = [line for line in lines if line.is_interval]
+    covered = 100.0 * sum(line.is_met for line in intervals) / len(intervals)
+    verdict = "as it should be" if LEAST <= covered <= MOST else "not as it should be"
+    head = (
+        "# The truth board\n\nWhat others have published, beside what Epicycle finds. Written by `make truth`; the "
+        "models are in `benchmarks/truth`.\n\n"
+        f"{len(lines)} values are compared. Of {len(intervals)} intervals of 95 %, {covered:.1f} % hold the published "
+        f"value, which is {verdict} ({LEAST:g} to {MOST:g} %)."
+    )
+    return "\n\n".join([head, *(section(source(name), each) for name, each in found.items())]) + "\n"
