@@ -291,7 +291,9 @@ def test_a_disturbance_is_dropped_in(tmp_path: Path) -> None:
     ]
 
 
-@pytest.mark.parametrize("name", [*packaged_models()])
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=[pytest.mark.slow] * (name == "changing_roles")) for name in packaged_models()]
+)
 def test_switching_off_and_on_leaves_a_packaged_model_as_it_was(name: str) -> None:
     text = packaged_models()[name].read_text(encoding="utf-8")
     data = data_of(text)

@@ -177,6 +177,7 @@ def test_between_tokens_a_signal_holds_or_is_linear() -> None:
         assert found == {"slope": pytest.approx(3, abs=1e-4), "offset": pytest.approx(offset, abs=1e-3)}
 
 
+@pytest.mark.slow
 def test_several_signals_of_one_table() -> None:
     import pyarrow as pa
     import pyarrow.parquet as pq

@@ -115,6 +115,7 @@ def line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> str:
     return "line.yaml"
 
 
+@pytest.mark.slow
 def test_each_search_answers_the_same_with_several(line: str) -> None:
     def facts(jobs: int) -> list[object]:
         goal, out = epicycle.Match({"f.output": "measured.csv"}), Path(f"jobs {jobs}")

@@ -57,6 +57,7 @@ def lost(seed: int) -> list[int]:
     return [act.name.token for act in results.acts]
 
 
+@pytest.mark.slow
 def test_two_faults_that_no_single_one_replaces(capsys: pytest.CaptureFixture[str]) -> None:
     numbers = lost(4)
     pairs = [each for each in itertools.combinations(numbers, 2) if each[1] == each[0] + 1]

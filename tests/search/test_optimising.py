@@ -51,6 +51,7 @@ def optimum(bowl: str, **more: Any) -> epicycle.Optimum:
     return epicycle.search(bowl, kind(objective, **own), **given)
 
 
+@pytest.mark.slow
 def test_the_minimum_of_a_bowl(bowl: str) -> None:
     found = optimum(bowl)
     assert found.best is not None

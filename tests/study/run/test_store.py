@@ -70,6 +70,7 @@ def test_folder_of_another_study(copied: Path, capsys: pytest.CaptureFixture[str
     )
 
 
+@pytest.mark.slow
 def test_truncated_part(copied: Path, capsys: pytest.CaptureFixture[str]) -> None:
     part = next((copied / "out" / "parts").glob("*.parquet"))
     lost = pq.read_metadata(part).num_rows
@@ -101,6 +102,7 @@ def test_a_line_that_is_not_whole_was_not_finished(copied: Path, done: Path) -> 
     assert [path.name for path in (copied / "out" / "parts").iterdir() if path.name.startswith(".")] == []
 
 
+@pytest.mark.slow
 def test_full_disk_leaves_nothing_half(
     copied: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:

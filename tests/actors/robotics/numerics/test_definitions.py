@@ -178,6 +178,7 @@ def test_mutual_information(random: np.random.Generator, kappa: float) -> None:
         assert expected == pytest.approx(-written, abs=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("along", "across"), [(0.04, 4.0), (2.0, 2.0), (4.0, 0.5)])
 def test_information_of_ranges_and_directions(random: np.random.Generator, along: float, across: float) -> None:
     """What the kernels are given for the whole ellipse of eq. (1) is what the definition says, in polar coordinates."""
@@ -234,6 +235,7 @@ def all_values(positions: np.ndarray, zero: tuple[float, ...], rows: int, *field
     return found
 
 
+@pytest.mark.slow
 def test_constraints_with_their_margins(random: np.random.Generator) -> None:
     problem = inform_problem(random)._replace(
         safe_distance=2.0,
