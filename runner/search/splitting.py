@@ -27,6 +27,7 @@ from ..shown import finite, short
 from ..student import student_quantile
 from ..study.provenance import version_of
 from ..tables import Table
+from ..temporal import TINY
 from .answer import Answer
 from .cache import NUMBER, EvaluationCache
 from .evaluator import Evaluator, Recipe, jobs_for
@@ -142,7 +143,8 @@ class RareEvent(Answer):
 
     def _tables(self) -> list[Table]:
         rows = []
-        for place, name in enumerate([*map(short, self.levels), "broken"]):
+        levels = [0.0 if abs(level) == TINY else level for level in self.levels]
+        for place, name in enumerate([*map(short, levels), "broken"]):
             tried = [each[place] for each in self.shares if place < len(each)]
             mean = math.fsum(tried) / len(tried) if tried else math.nan
             rows.append((name, "" if math.isnan(mean) else f"{mean:.3f}", f"{len(tried)}"))

@@ -23,7 +23,9 @@ MAX_LENGTH: Final = 10_000  # characters
 MAX_NESTING: Final = 50
 _TOKEN: Final = re.compile(r"\s*('[^']*'|\"[^\"]*\"|[A-Za-z_][\w.\[\]]*|[\d.]+(?:[eE][+-]?\d+)?|[^\s\w])")
 _UNIT: Final = r"[A-Za-zµ°]+(?:\^-?\d+)?(?:[/*][A-Za-zµ°]+(?:\^-?\d+)?)*|%(?!\s*[\w(.])"
-_QUANTITY: Final = re.compile(rf"('[^']*'|\"[^\"]*\")|(?<![\w.])(\d+\.?\d*(?:[eE][+-]?\d+)?)\s*({_UNIT})(?![\w.])")
+_QUANTITY: Final = re.compile(
+    rf"('[^']*'|\"[^\"]*\")|(?<![\w.])(\d+\.?\d*(?:[eE][+-]?\d+)?)(?![eE][+-]?\d)\s*({_UNIT})(?![\w.])"
+)
 _SIGNS: Final = {
     ast.Lt: "<", ast.LtE: "<=", ast.Gt: ">", ast.GtE: ">=", ast.Eq: "==", ast.NotEq: "!=",
 }  # fmt: skip
