@@ -13,9 +13,13 @@ from ..expression import Formula, FormulaParameter
 
 _QUOTED: Final = re.compile(r"'[^']*'|\"[^\"]*\"")
 _ARROW: Final = re.compile(r"\s*(?P<sources>[^>]+?)\s*->\s*(?P<target>[^\s;]+)(?P<rest>(\s.*)?)", re.DOTALL)
+_FLAGS: Final = "else|immediate|nondeterministic|preemptive|history|error"
+_AFTER_IT: Final = f"{_FLAGS}|priority|probability|rate|on|after|when|do"
 _FLAG: Final = re.compile(
-    r"\s*(?:(?P<flag>else|immediate|nondeterministic|preemptive|history|error)|priority\s+(?P<priority>-?\d+)"
-    r"|(?P<number>probability|rate)\s+(?P<value>\S+))(?=\s|$)"
+    rf"\s*(?:(?P<flag>{_FLAGS})|priority\s+(?P<priority>-?\d+)"
+    rf"|(?P<number>probability|rate)\s+(?P<value>\S.*?)(?=\s+(?:{_AFTER_IT})(?:\s|$)|\s*$))"
+    r"(?=\s|$)",
+    re.DOTALL,
 )
 _CLAUSE: Final = re.compile(r"(?<![\w.])(on|after|when|do)(?![\w.])")
 _DIVISION: Final = re.compile(r"[\s\d.eE+-]*[*/]")
@@ -234,18 +238,17 @@ def _clauses(text: str) -> tuple[dict[str, object], dict[str, Span]]:
         raise ParameterError(f"{text!r} is not a transition: write {_FORM}")
     said: dict[str, object] = {"to": arrow["target"], "from": [each.strip() for each in arrow["sources"].split(",")]}
     places: dict[str, Span] = {}
-    start = arrow.start("rest")
-    while (flag := _FLAG.match(text, start)) is not None:
+    start, outside = arrow.start("rest"), _masked(text)
+    while (flag := _FLAG.match(outside, start)) is not None:
         if flag["number"] is not None:
-            said[flag["number"]] = flag["value"]
+            said[flag["number"]] = text[slice(*flag.span("value"))]
             places[flag["number"]] = flag.start("value"), len(flag["value"])
         elif flag["priority"] is not None:
             said["priority"] = int(flag["priority"])
         else:
             said[flag["flag"]] = True
         start = flag.end()
-    rest = text[start:]
-    masked = _masked(rest)
+    rest, masked = text[start:], outside[start:]
     clauses = list(_CLAUSE.finditer(masked))
     actions = next((number for number, clause in enumerate(clauses) if clause[0] == "do"), len(clauses))
     clauses = clauses[: actions + 1]

@@ -23,6 +23,7 @@ from epicycle.actors import (
     type_name,
     variants,
 )
+from epicycle.actors.expression import Formula, PortFormula, TokenFormula
 from epicycle.aspects import Aspect
 
 
@@ -171,6 +172,8 @@ def as_written(value: object) -> object:
         return int(value)
     if value is None or isinstance(value, (bool, int, float, str)):
         return value
+    if isinstance(value, (Formula, PortFormula, TokenFormula)):
+        return value.source
     return str(value) if isinstance(value, Path) else f"<{type(value).__name__}>"  # no file can say it
 
 

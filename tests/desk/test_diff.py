@@ -123,6 +123,17 @@ def test_an_actor_less(files: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert "  - clock[1].output -> sum.input" in out.splitlines()
 
 
+def test_a_change_in_a_transition(files: Path) -> None:
+    machine = (
+        "model: m\nactors: {it: {type: StateMachine, modes: [a, b], transitions: [a -> b rate 3, b -> a after 2 s]}}\n"
+    )
+    Path("a.yaml").write_text(machine)
+    Path("b.yaml").write_text(machine.replace("rate 3", "rate 3 / 2"))
+    [change] = epicycle.diff("a.yaml", "b.yaml").changes
+    assert (change.section, change.path, change.fact) == ("actors", "it", "transitions")
+    assert [each["rate"] for each in change.after if "rate" in each] == ["3 / 2"]
+
+
 def test_json_and_python(files: Path, capsys: pytest.CaptureFixture[str]) -> None:
     Path("b.yaml").write_text(BEFORE.replace("factor: 2", "factor: 3"))
     assert main(["diff", "a.yaml", "b.yaml", "--json"]) == 1

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from epicycle.actors import InputPort, ModalActor, OutputPort, transition
+from epicycle.actors.modes.text import read_transition
 from epicycle.runner.engine.errors import ActorError
 from tests.actors.feeding import feed
 from tests.modes.test_machines import sent
@@ -102,3 +103,21 @@ def test_rates_that_are_none(rate: str, message: str) -> None:
     with pytest.raises(ActorError) as caught:
         sent(machine, {})
     assert str(caught.value).splitlines()[0] == f"it failed in fire() at (0 s, 1): {message}"
+
+
+@pytest.mark.parametrize(
+    ("line", "value", "more"),
+    [
+        ("a -> b rate n / 3 when x do y = 1", "n / 3", {"when": "x"}),
+        ("a -> b rate 2", "2.0", {}),
+        ("a -> b rate (1 if x else 2) on x", "(1 if x else 2)", {"on": ("x",)}),
+        ("a -> b immediate rate 3 * n history", "3 * n", {"immediate": True, "history": True}),
+        ("a -> b probability 1 / n priority 2", "1 / n", {"priority": 2}),
+    ],
+)
+def test_a_rate_ends_where_the_next_word_begins(line: str, value: str, more: dict[str, Any]) -> None:
+    read = read_transition(line)
+    assert (read.rate or read.probability).source == value
+    for name, given in more.items():
+        found = getattr(read, name)
+        assert (found.source if name == "when" else found) == given
