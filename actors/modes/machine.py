@@ -262,7 +262,7 @@ class StateMachine(ModalActor):
         self.is_asked = False
         if self.trigger.present:
             self._tell()
-        self._tokens = {}
+        self._tokens, self._scope = {}, {}
         self.rests()
         self._watch(self._borders.next_time(self.context.time))
 
@@ -321,7 +321,7 @@ class StateMachine(ModalActor):
     def enters(self, mode: str) -> None:
         declared = self.modes[mode]
         if declared.entry:
-            if "error" in self._scope:  # which a transition has handled
+            if self._catches:  # a transition has handled it
                 self._scope["error"] = ""
             self._act(declared.entry)
         self._entered = self.context.time

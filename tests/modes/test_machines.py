@@ -382,3 +382,13 @@ run: {stop: 7 s}
     results = Simulation(model, keep_log=True).run()
     found = [(each.tag.seconds, each.value) for each in results.log.records if each.port == "mode"]
     assert found == [(0.0, "a"), (2.0, "b"), (4.0, "a"), (6.0, "b")]
+
+
+def test_a_variable_may_be_called_error() -> None:
+    machine: dict[str, Any] = {
+        "type": "StateMachine",
+        "variables": {"error": 3},
+        "modes": {"a": None, "b": {"entry": "y = error + 1"}},
+        "transitions": ["a -> b on x"],
+    }
+    assert [value for *_, port, value in sent(machine, {"x": [(1.0, 1)]}) if port == "y"] == [4]

@@ -163,7 +163,7 @@ ODD: dict[str, Any] = {
     "a save of half a character": {"id": 1, "ask": "save", "text": "\ud800"},
     "a read of half a character": {"id": 1, "ask": "read", "text": "model: \ud800"},
     "fields of nothing": {"id": 1, "ask": "fields", "text": MODEL, "path": "a.b.c"},
-    "another path": {"id": 1, "ask": "save", "text": MODEL, "path": "/tmp/other.yaml", "name": "../other.yaml"},
+    "another path": {"id": 1, "ask": "save", "text": MODEL, "path": "/elsewhere/other.yaml", "name": "../other.yaml"},
 }
 
 
