@@ -1,6 +1,6 @@
 """``python -m epicycle``: the command line."""
 
-from epicycle.runner.cli import main
+from epicycle.runner.interface.cli import main
 
 if __name__ == "__main__":
     raise SystemExit(main())

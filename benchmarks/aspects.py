@@ -30,7 +30,7 @@ from typing import Any
 
 from benchmarks.measure import interval
 from epicycle.runner import Simulation, load_model
-from epicycle.runner.build.model import Model
+from epicycle.runner.model.build.model import Model
 
 TEXT = """\
 model: cost

@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from epicycle.runner import StudyResults, open_study
-from epicycle.runner.language.claims import ALWAYS
+from epicycle.runner.model.language.claims import ALWAYS
 from epicycle.runner.study.judge.claims import (
     CONFIRMED,
     NOT_REPRODUCED,

@@ -14,9 +14,9 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks.measure import Row, of_the_pace, pace, table
-from epicycle.runner.collection import seldom_collecting
 from epicycle.runner.desk import editing
-from epicycle.runner.studio.worker import Worker
+from epicycle.runner.interface.studio.worker import Worker
+from epicycle.runner.support.collection import seldom_collecting
 
 ROOT = Path(__file__).parents[1]
 ACTORS = 2_000

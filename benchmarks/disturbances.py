@@ -49,7 +49,7 @@ HEAD = """\
 
 def main() -> None:
     """Run all disturbances and print the table."""
-    from epicycle.runner.catalogue.packaged import packaged_disturbances
+    from epicycle.runner.model.catalogue.packaged import packaged_disturbances
 
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     options.add_argument("names", nargs="*", metavar="NAME", help="packaged disturbances, or files (default: all)")

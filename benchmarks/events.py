@@ -32,7 +32,7 @@ import simpy
 from benchmarks.measure import Row, compare, cpu_seconds, table, take_turns
 from epicycle.actors import CORE, random_stream
 from epicycle.runner import Simulation, load_model
-from epicycle.runner.build.model import Model
+from epicycle.runner.model.build.model import Model
 
 HOPS = 200_000  # in each of five rounds
 JOBS = 200_000

@@ -24,7 +24,7 @@ import simpy
 
 from benchmarks.measure import Row, cpu_seconds, table, take_turns
 from epicycle.runner import Simulation, load_model
-from epicycle.runner.build.model import Model
+from epicycle.runner.model.build.model import Model
 
 ROOT = Path(__file__).parents[1]
 ACTORS = (10, 100, 1_000, 10_000, 100_000)

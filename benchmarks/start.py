@@ -39,7 +39,7 @@ def seconds_of(command: list[str], folder: str) -> tuple[float, float]:
 
 def rows(rounds: int = 9) -> Iterator[Row]:
     """The table's lines."""
-    epicycle = [sys.executable, "-m", "epicycle.runner.cli"]
+    epicycle = [sys.executable, "-m", "epicycle.runner.interface.cli"]
     commands = {
         "epicycle run of a tiny model": ([*epicycle, "run", "tiny.yaml"], 0.5),
         "epicycle validate of a tiny model": ([*epicycle, "validate", "tiny.yaml"], None),

@@ -28,7 +28,16 @@ ROUNDS = 3
 def rate(replications: int, jobs: int, **environment: str) -> float:
     """Runs a second, with these variables set."""
     with tempfile.TemporaryDirectory() as folder:
-        command = [sys.executable, "-m", "epicycle.runner.cli", "study", "table_1", "--yes", "--out", "results"]
+        command = [
+            sys.executable,
+            "-m",
+            "epicycle.runner.interface.cli",
+            "study",
+            "table_1",
+            "--yes",
+            "--out",
+            "results",
+        ]
         before = time.perf_counter()
         subprocess.run(
             [*command, "--replications", str(replications), "--jobs", str(jobs)],

@@ -93,7 +93,7 @@ run: {{stop: 1 s, record: "robot[*].distance"}}
 def user_seconds(path: Path) -> tuple[float, str]:
     """The user CPU time of `epicycle validate`, and what it prints."""
     before = os.times().children_user
-    command = [sys.executable, "-m", "epicycle.runner.cli", "validate", str(path)]
+    command = [sys.executable, "-m", "epicycle.runner.interface.cli", "validate", str(path)]
     done = subprocess.run(command, check=True, capture_output=True, text=True)
     return os.times().children_user - before, done.stdout.strip()
 

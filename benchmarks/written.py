@@ -17,7 +17,7 @@ from statistics import median
 
 from benchmarks.measure import Row, compare, cpu_seconds, ratios, table, take_turns
 from epicycle.runner import Simulation, load_model
-from epicycle.runner.build.model import Model
+from epicycle.runner.model.build.model import Model
 
 HERE = Path(__file__).parent
 NAMES = (

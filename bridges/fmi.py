@@ -21,7 +21,7 @@ from epicycle.actors import (
     to_nanoseconds,
     to_seconds,
 )
-from epicycle.runner.catalogue import given_programs, types_of_file
+from epicycle.runner.model.catalogue import given_programs, types_of_file
 
 from .slaves import CLOCK, TYPES, Apart, FMUError, Slave, described, digest_of, runnable
 

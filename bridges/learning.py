@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 
 from epicycle.actors import Actor, EpicycleError, InputPort, OutputPort, Parameter, brief, did_you_mean
 from epicycle.runner import Model, Results, Simulation, load_model
-from epicycle.runner.results import STOP_TIME
+from epicycle.runner.execution.results import STOP_TIME
 
 Observation = NDArray[np.float64]
 Source = str | Path | Callable[[], Model]

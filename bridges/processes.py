@@ -26,7 +26,7 @@ from epicycle.actors import (
     texts_parameter,
 )
 from epicycle.runner import ActorError, Model, Simulation
-from epicycle.runner.catalogue import given_functions
+from epicycle.runner.model.catalogue import given_functions
 
 ENV = "env"
 RESOURCES: Mapping[str, type] = {

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from epicycle.runner.commands import DONE, TYPES, Command, complain, option, own_types, tell
+from epicycle.runner.interface.commands import DONE, TYPES, Command, complain, option, own_types, tell
 
 
 def _run(options: argparse.Namespace) -> int:

@@ -9,7 +9,7 @@ from typing import Any
 
 from epicycle.actors import Actor
 from epicycle.aspects import Aspect
-from epicycle.runner.catalogue import Catalogue, Dialect, built_in
+from epicycle.runner.model.catalogue import Catalogue, Dialect, built_in
 
 
 class Ptolemy(Dialect):

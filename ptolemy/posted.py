@@ -9,8 +9,7 @@ from typing import Any, TypeVar
 from weakref import WeakKeyDictionary
 
 from epicycle.actors import Actor, InputPort, Moment, Receiver, StateMachine, Tag, Wake
-from epicycle.runner.catalogue import Dialect
-from epicycle.runner.engine import (
+from epicycle.runner.execution.engine import (
     Activation,
     BoundaryPort,
     Call,
@@ -22,8 +21,9 @@ from epicycle.runner.engine import (
     Outer,
     Refinement,
 )  # fmt: skip
-from epicycle.runner.graph import ModelGraph, is_within, steps
-from epicycle.runner.text import Limits
+from epicycle.runner.model.catalogue import Dialect
+from epicycle.runner.model.graph import ModelGraph, is_within, steps
+from epicycle.runner.model.text import Limits
 
 M = TypeVar("M", Wake, Moment)
 Place = tuple[tuple[int, int], ...]  # of a rank: its group and its number there, in each director from the outermost in

@@ -6,15 +6,15 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from .build.composite_class import load_composite
-    from .build.load import load_model
-    from .build.model import Model
-    from .build.scope import Composite
-    from .engine import ActorError, Simulation
-    from .results import Results, Signal
+    from .execution.engine import ActorError, Simulation
+    from .execution.results import Results, Signal
+    from .execution.trial import Trial
+    from .model.build.composite_class import load_composite
+    from .model.build.load import load_model
+    from .model.build.model import Model
+    from .model.build.scope import Composite
+    from .model.text.problems import ModelError
     from .study.judge.study_results import StudyResults, open_study
-    from .text.problems import ModelError
-    from .trial import Trial
 
 __all__ = [
     "ActorError",
@@ -32,16 +32,16 @@ __all__ = [
 ]
 
 _HOMES = {
-    "ActorError": "engine",
-    "Composite": "build.scope",
-    "Results": "results",
-    "Signal": "results",
-    "Simulation": "engine",
-    "Trial": "trial",
-    "Model": "build.model",
-    "ModelError": "text.problems",
-    "load_composite": "build.composite_class",
-    "load_model": "build.load",
+    "ActorError": "execution.engine",
+    "Composite": "model.build.scope",
+    "Results": "execution.results",
+    "Signal": "execution.results",
+    "Simulation": "execution.engine",
+    "Trial": "execution.trial",
+    "Model": "model.build.model",
+    "ModelError": "model.text.problems",
+    "load_composite": "model.build.composite_class",
+    "load_model": "model.build.load",
     "StudyResults": "study.judge.study_results",
     "open_study": "study.judge.study_results",
 }

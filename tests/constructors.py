@@ -21,8 +21,8 @@ from epicycle.actors.expression import (
 )
 from epicycle.actors.functions import FunctionParameter
 from epicycle.aspects import ByActorParameter, GroupsParameter
-from epicycle.runner.catalogue.reference import describe, is_part, parts_of
-from epicycle.runner.catalogue.types import built_in
+from epicycle.runner.model.catalogue.reference import describe, is_part, parts_of
+from epicycle.runner.model.catalogue.types import built_in
 
 HEAD = """\
 # What constructors take, as the declarations say: for type checkers only.  Written by `make reference`.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from epicycle.runner import Simulation, load_model
-from epicycle.runner.engine import Results
+from epicycle.runner.execution.engine import Results
 
 # How long tests of all packaged models let those run in which much happens (s).
 DURATIONS = {

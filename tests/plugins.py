@@ -57,7 +57,7 @@ def copied(to: Path) -> dict[str, str]:
     info = to / "links" / "epicycle-0.1.0.dist-info"
     info.mkdir()
     (info / "METADATA").write_text(METADATA, "utf-8")
-    points = "[console_scripts]\nepicycle = epicycle.runner.cli:main\n" + _offered()
+    points = "[console_scripts]\nepicycle = epicycle.runner.interface.cli:main\n" + _offered()
     (info / "entry_points.txt").write_text(points, "utf-8")
     (to / "links" / "sitecustomize.py").write_text(f"PLUGINS = {PLUGINS!r}\n{BLOCKER}", "utf-8")
     settings = {key: value for key, value in os.environ.items() if not key.startswith("EPICYCLE_")}

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from epicycle.runner import Simulation, load_model
-from epicycle.runner.engine import Results
+from epicycle.runner.execution.engine import Results
 
 LINK, WATCH, VAGUE, SURE, SLACK, PATIENCE = 27.0, 20.0, 0.6, 0.3, 3.0, 1.0
 REACH, HOP, PERIOD = 30.0, 0.01, 0.1

@@ -14,9 +14,9 @@ import scipy.stats
 import simpy
 
 from epicycle.runner import Simulation, load_model
-from epicycle.runner.build.figures import figures_of
-from epicycle.runner.engine import LoopError
-from epicycle.runner.text.problems import Problems
+from epicycle.runner.execution.engine import LoopError
+from epicycle.runner.model.build.figures import figures_of
+from epicycle.runner.model.text.problems import Problems
 from tests.demo_models import run
 
 

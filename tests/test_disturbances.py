@@ -14,10 +14,10 @@ from scipy import stats
 
 from epicycle.aspects import ClockOffset, ExecutionTime, Latency
 from epicycle.runner import ModelError, Results, Simulation, load_model
-from epicycle.runner.catalogue.packaged import packaged_disturbances
-from epicycle.runner.cli import main
-from epicycle.runner.language.disturbance import load_disturbance
-from epicycle.runner.text.problems import Problems
+from epicycle.runner.interface.cli import main
+from epicycle.runner.model.catalogue.packaged import packaged_disturbances
+from epicycle.runner.model.language.disturbance import load_disturbance
+from epicycle.runner.model.text.problems import Problems
 
 NAMES = sorted(packaged_disturbances())
 

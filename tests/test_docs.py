@@ -23,10 +23,10 @@ from typing import Any, NamedTuple
 import pytest
 
 from epicycle.runner import ModelError, Simulation, load_model
-from epicycle.runner.catalogue.metrics import TAKES, TIME, TOKENS
-from epicycle.runner.catalogue.types import built_in
-from epicycle.runner.cli import main
-from epicycle.runner.language.study import read_study
+from epicycle.runner.interface.cli import main
+from epicycle.runner.model.catalogue.metrics import TAKES, TIME, TOKENS
+from epicycle.runner.model.catalogue.types import built_in
+from epicycle.runner.model.language.study import read_study
 from epicycle.runner.study.plan.plan import Plan
 from tests.plugins import ABSENT
 

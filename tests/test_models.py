@@ -7,7 +7,7 @@ import math
 import pytest
 
 from epicycle.runner import Simulation, load_model
-from epicycle.runner.catalogue.packaged import packaged_models
+from epicycle.runner.model.catalogue.packaged import packaged_models
 from tests.demo_models import DURATIONS
 
 

@@ -18,7 +18,7 @@ from pathlib import Path
 import pytest
 
 from epicycle.actors.compiled import LIBRARIES
-from epicycle.runner.catalogue.metrics import TAKES
+from epicycle.runner.model.catalogue.metrics import TAKES
 from tests.plugins import ABSENT, PLUGINS
 
 ROOT = Path(__file__).parents[1]
@@ -174,9 +174,13 @@ def test_imports_go_one_way() -> None:
         ("actors/flow.py", "from .. import aspects", "epicycle.aspects"),
         ("actors/__init__.py", "from ..runner import run", "epicycle.runner.run"),
         ("actors/core/ports.py", "from ...aspects.core import Aspect", "epicycle.aspects.core.Aspect"),
-        ("aspects/core/port.py", "from epicycle.runner.engine import Director", "epicycle.runner.engine.Director"),
-        ("runner/cli.py", "import actors", "actors"),
-        ("runner/cli.py", "from models import robots", "models.robots"),
+        (
+            "aspects/core/port.py",
+            "from epicycle.runner.execution.engine import Director",
+            "epicycle.runner.execution.engine.Director",
+        ),
+        ("runner/interface/cli.py", "import actors", "actors"),
+        ("runner/interface/cli.py", "from models import robots", "models.robots"),
     ],
 )
 def test_an_import_the_wrong_way_is_found(file: str, line: str, name: str) -> None:
@@ -189,8 +193,8 @@ def test_an_import_the_wrong_way_is_found(file: str, line: str, name: str) -> No
         ("actors/core/ports.py", "from ..core import Tag"),
         ("actors/core/ports.py", "from . import Tag"),
         ("aspects/core/port.py", "from epicycle.actors import Actor"),
-        ("runner/cli.py", "from .model import actors"),
-        ("runner/build/load.py", "from epicycle.aspects import Aspect"),
+        ("runner/interface/cli.py", "from .model import actors"),
+        ("runner/model/build/load.py", "from epicycle.aspects import Aspect"),
     ],
 )
 def test_an_import_the_right_way_is_not(file: str, line: str) -> None:
@@ -361,9 +365,9 @@ program.py:46: note: "Exponential" defined in "epicycle.actors.constructors"
 program.py:47: error: Argument "take" to "metric" of "Model" has incompatible type "Literal['maximum']"; \
 expected "Literal[{", ".join(map(repr, TAKES))}]"  [arg-type]
 program.py:48: error: Unexpected keyword argument "afer" for "metric" of "Model"; did you mean "after"?  [call-arg]
-program.py:48: note: "metric" defined in "epicycle.runner.build.model"
+program.py:48: note: "metric" defined in "epicycle.runner.model.build.model"
 program.py:49: error: Unexpected keyword argument "sed" for "run"; did you mean "seed"?  [call-arg]
-program.py:49: note: "run" defined in "epicycle.runner.calls.running"
+program.py:49: note: "run" defined in "epicycle.runner.interface.calls.running"
 program.py:50: note: Revealed type is "int | None"
 program.py:51: note: Revealed type is "epicycle.actors.core.parameter.Parameter[int | None]"
 program.py:52: note: Revealed type is "float | None"
@@ -425,7 +429,12 @@ def test_make_clean_removes_all_that_is_compiled(tmp_path: Path) -> None:
         "models/mm1.yaml",
         "tests/a.py",
     ]
-    made = ["actors/core/tag.cpython-311.so", "aspects/gone.pyd", "runner/engine/way.so", "actors/built/manifest.json"]
+    made = [
+        "actors/core/tag.cpython-311.so",
+        "aspects/gone.pyd",
+        "runner/execution/engine/way.so",
+        "actors/built/manifest.json",
+    ]
     for name in (*sources, *made, "runner/__pycache__/cli.pyc", "build/core/tag.c"):
         (tmp_path / name).parent.mkdir(parents=True, exist_ok=True)
         (tmp_path / name).write_text("")

@@ -30,8 +30,8 @@ from epicycle.actors import (
     Vehicle,
 )
 from epicycle.runner import Model, Simulation, load_model
-from epicycle.runner.catalogue.packaged import packaged_models
-from epicycle.runner.language.study import read_study
+from epicycle.runner.model.catalogue.packaged import packaged_models
+from epicycle.runner.model.language.study import read_study
 
 MAIN, OBSERVERS = "main", tuple(f"observer[{number}]" for number in range(4))
 

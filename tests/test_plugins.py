@@ -65,9 +65,9 @@ def test_ptolemy_is_a_source_in_docstrings_and_nothing_else() -> None:
 PROGRAM = """
 import json
 from epicycle.runner import Simulation, load_model
-from epicycle.runner.catalogue.like import dialects
-from epicycle.runner.commands import commands
-from epicycle.runner.text.problems import ModelError
+from epicycle.runner.model.catalogue.like import dialects
+from epicycle.runner.interface.commands import commands
+from epicycle.runner.model.text.problems import ModelError
 found = {"commands": [each.name for each in commands()], "dialects": [*dialects()]}
 found["digest"] = Simulation(load_model("mm1"), seed=1).run(until=1000).digest
 open("m.yaml", "w").write("model: m\\ndirector: {like: ptolemy}\\n")
@@ -86,7 +86,7 @@ print(json.dumps(found))
 @pytest.mark.skipif(bool(ABSENT), reason="there are none")
 def test_epicycle_without_plugins(tmp_path: Path) -> None:
     from epicycle.runner import Simulation, load_model
-    from epicycle.runner.commands import COMMANDS
+    from epicycle.runner.interface.commands import COMMANDS
 
     done = subprocess.run(
         [sys.executable, "-c", PROGRAM], cwd=tmp_path, env=copied(tmp_path), capture_output=True, text=True, check=False

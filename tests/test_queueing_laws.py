@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 from epicycle.runner import Simulation, load_model
-from epicycle.runner.engine import Results
+from epicycle.runner.execution.engine import Results
 
 QUEUE = """
 model: queue

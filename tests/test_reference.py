@@ -27,10 +27,10 @@ FILES = (
 
 def texts() -> dict[str, str]:
     """What the files should hold: Epicycle's own types, whatever else is installed."""
-    from epicycle.runner.catalogue.figure import own_figures
-    from epicycle.runner.catalogue.types import built_in
     from epicycle.runner.desk import page
-    from epicycle.runner.language.schema import json_schema, schema_text
+    from epicycle.runner.model.catalogue.figure import own_figures
+    from epicycle.runner.model.catalogue.types import built_in
+    from epicycle.runner.model.language.schema import json_schema, schema_text
     from epicycle.runner.show import markdown
     from epicycle.runner.show.report import own_study_figures
 
@@ -41,7 +41,7 @@ def texts() -> dict[str, str]:
 
 def api() -> str:
     """The page of the Python API: its names are written by hand, what they are is said by their docstrings."""
-    from epicycle.runner.catalogue.reference import first_sentence
+    from epicycle.runner.model.catalogue.reference import first_sentence
 
     def line(found: re.Match[str]) -> str:
         module, _, name = found[1].rpartition(".")

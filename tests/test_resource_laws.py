@@ -10,7 +10,7 @@ import pytest
 from scipy import integrate
 
 from epicycle.runner import Simulation, load_model
-from epicycle.runner.engine import Results
+from epicycle.runner.execution.engine import Results
 
 pytestmark = pytest.mark.slow
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from epicycle.runner.shown import finite, in_time, in_words, rounded, short, six_digits
+from epicycle.runner.support.shown import finite, in_time, in_words, rounded, short, six_digits
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ import yaml
 
 import epicycle
 import epicycle.runner
-from epicycle.runner.catalogue.packaged import packaged_models
+from epicycle.runner.model.catalogue.packaged import packaged_models
 from tests.plugins import ABSENT
 from website.reference import FOLDER, reference
 

@@ -10,13 +10,13 @@ from pathlib import Path
 from typing import NamedTuple
 
 from epicycle.runner import Model, Results, load_model
-from epicycle.runner.build.figures import figures_of
-from epicycle.runner.catalogue.packaged import packaged_models
-from epicycle.runner.cli import main
+from epicycle.runner.interface.cli import main
+from epicycle.runner.model.build.figures import figures_of
+from epicycle.runner.model.catalogue.packaged import packaged_models
+from epicycle.runner.model.text.problems import Problems
 from epicycle.runner.show import draw_figures
 from epicycle.runner.show.outcome import shown
 from epicycle.runner.show.view import Recording, write_page
-from epicycle.runner.text.problems import Problems
 
 UNTIL = {"mg1": 1000.0, "mm1": 1000.0, "switched_network": 0.2}  # s; as much as a page can show in full
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from PIL import Image
 from playwright.sync_api import sync_playwright
 
-from epicycle.runner.cli import main
+from epicycle.runner.interface.cli import main
 
 PICTURE = Path(__file__).parents[1] / "docs" / "pictures" / "view.png"
 WIDTH, HEIGHT, COLOURS = 1440, 760, 255

@@ -26,8 +26,8 @@ import yaml
 
 import epicycle
 from epicycle.runner import Simulation
-from epicycle.runner.shown import rounded
 from epicycle.runner.study.inference import mean, rate
+from epicycle.runner.support.shown import rounded
 
 HERE = Path(__file__).parent
 ROOT = HERE.parent.parent

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from epicycle.actors import Actor as OwnActor
-from epicycle.runner.catalogue import installed
+from epicycle.runner.model.catalogue import installed
 
 from .actors import Actor
 from .aspects import aspects_of

@@ -10,11 +10,11 @@ from typing import Any
 
 from epicycle.actors import EpicycleError, Parameter
 
-from ..language.ports import ParameterText
-from ..text.document import Mapping as MappingNode
-from ..text.document import Node
-from ..text.problems import Position, Problem
-from ..text.reading import NAME, NAMES_HAVE
+from ..model.language.ports import ParameterText
+from ..model.text.document import Mapping as MappingNode
+from ..model.text.document import Node
+from ..model.text.problems import Position, Problem
+from ..model.text.reading import NAME, NAMES_HAVE
 from .knowledge import Knowledge
 from .names import MODEL, Name
 from .reading import NO_TEXTS, Reading, Texts, read

@@ -9,12 +9,12 @@ from typing import Any
 
 from epicycle.actors import counted, declared_parameters, plain, type_name
 
-from ..build.model import Model
-from ..catalogue.reference import as_written, shown
-from ..graph.outputs import Metric
-from ..shown import in_time
-from ..text.document import plain as plain_node
-from ..text.patterns import in_general
+from ..model.build.model import Model
+from ..model.catalogue.reference import as_written, shown
+from ..model.graph.outputs import Metric
+from ..model.text.document import plain as plain_node
+from ..model.text.patterns import in_general
+from ..support.shown import in_time
 
 Facts = dict[str, Any]  # by what they are of
 Contents = dict[str, dict[str, Facts]]  # by section and path

@@ -11,8 +11,8 @@ from typing import Any
 from epicycle.actors import units_like
 from epicycle.actors.expression import FUNCTIONS
 
-from ..catalogue.packaged import packaged_models
-from ..text.document import Mapping
+from ..model.catalogue.packaged import packaged_models
+from ..model.text.document import Mapping
 from .knowledge import Keys, Knowledge, Known, owner_of
 from .names import MODEL
 from .places import Place, lines_of, place_at

@@ -7,9 +7,9 @@ from typing import Any
 
 from epicycle.actors import Parameter, declared_parameters
 
-from ..catalogue.reference import as_written, doc_of, first_sentence, shown
-from ..language.ports import ParameterText
-from ..text.document import Node, Scalar, plain
+from ..model.catalogue.reference import as_written, doc_of, first_sentence, shown
+from ..model.language.ports import ParameterText
+from ..model.text.document import Node, Scalar, plain
 from . import parts
 from .changes import sample
 from .knowledge import Knowledge

@@ -15,12 +15,12 @@ from typing import Any
 
 from epicycle.actors import declared_parameters
 
-from ..language.models import COMPOSITE, MODEL
-from ..language.parts import BESIDE
-from ..language.places import PORT_SCHEMA, connection
-from ..text.document import parse
-from ..text.problems import Problems
-from ..text.reading import NAME, NAMES_HAVE, NodeReader
+from ..model.language.models import COMPOSITE, MODEL
+from ..model.language.parts import BESIDE
+from ..model.language.places import PORT_SCHEMA, connection
+from ..model.text.document import parse
+from ..model.text.problems import Problems
+from ..model.text.reading import NAME, NAMES_HAVE, NodeReader
 from . import parts
 from .knowledge import Knowledge
 from .names import MODEL as OF_MODEL

@@ -5,7 +5,7 @@ from __future__ import annotations
 import shlex
 from pathlib import Path
 
-from ..text.kinds import KINDS, Kind
+from ..model.text.kinds import KINDS, Kind
 from .reading import Reading, read
 
 COMMAND = "# epicycle validate example.yaml"
@@ -13,7 +13,7 @@ _HEAD = """# Kinds of problems
 
 Each problem of a model has a code that stays the same, whatever its message says. Programs use it: `epicycle validate
 --json MODEL`, editors, and your own scripts. Codes with E are errors, codes with W are warnings.
-`make reference` writes this page from `runner/text/kinds.py`.
+`make reference` writes this page from `runner/model/text/kinds.py`.
 """
 
 

@@ -10,13 +10,13 @@ from typing import Any
 
 from epicycle.actors import Parameter, counted, declared_parameters, declared_ports, has_own_ports, type_name
 
-from ..catalogue.metrics import MetricSpec
-from ..catalogue.reference import doc_of, first_sentence
-from ..catalogue.types import Catalogue, CatalogueError, figure_types, installed
-from ..graph.model_graph import ModelGraph
-from ..language.ports import ParameterText
-from ..temporal import Requirement
-from ..text.patterns import PatternError, in_general, select
+from ..model.catalogue.metrics import MetricSpec
+from ..model.catalogue.reference import doc_of, first_sentence
+from ..model.catalogue.types import Catalogue, CatalogueError, figure_types, installed
+from ..model.graph.model_graph import ModelGraph
+from ..model.language.ports import ParameterText
+from ..model.temporal import Requirement
+from ..model.text.patterns import PatternError, in_general, select
 from .names import MODEL, Names
 from .reading import Reading
 

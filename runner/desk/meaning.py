@@ -8,13 +8,13 @@ from pathlib import Path
 
 from epicycle.actors import declared_ports, type_name
 
-from ..catalogue.reference import as_written, shown
-from ..language.files import named_file
-from ..shown import short
-from ..text.document import Mapping, Node, Scalar, Sequence
-from ..text.patterns import in_general
-from ..text.problems import Position, Problems
-from ..text.reading import Text
+from ..model.catalogue.reference import as_written, shown
+from ..model.language.files import named_file
+from ..model.text.document import Mapping, Node, Scalar, Sequence
+from ..model.text.patterns import in_general
+from ..model.text.problems import Position, Problems
+from ..model.text.reading import Text
+from ..support.shown import short
 from .knowledge import Keys, Knowledge, owner_of
 from .names import MODEL, SECTIONS, Name, Use
 from .places import place_at

@@ -9,10 +9,10 @@ from dataclasses import dataclass, field, replace
 
 from epicycle.actors.expression import ExpressionError, names_in
 
-from ..text.document import Entry, Node, Scalar, Sequence
-from ..text.document import Mapping as MappingNode
-from ..text.problems import Position
-from ..text.reading import inside
+from ..model.text.document import Entry, Node, Scalar, Sequence
+from ..model.text.document import Mapping as MappingNode
+from ..model.text.problems import Position
+from ..model.text.reading import inside
 from .reading import Reading
 
 MODEL = ""  # the class of what the model itself declares

@@ -16,10 +16,10 @@ from yaml.events import AliasEvent, CollectionEndEvent, CollectionStartEvent, Ma
 
 from epicycle.actors import EpicycleError
 
-from ..text.document import Scalar, parse, plain
-from ..text.document import Sequence as ListNode
-from ..text.problems import Problems
-from ..text.scalars import resolve
+from ..model.text.document import Scalar, parse, plain
+from ..model.text.document import Sequence as ListNode
+from ..model.text.problems import Problems
+from ..model.text.scalars import resolve
 
 Keys = tuple[str | int, ...]
 SECTIONS = ("actors", "connections", "aspects")  # that go with their last entry

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import yaml
 
-from ..text.document import Mapping, Node, Scalar, Sequence, parse
-from ..text.problems import Problems
+from ..model.text.document import Mapping, Node, Scalar, Sequence, parse
+from ..model.text.problems import Problems
 
 MARK = "epicycle_mark_here"
 _LOADER: type[yaml.CSafeLoader] | type[yaml.SafeLoader] = getattr(yaml, "CSafeLoader", yaml.SafeLoader)

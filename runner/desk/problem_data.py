@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from ..text.problems import Problem
+from ..model.text.problems import Problem
 from .changes import Edit, fix
 from .knowledge import Knowledge
 from .reading import Reading

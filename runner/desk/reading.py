@@ -10,18 +10,18 @@ from typing import Any
 
 from epicycle.actors import EpicycleError
 
-from ..build.load import Loading
-from ..catalogue.packaged import is_path, packaged_models
-from ..language.disturbance import load_disturbance
-from ..language.files import read_library
-from ..language.models import LIBRARY
-from ..language.study import read_study
-from ..text.document import Mapping as MappingNode
-from ..text.document import Node, parse
-from ..text.document import read as read_node
-from ..text.files import opened
-from ..text.kinds import FILE
-from ..text.problems import ModelError, Problem, Problems
+from ..model.build.load import Loading
+from ..model.catalogue.packaged import is_path, packaged_models
+from ..model.language.disturbance import load_disturbance
+from ..model.language.files import read_library
+from ..model.language.models import LIBRARY
+from ..model.language.study import read_study
+from ..model.text.document import Mapping as MappingNode
+from ..model.text.document import Node, parse
+from ..model.text.document import read as read_node
+from ..model.text.files import opened
+from ..model.text.kinds import FILE
+from ..model.text.problems import ModelError, Problem, Problems
 
 Texts = Mapping[Path, str]
 NO_TEXTS: Texts = MappingProxyType({})

@@ -6,9 +6,9 @@ from collections.abc import Iterable, Iterator
 from functools import cache
 from typing import Any
 
-from ..catalogue.types import figure_types, installed, load_all
-from ..language.schema import json_schema
-from ..text.document import Mapping, Node, Scalar, Sequence
+from ..model.catalogue.types import figure_types, installed, load_all
+from ..model.language.schema import json_schema
+from ..model.text.document import Mapping, Node, Scalar, Sequence
 
 Schema = dict[str, Any]
 

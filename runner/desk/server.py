@@ -13,7 +13,7 @@ from pygls.exceptions import JsonRpcInvalidParams
 from pygls.lsp.server import LanguageServer
 from pygls.uris import from_fs_path, to_fs_path
 
-from ..text.problems import Position, Problem
+from ..model.text.problems import Position, Problem
 from . import changes, completion, meaning
 from .knowledge import Knowledge
 from .positions import Positions

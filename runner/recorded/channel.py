@@ -13,8 +13,8 @@ import yaml
 
 from epicycle.actors import counted
 
-from ..shown import finite, short
-from ..tables import Table, Tabled
+from ..support.shown import finite, short
+from ..support.tables import Table, Tabled
 from .delays import DelayLaw
 from .fitting import Fitted
 from .losses import Goodness, LossModel

@@ -6,8 +6,8 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from ..shown import short
-from ..tables import Table, Tabled
+from ..support.shown import short
+from ..support.tables import Table, Tabled
 from .passing import Passed
 
 

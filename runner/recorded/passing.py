@@ -13,12 +13,12 @@ from typing import Any
 from epicycle.actors import Actor, InputPort, OutputPort, texts_parameter
 from epicycle.aspects import FieldError
 
-from ..build.disturbance import disturb_ports
-from ..build.model import Model
-from ..engine import ActorError, Simulation
-from ..language.settings import Setting
-from ..results import Results
-from ..shown import finite
+from ..execution.engine import ActorError, Simulation
+from ..execution.results import Results
+from ..model.build.disturbance import disturb_ports
+from ..model.build.model import Model
+from ..model.language.settings import Setting
+from ..support.shown import finite
 from .files import Message, Recording, RecordingError, check_topics, opened
 
 SENDER = "recording"

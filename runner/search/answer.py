@@ -9,7 +9,7 @@ from typing import Any, ClassVar
 
 from epicycle.actors import EpicycleError
 
-from ..tables import Tabled
+from ..support.tables import Tabled
 
 
 class Answer(Tabled):

@@ -12,7 +12,7 @@ from typing import Any
 
 from epicycle.actors import counted, read_regular
 
-from ..build.model import Model
+from ..model.build.model import Model
 from ..study.provenance import version_of
 
 _LOGGER = logging.getLogger("epicycle")

@@ -12,14 +12,14 @@ from typing import TYPE_CHECKING, Any
 
 from epicycle.actors import EpicycleError, read_table, to_nanoseconds, to_seconds
 
-from ..build.model import Model
-from ..engine import Simulation
-from ..language.dimensions import number_node
-from ..language.settings import Setting
-from ..student import student_quantile
+from ..execution.engine import Simulation
+from ..model.build.model import Model
+from ..model.language.dimensions import number_node
+from ..model.language.settings import Setting
+from ..model.text.files import COMMAND_LINE
+from ..model.text.problems import ModelError, Position, Problems
 from ..study.session import available_cores
-from ..text.files import COMMAND_LINE
-from ..text.problems import ModelError, Position, Problems
+from ..support.student import student_quantile
 from .cache import NUMBER, EvaluationCache
 from .calibration import Calibration, Fitted, Matched
 from .evaluator import Evaluator

@@ -14,11 +14,11 @@ from typing import Any
 
 from epicycle.actors import counted, to_seconds
 
-from ..language.dimensions import number_node
-from ..shown import finite, rounded
+from ..model.language.dimensions import number_node
+from ..model.text.program import call_site
 from ..study.provenance import version_of
-from ..tables import Table
-from ..text.program import call_site
+from ..support.shown import finite, rounded
+from ..support.tables import Table
 from .answer import Answer
 
 _ENOUGH = 10  # residuals, of which a correlation can be told

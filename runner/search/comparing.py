@@ -12,11 +12,11 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from epicycle.actors import EpicycleError, counted, did_you_mean
 
-from ..build.model import Model
-from ..engine import ActorError, LoopError, Simulation
-from ..shown import finite
+from ..execution.engine import ActorError, LoopError, Simulation
+from ..model.build.model import Model
 from ..study.inference import Estimate, holm, mean, paired_difference, with_interval
-from ..tables import Table, pandas_module
+from ..support.shown import finite
+from ..support.tables import Table, pandas_module
 from .answer import Answer
 from .cache import EvaluationCache
 from .evaluator import Evaluator, Recipe, jobs_for

@@ -15,7 +15,7 @@ from typing import Any
 
 from epicycle.actors import EpicycleError
 
-from ..build.model import Model
+from ..model.build.model import Model
 from ..study.run.processes import DONE, Outcome, Processes, Worker, WorkerError
 from ..study.run_spec import RunSpec, opened, spec_of
 from ..study.session import available_cores

@@ -11,11 +11,11 @@ from typing import Any
 
 from epicycle.actors import EpicycleError, did_you_mean, to_seconds
 
-from ..build.model import Model
-from ..engine import Interventions, Simulation
-from ..graph.acts import Act, ActName
-from ..graph.model_graph import ModelGraph
-from ..results import Results, Verdict, canonical, plain
+from ..execution.engine import Interventions, Simulation
+from ..execution.results import Results, Verdict, canonical, plain
+from ..model.build.model import Model
+from ..model.graph.acts import Act, ActName
+from ..model.graph.model_graph import ModelGraph
 from .cache import NUMBER, EvaluationCache
 from .evaluator import Evaluator, Recipe, jobs_for
 from .explanation import INTERRUPT, LIMIT, RUNS, Effect, Explanation, Step

@@ -13,12 +13,12 @@ import yaml
 
 from epicycle.actors import counted, to_seconds
 
-from ..build.model import Model
-from ..graph.acts import Act, ActName
-from ..results import Verdict
-from ..shown import finite, short
+from ..execution.results import Verdict
+from ..model.build.model import Model
+from ..model.graph.acts import Act, ActName
 from ..study.provenance import version_of
-from ..tables import Table
+from ..support.shown import finite, short
+from ..support.tables import Table
 from .answer import Answer
 
 if TYPE_CHECKING:

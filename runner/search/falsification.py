@@ -14,20 +14,20 @@ from typing import Any
 
 from epicycle.actors import EpicycleError, counted
 
-from ..build.model import Model
-from ..engine import Interventions, Simulation
-from ..graph.acts import ActName
-from ..language.dimensions import Level, split_number
-from ..language.disturbance import EXACTLY
-from ..language.settings import Setting
-from ..results import Verdict
-from ..shown import finite, short
+from ..execution.engine import Interventions, Simulation
+from ..execution.results import Verdict
+from ..model.build.model import Model
+from ..model.graph.acts import ActName
+from ..model.language.dimensions import Level, split_number
+from ..model.language.disturbance import EXACTLY
+from ..model.language.settings import Setting
+from ..model.text.document import Node, Scalar, plain
 from ..study.judge.study_results import StudyResults, open_study
 from ..study.provenance import version_of
 from ..study.run.backlog import OK
 from ..study.run_spec import RunSpec
-from ..tables import Table
-from ..text.document import Node, Scalar, plain
+from ..support.shown import finite, short
+from ..support.tables import Table
 from .answer import Answer, listed
 from .faults import FaultSpace
 from .monitored import with_monitors

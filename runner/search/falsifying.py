@@ -10,13 +10,13 @@ from typing import Any
 
 from epicycle.actors import EpicycleError
 
-from ..build.model import Model
-from ..engine import Interventions, Simulation
-from ..language.study import study_of_text
+from ..execution.engine import Interventions, Simulation
+from ..model.build.model import Model
+from ..model.language.study import study_of_text
+from ..model.text.problems import Problems
 from ..study.plan.plan import Search
 from ..study.search_runs import SearchRuns, open_search_runs
 from ..study.session import available_cores
-from ..text.problems import Problems
 from .falsification import Falsification, Run
 from .faults import FaultSpace
 from .growing import Growing, place_of, text_of

@@ -8,13 +8,13 @@ from itertools import islice
 
 from epicycle.actors import random_stream
 
-from ..graph.acts import ActName
-from ..language.dimensions import Dimension, Level, Listed, as_factor
-from ..language.disturbance import EXACTLY
-from ..language.settings import Setting
-from ..text.files import COMMAND_LINE
-from ..text.problems import Position
-from ..text.program import node_of
+from ..model.graph.acts import ActName
+from ..model.language.dimensions import Dimension, Level, Listed, as_factor
+from ..model.language.disturbance import EXACTLY
+from ..model.language.settings import Setting
+from ..model.text.files import COMMAND_LINE
+from ..model.text.problems import Position
+from ..model.text.program import node_of
 from .proposals import BATCH, Point, Proposals, ranks
 from .space import Axis
 

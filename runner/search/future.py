@@ -9,11 +9,11 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 from epicycle.actors import EpicycleError, Tag, counted
 
-from ..build.model import Model
-from ..engine import Interventions
-from ..results import Results, plain
-from ..shown import finite, short
-from ..tables import Table
+from ..execution.engine import Interventions
+from ..execution.results import Results, plain
+from ..model.build.model import Model
+from ..support.shown import finite, short
+from ..support.tables import Table
 from .answer import Answer, listed
 
 if TYPE_CHECKING:

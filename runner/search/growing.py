@@ -8,8 +8,8 @@ from typing import Any
 
 import yaml
 
-from ..language.dimensions import Level
-from ..language.study import Study
+from ..model.language.dimensions import Level
+from ..model.language.study import Study
 from ..study.plan.plan import Plan, Search
 from ..study.search_runs import SearchRuns
 from .faults import FaultSpace

@@ -7,9 +7,9 @@ from dataclasses import replace
 
 from epicycle.actors import EpicycleError, did_you_mean
 
-from ..build.model import Model
-from ..text.files import COMMAND_LINE
-from ..text.problems import ModelError, Position
+from ..model.build.model import Model
+from ..model.text.files import COMMAND_LINE
+from ..model.text.problems import ModelError, Position
 
 AD_HOC = "property"  # the name of a monitor that is made of a text
 

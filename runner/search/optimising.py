@@ -11,17 +11,17 @@ from typing import Any
 from epicycle.actors import EpicycleError, did_you_mean
 from epicycle.actors.expression import ExpressionError, Formula
 
-from ..catalogue.packaged import is_path, packaged_files
-from ..language.study import is_study, read_study, study_of_text
-from ..language.study_metric import asks_for_none
+from ..model.catalogue.packaged import is_path, packaged_files
+from ..model.language.study import is_study, read_study, study_of_text
+from ..model.language.study_metric import asks_for_none
+from ..model.text.document import parse, plain
+from ..model.text.files import COMMAND_LINE
+from ..model.text.problems import Position, Problems
 from ..study.inference import mean
 from ..study.plan.plan import Plan, Search
 from ..study.run.backlog import OK
 from ..study.search_runs import SearchRuns, open_search_runs
 from ..study.session import available_cores
-from ..text.document import parse, plain
-from ..text.files import COMMAND_LINE
-from ..text.problems import Position, Problems
 from .growing import Growing, place_of, text_of
 from .optimum import Optimum, Outcome, Tested
 from .proposals import Point, is_guided, proposals

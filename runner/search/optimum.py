@@ -12,11 +12,11 @@ from typing import Any
 
 from epicycle.actors import counted
 
-from ..language.dimensions import Level, split_number
+from ..model.language.dimensions import Level, split_number
+from ..model.text.document import Scalar, plain
 from ..study.inference import Estimate, with_interval
 from ..study.judge.study_results import StudyResults, open_study
-from ..tables import Table
-from ..text.document import Scalar, plain
+from ..support.tables import Table
 from .answer import Answer
 from .space import Interval, Space
 from .spec import Maximise, Minimise

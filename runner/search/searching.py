@@ -7,8 +7,8 @@ from pathlib import Path
 
 from epicycle.actors import EpicycleError
 
-from ..shown import short
 from ..study.inference import with_interval
+from ..support.shown import short
 from .calibrating import calibrate
 from .calibration import Calibration
 from .falsification import Falsification, Run

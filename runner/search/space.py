@@ -10,8 +10,8 @@ from decimal import Decimal
 
 from epicycle.actors import UnitError, counted, declared_parameters, parse_unit
 
-from ..build.model import Model
-from ..language.dimensions import (
+from ..model.build.model import Model
+from ..model.language.dimensions import (
     RANGE,
     Dimension,
     DimensionReader,
@@ -24,11 +24,11 @@ from ..language.dimensions import (
     number_node,
     split_number,
 )
-from ..language.settings import Setting, parse_setting
-from ..language.study import RESERVED
-from ..text.document import Entry, Mapping, Node, Scalar, Sequence, plain
-from ..text.patterns import matches, select
-from ..text.problems import POISON, Position, Problems
+from ..model.language.settings import Setting, parse_setting
+from ..model.language.study import RESERVED
+from ..model.text.document import Entry, Mapping, Node, Scalar, Sequence, plain
+from ..model.text.patterns import matches, select
+from ..model.text.problems import POISON, Position, Problems
 
 HINT = "write load=0.5..0.9, policy=[fifo, lifo] or 'period={from: 1 s, to: 5 s, step: 1 s}'"
 _RANGE = re.compile(r"(.*?\S)\s*\.\.\s*(\S.*)")

@@ -7,11 +7,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from ..declare.parameters import COUNT, option, repeated, whole
+from ..support.declare.parameters import COUNT, option, repeated, whole
 
 if TYPE_CHECKING:
-    from ..build.model import Model
-    from ..language.settings import Setting
+    from ..model.build.model import Model
+    from ..model.language.settings import Setting
 
 MAX_RUNS, MAX_POINTS = 1_000_000, 100_000
 
@@ -125,8 +125,8 @@ class SearchSpec:
 
     def load(self, settings: Sequence[Setting] = ()) -> Model:
         """The model, with further settings."""
-        from ..build.load import load_model
-        from ..catalogue.types import types_of_file
+        from ..model.build.load import load_model
+        from ..model.catalogue.types import types_of_file
 
         model = load_model(
             self.model,

@@ -21,13 +21,13 @@ from typing import Any, NamedTuple
 
 from epicycle.actors import EpicycleError, Process, counted, elementary, random_stream
 
-from ..build.model import Model
-from ..engine import Simulation
-from ..shown import finite, short
-from ..student import student_quantile
+from ..execution.engine import Simulation
+from ..model.build.model import Model
+from ..model.temporal import TINY
 from ..study.provenance import version_of
-from ..tables import Table
-from ..temporal import TINY
+from ..support.shown import finite, short
+from ..support.student import student_quantile
+from ..support.tables import Table
 from .answer import Answer
 from .cache import NUMBER, EvaluationCache
 from .evaluator import Evaluator, Recipe, jobs_for

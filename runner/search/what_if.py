@@ -11,17 +11,17 @@ from typing import Any, ClassVar, NamedTuple
 from epicycle.actors import EpicycleError, ParameterError, Tag, declared_parameters, did_you_mean, to_nanoseconds
 from epicycle.aspects import ClockAspect, ExecutionAspect, JoinPoint, PortAspect
 
-from ..build.model import Model
 from ..desk import difference
-from ..engine import Interventions, Simulation
-from ..graph.acts import Act
-from ..graph.woven import WovenAspect
-from ..language.settings import settings_of
-from ..shown import short
+from ..execution.engine import Interventions, Simulation
+from ..model.build.model import Model
+from ..model.graph.acts import Act
+from ..model.graph.woven import WovenAspect
+from ..model.language.settings import settings_of
+from ..model.text.document import plain
+from ..model.text.patterns import PatternError, select
+from ..model.text.problems import Problems
 from ..study.run_spec import RunSpec, opened, seconds, spec_of
-from ..text.document import plain
-from ..text.patterns import PatternError, select
-from ..text.problems import Problems
+from ..support.shown import short
 from .future import WhatIf, future_of
 
 _TAG = re.compile(r"\(?\s*(?P<time>[^,()]+?)\s*(?:,\s*(?:microstep\s+)?(?P<microstep>\d{1,9})\s*)?\)?")

@@ -1,6 +1,6 @@
 """Output for people: a run's summary, figures and results folder, and the reference of what is installed."""
 
-from ..catalogue.figure import Figure
+from ..model.catalogue.figure import Figure
 from .figures import Histogram, TimeSeries
 from .outcome import check_folder, draw_figures, summary_object, summary_table, write_folder
 from .pen import FigureError, draw

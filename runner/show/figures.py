@@ -13,9 +13,9 @@ import numpy as np
 
 from epicycle.actors import EpicycleError, Parameter, abridged, texts_parameter
 
-from ..catalogue.figure import Figure
-from ..results import Results
-from ..shown import short
+from ..execution.results import Results
+from ..model.catalogue.figure import Figure
+from ..support.shown import short
 from .samples import Floats, Numbers, Span, States, envelope, longest_spans, read, spans_of
 from .sheet import (
     FEW,

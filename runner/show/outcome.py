@@ -14,13 +14,13 @@ from rich.text import Text
 
 from epicycle.actors import EpicycleError, abridged, read_regular, shortened, visible
 
-from ..build.model import Model
-from ..catalogue.figure import Figure
-from ..graph.woven import extent
-from ..printing import columns
-from ..results import Results, plain, write_signals
-from ..shown import finite, in_time, in_words
+from ..execution.results import Results, plain, write_signals
+from ..model.build.model import Model
+from ..model.catalogue.figure import Figure
+from ..model.graph.woven import extent
 from ..study.provenance import versions
+from ..support.printing import columns
+from ..support.shown import finite, in_time, in_words
 from .pen import FigureError, draw
 
 MAX_NAME = 60  # characters of a file name; file systems limit it

@@ -15,10 +15,10 @@ from typing import Any
 
 from epicycle.actors import EpicycleError, readable, visible
 
-from ..catalogue.figure import Figure
-from ..results import Results
-from ..text.problems import Position, told_raised
-from ..text.program import describe, raised_at
+from ..execution.results import Results
+from ..model.catalogue.figure import Figure
+from ..model.text.problems import Position, told_raised
+from ..model.text.program import describe, raised_at
 
 FORMATS = ("png", "svg")
 _UNWRITABLE = re.compile("[\x00-\x08\x0b\x0c\x0e-\x1f\ufffe\uffff]")  # not allowed in XML files

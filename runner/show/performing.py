@@ -9,14 +9,14 @@ from pathlib import Path
 
 from epicycle.actors import EpicycleError
 
-from ..bars import SOON
-from ..build.figures import figures_of
-from ..build.model import Model
-from ..engine import ActorError, LogFilter, LoopError, Pace, Simulation
-from ..printing import complain
-from ..results import LogFile, Results
+from ..execution.engine import ActorError, LogFilter, LoopError, Pace, Simulation
+from ..execution.results import LogFile, Results
+from ..model.build.figures import figures_of
+from ..model.build.model import Model
+from ..model.text.problems import Problems
 from ..study.run_spec import RunSpec, spec_of
-from ..text.problems import Problems
+from ..support.bars import SOON
+from ..support.printing import complain
 from .outcome import check_folder, draw_figures, write_folder
 from .watching import watched
 

@@ -10,16 +10,16 @@ from typing import Any, Protocol, overload
 
 from epicycle.actors import EpicycleError, did_you_mean
 
-from ..build.figures import made_figure
-from ..catalogue.figure import Figure
-from ..catalogue.types import figure_types
-from ..html import Html, tag
-from ..printing import complain
-from ..results import Results, write_log
+from ..execution.results import Results, write_log
+from ..model.build.figures import made_figure
+from ..model.catalogue.figure import Figure
+from ..model.catalogue.types import figure_types
+from ..model.text.patterns import select
+from ..model.text.problems import Problems
 from ..study.judge.study_results import StudyResults
 from ..study.session import available_cores
-from ..text.patterns import select
-from ..text.problems import Problems
+from ..support.html import Html, tag
+from ..support.printing import complain
 from .figures import TimeSeries
 from .outcome import check_folder, draw_figures, write_folder
 from .pen import draw as draw_figure

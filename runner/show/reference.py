@@ -13,10 +13,10 @@ from rich.text import Text
 
 from epicycle.actors import Configurable, bounds_text
 
-from ..build.model import Model
-from ..catalogue.figure import Figure
-from ..catalogue.metrics import TAKES, MetricSpec
-from ..catalogue.reference import (
+from ..model.build.model import Model
+from ..model.catalogue.figure import Figure
+from ..model.catalogue.metrics import TAKES, MetricSpec
+from ..model.catalogue.reference import (
     ParameterReference,
     PortReference,
     TypeReference,
@@ -26,10 +26,10 @@ from ..catalogue.reference import (
     shown,
     topic_order,
 )
-from ..catalogue.types import Catalogue
-from ..language.schema import RECORDS
-from ..printing import columns
-from ..temporal import Requirement
+from ..model.catalogue.types import Catalogue
+from ..model.language.schema import RECORDS
+from ..model.temporal import Requirement
+from ..support.printing import columns
 
 
 def described(types: Mapping[str, type[Configurable]]) -> list[TypeReference]:

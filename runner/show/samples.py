@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from epicycle.aspects import STAMP
 
-from ..results import Results, cell, leaves
-from ..text.patterns import select
+from ..execution.results import Results, cell, leaves
+from ..model.text.patterns import select
 
 COLUMNS = 700  # approximate width of a panel in pixels
 _DENSE = 4  # samples per column above which they are drawn as an envelope

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from epicycle.actors import EpicycleError
 
-from ..results import Signal
+from ..execution.results import Signal
 
 Rows = NDArray[np.float64]
 

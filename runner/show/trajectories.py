@@ -11,8 +11,8 @@ import numpy as np
 
 from epicycle.actors import Parameter, array_parameter, texts_parameter
 
-from ..catalogue.figure import Figure, Mark, Shape
-from ..results import Results, Signal
+from ..execution.results import Results, Signal
+from ..model.catalogue.figure import Figure, Mark, Shape
 from .figures import title_of
 from .samples import Floats, selected
 from .sheet import FEW, LIMIT, Sheet, band_beside, colours, legend_beside

@@ -7,10 +7,10 @@ import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from ..bars import bar
-from ..build.model import Model
-from ..printing import complain, console, notices
-from ..shown import in_time
+from ..model.build.model import Model
+from ..support.bars import bar
+from ..support.printing import complain, console, notices
+from ..support.shown import in_time
 
 PATIENCE = 5.0  # s after which the length of a run can be judged
 LONG = 600.0  # s that are worth a notice

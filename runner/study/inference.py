@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING
 
 from epicycle.actors import normal_quantile, normal_share, random_stream
 
-from ..shown import rounded
-from ..student import student_quantile, student_tail
+from ..support.shown import rounded
+from ..support.student import student_quantile, student_tail
 
 if TYPE_CHECKING:
     import numpy as np

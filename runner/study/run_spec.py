@@ -11,12 +11,12 @@ from typing import TYPE_CHECKING, Any, Final, NamedTuple, cast
 
 from epicycle.actors import EpicycleError, convert, read_regular
 
-from ..build.load import load_model
-from ..build.model import Model
-from ..catalogue.types import types_of_file
-from ..language.settings import Setting
-from ..text.document import plain
-from ..text.program import call_site, node_of
+from ..model.build.load import load_model
+from ..model.build.model import Model
+from ..model.catalogue.types import types_of_file
+from ..model.language.settings import Setting
+from ..model.text.document import plain
+from ..model.text.program import call_site, node_of
 
 if TYPE_CHECKING:
     from .plan.plan import Plan

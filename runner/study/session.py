@@ -12,7 +12,7 @@ from typing import Any
 
 from epicycle.actors import EpicycleError, counted
 
-from ..engine import Simulation
+from ..execution.engine import Simulation
 from .judge.study_results import StudyResults
 from .plan.plan import Plan, epicycle_version
 from .provenance import git_revision, machine, versions

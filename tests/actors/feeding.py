@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from epicycle.actors import Actor, OutputPort, Parameter
-from epicycle.runner.build.load import load_model
-from epicycle.runner.build.model import Model
-from epicycle.runner.engine import Results, Simulation
+from epicycle.runner.execution.engine import Results, Simulation
+from epicycle.runner.model.build.load import load_model
+from epicycle.runner.model.build.model import Model
 
 Events = Sequence[tuple[float, Any]]
 

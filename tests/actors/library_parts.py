@@ -40,7 +40,7 @@ def tokens(sends: Sends, port: str = "output") -> list[Any]:
 
 def problem(actor: str, feeds: Feeds = [], like: str = "") -> str:  # noqa: B006
     """The message of what is wrong with the actor."""
-    from epicycle.runner.text.problems import ModelError
+    from epicycle.runner.model.text.problems import ModelError
 
     try:
         load(text(actor, feeds, like=like), types=[Feed])

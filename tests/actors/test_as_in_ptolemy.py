@@ -10,7 +10,7 @@ import pytest
 
 from epicycle.actors import Clock, Tag
 from epicycle.actors.testing import Harness
-from epicycle.runner.engine import ActorError, Simulation
+from epicycle.runner.execution.engine import ActorError, Simulation
 from tests.actors.feeding import load
 from tests.actors.library_parts import Feeds, behave, problem, text
 from tests.engine.engine_parts import Probe

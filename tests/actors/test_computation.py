@@ -16,8 +16,8 @@ from hypothesis import strategies as st
 
 from epicycle.actors import EpicycleError, Function, ParameterError
 from epicycle.actors.expression import Formula, operand
-from epicycle.runner.engine import ActorError
-from epicycle.runner.text.problems import ModelError
+from epicycle.runner.execution.engine import ActorError
+from epicycle.runner.model.text.problems import ModelError
 from tests.actors.feeding import feed, load, model_of, seconds, tokens
 
 # -- Expression -----------------------------------------------------------------------------------------------------

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from epicycle.runner.engine import ActorError
+from epicycle.runner.execution.engine import ActorError
 from tests.actors.library_parts import Feeds, behave, problem, tokens
 
 

@@ -14,10 +14,10 @@ import pytest
 import yaml
 
 from epicycle.actors import declared_parameters, declared_ports, robotics
-from epicycle.runner.build.model import Model
-from epicycle.runner.catalogue.types import built_in
-from epicycle.runner.engine import Firing, Simulation, Tracer
-from epicycle.runner.text.problems import ModelError, Problem
+from epicycle.runner.execution.engine import Firing, Simulation, Tracer
+from epicycle.runner.model.build.model import Model
+from epicycle.runner.model.catalogue.types import built_in
+from epicycle.runner.model.text.problems import ModelError, Problem
 from tests.actors.feeding import load
 
 # Those that there were before; they have tests of their own.

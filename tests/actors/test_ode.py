@@ -14,8 +14,8 @@ from epicycle.actors import trajectory
 from epicycle.actors.core import EpicycleError
 from epicycle.actors.expression import ExpressionError, Formula, evaluate
 from epicycle.actors.integration import STEPPERS
-from epicycle.runner.engine import ActorError, Simulation
-from epicycle.runner.text.problems import ModelError
+from epicycle.runner.execution.engine import ActorError, Simulation
+from epicycle.runner.model.text.problems import ModelError
 from tests.actors.feeding import feed, load, model_of, tokens
 
 GRAVITY = 9.81

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from epicycle.runner.engine import ActorError
+from epicycle.runner.execution.engine import ActorError
 from tests.actors.library_parts import Feeds, behave, problem, tokens
 
 

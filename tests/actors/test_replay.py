@@ -10,9 +10,9 @@ import pyarrow as arrow
 import pytest
 from pyarrow import parquet
 
-from epicycle.runner.build.load import load_model
-from epicycle.runner.engine import ActorError, Simulation
-from epicycle.runner.text.problems import ModelError
+from epicycle.runner.execution.engine import ActorError, Simulation
+from epicycle.runner.model.build.load import load_model
+from epicycle.runner.model.text.problems import ModelError
 from tests.engine.engine_parts import sends
 
 

@@ -8,7 +8,7 @@ import pytest
 import simpy
 
 from epicycle.actors import Actor, InputPort, OutputPort, Pending
-from epicycle.runner.engine import ActorError, Simulation
+from epicycle.runner.execution.engine import ActorError, Simulation
 from tests.actors.library_parts import Feeds, Sends, behave, problem, tokens
 from tests.engine.engine_parts import load, simulate
 

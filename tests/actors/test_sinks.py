@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from epicycle.actors import Histogram, Recorder
-from epicycle.runner.engine import ActorError, Simulation
-from epicycle.runner.text.problems import ModelError
+from epicycle.runner.execution.engine import ActorError, Simulation
+from epicycle.runner.model.text.problems import ModelError
 from tests.actors.feeding import feed, model_of, tokens
 
 EVENTS = [(1.0, 1.5), (1.0, 2.5), (2.0, 3.5)]

@@ -9,7 +9,7 @@ import pytest
 from scipy import stats
 
 from epicycle.actors import Actor
-from epicycle.runner.engine import ActorError
+from epicycle.runner.execution.engine import ActorError
 from tests.actors.feeding import Feed
 from tests.actors.library_parts import Feeds, behave, problem, text, tokens
 from tests.engine.engine_parts import load

@@ -11,8 +11,8 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from epicycle.runner.engine import ActorError, Simulation
-from epicycle.runner.text.problems import ModelError
+from epicycle.runner.execution.engine import ActorError, Simulation
+from epicycle.runner.model.text.problems import ModelError
 from tests.actors.feeding import feed, load, model_of, seconds, tokens
 
 

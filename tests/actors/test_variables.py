@@ -6,8 +6,8 @@ from typing import Any
 
 import pytest
 
-from epicycle.runner.engine import Simulation
-from epicycle.runner.text.problems import ModelError
+from epicycle.runner.execution.engine import Simulation
+from epicycle.runner.model.text.problems import ModelError
 from tests.actors.feeding import load
 
 MODEL = """

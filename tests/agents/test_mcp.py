@@ -20,8 +20,8 @@ from mcp import Client, StdioServerParameters
 from mcp.client.stdio import stdio_client
 
 import epicycle
-from epicycle.runner.agents import LimitedCall, ToolError
-from epicycle.runner.cli import main
+from epicycle.runner.interface.agents import LimitedCall, ToolError
+from epicycle.runner.interface.cli import main
 
 MODEL = """model: line
 actors:
@@ -251,12 +251,12 @@ def test_types_are_those_that_the_command_line_names(folder: Path, tmp_path: Pat
     dialogue(folder, talk, "--types", str(tmp_path / "mine.py"))
 
 
-LANGUAGE = Path("runner/agents/language.md")
+LANGUAGE = Path("runner/interface/agents/language.md")
 
 
 def test_the_language_names_only_what_there_is() -> None:
     from epicycle.actors import declared_parameters
-    from epicycle.runner.catalogue.types import installed, load_all
+    from epicycle.runner.model.catalogue.types import installed, load_all
 
     text, catalogue = LANGUAGE.read_text("utf-8"), installed()
     types, _ = load_all({**catalogue.actors, **catalogue.aspects})
@@ -295,8 +295,8 @@ def test_the_command_refuses_what_it_cannot_serve(tmp_path: Path, capsys: pytest
 @pytest.mark.parametrize("words", [["--help"], ["run", "--help"], ["run", "mm1", "--until", "1", "--json"]])
 def test_other_commands_import_none_of_it(words: list[str]) -> None:
     program = (
-        "import sys\nfrom epicycle.runner.cli import main\ntry:\n    main(sys.argv[1:])\nexcept SystemExit:\n    pass\n"
-        "ours = ('mcp', 'epicycle.runner.agents', 'epicycle.runner.search.what_if', 'epicycle.runner.search.future')\n"
+        "import sys\nfrom epicycle.runner.interface.cli import main\ntry:\n    main(sys.argv[1:])\nexcept SystemExit:\n    pass\n"
+        "ours = ('mcp', 'epicycle.runner.interface.agents', 'epicycle.runner.search.what_if', 'epicycle.runner.search.future')\n"
         "print([each for each in ours if each in sys.modules], file=sys.stderr)"
     )
     done = subprocess.run([sys.executable, "-c", program, *words], capture_output=True, text=True, check=True)

@@ -14,8 +14,8 @@ from epicycle.actors import (
 )
 from epicycle.aspects import MeasurementFailure
 from epicycle.runner import Model, ModelError, Simulation, load_composite, load_model
-from epicycle.runner.catalogue.packaged import packaged_models
-from epicycle.runner.graph.ranks import firing_order
+from epicycle.runner.model.catalogue.packaged import packaged_models
+from epicycle.runner.model.graph.ranks import firing_order
 from tests.api.build_parts import TYPES, YAML, Adder, Noisy, in_python, run, structure, write
 from tests.demo_models import DURATIONS
 

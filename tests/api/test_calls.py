@@ -14,9 +14,9 @@ import pytest
 import epicycle
 from epicycle.actors import EpicycleError
 from epicycle.runner import Model, ModelError, Simulation, load_model
-from epicycle.runner.catalogue.metrics import TAKES, MetricOptions, MetricSpec, TakeName
-from epicycle.runner.catalogue.reference import describe
-from epicycle.runner.cli import main
+from epicycle.runner.interface.cli import main
+from epicycle.runner.model.catalogue.metrics import TAKES, MetricOptions, MetricSpec, TakeName
+from epicycle.runner.model.catalogue.reference import describe
 from epicycle.runner.search.comparing import Comparison
 from epicycle.runner.show import TimeSeries
 from epicycle.runner.study.inference import paired_difference

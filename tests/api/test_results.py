@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 from epicycle.actors import EpicycleError, Tag
-from epicycle.runner.engine import Signal, SignalError
-from epicycle.runner.tables import MAX_ROWS, Table, as_html, as_text
+from epicycle.runner.execution.engine import Signal, SignalError
+from epicycle.runner.support.tables import MAX_ROWS, Table, as_html, as_text
 
 
 @dataclass

@@ -13,8 +13,8 @@ from scipy import stats
 from epicycle.actors import Actor, EpicycleError, InputPort, OutputPort
 from epicycle.aspects import ClockAspect, ClockDrift, ClockOffset
 from epicycle.runner import ModelError, Simulation, load_model
-from epicycle.runner.catalogue.packaged import packaged_models
-from epicycle.runner.engine import Results
+from epicycle.runner.execution.engine import Results
+from epicycle.runner.model.catalogue.packaged import packaged_models
 from tests.engine.engine_parts import Script, load, sends, simulate
 
 

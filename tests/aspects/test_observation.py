@@ -8,7 +8,7 @@ import pytest
 
 from epicycle.actors.expression import ExpressionError, PortFormula
 from epicycle.runner import ActorError, ModelError, load_model
-from epicycle.runner.engine import Results
+from epicycle.runner.execution.engine import Results
 from tests.engine.engine_parts import simulate
 
 PARTS = """

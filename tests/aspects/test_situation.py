@@ -12,7 +12,7 @@ from scipy import stats
 
 from epicycle.aspects import Occlusion, Outage, OutOfRange, RangeLoss, SituationError
 from epicycle.runner import ModelError
-from epicycle.runner.engine import Results
+from epicycle.runner.execution.engine import Results
 from tests.aspects.bench import Bench
 from tests.engine.engine_parts import load, simulate
 

@@ -15,10 +15,10 @@ from pyarrow import parquet
 from epicycle.actors import EpicycleError
 from epicycle.aspects import TraceReplay
 from epicycle.aspects.trace import MOST
-from epicycle.runner.build.load import load_model
-from epicycle.runner.build.model import Model
-from epicycle.runner.engine import Simulation
-from epicycle.runner.text.problems import ModelError
+from epicycle.runner.execution.engine import Simulation
+from epicycle.runner.model.build.load import load_model
+from epicycle.runner.model.build.model import Model
+from epicycle.runner.model.text.problems import ModelError
 from tests.aspects.bench import Bench
 from tests.engine.engine_parts import Probe, Ticker, seen
 

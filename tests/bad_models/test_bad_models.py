@@ -20,11 +20,11 @@ from pathlib import Path
 import pytest
 
 from epicycle.aspects import MeasurementFailure, PacketLoss
-from epicycle.runner.build import load as load_module
-from epicycle.runner.build.load import load_model
-from epicycle.runner.catalogue.types import Catalogue
-from epicycle.runner.cli import main
-from epicycle.runner.text.problems import ModelError
+from epicycle.runner.interface.cli import main
+from epicycle.runner.model.build import load as load_module
+from epicycle.runner.model.build.load import load_model
+from epicycle.runner.model.catalogue.types import Catalogue
+from epicycle.runner.model.text.problems import ModelError
 from tests import cases
 from tests.cases import Case
 from tests.model.model_parts import TYPES

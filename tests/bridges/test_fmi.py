@@ -15,10 +15,10 @@ pytest.importorskip("fmpy")
 from epicycle.actors import Clock, EpicycleError, ParameterError
 from epicycle.bridges import FMU, fmi, trust
 from epicycle.runner import ActorError, Model, Results, Simulation
-from epicycle.runner.catalogue import types
-from epicycle.runner.catalogue.code import code_of
-from epicycle.runner.catalogue.types import TypesError
-from epicycle.runner.cli import main
+from epicycle.runner.interface.cli import main
+from epicycle.runner.model.catalogue import types
+from epicycle.runner.model.catalogue.code import code_of
+from epicycle.runner.model.catalogue.types import TypesError
 from tests.bridges.made_fmus import decay, events
 
 

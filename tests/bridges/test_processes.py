@@ -14,7 +14,7 @@ import simpy
 from epicycle.actors import Clock, ParameterError, Recorder
 from epicycle.bridges import Environment, Process, process
 from epicycle.runner import ActorError, Model, ModelError, Simulation, load_model
-from epicycle.runner.catalogue.types import types_of_file
+from epicycle.runner.model.catalogue.types import types_of_file
 from tests.bridges.random_programs import END, TRACE, Shared, play, program
 
 Behaviour = Generator[Any, Any, None]
@@ -137,7 +137,7 @@ def bank(tmp_path: Path) -> Path:
 
 @pytest.fixture(autouse=True)
 def forget_modules(monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    from epicycle.runner.catalogue import types
+    from epicycle.runner.model.catalogue import types
 
     monkeypatch.setattr(types, "_functions", {})
     sys.modules.pop("bank", None)

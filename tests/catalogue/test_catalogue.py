@@ -16,15 +16,15 @@ from typing import Any
 
 import pytest
 
-from epicycle.runner.build.load import load_model
-from epicycle.runner.catalogue.like import dialects
-from epicycle.runner.catalogue.reference import TOPICS, describe, doc_of
-from epicycle.runner.catalogue.types import CatalogueError, Types, _offered, built_in, figure_types, installed
-from epicycle.runner.engine import Simulation
-from epicycle.runner.language.study import read_study
+from epicycle.runner.execution.engine import Simulation
+from epicycle.runner.model.build.load import load_model
+from epicycle.runner.model.catalogue.like import dialects
+from epicycle.runner.model.catalogue.reference import TOPICS, describe, doc_of
+from epicycle.runner.model.catalogue.types import CatalogueError, Types, _offered, built_in, figure_types, installed
+from epicycle.runner.model.language.study import read_study
+from epicycle.runner.model.text.problems import ModelError
 from epicycle.runner.show.report import check_figures
 from epicycle.runner.study.plan.plan import Plan
-from epicycle.runner.text.problems import ModelError
 
 THIRD_PARTY = Path(__file__).parents[1] / "third_party"
 GOOD = """
@@ -200,8 +200,8 @@ def test_name_of_two_packages_must_be_qualified(site: Path) -> None:
 
 
 DIALECTS = """
-from epicycle.runner.catalogue import Dialect
-from epicycle.runner.engine import Director
+from epicycle.runner.model.catalogue import Dialect
+from epicycle.runner.execution.engine import Director
 class Odd(Dialect):
     name = "odd"
     @classmethod
@@ -285,7 +285,7 @@ def epicycle(site: Path, *arguments: str) -> str:
     """What the command line prints when the packages in a folder are installed."""
     path = os.pathsep.join([str(site), *filter(None, [os.environ.get("PYTHONPATH")])])
     done = subprocess.run(
-        [sys.executable, "-m", "epicycle.runner.cli", *arguments],
+        [sys.executable, "-m", "epicycle.runner.interface.cli", *arguments],
         capture_output=True,
         text=True,
         cwd=site,

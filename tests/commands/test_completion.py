@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from epicycle.runner.catalogue.packaged import packaged_disturbances, packaged_models
-from epicycle.runner.cli import main
-from epicycle.runner.commands import commands
+from epicycle.runner.interface.cli import main
+from epicycle.runner.interface.commands import commands
+from epicycle.runner.model.catalogue.packaged import packaged_disturbances, packaged_models
 
 
 def script(shell: str, capsys: pytest.CaptureFixture[str]) -> str:

@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from epicycle.runner import ModelError, load_model
-from epicycle.runner.cli import main
+from epicycle.runner.interface.cli import main
 
 OWN = """\
 from epicycle.actors import Actor, InputPort, OutputPort, Parameter, Process
@@ -293,7 +293,7 @@ def test_a_backend_that_there_is_not() -> None:
         f"{clock}figures: {{f: {{type: TimeSeries, signals: [clock.output]}}}}\n", encoding="utf-8"
     )
     environment = {**os.environ, "MPLBACKEND": "nonsense"}
-    program = "from epicycle.runner.cli import main; main(['graph', 'm.yaml', '-o', 'g.svg'])"
+    program = "from epicycle.runner.interface.cli import main; main(['graph', 'm.yaml', '-o', 'g.svg'])"
     program += "; main(['run', 'm.yaml', '--out', 'out'])"
     words = [sys.executable, "-c", program]
     done = subprocess.run(words, env=environment, capture_output=True, text=True, check=False)

@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 import epicycle
-from epicycle.runner.cli import main
-from epicycle.runner.commands import COMMANDS, FORMER
+from epicycle.runner.interface.cli import main
+from epicycle.runner.interface.commands import COMMANDS, FORMER
 
 ROOT = Path(__file__).parents[2]
 LINES = re.findall(

@@ -10,7 +10,7 @@ from types import FrameType
 
 import pytest
 
-from epicycle.runner.cli import main
+from epicycle.runner.interface.cli import main
 
 MODEL = "model: m\nactors: {clock: {type: Clock, period: 1}}\nrun: {stop: 3}\n"
 STUDY = "study: s\nmodel: ./m.yaml\nmetrics: {number: events}\n"

@@ -21,7 +21,7 @@ import os
 os.login_tty(0)
 from epicycle.runner.show import watching
 watching.PATIENCE = 1.0
-from epicycle.runner.cli import main
+from epicycle.runner.interface.cli import main
 raise SystemExit(main())
 """
 CLOCK = """

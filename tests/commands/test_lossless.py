@@ -16,10 +16,10 @@ import pyarrow.parquet as pq
 import pytest
 
 from epicycle.actors import Tag
-from epicycle.runner.cli import main
-from epicycle.runner.engine import LogError, Record
-from epicycle.runner.results import log_file as log_file_module
-from epicycle.runner.results.log_file import LogFile
+from epicycle.runner.execution.engine import LogError, Record
+from epicycle.runner.execution.results import log_file as log_file_module
+from epicycle.runner.execution.results.log_file import LogFile
+from epicycle.runner.interface.cli import main
 
 ENDLESS = """
 model: tick
@@ -85,7 +85,7 @@ def test_a_model_that_may_end_is_not_warned_of(
 def test_an_interrupt_ends_a_run_without_an_end(ending: str, folder: Path) -> None:
     """What was recorded and logged before is complete."""
     process = subprocess.Popen(
-        [sys.executable, "-m", "epicycle.runner.cli", "run", "tick.yaml", "--out", "out", "--log", f"log.{ending}"],
+        [sys.executable, "-m", "epicycle.runner.interface.cli", "run", "tick.yaml", "--out", "out", "--log", f"log.{ending}"],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
     )  # fmt: skip
     log, start = folder / f"log.{ending}", time.monotonic()

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from epicycle.runner.cli import main
+from epicycle.runner.interface.cli import main
 
 
 @pytest.fixture(autouse=True)
@@ -46,7 +46,7 @@ def test_models_know_a_package_once_it_is_installed(tmp_path: Path) -> None:
     assert main(["new", "acme", "--package"]) == 0
     install = [sys.executable, "-m", "pip", "install", "-q", "--no-deps", "--no-index", "--no-build-isolation"]
     subprocess.run([*install, "--target", tmp_path / "site", "./acme"], check=True)
-    command = [sys.executable, "-c", "from epicycle.runner.cli import main; raise SystemExit(main())"]
+    command = [sys.executable, "-c", "from epicycle.runner.interface.cli import main; raise SystemExit(main())"]
     there = {**os.environ, "PYTHONPATH": str(tmp_path / "site")}
     done = subprocess.run([*command, "run", "acme/acme.yaml", "--json"], env=there, capture_output=True, check=False)
     assert done.returncode == 0, done.stderr

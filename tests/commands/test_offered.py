@@ -8,12 +8,12 @@ from pathlib import Path
 
 import pytest
 
-from epicycle.runner.cli import main
-from epicycle.runner.commands import COMMANDS, commands
+from epicycle.runner.interface.cli import main
+from epicycle.runner.interface.commands import COMMANDS, commands
 from tests.catalogue.test_catalogue import install
 
 GREET = """
-from epicycle.runner.commands import DONE, command, option, tell
+from epicycle.runner.interface.commands import DONE, command, option, tell
 @command("say hello, 100 % of it", option("name", help="to whom"), imports=())
 def greet(options):
     tell(f"hello {options.name}")

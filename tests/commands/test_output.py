@@ -16,7 +16,7 @@ import pytest
 from epicycle.actors import Clock, Display, EpicycleError, Parameter, readable, shortened, visible, visible_lines
 from epicycle.actors.core.messages import LONGEST
 from epicycle.runner import Model, ModelError, Simulation, load_model
-from epicycle.runner.cli import main
+from epicycle.runner.interface.cli import main
 
 # Escape sequences for colour and for the title of the window, a bell, text that runs backwards, the 8-bit form of an
 # escape sequence, and what rich takes for the end of a style.
@@ -143,7 +143,7 @@ def test_streams_that_are_closed(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.mark.skipif(os.name == "nt", reason="a shell of Unix")
 def test_the_program_with_closed_or_full_streams() -> None:
-    program = f"{sys.executable} -m epicycle.runner.cli"
+    program = f"{sys.executable} -m epicycle.runner.interface.cli"
     closed = f"{program} run m.yaml --out out >&- 2>&- <&-"
     done = subprocess.run(closed, shell=True, capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")

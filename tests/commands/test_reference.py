@@ -13,9 +13,9 @@ import pytest
 from rich.console import Console
 
 from epicycle.actors import Actor, InputPort, OutputPort, Parameter, array_parameter
-from epicycle.runner.catalogue.reference import TypeReference, describe, parts_of
-from epicycle.runner.catalogue.types import built_in, installed
-from epicycle.runner.cli import main
+from epicycle.runner.interface.cli import main
+from epicycle.runner.model.catalogue.reference import TypeReference, describe, parts_of
+from epicycle.runner.model.catalogue.types import built_in, installed
 from epicycle.runner.show import detail
 
 
@@ -120,7 +120,7 @@ def test_parts_are_described_with_the_actor(capsys: pytest.CaptureFixture[str]) 
     assert "Inform  objective\n" in text
     assert "Casadi  solver\n" in text
     # In a process of its own: the parts of other tests are known here.
-    command = [sys.executable, "-m", "epicycle.runner.cli", "describe", "RobustController", "--json"]
+    command = [sys.executable, "-m", "epicycle.runner.interface.cli", "describe", "RobustController", "--json"]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     parts = json.loads(done.stdout)["parts"]
     assert {base: [each["name"] for each in known] for base, known in parts.items()} == {
@@ -193,7 +193,7 @@ def test_schema_is_written(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -
 
 def test_help_needs_nothing_heavy() -> None:
     heavy = {"numpy", "rich", "networkx", "yaml", "epicycle.ptolemy.importing"}
-    script = f"import sys, epicycle.runner.cli as c; c.parser(); print({heavy} & {{*sys.modules}})"
+    script = f"import sys, epicycle.runner.interface.cli as c; c.parser(); print({heavy} & {{*sys.modules}})"
     done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True)
     assert done.stdout == "set()\n"
 

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 import epicycle
-from epicycle.runner.cli import main
+from epicycle.runner.interface.cli import main
 
 MODEL = """
 model: line

@@ -13,7 +13,7 @@ from typing import Any
 
 import pytest
 
-from epicycle.runner.cli import main
+from epicycle.runner.interface.cli import main
 
 SHORT = ("--set", "observers=2", "--until", "1.5", "--seed", "7")
 
@@ -21,7 +21,7 @@ SHORT = ("--set", "observers=2", "--until", "1.5", "--seed", "7")
 def epicycle(*arguments: str, cwd: Path | None = None, **environment: str) -> subprocess.CompletedProcess[str]:
     """Run the command line in a new process."""
     return subprocess.run(
-        [sys.executable, "-m", "epicycle.runner.cli", *arguments],
+        [sys.executable, "-m", "epicycle.runner.interface.cli", *arguments],
         capture_output=True,
         text=True,
         cwd=cwd,
@@ -204,7 +204,7 @@ def test_help_loads_nothing_heavy() -> None:
     assert done.returncode == 0
     probe = (
         "import sys\n"
-        "from epicycle.runner.cli import parser\n"
+        "from epicycle.runner.interface.cli import parser\n"
         "parser()\n"
         "print([m for m in ('numpy', 'networkx', 'rich', 'numba', 'yaml', 'simpy') if m in sys.modules])"
     )
@@ -233,8 +233,8 @@ def test_a_small_run_imports_and_searches_only_what_it_needs(tmp_path: Path) -> 
         "epicycle.actors.continuous", "epicycle.actors.robotics", "epicycle.runner.study.plan",
     )  # fmt: skip
     script = (
-        "import sys, epicycle.runner.catalogue.types as types\n"
-        "from epicycle.runner.cli import main\n"
+        "import sys, epicycle.runner.model.catalogue.types as types\n"
+        "from epicycle.runner.interface.cli import main\n"
         "types.entry_points = None\n"  # which search all installed packages
         "assert main(['run', 'tiny.yaml']) == 0\n"
         f"print('imported:', *({{*{late}}} & {{*sys.modules}}))"
@@ -244,7 +244,7 @@ def test_a_small_run_imports_and_searches_only_what_it_needs(tmp_path: Path) -> 
 
 def test_what_a_program_imports_is_never_garbage(tmp_path: Path) -> None:
     """A command called by another program leaves the garbage collector as it was."""
-    script = "import gc, sys\nfrom epicycle.runner.cli import main\nbefore = gc.get_threshold()\n"
+    script = "import gc, sys\nfrom epicycle.runner.interface.cli import main\nbefore = gc.get_threshold()\n"
     told = "print(gc.get_freeze_count() > 10_000, gc.isenabled(), gc.get_threshold() == before)"
     program = f"{script}sys.argv = ['epicycle', 'run', 'tiny.yaml']\nassert main() == 0\n{told}"
     assert answer(program, tmp_path) == ["True", "True", "True"]

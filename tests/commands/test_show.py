@@ -10,7 +10,7 @@ import pytest
 
 import epicycle
 from epicycle.actors import EpicycleError
-from epicycle.runner.cli import main
+from epicycle.runner.interface.cli import main
 
 MODEL = """\
 model: m

@@ -9,8 +9,8 @@ from typing import Any
 
 import pytest
 
-from epicycle.runner.cli import main
-from epicycle.runner.engine import Pace
+from epicycle.runner.execution.engine import Pace
+from epicycle.runner.interface.cli import main
 
 MODEL = """
 model: line

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from epicycle.runner.cli import main
+from epicycle.runner.interface.cli import main
 
 ACTORS = """
 from helpers_of_mine import FACTOR
@@ -139,7 +139,16 @@ def test_a_command_ends_though_a_thread_of_the_run_does_not() -> None:
         "    def initialize(self):\n        threading.Thread(target=threading.Event().wait, name='mine').start()\n"
     )
     Path("m.yaml").write_text("model: m\nactors: {a: {type: Starter}}\nrun: {stop: 1}\n")
-    command = [sys.executable, "-m", "epicycle.runner.cli", "run", "m.yaml", "--types", "threads_of_mine.py", "--json"]
+    command = [
+        sys.executable,
+        "-m",
+        "epicycle.runner.interface.cli",
+        "run",
+        "m.yaml",
+        "--types",
+        "threads_of_mine.py",
+        "--json",
+    ]
     done = subprocess.run(command, check=False, capture_output=True, text=True, timeout=60)
     assert done.returncode == 0
     assert done.stderr.endswith("threads that the run started are still running and are ended: mine\n")

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from epicycle.runner.cli import main
+from epicycle.runner.interface.cli import main
 
 MODEL = """model: m
 actors:

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from epicycle.runner import Results, Simulation
-from epicycle.runner.cli import main
+from epicycle.runner.interface.cli import main
 
 MODEL = """
 model: line

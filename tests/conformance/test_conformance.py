@@ -20,12 +20,12 @@ import pytest
 
 from epicycle.actors import SetVariable, Variable
 from epicycle.aspects import FiringRequest, Request
-from epicycle.runner.build.load import load_model
-from epicycle.runner.build.model import Model
-from epicycle.runner.catalogue.types import built_in
-from epicycle.runner.engine import Simulation
-from epicycle.runner.graph.ranks import dependencies, depths
-from epicycle.runner.text.problems import ModelError
+from epicycle.runner.execution.engine import Simulation
+from epicycle.runner.model.build.load import load_model
+from epicycle.runner.model.build.model import Model
+from epicycle.runner.model.catalogue.types import built_in
+from epicycle.runner.model.graph.ranks import dependencies, depths
+from epicycle.runner.model.text.problems import ModelError
 from tests.conformance.conformance_parts import TYPES, TestActorPortDepth
 
 HERE = Path(__file__).parent

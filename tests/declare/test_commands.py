@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated, Literal, TypedDict, Unpack
 
 import pytest
 
-from epicycle.runner.declare.commands import add_options, arguments, declared
-from epicycle.runner.declare.parameters import argument, option, positive_seconds, repeated, whole
+from epicycle.runner.support.declare.commands import add_options, arguments, declared
+from epicycle.runner.support.declare.parameters import argument, option, positive_seconds, repeated, whole
 
 if TYPE_CHECKING:
     from nowhere import Thing  # type: ignore[import-not-found]

@@ -9,8 +9,6 @@ from pathlib import Path
 
 import pytest
 
-from epicycle.runner.build.load import load_model
-from epicycle.runner.cli import main
 from epicycle.runner.desk import (
     Edit,
     Knowledge,
@@ -27,8 +25,10 @@ from epicycle.runner.desk import (
     texts_after,
 )
 from epicycle.runner.desk.kinds_page import example
-from epicycle.runner.text.kinds import KINDS, Kind
-from epicycle.runner.text.problems import ModelError
+from epicycle.runner.interface.cli import main
+from epicycle.runner.model.build.load import load_model
+from epicycle.runner.model.text.kinds import KINDS, Kind
+from epicycle.runner.model.text.problems import ModelError
 from tests.bad_models.test_bad_models import FOLDER
 from tests.desk.desk_parts import MODELS, NAME, folder_with_model, place
 
@@ -344,7 +344,7 @@ def test_edits_keep_ends_of_lines() -> None:
 
 def test_a_run_imports_no_desk(tmp_path: Path) -> None:
     script = (
-        "import sys; from epicycle.runner.cli import main\n"
+        "import sys; from epicycle.runner.interface.cli import main\n"
         "words = ('desk', 'pygls', 'studio', 'starlette', 'uvicorn', 'websockets')\n"
         f"code = main(['run', 'mm1', '--until', '10', '--out', {str(tmp_path)!r}])\n"
         "try: main(['--help'])\n"

@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 import epicycle
-from epicycle.runner.catalogue.packaged import packaged_models
-from epicycle.runner.cli import main
+from epicycle.runner.interface.cli import main
+from epicycle.runner.model.catalogue.packaged import packaged_models
 
 BEFORE = """model: line
 parameters: {loss: {value: 0.2, min: 0}}

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from epicycle.runner.catalogue.packaged import packaged_models
 from epicycle.runner.desk import EditError, Knowledge, difference, editing, read, splices
 from epicycle.runner.desk.parts import data_of
+from epicycle.runner.model.catalogue.packaged import packaged_models
 
 TEXT = """# A line of robots.
 model: two_bodies   # its name

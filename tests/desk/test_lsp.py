@@ -15,10 +15,10 @@ import pytest
 from lsprotocol import types as lsp
 from pygls.exceptions import JsonRpcException, JsonRpcInvalidParams
 
-from epicycle.runner.build.load import load_model
-from epicycle.runner.catalogue.packaged import packaged_models
 from epicycle.runner.desk.positions import Positions
-from epicycle.runner.text.problems import ModelError, Problem
+from epicycle.runner.model.build.load import load_model
+from epicycle.runner.model.catalogue.packaged import packaged_models
+from epicycle.runner.model.text.problems import ModelError, Problem
 from tests.desk.desk_parts import MODELS, folder_with_model, place
 from tests.desk.editor_parts import PATIENCE, Editor, edited, editor
 

@@ -10,9 +10,9 @@ from typing import Any, ClassVar
 from simpy.events import Event
 
 from epicycle.actors import Actor, InputPort, OutputPort, Parameter, Process
-from epicycle.runner.build.load import load_model
-from epicycle.runner.build.model import Model
-from epicycle.runner.engine import Results, Simulation
+from epicycle.runner.execution.engine import Results, Simulation
+from epicycle.runner.model.build.load import load_model
+from epicycle.runner.model.build.model import Model
 
 
 class Repeat(Actor):

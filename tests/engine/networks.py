@@ -20,8 +20,8 @@ from simpy.events import Event
 from epicycle.actors import CORE, Actor, InputPort, OutputPort, Parameter, Process, Recorder
 from epicycle.actors.expression import Formula
 from epicycle.runner import Simulation, load_model
-from epicycle.runner.engine import ActorError, LoopError, errors
-from epicycle.runner.text.problems import ModelError
+from epicycle.runner.execution.engine import ActorError, LoopError, errors
+from epicycle.runner.model.text.problems import ModelError
 from tests.engine.engine_parts import Join, Ticker
 
 

@@ -58,7 +58,7 @@ def test_a_difference_would_be_found(at: dict[str, Worker]) -> None:
 def run(*words: str, **environment: str) -> subprocess.CompletedProcess[str]:
     settings = {key: value for key, value in os.environ.items() if not key.startswith("EPICYCLE_")}
     return subprocess.run(
-        [sys.executable, "-m", "epicycle.runner.cli", *words],
+        [sys.executable, "-m", "epicycle.runner.interface.cli", *words],
         env={**settings, **environment},
         capture_output=True,
         text=True,

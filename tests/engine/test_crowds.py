@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 
 from epicycle.actors import Actor
-from epicycle.runner.build.load import load_model
-from epicycle.runner.engine import ActorError, LoopError, Simulation
-from epicycle.runner.text.limits import RAISE_IT
+from epicycle.runner.execution.engine import ActorError, LoopError, Simulation
+from epicycle.runner.model.build.load import load_model
+from epicycle.runner.model.text.limits import RAISE_IT
 from tests.engine.engine_parts import load
 
 

@@ -14,9 +14,9 @@ from hypothesis import strategies as st
 
 from epicycle.actors import Actor, InputPort, OutputPort, Parameter, Process, Tag
 from epicycle.aspects import JoinPoint, PortAspect
-from epicycle.runner.engine import ActorError
-from epicycle.runner.graph.clock import Clock
-from epicycle.runner.text.problems import ModelError
+from epicycle.runner.execution.engine import ActorError
+from epicycle.runner.model.graph.clock import Clock
+from epicycle.runner.model.text.problems import ModelError
 from tests.engine.engine_parts import Plan, Repeat, load, seen, sends, simulate
 
 

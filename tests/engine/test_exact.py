@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from epicycle.runner.engine import Results
-from epicycle.runner.engine.statistic import Quantile, Spread, TimeQuantile
-from epicycle.runner.results.encoding import cell
+from epicycle.runner.execution.engine import Results
+from epicycle.runner.execution.engine.statistic import Quantile, Spread, TimeQuantile
+from epicycle.runner.execution.results.encoding import cell
 from tests.engine.engine_parts import simulate
 
 

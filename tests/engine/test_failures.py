@@ -17,7 +17,7 @@ from epicycle.actors import Actor, Clock, InputPort, OutputPort, Parameter, Proc
 from epicycle.aspects import ClockAspect, ExecutionAspect, Job, JoinPoint, PortAspect
 from epicycle.aspects.execution import ActorPoint, Target
 from epicycle.runner import Model
-from epicycle.runner.engine import ActorError, Simulation
+from epicycle.runner.execution.engine import ActorError, Simulation
 from tests.engine.engine_parts import load
 
 

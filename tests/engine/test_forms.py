@@ -1,4 +1,4 @@
-"""Native forms do what the actors do whose forms they are; see runner/engine/forms.pyx."""
+"""Native forms do what the actors do whose forms they are; see runner/execution/engine/forms.pyx."""
 
 from __future__ import annotations
 

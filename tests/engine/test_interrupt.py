@@ -13,7 +13,7 @@ import pytest
 
 from epicycle.actors import Actor, Clock, InputPort, OutputPort, Tag
 from epicycle.runner import Model, Signal, Simulation
-from epicycle.runner.interrupt import held
+from epicycle.runner.support.interrupt import held
 from tests.engine.engine_parts import load
 
 

@@ -6,11 +6,11 @@ from pathlib import Path
 
 import pytest
 
-from epicycle.runner.build.load import load_model
-from epicycle.runner.engine import Interventions, Simulation
-from epicycle.runner.graph.acts import ActName
-from epicycle.runner.results import Results
-from epicycle.runner.text.problems import ModelError
+from epicycle.runner.execution.engine import Interventions, Simulation
+from epicycle.runner.execution.results import Results
+from epicycle.runner.model.build.load import load_model
+from epicycle.runner.model.graph.acts import ActName
+from epicycle.runner.model.text.problems import ModelError
 from tests.engine.engine_parts import load, seen
 
 TEXT = """

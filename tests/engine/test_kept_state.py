@@ -18,7 +18,7 @@ import simpy
 from epicycle.actors import Actor, Clock, EpicycleError, InputPort, OutputPort, Recorder
 from epicycle.aspects import CommunicationAspect, JoinPoint
 from epicycle.runner import Model, Simulation
-from epicycle.runner.engine import CopyError, SnapshotError, Tracer
+from epicycle.runner.execution.engine import CopyError, SnapshotError, Tracer
 from tests.engine.engine_parts import Script, Ticker, load
 from tests.engine.test_snapshots import assert_goes_on
 

@@ -9,11 +9,11 @@ from typing import Any
 import pytest
 
 from epicycle.actors import OutputPort
-from epicycle.runner.build.model import Model
-from epicycle.runner.cli import main
-from epicycle.runner.engine import Simulation
-from epicycle.runner.results import Results
-from epicycle.runner.text.problems import ModelError
+from epicycle.runner.execution.engine import Simulation
+from epicycle.runner.execution.results import Results
+from epicycle.runner.interface.cli import main
+from epicycle.runner.model.build.model import Model
+from epicycle.runner.model.text.problems import ModelError
 from tests.engine.engine_parts import load
 from tests.engine.test_monitors import Steps
 

@@ -11,11 +11,11 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from epicycle.runner.catalogue.metrics import TAKES, MetricSpec
-from epicycle.runner.engine.batches import MOST, TimeBatches, TokenBatches, batch_interval, mser
-from epicycle.runner.engine.measurement import Measurement, Outcome
-from epicycle.runner.engine.statistic import Total
-from epicycle.runner.graph.outputs import Metric
+from epicycle.runner.execution.engine.batches import MOST, TimeBatches, TokenBatches, batch_interval, mser
+from epicycle.runner.execution.engine.measurement import Measurement, Outcome
+from epicycle.runner.execution.engine.statistic import Total
+from epicycle.runner.model.catalogue.metrics import TAKES, MetricSpec
+from epicycle.runner.model.graph.outputs import Metric
 from epicycle.runner.show import summary_object
 from tests.engine.engine_parts import simulate
 

@@ -11,11 +11,11 @@ from typing import Any
 import pytest
 
 from epicycle.actors import Actor, OutputPort, Parameter
-from epicycle.runner.build.model import Model
-from epicycle.runner.cli import main
-from epicycle.runner.engine import Simulation
-from epicycle.runner.results import Results, Verdict
-from epicycle.runner.text.problems import ModelError
+from epicycle.runner.execution.engine import Simulation
+from epicycle.runner.execution.results import Results, Verdict
+from epicycle.runner.interface.cli import main
+from epicycle.runner.model.build.model import Model
+from epicycle.runner.model.text.problems import ModelError
 from tests.engine.engine_parts import load
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from epicycle.actors import Tag
-from epicycle.runner.engine import LoopError, Simulation, errors
+from epicycle.runner.execution.engine import LoopError, Simulation, errors
 from tests.engine.engine_parts import Plan, Probe, load, seen, sends, simulate
 
 

@@ -6,7 +6,7 @@ import time
 
 import pytest
 
-from epicycle.runner.engine import SLOWEST, Pace, Simulation
+from epicycle.runner.execution.engine import SLOWEST, Pace, Simulation
 from tests.engine.engine_parts import Plan, load
 
 START = 128.0

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 import simpy
 
-from epicycle.runner.engine import ActorError, Results, Simulation
+from epicycle.runner.execution.engine import ActorError, Results, Simulation
 from tests.engine.engine_parts import Plan, Script, load, seen, sends, simulate
 
 Behaviour = Callable[[Script], Generator[Any, Any, None]]

@@ -11,8 +11,8 @@ import pytest
 
 from epicycle.actors import Actor, InputPort, OutputPort, Stream, random_stream
 from epicycle.runner import Simulation, load_model
-from epicycle.runner.build.model import Model
-from epicycle.runner.catalogue.packaged import packaged_models
+from epicycle.runner.model.build.model import Model
+from epicycle.runner.model.catalogue.packaged import packaged_models
 from tests.demo_models import DURATIONS
 from tests.engine.engine_parts import load
 from tests.engine.test_snapshots import FEATURES, told

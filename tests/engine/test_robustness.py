@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from epicycle.actors import EpicycleError
-from epicycle.runner.engine import Simulation
+from epicycle.runner.execution.engine import Simulation
 from tests.engine.test_monitors import model
 
 RISING = [[0, 1], [2, 3], [4, 7], [7, 2]]

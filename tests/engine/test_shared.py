@@ -6,9 +6,9 @@ from typing import Any
 
 import pytest
 
-from epicycle.runner.build.load import load_model
-from epicycle.runner.engine import Simulation
-from epicycle.runner.text.problems import ModelError
+from epicycle.runner.execution.engine import Simulation
+from epicycle.runner.model.build.load import load_model
+from epicycle.runner.model.text.problems import ModelError
 
 MODEL = """
 model: m

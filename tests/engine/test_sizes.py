@@ -10,7 +10,7 @@ import pytest
 from benchmarks import growth
 from epicycle.actors import NO_TOKENS
 from epicycle.runner import Simulation
-from epicycle.runner.build.model import Model
+from epicycle.runner.model.build.model import Model
 
 ACTORS = 500
 

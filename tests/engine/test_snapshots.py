@@ -12,8 +12,8 @@ import pytest
 from epicycle.actors import Recorder
 from epicycle.aspects import Aspect
 from epicycle.runner import Model, Simulation, load_model
-from epicycle.runner.catalogue.packaged import packaged_disturbances, packaged_models
-from epicycle.runner.engine import ActorError
+from epicycle.runner.execution.engine import ActorError
+from epicycle.runner.model.catalogue.packaged import packaged_disturbances, packaged_models
 from tests.aspects.strengths import AT_WORK
 from tests.aspects.testing.test_non_interference import GRID, at_home
 from tests.conformance.conformance_parts import TYPES

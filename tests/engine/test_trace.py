@@ -7,8 +7,8 @@ from typing import Any
 
 from epicycle.actors import Tag
 from epicycle.aspects import JoinPoint, PortAspect
-from epicycle.runner.build.load import load_model
-from epicycle.runner.engine import Firing, Simulation, Tracer
+from epicycle.runner.execution.engine import Firing, Simulation, Tracer
+from epicycle.runner.model.build.load import load_model
 from tests.engine.engine_parts import Script, load
 
 SECOND = 10**9

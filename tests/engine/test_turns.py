@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 import pytest
 
 from epicycle.actors import Actor, InputPort, OutputPort
-from epicycle.runner.engine import ActorError, Simulation
+from epicycle.runner.execution.engine import ActorError, Simulation
 from tests.engine.engine_parts import Probe, load, seen, sends, simulate
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from epicycle.actors import Actor, EpicycleError
-from epicycle.runner.engine import ActorError, Simulation
+from epicycle.runner.execution.engine import ActorError, Simulation
 from tests.engine.engine_parts import Plan, load, seen, sends, simulate
 
 

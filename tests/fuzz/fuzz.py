@@ -40,12 +40,12 @@ from hypothesis import strategies as st
 from epicycle.actors import part_finders
 from epicycle.actors.expression.translation import KNOWN
 from epicycle.runner import Simulation
-from epicycle.runner.build.load import load_model
-from epicycle.runner.catalogue.packaged import model_folders
-from epicycle.runner.catalogue.types import built_in, figure_types
-from epicycle.runner.engine import ActorError, LoopError
-from epicycle.runner.text.limits import NORMAL
-from epicycle.runner.text.problems import ModelError
+from epicycle.runner.execution.engine import ActorError, LoopError
+from epicycle.runner.model.build.load import load_model
+from epicycle.runner.model.catalogue.packaged import model_folders
+from epicycle.runner.model.catalogue.types import built_in, figure_types
+from epicycle.runner.model.text.limits import NORMAL
+from epicycle.runner.model.text.problems import ModelError
 from tests.fuzz.mutants import Mutation, Seedling, of_options, of_text, of_tree, seedling
 from tests.fuzz.recipes import cooked
 

@@ -34,8 +34,8 @@ from typing import Any
 
 import numpy as np
 
-from epicycle.runner.catalogue import types as catalogue_types
-from epicycle.runner.cli import main as epicycle
+from epicycle.runner.interface.cli import main as epicycle
+from epicycle.runner.model.catalogue import types as catalogue_types
 from tests.fuzz.surfaces import SURFACES, Answer, Case
 
 MAX_SECONDS = 20  # of wall-clock time for one input

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterable
 import yaml
 
 from epicycle.actors import InputPort, declared_parameters, declared_ports
-from epicycle.runner.catalogue.types import Catalogue, CatalogueError
+from epicycle.runner.model.catalogue.types import Catalogue, CatalogueError
 
 END = """\
   c: {type: Clock, period: 0.1}

@@ -9,8 +9,8 @@ import jsonschema
 import pytest
 import yaml
 
-from epicycle.runner.build.load import load_model
-from epicycle.runner.text.problems import ModelError
+from epicycle.runner.model.build.load import load_model
+from epicycle.runner.model.text.problems import ModelError
 
 ROOT = Path(__file__).parents[2]
 TEXT = """

@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 from epicycle.runner import ModelError, Simulation
-from epicycle.runner.build.composite_class import load_composite
-from epicycle.runner.build.load import load_model
-from epicycle.runner.build.model import Model
+from epicycle.runner.model.build.composite_class import load_composite
+from epicycle.runner.model.build.load import load_model
+from epicycle.runner.model.build.model import Model
 from tests.model.model_parts import TYPES
 
 BASE = """

@@ -23,22 +23,22 @@ from epicycle.actors import (
 )
 from epicycle.actors.core.units import quantity
 from epicycle.aspects import Aspect, MeasurementFailure, PacketLoss
-from epicycle.runner.build.connect import indices_of as resolve
-from epicycle.runner.catalogue.figure import own_figures
-from epicycle.runner.catalogue.packaged import model_folders, packaged_models
-from epicycle.runner.catalogue.types import Catalogue, built_in
-from epicycle.runner.language import acts, dimensions, disturbance, models, parts, places, ports, questions, study
-from epicycle.runner.language.fields import QUANTITY, Record
-from epicycle.runner.language.fields import schema_of as value_schema
-from epicycle.runner.language.parts import BESIDE
-from epicycle.runner.language.places import _END as ENDPOINT
-from epicycle.runner.language.places import CONNECTION_TEXT, PATTERN
-from epicycle.runner.language.schema import json_schema
+from epicycle.runner.model.build.connect import indices_of as resolve
+from epicycle.runner.model.catalogue.figure import own_figures
+from epicycle.runner.model.catalogue.packaged import model_folders, packaged_models
+from epicycle.runner.model.catalogue.types import Catalogue, built_in
+from epicycle.runner.model.language import acts, dimensions, disturbance, models, parts, places, ports, questions, study
+from epicycle.runner.model.language.fields import QUANTITY, Record
+from epicycle.runner.model.language.fields import schema_of as value_schema
+from epicycle.runner.model.language.parts import BESIDE
+from epicycle.runner.model.language.places import _END as ENDPOINT
+from epicycle.runner.model.language.places import CONNECTION_TEXT, PATTERN
+from epicycle.runner.model.language.schema import json_schema
+from epicycle.runner.model.text.document import parse, plain
+from epicycle.runner.model.text.patterns import PatternError, compile_pattern
+from epicycle.runner.model.text.problems import Problems
+from epicycle.runner.model.text.reading import NodeReader
 from epicycle.runner.show.report import own_study_figures
-from epicycle.runner.text.document import parse, plain
-from epicycle.runner.text.patterns import PatternError, compile_pattern
-from epicycle.runner.text.problems import Problems
-from epicycle.runner.text.reading import NodeReader
 from tests.bad_models.test_bad_models import CASES
 from tests.cases import Case
 from tests.model.model_parts import TYPES

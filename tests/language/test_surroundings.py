@@ -13,8 +13,8 @@ import pytest
 
 from epicycle.actors import Actor, InputPort, Parameter, declared_parameters
 from epicycle.runner import Simulation, load_composite, load_model
-from epicycle.runner.build.model import Model
-from epicycle.runner.catalogue.packaged import model_folders
+from epicycle.runner.model.build.model import Model
+from epicycle.runner.model.catalogue.packaged import model_folders
 from tests.model.model_parts import TYPES
 
 SHORT = """

@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from epicycle.actors import Actor, FaultError, InputPort, OutputPort
-from epicycle.runner.build.connect import indices_of as resolve
-from epicycle.runner.build.load import load_model
+from epicycle.runner.model.build.connect import indices_of as resolve
+from epicycle.runner.model.build.load import load_model
 from tests.model.model_parts import TYPES
 
 

@@ -6,7 +6,7 @@ from graphlib import CycleError
 
 import pytest
 
-from epicycle.runner.graph.digraph import find_loop, in_order
+from epicycle.runner.model.graph.digraph import find_loop, in_order
 
 
 def test_each_node_comes_before_those_behind_it() -> None:

@@ -9,8 +9,8 @@ import pytest
 
 from epicycle.actors import Actor, Parameter
 from epicycle.runner import Simulation
-from epicycle.runner.build.load import load_model
-from epicycle.runner.text.problems import ModelError
+from epicycle.runner.model.build.load import load_model
+from epicycle.runner.model.text.problems import ModelError
 
 
 class Reader(Actor):

@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from benchmarks import validation
-from epicycle.runner.build.load import load_model
-from epicycle.runner.text.patterns import PathIndex, matches
+from epicycle.runner.model.build.load import load_model
+from epicycle.runner.model.text.patterns import PathIndex, matches
 
 
 @pytest.mark.slow

@@ -8,11 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from epicycle.runner.build.load import load_model
-from epicycle.runner.cli import main
-from epicycle.runner.text.limits import RAISE_IT
-from epicycle.runner.text.patterns import PathIndex, compile_pattern, matches
-from epicycle.runner.text.problems import ModelError
+from epicycle.runner.interface.cli import main
+from epicycle.runner.model.build.load import load_model
+from epicycle.runner.model.text.limits import RAISE_IT
+from epicycle.runner.model.text.patterns import PathIndex, compile_pattern, matches
+from epicycle.runner.model.text.problems import ModelError
 
 END = "  c: {type: Clock, period: 1}\n  r: {type: Recorder}\nconnections: [c.output -> r.input]\nrun: {stop: 1}\n"
 HELP = f"   help: {RAISE_IT}"

@@ -22,11 +22,11 @@ from epicycle.actors import (
     UnitError,
 )
 from epicycle.actors.expression import ExpressionError
-from epicycle.runner.build.load import load_model
-from epicycle.runner.cli import main
-from epicycle.runner.engine import ActorError, LogError, LoopError
-from epicycle.runner.results.encoding import TokenError
-from epicycle.runner.text.problems import ModelError, Position, Problem
+from epicycle.runner.execution.engine import ActorError, LogError, LoopError
+from epicycle.runner.execution.results.encoding import TokenError
+from epicycle.runner.interface.cli import main
+from epicycle.runner.model.build.load import load_model
+from epicycle.runner.model.text.problems import ModelError, Position, Problem
 from tests.model.model_parts import TYPES
 
 

@@ -6,8 +6,8 @@ import random  # noqa: TID251 (what to try, and not what a model draws)
 from typing import Any
 
 from epicycle.actors import InputPort, ModalActor, OutputPort, ParameterError, StateMachine, transition
-from epicycle.runner.engine import Simulation
-from epicycle.runner.engine.errors import ActorError, LoopError
+from epicycle.runner.execution.engine import Simulation
+from epicycle.runner.execution.engine.errors import ActorError, LoopError
 from tests.actors.feeding import model_of
 from tests.modes.reference import interpret
 

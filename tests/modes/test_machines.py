@@ -17,8 +17,8 @@ from epicycle.actors import (
     on_exit,
     transition,
 )
-from epicycle.runner.engine import Simulation
-from epicycle.runner.engine.errors import ActorError
+from epicycle.runner.execution.engine import Simulation
+from epicycle.runner.execution.engine.errors import ActorError
 from tests.actors.feeding import Events, feed, load, model_of
 from tests.modes.machines import disagreement
 

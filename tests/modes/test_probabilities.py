@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from epicycle.actors import InputPort, ModalActor, transition
-from epicycle.runner.engine.errors import ActorError
+from epicycle.runner.execution.engine.errors import ActorError
 from tests.actors.feeding import Events, feed
 from tests.modes.test_machines import sent
 

@@ -10,7 +10,7 @@ import pytest
 
 from epicycle.actors import InputPort, ModalActor, OutputPort, transition
 from epicycle.actors.modes.text import read_transition
-from epicycle.runner.engine.errors import ActorError
+from epicycle.runner.execution.engine.errors import ActorError
 from tests.actors.feeding import feed
 from tests.modes.test_machines import sent
 

@@ -10,9 +10,9 @@ from typing import Any
 import pytest
 
 from epicycle.actors import InputPort, OutputPort, Process
-from epicycle.runner.engine import Simulation
-from epicycle.runner.engine.errors import ActorError
-from epicycle.runner.text.problems import ModelError
+from epicycle.runner.execution.engine import Simulation
+from epicycle.runner.execution.engine.errors import ActorError
+from epicycle.runner.model.text.problems import ModelError
 from tests.actors.feeding import load
 from tests.cases import read, write
 

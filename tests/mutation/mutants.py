@@ -16,7 +16,7 @@ from cosmic_ray.ast import ast_nodes, get_ast_from_path
 from cosmic_ray.mutating import mutate_code
 from cosmic_ray.plugins import get_operator, operator_names
 
-GUARDED = ("actors/core", "actors/robotics", "aspects", "runner/engine", "runner/results")
+GUARDED = ("actors/core", "actors/robotics", "aspects", "runner/execution/engine", "runner/execution/results")
 
 # What numba compiles, and Python runs to the same bits.
 KERNELS = ("actors/robotics/numerics/", "actors/core/elementary/")

@@ -20,7 +20,7 @@ import pytest
 
 from epicycle.actors import random_stream
 from epicycle.runner import Simulation, load_model
-from epicycle.runner.catalogue.packaged import packaged_models
+from epicycle.runner.model.catalogue.packaged import packaged_models
 from tests.actors.core.test_random import CONTINUOUS, DISCRETE
 from tests.test_docs import TUTORIALS, Reader, blocks
 
@@ -89,7 +89,7 @@ def table() -> str:
     """The table of a study."""
     from pyarrow import parquet
 
-    from epicycle.runner.cli import main
+    from epicycle.runner.interface.cli import main
 
     with tempfile.TemporaryDirectory() as folder, contextlib.redirect_stdout(io.StringIO()):
         main(["study", "waiting_time", "--replications", "1", "--out", folder])
@@ -120,7 +120,7 @@ def tutorials() -> dict[str, Path]:
 
 def parts() -> dict[str, Callable[[], str]]:
     """What there is to compute, by name."""
-    from epicycle.runner.catalogue.packaged import packaged_disturbances
+    from epicycle.runner.model.catalogue.packaged import packaged_disturbances
 
     found: dict[str, Callable[[], str]] = {"functions": functions, "functions, compiled": lambda: functions(True)}
     found["laws"] = laws

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from epicycle.ptolemy.computing import Test as Checks
-from epicycle.runner.engine import ActorError, Simulation
+from epicycle.runner.execution.engine import ActorError, Simulation
 from tests.actors.feeding import load
 from tests.actors.library_parts import Feeds, behave, text
 from tests.engine.engine_parts import Probe

@@ -11,9 +11,9 @@ from epicycle import actors
 from epicycle.actors import Actor, InputPort, OutputPort, Parameter, Tag
 from epicycle.ptolemy.changing import Singly, Waiting
 from epicycle.ptolemy.timing import TimeDelay
-from epicycle.runner.build.model import Model
-from epicycle.runner.engine import Simulation
-from epicycle.runner.text.problems import ModelError
+from epicycle.runner.execution.engine import Simulation
+from epicycle.runner.model.build.model import Model
+from epicycle.runner.model.text.problems import ModelError
 from tests.engine.engine_parts import Probe, Repeat, load, seen, sends, simulate
 
 

@@ -12,7 +12,7 @@ import pytest
 from scipy import stats
 
 from epicycle.ptolemy.generators import LAWS, DRand, JavaRandom
-from epicycle.runner.engine import ActorError, Simulation
+from epicycle.runner.execution.engine import ActorError, Simulation
 from tests.actors import library_parts
 from tests.actors.feeding import load
 from tests.actors.library_parts import tokens

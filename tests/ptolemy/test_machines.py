@@ -8,7 +8,7 @@ import pytest
 
 from epicycle.actors import ParameterError
 from epicycle.ptolemy.machine import StateMachine
-from epicycle.runner.engine import Simulation
+from epicycle.runner.execution.engine import Simulation
 from tests.actors.feeding import load
 from tests.modes.machines import UNTIL, as_entry, random_machine, sends_of
 from tests.modes.reference import interpret

@@ -8,7 +8,7 @@ import pytest
 
 from epicycle.actors import Actor, InputPort, OutputPort, Parameter, Pending
 from epicycle.ptolemy.changing import Together
-from epicycle.runner.engine import Firing, Simulation, Tracer
+from epicycle.runner.execution.engine import Firing, Simulation, Tracer
 from tests.engine.engine_parts import Repeat, load, sends, simulate
 
 

@@ -12,9 +12,9 @@ from epicycle.actors import Actor
 from epicycle.aspects import Aspect
 from epicycle.ptolemy.dialect import Ptolemy
 from epicycle.runner import Simulation, load_model
-from epicycle.runner.catalogue.reference import describe
-from epicycle.runner.catalogue.types import built_in
-from epicycle.runner.cli import main
+from epicycle.runner.interface.cli import main
+from epicycle.runner.model.catalogue.reference import describe
+from epicycle.runner.model.catalogue.types import built_in
 
 README = (Path(__file__).parents[2] / "ptolemy" / "README.md").read_text(encoding="utf-8")
 TYPES = {each.__name__: each for each in Ptolemy.types()}

@@ -14,7 +14,7 @@ from scipy import stats
 
 import epicycle
 from epicycle.aspects import GilbertElliott, Latency, PacketLoss, PortAspect
-from epicycle.runner.cli import main
+from epicycle.runner.interface.cli import main
 from epicycle.runner.recorded.delays import delay_laws
 from epicycle.runner.recorded.losses import Channel, LossModel, gilbert, log_likelihood, loss_models, run_lengths, runs
 from tests.aspects.bench import Bench

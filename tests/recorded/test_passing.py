@@ -13,7 +13,7 @@ import pytest
 
 import epicycle
 from epicycle.actors import EpicycleError
-from epicycle.runner.cli import main
+from epicycle.runner.interface.cli import main
 from epicycle.runner.recorded.files import McapRecording, opened
 from epicycle.runner.recorded.passing import _names
 

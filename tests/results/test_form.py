@@ -13,8 +13,8 @@ import pytest
 
 from epicycle.actors import Tag
 from epicycle.runner import load_model
-from epicycle.runner.engine import Simulation
-from epicycle.runner.results import EventLog, Record, TokenError
+from epicycle.runner.execution.engine import Simulation
+from epicycle.runner.execution.results import EventLog, Record, TokenError
 from tests.engine.engine_parts import load
 from tests.results.test_log import DIFFERENT, Frozen
 

@@ -25,8 +25,8 @@ import pytest
 
 from epicycle.actors import Tag
 from epicycle.actors.compiled import CORE
-from epicycle.runner.engine import ActorError, LogFilter, Simulation
-from epicycle.runner.results import (
+from epicycle.runner.execution.engine import ActorError, LogFilter, Simulation
+from epicycle.runner.execution.results import (
     EventLog,
     LogError,
     Record,
@@ -289,7 +289,7 @@ def test_order_and_digest() -> None:
 def test_the_digest_does_not_depend_on_the_hash_seed() -> None:
     script = (
         "from tests.results.test_log import MODEL, simulate\n"
-        "from epicycle.runner.engine import canonical\n"
+        "from epicycle.runner.execution.engine import canonical\n"
         "print(simulate(MODEL, seed=3)[1].digest, canonical({'a', 'b', 'c', 'd'}).hex())"
     )
     found = set()

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 
 from epicycle.actors import Tag
-from epicycle.runner.results import Signal
+from epicycle.runner.execution.results import Signal
 
 
 @pytest.mark.parametrize(

@@ -12,8 +12,8 @@ from typing import Any
 import pytest
 
 import epicycle
-from epicycle.runner.build.load import load_model
-from epicycle.runner.build.model import Model
+from epicycle.runner.model.build.load import load_model
+from epicycle.runner.model.build.model import Model
 from epicycle.runner.search.cache import EvaluationCache
 
 PLAIN = """
@@ -40,7 +40,7 @@ SHAPE = [(float,), (int, type(None))]
 
 def model_in(folder: Path, name: str, **changes: Any) -> Model:
     """A model whose types import a neighbour; names of modules are new, as Python keeps those that it knows."""
-    from epicycle.runner.catalogue.types import types_of_file
+    from epicycle.runner.model.catalogue.types import types_of_file
 
     folder.mkdir(exist_ok=True)
     (folder / "m.yaml").write_text(PLAIN)

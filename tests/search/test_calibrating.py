@@ -12,7 +12,7 @@ import pytest
 
 import epicycle
 from epicycle.actors import EpicycleError, random_stream
-from epicycle.runner.cli import main
+from epicycle.runner.interface.cli import main
 
 OSCILLATOR = """
 model: oscillator

@@ -11,10 +11,10 @@ import yaml
 
 import epicycle
 from epicycle.actors import EpicycleError
-from epicycle.runner.build.load import load_model
-from epicycle.runner.cli import main
-from epicycle.runner.engine import Interventions, Simulation
-from epicycle.runner.graph.acts import ActName
+from epicycle.runner.execution.engine import Interventions, Simulation
+from epicycle.runner.interface.cli import main
+from epicycle.runner.model.build.load import load_model
+from epicycle.runner.model.graph.acts import ActName
 from epicycle.runner.search import explaining
 
 # A relay sends what it gets once a second; it must not be silent for longer than two and a half.

@@ -18,7 +18,7 @@ import pytest
 
 import epicycle
 from epicycle.actors import EpicycleError
-from epicycle.runner.cli import main
+from epicycle.runner.interface.cli import main
 from epicycle.runner.search import falsifying
 from epicycle.runner.search import proposals as proposing
 from tests import cases

@@ -10,8 +10,8 @@ import pytest
 
 import epicycle
 from epicycle.actors import EpicycleError
-from epicycle.runner.cli import main
-from epicycle.runner.graph.acts import ActName
+from epicycle.runner.interface.cli import main
+from epicycle.runner.model.graph.acts import ActName
 from epicycle.runner.search.faults import FaultSpace, _by_sum
 
 # A plan comes each second: one that is lost makes the robot's plan 1.9 s old, two in a row 2.9 s.
@@ -51,7 +51,7 @@ def falsify(*arguments: object) -> int:
 def lost(seed: int) -> list[int]:
     """The numbers of the plans that are lost in a run."""
     from epicycle.runner import Simulation, load_model
-    from epicycle.runner.engine import Interventions
+    from epicycle.runner.execution.engine import Interventions
 
     results = Simulation(load_model("stale.yaml"), seed=seed, acts=Interventions()).run()
     return [act.name.token for act in results.acts]

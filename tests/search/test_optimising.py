@@ -14,7 +14,7 @@ import pytest
 
 import epicycle
 from epicycle.actors import EpicycleError
-from epicycle.runner.cli import main
+from epicycle.runner.interface.cli import main
 from tests.study.study_parts import command
 
 pytest.importorskip("cma")

@@ -10,10 +10,10 @@ from typing import NamedTuple
 import pytest
 
 import epicycle
-from epicycle.runner.cli import main
-from epicycle.runner.engine import Interventions, Simulation
-from epicycle.runner.graph.acts import ActName
-from epicycle.runner.results import Results
+from epicycle.runner.execution.engine import Interventions, Simulation
+from epicycle.runner.execution.results import Results
+from epicycle.runner.interface.cli import main
+from epicycle.runner.model.graph.acts import ActName
 
 PLANTED = Path(__file__).parent / "planted"
 RUNS = 300  # within which each fault is found, with any seed of the search

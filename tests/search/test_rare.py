@@ -12,8 +12,8 @@ import pytest
 
 import epicycle
 from epicycle.actors import EpicycleError
-from epicycle.runner.build.model import Model
-from epicycle.runner.cli import main
+from epicycle.runner.interface.cli import main
+from epicycle.runner.model.build.model import Model
 from epicycle.runner.search.splitting import RareEvent, rare
 from tests.engine.engine_parts import load
 

@@ -11,9 +11,9 @@ import pytest
 
 import epicycle
 from epicycle.actors import EpicycleError, Tag, declared_parameters
-from epicycle.runner.catalogue.packaged import packaged_models
-from epicycle.runner.cli import main
-from epicycle.runner.engine import Interventions, Simulation
+from epicycle.runner.execution.engine import Interventions, Simulation
+from epicycle.runner.interface.cli import main
+from epicycle.runner.model.catalogue.packaged import packaged_models
 from epicycle.runner.search.what_if import Changes, forked, tag_of
 
 QUICK = {"mm1": 200.0, "bouncing_modes": 3.0, "switched_network": 0.2}

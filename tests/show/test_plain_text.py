@@ -11,7 +11,7 @@ import yaml
 
 from epicycle.actors import Clock, Parameter
 from epicycle.runner import Model, Results, Simulation
-from epicycle.runner.cli import main
+from epicycle.runner.interface.cli import main
 from epicycle.runner.show import Figure, FigureError, draw, draw_figures
 from epicycle.runner.show.graph import outline, write_graph
 from epicycle.runner.show.pen import style

@@ -17,9 +17,9 @@ import pytest
 
 from epicycle.actors import Tag
 from epicycle.runner import Simulation, load_model
-from epicycle.runner.catalogue.packaged import packaged_models
-from epicycle.runner.engine import Results, Signal, plain
-from epicycle.runner.results import write_signals
+from epicycle.runner.execution.engine import Results, Signal, plain
+from epicycle.runner.execution.results import write_signals
+from epicycle.runner.model.catalogue.packaged import packaged_models
 from tests.demo_models import DURATIONS
 
 

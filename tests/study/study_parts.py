@@ -82,12 +82,12 @@ def write(folder: Path, study: str = STUDY, model: str = MODEL) -> Path:
 
 def command(*arguments: object) -> list[str]:
     """The command line in a process of its own."""
-    return [sys.executable, "-m", "epicycle.runner.cli", *map(str, arguments)]
+    return [sys.executable, "-m", "epicycle.runner.interface.cli", *map(str, arguments)]
 
 
 def plan_of(path: Path, **changes: Any) -> Any:
     """A study that has been tried."""
-    from epicycle.runner.language.study import read_study
+    from epicycle.runner.model.language.study import read_study
     from epicycle.runner.study.plan.plan import Plan
 
     return Plan.made(read_study(path, types=[THIS], **changes))

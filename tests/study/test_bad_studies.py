@@ -15,14 +15,14 @@ import pytest
 from jsonschema import Draft202012Validator
 
 from epicycle.runner import ModelError, load_model
-from epicycle.runner.catalogue.figure import own_figures
-from epicycle.runner.catalogue.types import built_in
-from epicycle.runner.cli import main
-from epicycle.runner.language.schema import json_schema
+from epicycle.runner.interface.cli import main
+from epicycle.runner.model.catalogue.figure import own_figures
+from epicycle.runner.model.catalogue.types import built_in
+from epicycle.runner.model.language.schema import json_schema
+from epicycle.runner.model.text.document import parse, plain
+from epicycle.runner.model.text.problems import Problems
 from epicycle.runner.show.report import check_figures, own_study_figures
 from epicycle.runner.study.judge.study_results import open_study
-from epicycle.runner.text.document import parse, plain
-from epicycle.runner.text.problems import Problems
 from tests import cases
 from tests.cases import Case
 from tests.study.study_parts import STUDY, plan_of, write

@@ -11,7 +11,7 @@ import pytest
 
 from epicycle.actors import EpicycleError
 from epicycle.runner import open_study
-from epicycle.runner.cli import main
+from epicycle.runner.interface.cli import main
 from epicycle.runner.study.run.manifest import manifest_text
 from tests.study.study_parts import write
 

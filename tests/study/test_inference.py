@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from epicycle.runner.student import student_quantile, student_tail
 from epicycle.runner.study.inference import bootstrap_mean, half_width, holm, mean, paired_difference, rate
+from epicycle.runner.support.student import student_quantile, student_tail
 
 RUNS = 3000
 

@@ -10,7 +10,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from epicycle.runner import open_study
-from epicycle.runner.cli import main
+from epicycle.runner.interface.cli import main
 from epicycle.runner.study import session as session_module
 from epicycle.runner.study.plan import plan as plan_module
 from epicycle.runner.study.run.backlog import Backlog

@@ -6,8 +6,8 @@ import math
 import random  # noqa: TID251 (what to try, and not what a model draws)
 from collections.abc import Iterator
 
-from epicycle.runner.temporal import TINY, Line, Piece, Property, Sends, moment
-from epicycle.runner.temporal.property import Junction, Not, Quantified, Until
+from epicycle.runner.model.temporal import TINY, Line, Piece, Property, Sends, moment
+from epicycle.runner.model.temporal.property import Junction, Not, Quantified, Until
 
 Values = list[float | None]  # in the samples, in superdense order
 

@@ -8,8 +8,8 @@ from typing import Any
 
 import pytest
 
-from epicycle.runner.temporal import Finding, Judge, Piece, Property, Sends, leaves, moment
-from epicycle.runner.temporal.property import Junction, Not, Quantified, Until
+from epicycle.runner.model.temporal import Finding, Judge, Piece, Property, Sends, leaves, moment
+from epicycle.runner.model.temporal.property import Junction, Not, Quantified, Until
 from tests.temporal.definition import random_property, random_signal, random_times, robustness, values_of
 
 

@@ -7,8 +7,8 @@ import math
 import pytest
 
 from epicycle.actors import EpicycleError
-from epicycle.runner.temporal import TINY, Condition, PropertyError, Sends, property_of
-from epicycle.runner.temporal.property import Junction, Not, Property, Quantified, Until
+from epicycle.runner.model.temporal import TINY, Condition, PropertyError, Sends, property_of
+from epicycle.runner.model.temporal.property import Junction, Not, Property, Quantified, Until
 
 S = 1_000_000_000
 A, B, C = Sends("a.x"), Sends("b.x"), Sends("c.x")

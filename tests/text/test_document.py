@@ -9,9 +9,9 @@ import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from epicycle.runner.text import document
-from epicycle.runner.text.document import Mapping, Node, Scalar, parse, plain, read
-from epicycle.runner.text.problems import ModelError, Position, Problems
+from epicycle.runner.model.text import document
+from epicycle.runner.model.text.document import Mapping, Node, Scalar, parse, plain, read
+from epicycle.runner.model.text.problems import ModelError, Position, Problems
 
 
 def load(text: str) -> Node:

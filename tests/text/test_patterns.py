@@ -7,7 +7,7 @@ import time
 from hypothesis import given
 from hypothesis import strategies as st
 
-from epicycle.runner.text.patterns import matches
+from epicycle.runner.model.text.patterns import matches
 
 
 def fits(pattern: list[str], path: list[str]) -> bool:

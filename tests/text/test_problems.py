@@ -7,7 +7,7 @@ import pytest
 
 from epicycle.actors import did_you_mean, nearest
 from epicycle.actors.core.errors import EpicycleError
-from epicycle.runner.text.problems import MAX_PROBLEMS, ModelError, Position, Problem, Problems
+from epicycle.runner.model.text.problems import MAX_PROBLEMS, ModelError, Position, Problem, Problems
 
 LINE = "    vehicle: {type: Vehicle, sped: 8 m/s}"
 MISTYPED = Problem(

@@ -10,9 +10,9 @@ from typing import Any, ClassVar
 from epicycle import actors
 from epicycle.actors import Actor, InputPort, OutputPort, Parameter
 from epicycle.aspects import JoinPoint, MeasurementAspect
-from epicycle.runner.catalogue import Dialect
-from epicycle.runner.commands import DONE, command, option, tell
-from epicycle.runner.engine import Activation, Director
+from epicycle.runner.execution.engine import Activation, Director
+from epicycle.runner.interface.commands import DONE, command, option, tell
+from epicycle.runner.model.catalogue import Dialect
 from epicycle.runner.show import Figure
 from epicycle.runner.show.report import StudyFigure
 

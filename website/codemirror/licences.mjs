@@ -10,4 +10,4 @@ for (const [path, about] of Object.entries(packages)) {
   texts.set(text, [...(texts.get(text) ?? []), name]);
 }
 const parts = [...texts].map(([text, names]) => `${names.join(", ")}:\n\n${text}\n`);
-writeFileSync("../../runner/studio/browser/codemirror.LICENSE", `codemirror.js holds\n\n${parts.join(`\n${"-".repeat(78)}\n\n`)}`);
+writeFileSync("../../runner/interface/studio/browser/codemirror.LICENSE", `codemirror.js holds\n\n${parts.join(`\n${"-".repeat(78)}\n\n`)}`);

@@ -14,7 +14,7 @@ from ..pen import new_canvas, save, style, text_width
 from .layout import MARGIN, Point, Words
 
 if TYPE_CHECKING:
-    from ...build.model import Model
+    from ...model.build.model import Model
     from .picture import Painter
 
 INK = "#1a1a1a"

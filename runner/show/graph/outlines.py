@@ -13,10 +13,10 @@ from itertools import accumulate, chain
 from epicycle.actors import InputPort, OutputPort, PortParameter, counted
 from epicycle.aspects import Medium, Processor
 
-from ...build.model import Model
-from ...graph.clock import Clock
-from ...graph.nodes import Edge
-from ...graph.woven import WovenAspect
+from ...model.build.model import Model
+from ...model.graph.clock import Clock
+from ...model.graph.nodes import Edge
+from ...model.graph.woven import WovenAspect
 
 MANY = 60  # boxes that a reader can take in; a larger model is folded by default
 

@@ -16,7 +16,7 @@ import networkx as nx
 
 from epicycle.aspects import Processor
 
-from ...graph.woven import WovenAspect, extent
+from ...model.graph.woven import WovenAspect, extent
 from ..pen import font, new_canvas, save, style, text_width
 from .layout import MARGIN, PILL, PILL_HEIGHT, PORT, Drawing, Line, Pill, PlacedBox, Point, Wire, Words, pill_width
 from .outlines import duration, shared, short_name

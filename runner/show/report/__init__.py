@@ -11,13 +11,13 @@ from typing import Any
 
 from epicycle.actors import EpicycleError, abridged
 
+from ...model.text.problems import ModelError, Problems
+from ...model.text.program import describe, raised_at
 from ...study.judge.claims import ranked
 from ...study.judge.study_results import StudyResults
 from ...study.run.runner import Replay, repeat
 from ...study.run.store import replace_file
 from ...study.session import plan_of_folder
-from ...text.problems import ModelError, Problems
-from ...text.program import describe, raised_at
 from ..outcome import MAX_NAME
 from ..pen import FORMATS, FigureError, style
 from .data import Data

@@ -7,9 +7,7 @@ from collections.abc import Iterable, Sequence
 
 from epicycle.actors import counted
 
-from ...html import Content, Html, note, tag, wide_table
-from ...language.claims import ALWAYS
-from ...shown import rounded
+from ...model.language.claims import ALWAYS
 from ...study.judge.claims import (
     CONFIRMED,
     NOT_REPRODUCED,
@@ -21,6 +19,8 @@ from ...study.judge.claims import (
     ranked,
 )
 from ...study.judge.guideline import Recommendation
+from ...support.html import Content, Html, note, tag, wide_table
+from ...support.shown import rounded
 from .data import Data, Names, estimated, mean_of, shown
 
 

@@ -11,13 +11,13 @@ from typing import Any
 
 from epicycle.actors import abridged, visible
 
-from ...language.dimensions import Factor
-from ...shown import in_words, rounded
+from ...model.language.dimensions import Factor
 from ...study.inference import Estimate
 from ...study.judge.study_results import StudyResults
 from ...study.plan.columns import Column
 from ...study.plan.plan import Plan
 from ...study.run.backlog import OK
+from ...support.shown import in_words, rounded
 
 MAX_LISTED = 12  # levels in a message
 MAX_LABEL, MAX_LEVEL = 80, 40  # letters of a column's name, and of a level

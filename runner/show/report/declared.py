@@ -7,13 +7,13 @@ from contextlib import suppress
 
 from epicycle.actors import Fault, UnitError, variants
 
-from ...build.figures import made_figure, tell_of_figure
-from ...catalogue.types import with_offered
-from ...language.dimensions import in_si, split_number
+from ...model.build.figures import made_figure, tell_of_figure
+from ...model.catalogue.types import with_offered
+from ...model.language.dimensions import in_si, split_number
+from ...model.text.document import Mapping, Node, Sequence, plain
+from ...model.text.faults import place_in
+from ...model.text.problems import Problems
 from ...study.plan.plan import Plan
-from ...text.document import Mapping, Node, Sequence, plain
-from ...text.faults import place_in
-from ...text.problems import Problems
 from . import of_signals  # noqa: F401  whose types are known by that
 from .figure import SignalFigure, StudyFigure
 from .of_table import CURVES, Distributions, Means

@@ -9,9 +9,9 @@ from typing import Any, ClassVar, NamedTuple
 
 from epicycle.actors import Configurable, Fault, MappingParameter, Parameter, counted, did_you_mean
 
-from ...build.model import Model
-from ...language.dimensions import Dimension, Factor
-from ...results import Results
+from ...execution.results import Results
+from ...model.build.model import Model
+from ...model.language.dimensions import Dimension, Factor
 from ...study.plan.plan import Plan
 from ..sheet import DASHES, FEW, MARKERS, MAX_LINES, MAX_PANELS, Sheet, colours
 from .data import MAX_LISTED, Condition, Data, Names, is_numeric, shown

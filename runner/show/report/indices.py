@@ -5,9 +5,9 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 
-from ...html import Content, Html, note, tag, wide_table
-from ...language.sampling import SOBOL
-from ...shown import rounded
+from ...model.language.sampling import SOBOL
+from ...support.html import Content, Html, note, tag, wide_table
+from ...support.shown import rounded
 from .data import Data, shown
 
 _NOTES = {

@@ -24,13 +24,13 @@ from epicycle.actors import (
 )
 from epicycle.actors.expression import PortFormula, PortFormulaParameter
 
-from ...build.figures import figures_of
-from ...build.model import Model
-from ...catalogue.figure import Figure
-from ...results import STOP_TIME, Results
+from ...execution.results import STOP_TIME, Results
+from ...model.build.figures import figures_of
+from ...model.build.model import Model
+from ...model.catalogue.figure import Figure
+from ...model.text.problems import Problems
 from ...study.inference import half_width
 from ...study.plan.plan import Plan
-from ...text.problems import Problems
 from ..pen import FORMATS, draw
 from ..samples import selected
 from ..sheet import colours, set_log, width_of

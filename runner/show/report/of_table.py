@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 from epicycle.actors import EpicycleError, Fault, Parameter, counted, texts_parameter
 
-from ...language.dimensions import Factor
+from ...model.language.dimensions import Factor
 from ...study.inference import Estimate, mean
 from ...study.plan.plan import Plan
 from ..sheet import LIMIT, Sheet, set_log

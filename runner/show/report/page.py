@@ -11,12 +11,12 @@ from typing import Any, NamedTuple
 
 from epicycle.actors import counted
 
-from ...html import Content, Html, note, page, tag, wide_table
-from ...language.dimensions import Factor
+from ...model.language.dimensions import Factor
+from ...model.text.document import plain
 from ...study.inference import mean
 from ...study.judge.claims import REPRODUCED, UNDECIDED, ClaimVerdict
 from ...study.judge.guideline import Recommendation
-from ...text.document import plain
+from ...support.html import Content, Html, note, page, tag, wide_table
 from ..sheet import tips_of
 from .claims import claims, class_of, guideline
 from .data import Condition, Data, estimated, shown

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 from epicycle.actors import Tag, shortened
 
-from ...shown import in_words
+from ...support.shown import in_words
 from .recording import NOTHING, Recording
 
 _WIDEST, _NARROW = 80, 40  # characters of a token, and of one of several

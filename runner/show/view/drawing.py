@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from ...build.model import Model
+from ...model.build.model import Model
 from ..graph import MOST_BOXES, Drawing, Outline, draw, outline
 
 FEW = 8  # instances of an array that are drawn one by one

@@ -16,9 +16,9 @@ from numpy.typing import NDArray
 
 from epicycle.actors import Tag, to_nanoseconds
 
-from ...catalogue.figure import Mark
-from ...results import Results
-from ...shown import short
+from ...execution.results import Results
+from ...model.catalogue.figure import Mark
+from ...support.shown import short
 from ..sheet import LIMIT, PALETTE
 from .recording import NOTHING, Recording
 from .writing import ViewError

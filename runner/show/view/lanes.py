@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ...catalogue.figure import Figure
-from ...results import Results
+from ...execution.results import Results
+from ...model.catalogue.figure import Figure
 from ..samples import read
 
 POINTS = 8_000  # per line; above this, the lowest and highest value in each of half as many parts of the run

@@ -18,8 +18,8 @@ from typing import TYPE_CHECKING, Any
 
 from epicycle.actors import Tag
 
-from ...results import Signal, plain
-from ...shown import finite
+from ...execution.results import Signal, plain
+from ...support.shown import finite
 from .export import Act, Colour, Disc, Point, Scene, Thing, about, acts, extent, firings, parts, results_of, things
 from .recording import Recording
 from .writing import ViewError, replace_file

@@ -14,12 +14,12 @@ import numpy as np
 
 from epicycle.actors import to_nanoseconds
 
-from ...build.model import Model
-from ...catalogue.figure import Figure
-from ...graph.model_graph import ModelGraph
-from ...html import Html, tag
-from ...results import Results, Verdict
-from ...shown import short
+from ...execution.results import Results, Verdict
+from ...model.build.model import Model
+from ...model.catalogue.figure import Figure
+from ...model.graph.model_graph import ModelGraph
+from ...support.html import Html, tag
+from ...support.shown import short
 from ..sheet import PALETTE
 from .differing import comparison, difference, four
 from .drawing import drawn

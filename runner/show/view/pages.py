@@ -11,12 +11,12 @@ from pathlib import Path
 
 from epicycle.actors import EpicycleError
 
-from ...bars import SOON
-from ...build.figures import figures_of
-from ...build.model import Model
-from ...engine import ActorError, Interventions, LoopError
-from ...printing import complain
-from ...text.problems import Problems
+from ...execution.engine import ActorError, Interventions, LoopError
+from ...model.build.figures import figures_of
+from ...model.build.model import Model
+from ...model.text.problems import Problems
+from ...support.bars import SOON
+from ...support.printing import complain
 from ..watching import watched
 from .page import page_of, write_page
 from .recording import Recording

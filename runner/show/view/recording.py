@@ -15,12 +15,12 @@ from typing import Any, NamedTuple
 
 from epicycle.actors import Tag
 
-from ...build.model import Model
-from ...catalogue.figure import Figure
-from ...engine import Firing, Interventions, Simulation, Tracer
-from ...results import Record, Results, canonical, plain
-from ...shown import json_line
-from ...text.patterns import select
+from ...execution.engine import Firing, Interventions, Simulation, Tracer
+from ...execution.results import Record, Results, canonical, plain
+from ...model.build.model import Model
+from ...model.catalogue.figure import Figure
+from ...model.text.patterns import select
+from ...support.shown import json_line
 
 MOST = 1_600_000  # firings that are kept: a page of some 15 MB
 STRETCH = 512  # firings in a row that are kept or left out together

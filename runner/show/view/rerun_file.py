@@ -14,7 +14,7 @@ import numpy as np
 from epicycle.actors import Tag
 from epicycle.aspects import STAMP
 
-from ...results import Signal, cell, leaves
+from ...execution.results import Signal, cell, leaves
 from ..samples import selected
 from .export import Act, Disc, Thing, about, acts, encodable, extent, firings, parts, results_of, things
 from .recording import Recording

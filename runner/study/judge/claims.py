@@ -19,10 +19,10 @@ from typing import Any
 from epicycle.actors import EpicycleError
 from epicycle.actors.expression import Formula
 
-from ...language.claims import ALWAYS, FALLS, GREATER, RISES, Claim, Selection
-from ...language.dimensions import Factor
-from ...language.study_metric import asks_for_none
-from ...shown import finite
+from ...model.language.claims import ALWAYS, FALLS, GREATER, RISES, Claim, Selection
+from ...model.language.dimensions import Factor
+from ...model.language.study_metric import asks_for_none
+from ...support.shown import finite
 from ..inference import LEVEL, bootstrap_mean, holm, paired_difference, rate, without_rounding
 from .samples import Levels, Place, Samples, has_enough
 

@@ -15,9 +15,9 @@ import math
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from ...language.claims import Guideline
-from ...language.dimensions import Factor
-from ...shown import finite
+from ...model.language.claims import Guideline
+from ...model.language.dimensions import Factor
+from ...support.shown import finite
 from ..inference import LEVEL, Estimate, mean, paired_difference, resampled_sums
 from .samples import Levels, Place, Samples, has_enough
 

@@ -8,9 +8,9 @@ from functools import cache, cached_property
 from itertools import product
 from typing import TYPE_CHECKING, TypeAlias
 
-from ...language.claims import Selection
-from ...language.dimensions import Factor
-from ...language.study import Study
+from ...model.language.claims import Selection
+from ...model.language.dimensions import Factor
+from ...model.language.study import Study
 from ..plan.plan import index_of
 from ..run.backlog import OK
 

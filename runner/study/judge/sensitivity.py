@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from functools import cache
 from itertools import product
 
-from ...language.sampling import SOBOL, Design
+from ...model.language.sampling import SOBOL, Design
 from ..inference import LEVEL, Estimate, mean, resampled_sums
 from .samples import Levels, Samples, has_enough
 

@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING, Any
 
 from epicycle.actors import EpicycleError, counted, did_you_mean, read_regular
 
-from ...language.dimensions import Factor
-from ...shown import in_words
-from ...tables import Table, Tabled, pandas_module
+from ...model.language.dimensions import Factor
+from ...support.shown import in_words
+from ...support.tables import Table, Tabled, pandas_module
 from ..inference import LEVEL, holm, mean, paired_difference, with_interval
 from ..plan.plan import Plan
 from ..run.backlog import OK

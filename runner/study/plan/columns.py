@@ -9,14 +9,14 @@ from typing import Any
 from epicycle.actors import EpicycleError, Quantity, declared_parameters, did_you_mean, parse_unit
 from epicycle.actors.expression import operand
 
-from ...build.model import Model
-from ...catalogue.metrics import conversion_fault, unit_before
-from ...engine import Results
-from ...language.dimensions import Dimension, split_number
-from ...language.study_metric import ASPECTS, NUMBERS, SIGNALS, StudyMetric, asks_for_none
-from ...text.patterns import select
-from ...text.problems import Problems
-from ...text.reading import inside
+from ...execution.engine import Results
+from ...model.build.model import Model
+from ...model.catalogue.metrics import conversion_fault, unit_before
+from ...model.language.dimensions import Dimension, split_number
+from ...model.language.study_metric import ASPECTS, NUMBERS, SIGNALS, StudyMetric, asks_for_none
+from ...model.text.patterns import select
+from ...model.text.problems import Problems
+from ...model.text.reading import inside
 
 
 @dataclass(frozen=True)

@@ -15,18 +15,18 @@ from typing import Any, TypedDict
 from epicycle.actors import EpicycleError, did_you_mean
 from epicycle.actors.expression import ExpressionError
 
-from ...build.load import load_model
-from ...build.model import Model
-from ...catalogue.code import code_of
-from ...catalogue.packaged import is_path
-from ...catalogue.types import types_of_file
-from ...language.dimensions import Dimension, Factor, Level
-from ...language.study import RESERVED, Study, study_of_text
-from ...language.study_metric import StudyMetric
-from ...text.document import plain
-from ...text.files import Noted, noting
-from ...text.kinds import OF_STUDY
-from ...text.problems import ModelError, Problems
+from ...model.build.load import load_model
+from ...model.build.model import Model
+from ...model.catalogue.code import code_of
+from ...model.catalogue.packaged import is_path
+from ...model.catalogue.types import types_of_file
+from ...model.language.dimensions import Dimension, Factor, Level
+from ...model.language.study import RESERVED, Study, study_of_text
+from ...model.language.study_metric import StudyMetric
+from ...model.text.document import plain
+from ...model.text.files import Noted, noting
+from ...model.text.kinds import OF_STUDY
+from ...model.text.problems import ModelError, Problems
 from ..provenance import version_of
 from .columns import Column, check_metric, columns_of
 from .seal import has_seal, seal

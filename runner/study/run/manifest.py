@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from epicycle.actors import EpicycleError, read_regular
 
-from ...language.study import MAX_REPLICATIONS, MAX_STUDY_SEED
+from ...model.language.study import MAX_REPLICATIONS, MAX_STUDY_SEED
 
 if TYPE_CHECKING:
     import pyarrow as pa

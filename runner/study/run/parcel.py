@@ -21,9 +21,9 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-from ...catalogue.code import code_of
-from ...text.files import noting
-from ...text.problems import ModelError
+from ...model.catalogue.code import code_of
+from ...model.text.files import noting
+from ...model.text.problems import ModelError
 from ..plan.plan import Plan
 from ..provenance import version_of, versions
 from .backlog import Task

@@ -22,7 +22,7 @@ from typing import Any, BinaryIO, Protocol
 
 from epicycle.actors import EpicycleError
 
-from ...collection import keep_for_good, seldom_collecting
+from ...support.collection import keep_for_good, seldom_collecting
 
 MAX_STILLBORN = 5  # processes in a row that end before they start work
 _LOOK = 0.5  # s between two checks whether a run is still wanted

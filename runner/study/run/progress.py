@@ -7,8 +7,8 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
-from ...bars import bar
-from ...printing import complain
+from ...support.bars import bar
+from ...support.printing import complain
 from .backlog import Backlog
 
 EVERY = 60.0  # s between two lines where there is no bar

@@ -11,8 +11,8 @@ from typing import Any, Protocol
 
 from epicycle.actors import EpicycleError, readable
 
-from ...build.model import Model
-from ...engine import LogFilter, Results, Simulation
+from ...execution.engine import LogFilter, Results, Simulation
+from ...model.build.model import Model
 from ..plan.columns import value_of
 from ..plan.plan import Condition, Plan
 from .backlog import FAILED, OK, Task

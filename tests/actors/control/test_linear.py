@@ -214,7 +214,7 @@ def test_a_plant_without_direct_part_stands_in_a_loop_without_delay() -> None:
 
 
 def test_a_plant_with_a_direct_part_does_not() -> None:
-    from epicycle.runner.text.problems import ModelError
+    from epicycle.runner.model.text.problems import ModelError
 
     with pytest.raises(ModelError, match="loop without delay"):
         Simulation(load(LOOP.replace("PLANT", "TransferFunction, numerator: [1, 0], denominator: [1, 1]")))

@@ -8,7 +8,7 @@ import math
 import pytest
 
 from epicycle.runner import ActorError, Simulation, load_model
-from epicycle.runner.engine import Firing, Tracer
+from epicycle.runner.execution.engine import Firing, Tracer
 from tests.actors.feeding import load
 
 LOOP = """

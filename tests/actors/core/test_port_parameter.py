@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import pytest
 
 from epicycle.actors import Actor, OutputPort, Parameter, ParameterError, PortParameter
-from epicycle.runner.engine import ActorError, Simulation
+from epicycle.runner.execution.engine import ActorError, Simulation
 from tests.engine.engine_parts import load, sends, simulate
 
 

@@ -12,8 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from epicycle.actors import Actor, FaultError, InputPort, Measurement, OutputPort, Vehicle, accepts, shaped, type_name
-from epicycle.runner.catalogue.port_types import read_type, token_types
-from epicycle.runner.catalogue.types import built_in
+from epicycle.runner.model.catalogue.port_types import read_type, token_types
+from epicycle.runner.model.catalogue.types import built_in
 
 SIZES = (1, 2, 3)
 CONCRETE = [shape for length in (0, 1, 2) for shape in product(SIZES, repeat=length)]

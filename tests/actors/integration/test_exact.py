@@ -10,7 +10,7 @@ import pytest
 
 from epicycle.actors.expression.affine import factors_of
 from epicycle.actors.integration import Exact
-from epicycle.runner.engine import ActorError
+from epicycle.runner.execution.engine import ActorError
 from tests.actors.feeding import feed
 
 

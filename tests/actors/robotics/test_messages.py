@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from epicycle.actors import BodyState, Estimate, Measurement, Plan, Pose
-from epicycle.runner.results.encoding import canonical
+from epicycle.runner.execution.results.encoding import canonical
 
 
 def state(**changes: Any) -> BodyState:

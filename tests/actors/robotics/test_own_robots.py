@@ -31,9 +31,9 @@ from epicycle.actors import (
 )
 from epicycle.actors.testing import Harness
 from epicycle.runner import Model, Results, Simulation, load_model
-from epicycle.runner.catalogue.packaged import packaged_models
-from epicycle.runner.catalogue.types import types_of_file
-from epicycle.runner.cli import main
+from epicycle.runner.interface.cli import main
+from epicycle.runner.model.catalogue.packaged import packaged_models
+from epicycle.runner.model.catalogue.types import types_of_file
 
 OWN = Path(__file__).parent / "own"
 OWN_ROBOT = """composites:

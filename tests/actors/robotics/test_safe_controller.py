@@ -9,7 +9,7 @@ import epicycle
 from epicycle.actors import BodyState, Estimate, IntegratedOUEstimator, ReachGoal, SafeController, Vehicle
 from epicycle.actors.robotics.numerics import retreat
 from epicycle.actors.testing import Harness
-from epicycle.runner.cli import main
+from epicycle.runner.interface.cli import main
 
 PERIOD, SPEED, LIMIT = 0.1, 1.5, 8.0  # s; m/s of the target; m/s and m/s^2 of the robot
 LIMITS = SPEED, LIMIT, LIMIT, PERIOD

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from epicycle.actors import BodyState, InertialSensor, ParameterError, RangeBearingSensor, RangeScanner
 from epicycle.actors.testing import Harness
 from epicycle.runner import ActorError
-from epicycle.runner.engine import Simulation
+from epicycle.runner.execution.engine import Simulation
 from tests.actors.feeding import load
 from tests.actors.vehicles.test_motion import pose
 

@@ -8,8 +8,8 @@ from typing import Any
 from epicycle.actors import Actor, InputPort, OutputPort
 from epicycle.aspects import Request
 from epicycle.runner import Simulation
-from epicycle.runner.build.model import Model
-from epicycle.runner.engine import Results
+from epicycle.runner.execution.engine import Results
+from epicycle.runner.model.build.model import Model
 from tests.engine import engine_parts
 
 

@@ -11,8 +11,8 @@ from scipy.stats import binom
 
 from epicycle.actors import random_stream
 from epicycle.aspects import CommunicationAspect, JoinPoint, PortAspect
-from epicycle.runner.build.load import load_model
-from epicycle.runner.engine import ActorError, Results, Simulation
+from epicycle.runner.execution.engine import ActorError, Results, Simulation
+from epicycle.runner.model.build.load import load_model
 from tests.engine.engine_parts import load, seen, sends, simulate
 
 PAIR = """

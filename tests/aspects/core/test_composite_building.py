@@ -8,7 +8,7 @@ import pytest
 
 from epicycle.aspects import PacketLoss
 from epicycle.runner import ModelError, load_composite, load_model
-from epicycle.runner.build.model import Model
+from epicycle.runner.model.build.model import Model
 from tests.aspects.core.composite_parts import CLASSES, PAIR, Negate, acts, load, pair, run, sends
 from tests.engine.engine_parts import Join, Scale, Ticker
 

@@ -10,8 +10,8 @@ import pytest
 from epicycle.actors import Actor, EpicycleError, InputPort, OutputPort, random_stream
 from epicycle.aspects import Bias, Drift, ExecutionTime, Latency, MeasurementFailure, Noise, PacketLoss
 from epicycle.runner import Model, ModelError, Simulation
-from epicycle.runner.cli import main
-from epicycle.runner.engine import Results
+from epicycle.runner.execution.engine import Results
+from epicycle.runner.interface.cli import main
 from tests.engine.engine_parts import Scale, Ticker, load
 
 

@@ -10,7 +10,7 @@ import pytest
 from epicycle.actors import Actor, InputPort, OutputPort, Parameter, array_parameter, random_stream
 from epicycle.aspects import Drift
 from epicycle.runner import ActorError, Model, ModelError, Simulation
-from epicycle.runner.engine import Results
+from epicycle.runner.execution.engine import Results
 from tests.engine.engine_parts import Scale, Ticker, load
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from epicycle.actors import Tag
 from epicycle.runner import Simulation, load_model
-from epicycle.runner.results.log import Record
+from epicycle.runner.execution.results.log import Record
 
 LOSS, BURST = 0.25, 4.0
 BERNOULLI = f"packet_loss=PacketLoss,probability={LOSS}"

@@ -10,7 +10,7 @@ from epicycle.actors import EpicycleError
 from epicycle.actors.expression import ExpressionError, PortFormula
 from epicycle.aspects import Bias, JoinPoint, PacketLoss, PortAspect
 from epicycle.runner import ActorError, ModelError
-from epicycle.runner.engine import Results
+from epicycle.runner.execution.engine import Results
 from tests.engine.engine_parts import load, simulate
 
 PARTS = """

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from epicycle.runner import Model
-from epicycle.runner.engine import Results
+from epicycle.runner.execution.engine import Results
 from tests.engine.engine_parts import sends, simulate
 
 CHAIN = """

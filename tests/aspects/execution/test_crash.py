@@ -12,7 +12,7 @@ from scipy import stats
 
 from epicycle.actors import Actor, InputPort, OutputPort, PortParameter
 from epicycle.runner import ActorError, Simulation
-from epicycle.runner.engine import Results, Tracer
+from epicycle.runner.execution.engine import Results, Tracer
 from tests.engine.engine_parts import Plan, Script, load, sends, simulate
 
 

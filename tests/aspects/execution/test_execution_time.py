@@ -13,7 +13,7 @@ from scipy.stats import kstest
 from epicycle.actors import Actor, EpicycleError, InputPort, OutputPort
 from epicycle.aspects import ExecutionTime
 from epicycle.runner import ActorError, Simulation, load_model
-from epicycle.runner.engine import Results
+from epicycle.runner.execution.engine import Results
 from tests.aspects.execution.execution_parts import CHAIN, acts, chain, sent
 from tests.engine.engine_parts import TYPES, Script, seen, simulate
 

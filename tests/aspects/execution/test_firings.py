@@ -11,7 +11,7 @@ from epicycle.actors import Actor, InputPort, OutputPort, PortParameter
 from epicycle.aspects import CommunicationAspect, ExecutionAspect, Job
 from epicycle.aspects.execution import ActorPoint
 from epicycle.runner import ActorError, Simulation, load_model
-from epicycle.runner.engine import Tracer
+from epicycle.runner.execution.engine import Tracer
 from tests.aspects.execution.execution_parts import CHAIN, acts, chain, sent
 from tests.aspects.strengths import AT_ZERO
 from tests.engine.engine_parts import TYPES, Plan, Script, load, seen, simulate

@@ -12,7 +12,7 @@ from scipy import stats
 from epicycle.actors import PoissonClock, Sequence
 from epicycle.aspects import ExecutionTime, Processor
 from epicycle.runner import Model, ModelError, Simulation
-from epicycle.runner.engine import Results
+from epicycle.runner.execution.engine import Results
 from tests.engine.engine_parts import Scale, Ticker, load, simulate
 
 Task = tuple[int, int]  # period and execution time in ms

@@ -36,8 +36,8 @@ from epicycle.aspects.testing import (
     assert_streams_are_its_own,
 )
 from epicycle.runner import Simulation, Trial, load_model
-from epicycle.runner.catalogue.packaged import packaged_models
-from epicycle.runner.engine import Record
+from epicycle.runner.execution.engine import Record
+from epicycle.runner.model.catalogue.packaged import packaged_models
 from tests.aspects.strengths import AT_WORK, AT_ZERO
 from tests.engine.engine_parts import load
 

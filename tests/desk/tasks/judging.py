@@ -10,7 +10,7 @@ import yaml
 
 import epicycle
 from epicycle.actors import EpicycleError
-from epicycle.runner.engine import Simulation
+from epicycle.runner.execution.engine import Simulation
 
 FOLDER = Path(__file__).parent
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from epicycle.runner.cli import main
+from epicycle.runner.interface.cli import main
 from epicycle.runner.study.run.manifest import manifest_text
 from tests.fuzz.surfaces.case import MODEL, Case, Surface, chosen, spoiled, twisted, write
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from epicycle.runner.cli import main
+from epicycle.runner.interface.cli import main
 from tests.fuzz.surfaces.case import MODEL, Answer, Case, Surface, chosen, write
 
 _TEXTS = (

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from epicycle.runner.cli import main
+from epicycle.runner.interface.cli import main
 from tests.fuzz.surfaces.case import MODEL, Case, Surface, chosen, spoiled, write
 from tests.fuzz.surfaces.expressions import PIECES
 

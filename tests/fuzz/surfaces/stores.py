@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from pyarrow import parquet
 
-from epicycle.runner.cli import main
+from epicycle.runner.interface.cli import main
 from epicycle.runner.study.run.manifest import checksum
 from tests.fuzz.surfaces.case import Answer, Case, Surface, chosen, spoiled
 from tests.fuzz.surfaces.manifests import commands, make_results

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from epicycle.runner.cli import main
+from epicycle.runner.interface.cli import main
 from tests.fuzz.surfaces.case import MODEL, Answer, Case, Surface, chosen, spoiled, twisted, write
 
 _RARE = ("--monitor", "low", "--runs", "10", "--repetitions", "2")

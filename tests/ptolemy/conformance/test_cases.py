@@ -11,8 +11,8 @@ from typing import Any
 
 import pytest
 
-from epicycle.runner.build.load import load_model
-from epicycle.runner.build.model import Model
+from epicycle.runner.model.build.load import load_model
+from epicycle.runner.model.build.model import Model
 from tests.conformance.conformance_parts import TYPES
 from tests.conformance.test_conformance import (
     CASES,

@@ -7,8 +7,8 @@ from typing import Any
 from xml.sax.saxutils import quoteattr
 
 from epicycle.ptolemy.importing import Imported, import_moml
-from epicycle.runner.build.load import load_model
-from epicycle.runner.engine import Simulation
+from epicycle.runner.execution.engine import Simulation
+from epicycle.runner.model.build.load import load_model
 
 HEAD = """<?xml version="1.0" standalone="no"?>
 <!DOCTYPE entity PUBLIC "-//UC Berkeley//DTD MoML 1//EN"

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from epicycle.ptolemy.importing import MomlError, import_moml
-from epicycle.runner.build.load import load_model
+from epicycle.runner.model.build.load import load_model
 from tests.ptolemy.importing.moml_parts import (
     COMPOSITE,
     LIB,

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from epicycle.ptolemy.importing import MomlError, import_moml
-from epicycle.runner.build.load import load_model
+from epicycle.runner.model.build.load import load_model
 from tests.ptolemy.importing.moml_parts import DE, LIB, TEXT, composite, entity, model, port, prop, wires
 from tests.ptolemy.importing.test_modes import around, machine, modal, state, transition
 

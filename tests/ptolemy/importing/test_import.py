@@ -10,8 +10,8 @@ import pytest
 
 from epicycle.actors import Actor, InputPort, OutputPort
 from epicycle.ptolemy.importing import MomlError, import_moml
-from epicycle.runner.build.load import load_model
-from epicycle.runner.cli import main
+from epicycle.runner.interface.cli import main
+from epicycle.runner.model.build.load import load_model
 from tests.ptolemy.importing.moml_parts import (
     COMPOSITE,
     DE,
@@ -281,9 +281,7 @@ def test_a_refused_model_is_not_written(tmp_path: Path, capsys: pytest.CaptureFi
 
 
 def test_help_does_not_load_much() -> None:
-    code = (
-        "import sys; from epicycle.runner.cli import main\ntry:\n main(['import', '--help'])\nexcept SystemExit: pass\n"
-    )
+    code = "import sys; from epicycle.runner.interface.cli import main\ntry:\n main(['import', '--help'])\nexcept SystemExit: pass\n"
     code += "assert 'numpy' not in sys.modules and 'epicycle.ptolemy.importing' not in sys.modules"
     subprocess.run([sys.executable, "-c", code], check=True, stdout=subprocess.DEVNULL)
 

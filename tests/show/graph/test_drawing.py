@@ -9,8 +9,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from epicycle.runner import load_model
-from epicycle.runner.build.model import Model
-from epicycle.runner.catalogue.packaged import packaged_models
+from epicycle.runner.model.build.model import Model
+from epicycle.runner.model.catalogue.packaged import packaged_models
 from epicycle.runner.show.graph import outline
 from epicycle.runner.show.graph.layers import Cell, Net, Pin, Run
 from epicycle.runner.show.graph.layout import draw

@@ -12,10 +12,10 @@ import networkx as nx
 import pytest
 
 from epicycle.runner import load_model
-from epicycle.runner.build.model import Model
-from epicycle.runner.catalogue.packaged import packaged_models
-from epicycle.runner.cli import main
-from epicycle.runner.commands.options import BAD_INPUT
+from epicycle.runner.interface.cli import main
+from epicycle.runner.interface.commands.options import BAD_INPUT
+from epicycle.runner.model.build.model import Model
+from epicycle.runner.model.catalogue.packaged import packaged_models
 from epicycle.runner.show.graph import layers, mermaid, outline, write_graph
 from epicycle.runner.show.graph.layout import draw
 from epicycle.runner.show.graph.outlines import Outline
@@ -274,7 +274,7 @@ flowchart LR
 def epicycle(*arguments: str, cwd: Path, **environment: str) -> subprocess.CompletedProcess[str]:
     """Run the command line in a process of its own."""
     return subprocess.run(
-        [sys.executable, "-m", "epicycle.runner.cli", "graph", *arguments],
+        [sys.executable, "-m", "epicycle.runner.interface.cli", "graph", *arguments],
         capture_output=True,
         text=True,
         cwd=cwd,

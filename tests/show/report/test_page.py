@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from epicycle.runner.cli import main
+from epicycle.runner.interface.cli import main
 
 HOSTILE = "</title></svg><script>document.title='no'</script><img src=x onerror=a()>'\"&"
 LEVEL = "<img src=x onerror=alert(1)>"

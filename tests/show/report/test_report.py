@@ -14,9 +14,10 @@ import numpy as np
 import pytest
 
 from epicycle.runner import Simulation, load_model, open_study
-from epicycle.runner.cli import main
-from epicycle.runner.language.study import read_study
-from epicycle.runner.language.study_metric import StudyMetric
+from epicycle.runner.interface.cli import main
+from epicycle.runner.model.language.study import read_study
+from epicycle.runner.model.language.study_metric import StudyMetric
+from epicycle.runner.model.text.problems import Problems
 from epicycle.runner.show.pen import style
 from epicycle.runner.show.report import figures_of_study
 from epicycle.runner.show.report.data import Data
@@ -29,7 +30,6 @@ from epicycle.runner.study.plan.columns import Column, si_unit
 from epicycle.runner.study.plan.plan import Plan
 from epicycle.runner.study.run.manifest import manifest_text
 from epicycle.runner.study.run.runner import Replay, ReplayError, repeat
-from epicycle.runner.text.problems import Problems
 from tests.study.study_parts import STUDY, THIS, moved, write
 
 QUEUE = """

@@ -9,7 +9,7 @@ import pytest
 
 from epicycle.actors import EpicycleError, Fault
 from epicycle.runner import open_study
-from epicycle.runner.cli import main
+from epicycle.runner.interface.cli import main
 from epicycle.runner.show.pen import style
 from epicycle.runner.show.report.data import Data, Names
 from epicycle.runner.show.report.of_table import Distributions, Means

@@ -9,9 +9,9 @@ from typing import Any
 import pytest
 
 from epicycle.runner import load_model
-from epicycle.runner.build.figures import figures_of
+from epicycle.runner.model.build.figures import figures_of
+from epicycle.runner.model.text.problems import Problems
 from epicycle.runner.show.view import Recording, write_page
-from epicycle.runner.text.problems import Problems
 
 
 class Opened:

@@ -18,15 +18,15 @@ from mcap.reader import make_reader
 
 from epicycle.actors import Actor, InputPort, OutputPort
 from epicycle.runner import load_model
-from epicycle.runner.build.figures import figures_of
-from epicycle.runner.build.model import Model
-from epicycle.runner.catalogue.packaged import packaged_models
-from epicycle.runner.results import Results
+from epicycle.runner.execution.results import Results
+from epicycle.runner.model.build.figures import figures_of
+from epicycle.runner.model.build.model import Model
+from epicycle.runner.model.catalogue.packaged import packaged_models
+from epicycle.runner.model.text.problems import Problems
 from epicycle.runner.show.space import ellipses
 from epicycle.runner.show.view import Recording, ViewError, write_mcap, write_rerun
 from epicycle.runner.show.view.export import TRAIL
 from epicycle.runner.show.view.recording import STRETCH
-from epicycle.runner.text.problems import Problems
 
 from .test_page import SHORT
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from epicycle.runner import load_model
-from epicycle.runner.build.figures import figures_of
-from epicycle.runner.engine import Simulation
+from epicycle.runner.execution.engine import Simulation
+from epicycle.runner.model.build.figures import figures_of
+from epicycle.runner.model.text.problems import Problems
 from epicycle.runner.show.view.lanes import POINTS, lanes, turning_points
-from epicycle.runner.text.problems import Problems
 
 
 def test_what_is_left_of_a_line_keeps_its_extremes() -> None:

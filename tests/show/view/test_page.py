@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from epicycle.runner.catalogue.packaged import packaged_models
+from epicycle.runner.model.catalogue.packaged import packaged_models
 from epicycle.runner.show.view import drawing
 
 from .conftest import Opened, written

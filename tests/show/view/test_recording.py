@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from epicycle.runner import load_model
-from epicycle.runner.build.figures import figures_of
-from epicycle.runner.build.model import Model
-from epicycle.runner.engine import Firing, Simulation, Tracer
+from epicycle.runner.execution.engine import Firing, Simulation, Tracer
+from epicycle.runner.model.build.figures import figures_of
+from epicycle.runner.model.build.model import Model
+from epicycle.runner.model.text.problems import Problems
 from epicycle.runner.show.view import Recording
 from epicycle.runner.show.view.recording import MISSING, NOTHING, STRETCH
-from epicycle.runner.text.problems import Problems
 
 
 def recorded(model: Model, until: float | None = None, **given: Any) -> Recording:

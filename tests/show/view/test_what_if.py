@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from epicycle.runner.cli import main
+from epicycle.runner.interface.cli import main
 
 from .conftest import Opened
 

@@ -15,7 +15,7 @@ import pyarrow as pa
 import pytest
 from scipy import stats
 
-from epicycle.runner.language.study import Study, study_of_text
+from epicycle.runner.model.language.study import Study, study_of_text
 from epicycle.runner.study.judge.claims import (
     ClaimVerdict,
     ContrastTest,

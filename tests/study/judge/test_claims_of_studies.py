@@ -9,9 +9,10 @@ from pathlib import Path
 import pytest
 
 from epicycle.runner import open_study
-from epicycle.runner.catalogue.packaged import packaged_models
-from epicycle.runner.language.claims import Claim
-from epicycle.runner.language.study import read_study
+from epicycle.runner.model.catalogue.packaged import packaged_models
+from epicycle.runner.model.language.claims import Claim
+from epicycle.runner.model.language.study import read_study
+from epicycle.runner.model.text.problems import Position
 from epicycle.runner.show.report.claims import claims
 from epicycle.runner.show.report.data import Data
 from epicycle.runner.study.judge.claims import (
@@ -24,7 +25,6 @@ from epicycle.runner.study.judge.claims import (
 )
 from epicycle.runner.study.plan.plan import Plan
 from epicycle.runner.study.session import run_study
-from epicycle.runner.text.problems import Position
 
 QUEUE = """
 study: queue

@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 import epicycle
-from epicycle.runner.language.sampling import Design
-from epicycle.runner.language.study import Study, study_of_text
+from epicycle.runner.model.language.sampling import Design
+from epicycle.runner.model.language.study import Study, study_of_text
 from epicycle.runner.study.judge.samples import Samples
 from epicycle.runner.study.judge.sensitivity import Index, sensitivity
 from epicycle.runner.study.judge.study_results import open_study

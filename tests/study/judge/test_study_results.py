@@ -12,7 +12,7 @@ from scipy import stats
 
 from epicycle.actors import EpicycleError
 from epicycle.runner import open_study
-from epicycle.runner.cli import main
+from epicycle.runner.interface.cli import main
 from epicycle.runner.study.run.manifest import StoreError
 from epicycle.runner.study.run.store import lock
 from epicycle.runner.study.session import run_study

@@ -8,7 +8,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from epicycle.runner import ModelError, open_study
-from epicycle.runner.cli import main
+from epicycle.runner.interface.cli import main
 from epicycle.runner.study.plan.plan import Plan
 from epicycle.runner.study.run.manifest import read_manifest
 from epicycle.runner.study.session import run_study

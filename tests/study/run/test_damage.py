@@ -14,7 +14,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from epicycle.actors import EpicycleError
-from epicycle.runner.cli import main
+from epicycle.runner.interface.cli import main
 from epicycle.runner.study.judge.study_results import open_study
 from epicycle.runner.study.run.manifest import StoreError, checksum, manifest_text, read_manifest
 from epicycle.runner.study.run.store import Store, lock, prepare

@@ -19,8 +19,8 @@ from types import SimpleNamespace
 import pyarrow.parquet as pq
 import pytest
 
-from epicycle.runner.cli import main
-from epicycle.runner.language.study import read_study
+from epicycle.runner.interface.cli import main
+from epicycle.runner.model.language.study import read_study
 from epicycle.runner.study.judge.study_results import open_study
 from epicycle.runner.study.plan.plan import Plan
 from epicycle.runner.study.run import parcel

@@ -14,7 +14,7 @@ import pytest
 from scipy import stats
 
 from epicycle.runner import Simulation, load_model, open_study
-from epicycle.runner.cli import main
+from epicycle.runner.interface.cli import main
 from epicycle.runner.study.session import run_study
 from tests.study.study_commands import study
 from tests.study.study_parts import STUDY, THIS, plan_of, write

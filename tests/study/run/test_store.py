@@ -11,7 +11,7 @@ import pyarrow.parquet as pq
 import pytest
 
 from epicycle.runner import open_study
-from epicycle.runner.cli import main
+from epicycle.runner.interface.cli import main
 from epicycle.runner.study.run import store as store_module
 from epicycle.runner.study.run.manifest import checksum, manifest_text
 from epicycle.runner.study.run.store import Store, Writer, lock, prepare

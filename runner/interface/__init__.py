@@ -1,0 +1,1 @@
+"""What people, programs and assistants call: Python, the command line, the browser."""

@@ -1,0 +1,36 @@
+"""The model graph as a picture."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from ...support.declare.parameters import option, whole
+
+if TYPE_CHECKING:
+    from ...model.build.model import Model
+    from ...show.pictures import Picture
+
+
+def draw(
+    model: Model | str | Path,
+    *,
+    depth: Annotated[
+        int | None,
+        option(
+            "open composites N levels deep, 0 for none (default: as deep as the drawing stays readable)", "N", whole(0)
+        ),
+    ] = None,
+    expand: Annotated[bool, option("draw every instance of an array, even if they are alike")] = False,
+    machine: Annotated[
+        str | None, option("draw the modes of this machine or composite as a statechart", "PATH")
+    ] = None,
+) -> Picture:
+    """The model graph as a picture: what ``epicycle graph`` draws, with the same options."""
+    from ...show.graph import outline, statechart, write_graph
+    from ...show.pictures import Picture
+    from .running import opened
+
+    made = opened(model, None, None, {}).model
+    drawn = outline(made, depth=depth, expand=expand) if machine is None else statechart(made, machine)
+    return Picture(made.name if machine is None else f"{made.name}: {machine}", lambda path: write_graph(drawn, path))

@@ -1,0 +1,83 @@
+"""The commands that serve editors, and the browser."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+
+from ...support.printing import tell
+from .options import DONE, TYPES, command, option, own_types
+
+_INSTALL = "pip install 'epicycle[studio]'"
+
+
+@command(
+    "serve an editor: problems, completion, descriptions, new names, over standard input and output",
+    TYPES,
+    imports=("model.build",),
+)
+def lsp(options: argparse.Namespace) -> int:
+    """Serve an editor by the Language Server Protocol, over standard input and output.
+
+    docs/editors.md says how to set up VS Code, Neovim, Emacs, Helix and JetBrains' editors. It needs the extra
+    'editor': pip install 'epicycle[editor]'.
+    """
+    from epicycle.actors import EpicycleError
+
+    from ...study.provenance import version_of
+
+    try:
+        from ...desk.server import make_server
+    except ImportError as error:
+        if not str(error.name).startswith(("pygls", "lsprotocol")):
+            raise
+        message = "'epicycle lsp' needs the package pygls, which is not installed: pip install 'epicycle[editor]'"
+        raise EpicycleError(message) from None
+    make_server(version_of("epicycle") or "", tuple(own_types(options))).start_io()
+    return DONE
+
+
+@command(
+    "write a model in the browser: text, graph, and the run of what is written so far",
+    option("model", metavar="MODEL.yaml", type=Path, help="the model's file; a new one is written when you save"),
+    TYPES,
+    option("--port", type=int, default=0, metavar="N", help="port on this machine (default: any that is free)"),
+    option("--seconds", type=float, default=60.0, metavar="S", help="longest time of a run (default: 60)"),
+    option("--events", type=int, default=2_000_000, metavar="N", help="most events of a run (default: 2,000,000)"),
+    option("--no-browser", action="store_true", help="print the address only"),
+    imports=("model.build",),
+)
+def studio(options: argparse.Namespace) -> int:
+    """Write a model in the browser: its text with problems and completion, its graph, and its run.
+
+    The text is the only source: fields, switches and wires write it, and the file is written when you save. The page is
+    served to this machine only, at an address that nobody can guess. It needs the extra 'studio':
+    pip install 'epicycle[studio]'.
+    """
+    import webbrowser
+
+    from epicycle.actors import EpicycleError
+
+    path: Path = options.model
+    if path.suffix != ".yaml":
+        raise EpicycleError(f"{path} is no file of a model: its name ends with .yaml")
+    if not path.resolve().parent.is_dir():
+        raise EpicycleError(f"there is no folder {path.parent}")
+    if options.seconds <= 0 or options.events <= 0:
+        raise EpicycleError("a run has more than 0 seconds and events")
+    own_types(options)  # what is wrong with them is said here
+    try:
+        from ..studio.server import Document, Studio, serve
+    except ImportError as error:
+        if str(error.name).partition(".")[0] not in ("starlette", "uvicorn", "websockets", "anyio"):
+            raise
+        message = f"'epicycle studio' needs the package {error.name}, which is not installed: {_INSTALL}"
+        raise EpicycleError(message) from None
+
+    def opened(address: str) -> None:
+        tell(f"{path} is open at {address}\nCtrl-C ends it")
+        if not options.no_browser:
+            webbrowser.open(address)
+
+    serve(Studio(Document(path), options.seconds, options.events, getattr(options, "types", ())), options.port, opened)
+    return DONE

@@ -1,0 +1,271 @@
+"""Serves the page of one model to one browser on this machine: a page, its programs, and a socket.
+
+Whoever knows the address may write the model's file and make runs, so the address holds a secret; and requests that a
+page of somebody else could make a browser send are refused: ``Host`` and ``Origin`` must be those of the address.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import hmac
+import json
+import secrets
+from collections.abc import Awaitable, Callable, MutableMapping, Sequence
+from contextlib import suppress
+from html import escape
+from importlib.resources import files
+from pathlib import Path
+from typing import Any
+
+from starlette.applications import Starlette
+from starlette.requests import Request
+from starlette.responses import PlainTextResponse, Response
+from starlette.routing import Route, WebSocketRoute
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from epicycle.actors import EpicycleError, read_regular
+
+from ...model.text.document import MAX_BYTES
+from ...show.view import PARTS, part, replace_file, script
+from .workers import Workers
+
+OWN = ("socket", "text", "wiring", "fields", "running", "arrange")  # in this order
+LONGEST = 2 * MAX_BYTES + 100_000  # bytes of a message, in which a character may take several
+READING, GRACE = 30.0, 10.0  # s that reading a text may take, and that a run may take beyond its limit
+OF_READING = frozenset({"read", "complete", "hover", "colours", "types", "fields", "edit"})
+
+Message = dict[str, Any]
+Scope = MutableMapping[str, Any]
+App = Callable[[Scope, Callable[..., Awaitable[Any]], Callable[..., Awaitable[None]]], Awaitable[None]]
+
+
+class Document:
+    """The file of a model: nothing else is ever written."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path.resolve()
+        self.data = b""
+        if self.path.exists():
+            self.data = read_regular(self.path)
+        if len(self.data) > MAX_BYTES:
+            raise EpicycleError(f"{path} is larger than {MAX_BYTES // 1_000_000} MB")
+        try:
+            text = self.data.decode("utf-8")
+        except UnicodeDecodeError as error:
+            raise EpicycleError(f"{path} is not UTF-8 text: save it as UTF-8") from error
+        # Browsers end lines with LF; where all others do it in another way, they get that back.
+        self.has_crlf = "\r\n" in text and text.count("\r\n") == text.count("\n") == text.count("\r")
+        self.text = text.replace("\r\n", "\n") if self.has_crlf else text
+
+    def save(self, text: str, *, anyway: bool) -> Message:
+        """Write the text, unless somebody else has written the file."""
+        on_disk = read_regular(self.path) if self.path.exists() else b""
+        if on_disk != self.data and not anyway:
+            return {"conflict": f"{self.path.name} was changed by another program since it was read"}
+        data = (text.replace("\n", "\r\n") if self.has_crlf else text).encode("utf-8")
+        replace_file(self.path, data)
+        self.data = data
+        return {"saved": True}
+
+
+class Studio:
+    """One model, its workers, and the browser that is connected."""
+
+    def __init__(self, document: Document, seconds: float, events: int, types: Sequence[Path]) -> None:
+        self.document = document
+        given = [str(document.path), str(seconds), str(events), *map(str, types)]
+        self.reader = Workers("reading of the text", given, READING)
+        self.runner = Workers("run", given, seconds + GRACE)
+        self.token = secrets.token_urlsafe(32)
+        self.nonce = secrets.token_urlsafe(16)
+        self.hosts: frozenset[str] = frozenset()
+        self._browser: WebSocket | None = None
+
+    def address(self, port: int) -> str:
+        """The address for the browser; only this one is answered."""
+        self.hosts = frozenset({f"127.0.0.1:{port}", f"localhost:{port}"})
+        return f"http://127.0.0.1:{port}/{self.token}/"
+
+    def app(self) -> App:
+        routes = [
+            Route("/{token}/", self.page),
+            Route("/{token}/{name}", self.file),
+            WebSocketRoute("/{token}/socket", self.socket),
+        ]
+        return self.guarded(Starlette(routes=routes))
+
+    def guarded(self, app: Starlette) -> App:
+        """The application, for requests that come from its own page or from the address line only."""
+
+        async def guard(scope: Scope, receive: Any, send: Any) -> None:
+            if scope["type"] in ("http", "websocket") and not self.is_welcome(scope):
+                if scope["type"] == "websocket":
+                    await send({"type": "websocket.close", "code": 1008})
+                else:
+                    await PlainTextResponse("Not found", 404)(scope, receive, send)
+                return
+            await app(scope, receive, send)
+
+        return guard
+
+    def is_welcome(self, scope: Scope) -> bool:
+        """Whether a request has the secret, and comes from where it must."""
+        headers: dict[str, list[str]] = {}
+        for name, value in scope["headers"]:
+            headers.setdefault(name.decode("latin-1"), []).append(value.decode("latin-1"))
+        token = scope["path"].split("/")[1].encode()
+        hosts, origins = headers.get("host", []), headers.get("origin", [])
+        if not hmac.compare_digest(token, self.token.encode()) or len(hosts) != 1 or hosts[0] not in self.hosts:
+            return False
+        if origins != [f"http://{hosts[0]}"] and (origins or scope["type"] == "websocket"):
+            return False
+        return headers.get("sec-fetch-site", ["none"])[0] in ("none", "same-origin")
+
+    # -- the page -------------------------------------------------------------------------------------------------
+
+    async def page(self, request: Request) -> Response:
+        host = request.headers["host"]
+        policy = (
+            f"default-src 'none'; script-src 'self'; style-src 'self' 'nonce-{self.nonce}'; img-src data:; "
+            f"connect-src ws://{host}; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
+        )
+        name = escape(self.document.path.name)
+        html = (
+            '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
+            '<meta name="viewport" content="width=device-width, initial-scale=1">'
+            f'<title>{name} - Epicycle studio</title><link rel="stylesheet" href="studio.css">'
+            '<script src="codemirror.js" defer></script><script src="studio.js" defer></script></head>'
+            f'<body><div id="page" data-nonce="{self.nonce}"><noscript>The studio needs JavaScript.</noscript></div>'
+            "</body></html>\n"
+        )
+        return _response(html, "text/html", {"Content-Security-Policy": policy, "X-Frame-Options": "DENY"})
+
+    async def file(self, request: Request) -> Response:
+        name = request.path_params["name"]
+        own = files(__package__) / "browser"
+        if name == "codemirror.js":
+            return _response((own / name).read_text(encoding="utf-8"), "text/javascript")
+        if name == "studio.js":
+            parts = [part(f"{each}.js") for each in PARTS]
+            parts += [(own / f"{each}.js").read_text(encoding="utf-8") for each in OWN]
+            return _response(script(parts), "text/javascript")
+        if name == "studio.css":
+            return _response(part("page.css") + (own / "studio.css").read_text(encoding="utf-8"), "text/css")
+        return PlainTextResponse("Not found", 404)
+
+    # -- the socket -----------------------------------------------------------------------------------------------
+
+    async def socket(self, browser: WebSocket) -> None:
+        """Questions of the page, each answered when its answer is there."""
+        await browser.accept()
+        before, self._browser = self._browser, browser
+        if before is not None:
+            await _close(before, "another tab has opened this model")
+        document = self.document
+        hello = {"text": document.text, "name": document.path.name, "is_new": not document.path.exists()}
+        await browser.send_text(json.dumps({"hello": hello}))
+        tasks = set[asyncio.Task[None]]()
+        try:
+            while True:
+                message = json.loads(await browser.receive_text())
+                if not isinstance(message, dict) or not isinstance(message.get("id"), int):
+                    raise ValueError("not a question")
+                task = asyncio.create_task(self.answer(browser, message))
+                tasks.add(task)
+                task.add_done_callback(tasks.discard)
+        except WebSocketDisconnect:
+            pass
+        except (ValueError, KeyError, RecursionError):
+            await _close(browser, "this was not a question")
+        finally:
+            for task in tasks:
+                task.cancel()
+            if self._browser is browser:
+                self._browser = None
+
+    async def answer(self, browser: WebSocket, message: Message) -> None:
+        number, ask = message["id"], message.get("ask")
+        loop = asyncio.get_running_loop()
+        sending = set[asyncio.Task[None]]()
+
+        def tell(said: Message) -> None:
+            task = loop.create_task(_send(browser, {"id": number, **said}))
+            sending.add(task)
+            task.add_done_callback(sending.discard)
+
+        if ask == "save":
+            found = self.save(message)
+        elif ask in OF_READING:
+            found = await self.reader.ask(message, tell)
+        elif ask == "run":
+            found = await self.runner.ask(message, tell)
+        else:
+            found = {"error": "there is no such question"}
+        await asyncio.gather(*sending)
+        await _send(browser, {**found, "id": number, "done": True})
+
+    def save(self, message: Message) -> Message:
+        text = message.get("text")
+        if not isinstance(text, str) or len(text) > MAX_BYTES:
+            return {"error": f"a text has at most {MAX_BYTES // 1_000_000} MB"}
+        try:
+            return self.document.save(text, anyway=message.get("anyway") is True)
+        except (EpicycleError, OSError, UnicodeEncodeError) as error:
+            return {"error": str(error)}
+
+    def close(self) -> None:
+        self.reader.stop()
+        self.runner.stop()
+
+
+def _response(text: str, kind: str, more: dict[str, str] | None = None) -> Response:
+    headers = {
+        "Cache-Control": "no-store",
+        "Cross-Origin-Opener-Policy": "same-origin",
+        "Cross-Origin-Resource-Policy": "same-origin",
+        "Referrer-Policy": "no-referrer",
+        "X-Content-Type-Options": "nosniff",
+    }
+    return Response(text, media_type=kind, headers=headers | (more or {}))
+
+
+async def _send(browser: WebSocket, said: Message) -> None:
+    with suppress(RuntimeError, WebSocketDisconnect):  # it has gone
+        await browser.send_text(json.dumps(said))
+
+
+async def _close(browser: WebSocket, reason: str) -> None:
+    with suppress(RuntimeError, WebSocketDisconnect):
+        await browser.close(1000, reason)
+
+
+def serve(studio: Studio, port: int, opened: Callable[[str], None]) -> None:
+    """Serve until Ctrl-C, at a port (0: any) of this machine only; ``opened`` is called with the address."""
+    import socket
+
+    import uvicorn
+
+    listening = socket.socket()
+    listening.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    try:
+        listening.bind(("127.0.0.1", port))
+    except OSError as error:
+        raise EpicycleError(f"port {port} cannot be used: {error.strerror or error}") from error
+    address = studio.address(listening.getsockname()[1])
+    config = uvicorn.Config(
+        studio.app(),
+        log_level="error",
+        access_log=False,
+        ws_max_size=LONGEST,
+        ws_max_queue=64,
+        limit_concurrency=32,
+        server_header=False,
+        timeout_graceful_shutdown=1,
+        lifespan="off",
+    )
+    server = uvicorn.Server(config)
+    opened(address)
+    try:
+        server.run(sockets=[listening])
+    finally:
+        studio.close()

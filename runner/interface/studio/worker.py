@@ -1,0 +1,350 @@
+"""A process that answers questions about a text, and makes runs: one JSON object per line comes in, and goes out.
+
+``python -m epicycle.runner.interface.studio.worker MODEL.yaml SECONDS EVENTS [FILE.py ...]``.  Places in the text are offsets, in
+UTF-16, as browsers count them.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import queue
+import re
+import sys
+import threading
+import time
+from collections.abc import Callable, Mapping
+from contextlib import suppress
+from pathlib import Path
+from typing import Any, TextIO
+
+from epicycle.actors import EpicycleError
+
+from ...desk import (
+    EditError,
+    Knowledge,
+    RenameError,
+    Session,
+    apply,
+    complete,
+    controls,
+    editing,
+    fix,
+    hover,
+    rename,
+    splices,
+)
+from ...execution.engine import ActorError, LoopError
+from ...model.build.figures import figures_of
+from ...model.text.document import MAX_BYTES
+from ...model.text.problems import Position, Problems
+from ...show.view import Recording, data_of, drawn
+from ...support.collection import seldom_collecting
+from ...support.shown import in_words
+from ..calls.changes import classes
+
+MEMORY = 4 << 30  # bytes that a worker may take
+MOST = 100_000  # firings that a run shows
+BEAT = 0.2  # s between two messages of a run
+_BREAKS = re.compile("\r\n|[\n\r\x85\u2028\u2029]")
+
+Message = dict[str, Any]
+
+
+class StaleError(Exception):
+    """A newer question waits."""
+
+
+class Offsets:
+    """Places of a text: our lines and columns, characters, and UTF-16 as browsers count."""
+
+    def __init__(self, text: str) -> None:
+        self.text = text
+        self._starts = [0, *(found.end() for found in _BREAKS.finditer(text))]
+        self._is_simple = text.isascii() or max(text) <= "\uffff"
+
+    def there(self, offset: int) -> int:
+        return offset if self._is_simple else len(self.text[:offset].encode("utf-16-le", "surrogatepass")) // 2
+
+    def here(self, units: int) -> int:
+        if self._is_simple:
+            return min(max(units, 0), len(self.text))
+        return len(self.text.encode("utf-16-le", "surrogatepass")[: 2 * units].decode("utf-16-le", "ignore"))
+
+    def of(self, line: int, column: int) -> int:
+        """The browser's offset for a line and column from 0."""
+        return self.there(min(self._starts[min(line, len(self._starts) - 1)] + column, len(self.text)))
+
+    def place(self, units: int) -> tuple[int, int]:
+        """Line and column, from 0."""
+        offset = self.here(units)
+        line = sum(1 for _ in _BREAKS.finditer(self.text, 0, offset))
+        return line, offset - self._starts[line]
+
+
+class Worker:
+    """Everything that a process knows: the text under work, and the limits of runs."""
+
+    def __init__(self, path: Path, seconds: float, events: int, types: tuple[type, ...], say: Callable[..., None]):
+        self.path = path
+        self.seconds = seconds
+        self.events = events
+        self.session = Session(types)
+        self.say = say
+        self.waiting: queue.Queue[Message | None] = queue.Queue()
+
+    def answer(self, asked: Message) -> Message:
+        """The answer to a question; what is wrong with it is said in words."""
+        try:
+            text = asked["text"]
+            if not isinstance(text, str) or len(text) > MAX_BYTES:
+                raise EpicycleError(f"a text has at most {MAX_BYTES // 1_000_000} MB")
+            if self.session.texts.get(self.path) != text:
+                self.session.change(self.path, text)
+            act = ASKED.get(str(asked["ask"]))
+            if act is None:
+                raise EpicycleError("there is no such question")
+            return act(self, asked)
+        except StaleError:
+            return {"stale": True}
+        except (EpicycleError, RenameError) as error:
+            return {"error": str(error)}
+        except (KeyError, TypeError, ValueError, AttributeError, IndexError) as error:
+            return {"error": f"this question cannot be read ({type(error).__name__})"}
+        except MemoryError:
+            return {"error": "there is not enough memory"}
+
+    @property
+    def text(self) -> str:
+        return self.session.texts[self.path]
+
+    @property
+    def knowledge(self) -> Knowledge:
+        return self.session.knowledge(self.path)
+
+    # -- the text -------------------------------------------------------------------------------------------------
+
+    def read(self, asked: Message) -> Message:
+        """Problems at once, then the graph of what is valid so far, and what can be set."""
+        knowledge = self.knowledge
+        reading, at = knowledge.reading, Offsets(self.text)
+        self.say({"problems": [self._problem(each, at) for each in reading.problems], "valid": reading.is_valid})
+        reading = controls.so_far(reading, self.session.texts)
+        model, known = reading.loading.model, knowledge if reading is knowledge.reading else Knowledge(reading)
+        if model is None:
+            return {"graph": None, "parameters": [], "aspects": []}
+        return {
+            "graph": drawn(model),
+            "name": model.name,
+            "endless": bool(model.endless) and reading.is_valid,
+            "parameters": controls.parameters(known),
+            "aspects": list(controls.aspects(known)),
+        }
+
+    def _problem(self, problem: Any, at: Offsets) -> Message:
+        position: Position | None = problem.position
+        found = {
+            "code": problem.kind.code,
+            "severity": problem.severity,
+            "message": problem.message,
+            "help": list(problem.help),
+            "from": 0,
+            "to": 0,
+        }
+        if position is None or position.file != self.knowledge.file:
+            return found | {"where": "" if position is None else str(position)}
+        line, column = position.line - 1, position.column - 1
+        found |= {"from": at.of(line, column), "to": at.of(line, column + position.length), "line": position.line}
+        if (edit := fix(self.knowledge, problem)) is not None and edit.path.resolve() == self.path:
+            new = {"from": at.of(edit.line, edit.start), "to": at.of(edit.line, edit.end), "text": edit.text}
+            found["fix"] = new
+        return found
+
+    def complete(self, asked: Message) -> Message:
+        at = Offsets(self.text)
+        line, column = at.place(int(asked["at"]))
+        found = complete(self.path, line, column, self.session.texts, self.session.types)
+        return {
+            "options": [
+                {"text": e.text, "kind": e.kind, "what": e.what, "doc": e.doc, "from": at.of(line, column - e.replaces)}
+                for e in found[:500]
+            ]
+        }
+
+    def hover(self, asked: Message) -> Message:
+        return {"words": hover(self.knowledge, *Offsets(self.text).place(int(asked["at"])))}
+
+    def colours(self, asked: Message) -> Message:
+        """The names in the text, with what they are."""
+        at, found = Offsets(self.text), []
+        for use in self.knowledge.names.uses:
+            if use.position.file == self.knowledge.file:
+                start = at.of(use.position.line - 1, use.position.column - 1)
+                found.append([start, start + use.position.length, sorted(each.kind for each in use.names)[0]])
+        return {"colours": found}
+
+    def types(self, asked: Message) -> Message:
+        return {"types": controls.types(self.knowledge)}
+
+    def fields(self, asked: Message) -> Message:
+        """The parameters of an actor in the graph, or of an aspect."""
+        path = str(asked["path"])
+        scope, _, name = path.rpartition(".")
+        graph = self.knowledge.graph
+        if scope and (graph is None or scope not in graph.components):
+            raise EditError(f"there is no {path}")
+        owner = graph.components[scope].kind if graph is not None and scope else ""
+        name = name.partition("[")[0]
+        return {"owner": owner, "name": name, "fields": controls.fields(self.knowledge, owner, "actors", name)}
+
+    def edit(self, asked: Message) -> Message:
+        """A change of the model: the changes of the text that make it."""
+        what, given = str(asked["what"]), asked["given"]
+        if not isinstance(given, list) or not all(isinstance(each, (str, bool, dict)) for each in given):
+            raise EditError("this change cannot be read")
+        before = self.text
+        match what:
+            case "connect" | "disconnect":
+                after = getattr(editing, what)(before, *controls.local_ends(self.knowledge, *map(str, given)))
+            case "swap":
+                after = editing.swap(before, self.knowledge, "", str(given[0]), str(given[1]))
+            case "rename":
+                at = Offsets(before).place(int(asked["at"]))
+                edits = rename(self.knowledge, *at, str(given[0]), self.session.texts)
+                if {each.path.resolve() for each in edits} != {self.path}:
+                    raise EditError("this name stands in other files, too: rename it in an editor (epicycle lsp)")
+                after = apply(before, edits)
+            case "add_part" | "attach" | "remove" | "set_parameter" | "switch" | "drop_in":
+                after = getattr(editing, what)(before, *given)
+            case _:
+                raise EditError("there is no such change")
+        at_ = Offsets(before)
+        return {
+            "splices": [
+                {"from": at_.there(each.start), "to": at_.there(each.end), "text": each.text}
+                for each in splices(before, after)
+            ]
+        }
+
+    # -- runs -----------------------------------------------------------------------------------------------------
+
+    def run(self, asked: Message) -> Message:
+        """Run the model, if it is valid, within the limits; metrics are sent on the way."""
+        reading = self.knowledge.reading
+        model = reading.loading.model
+        if not reading.is_valid or model is None:
+            return {"error": "the model is not valid"}
+        problems = Problems()
+        recording = Recording(model, figures_of(model, problems), most=MOST)
+        problems.raise_if_any()
+        started = last = time.monotonic()
+        ended = error = ""
+
+        def progress(now: float) -> None:
+            nonlocal last, ended
+            if not self.waiting.empty():
+                raise StaleError
+            moment = time.monotonic()
+            if moment - started > self.seconds:
+                ended = f"ended after {self.seconds:g} s: a run in the studio takes no longer (--seconds)"
+            elif recording.records > self.events:
+                ended = f"ended after {self.events:,} events: a run in the studio has no more (--events)"
+            if ended:
+                raise KeyboardInterrupt
+            if moment - last > BEAT:
+                last = moment
+                share = None if model.stop is None else now / model.stop
+                self.say({"share": share, "metrics": _metrics(recording), "records": recording.records})
+
+        try:
+            recording.run(progress=progress)
+        except KeyboardInterrupt:
+            pass
+        except (ActorError, LoopError) as failure:
+            error = str(failure)
+        results = recording.results
+        assert results is not None
+        return {
+            "digest": results.digest,
+            "metrics": _metrics(recording),
+            "monitors": [
+                [name, each.holds and not each.missing, each.missing or each.remark or ("" if each.holds else "broken")]
+                for name, each in results.monitors.items()
+            ],
+            "records": recording.records,
+            "seconds": time.monotonic() - started,
+            "stopped": results.stopped,
+            "failed": error,
+            "ended": ended,
+            "view": data_of([recording]),
+        }
+
+
+def _metrics(recording: Recording) -> list[list[Any]]:
+    """Metrics as they are now: name, value in words, unit, what it is, and the number."""
+    results = recording.results or recording.so_far()
+    found: list[list[Any]] = []
+    for each in recording.model.output.metrics:
+        outcome = results.outcomes[each.name]
+        value = outcome.value
+        words = outcome.shown(lambda number: in_words(number, digits=4, nothing="–"))
+        number = float(value) if isinstance(value, (int, float)) and abs(value) < 1e300 else None
+        found.append([each.name, words, "" if each.unit == "1" else each.unit, each.measure.doc, number])
+    return found
+
+
+ASKED: Mapping[str, Callable[[Worker, Message], Message]] = {
+    "read": Worker.read,
+    "complete": Worker.complete,
+    "hover": Worker.hover,
+    "colours": Worker.colours,
+    "types": Worker.types,
+    "fields": Worker.fields,
+    "edit": Worker.edit,
+    "run": Worker.run,
+}
+
+
+def _limit() -> None:
+    """Take no more memory than a model needs; what is too large fails here, not on the whole machine."""
+    with suppress(ImportError, OSError, ValueError):
+        import resource
+
+        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+        resource.setrlimit(resource.RLIMIT_DATA, (MEMORY, MEMORY))
+
+
+def _listen(stream: TextIO, worker: Worker) -> None:
+    """Take questions while one is answered, so that a run can notice that it is stale."""
+    for line in stream:
+        worker.waiting.put(json.loads(line))
+    worker.waiting.put(None)
+
+
+def main(arguments: list[str]) -> None:
+    path, seconds, events, *files = arguments
+    # What actors print is not ours.
+    out = os.fdopen(os.dup(1), "w", encoding="utf-8", errors="backslashreplace")
+    os.dup2(2, 1)
+    current: Message = {}
+
+    def say(message: Message) -> None:
+        try:
+            out.write(json.dumps({"id": current.get("id"), **message}, allow_nan=False) + "\n")
+            out.flush()
+        except BrokenPipeError:  # the studio has ended
+            os._exit(0)
+
+    _limit()
+    worker = Worker(Path(path).resolve(), float(seconds), int(events), tuple(classes(files)), say)
+    threading.Thread(target=_listen, args=(sys.stdin, worker), daemon=True).start()
+    with seldom_collecting():
+        while (asked := worker.waiting.get()) is not None:
+            if asked["ask"] == "stop":  # only a run in progress heeds it
+                continue
+            current = asked
+            say({**worker.answer(asked), "done": True})
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

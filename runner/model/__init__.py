@@ -1,0 +1,1 @@
+"""How a text, or calls of a program, become a model."""

@@ -1,2 +1,0 @@
-from epicycle.runner.results.log cimport EventLog, Writer
-from epicycle.runner.results.record cimport Samples

@@ -1,0 +1,1 @@
+"""What every room uses: text and HTML for people, statistics, interrupts, declared parameters."""

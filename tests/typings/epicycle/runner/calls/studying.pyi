@@ -1,1 +1,0 @@
-from runner.calls.studying import *

@@ -1,1 +1,0 @@
-from runner.calls.what_if import *

@@ -1,0 +1,1 @@
+from runner.interface.calls.studying import *
