@@ -85,7 +85,8 @@ def test_a_model_that_may_end_is_not_warned_of(
 def test_an_interrupt_ends_a_run_without_an_end(ending: str, folder: Path) -> None:
     """What was recorded and logged before is complete."""
     process = subprocess.Popen(
-        [sys.executable, "-m", "epicycle.runner.interface.cli", "run", "tick.yaml", "--out", "out", "--log", f"log.{ending}"],
+        [sys.executable, "-m", "epicycle.runner.interface.cli",
+         "run", "tick.yaml", "--out", "out", "--log", f"log.{ending}"],
         stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
     )  # fmt: skip
     log, start = folder / f"log.{ending}", time.monotonic()

@@ -1,7 +1,7 @@
 """A process that answers questions about a text, and makes runs: one JSON object per line comes in, and goes out.
 
-``python -m epicycle.runner.interface.studio.worker MODEL.yaml SECONDS EVENTS [FILE.py ...]``.  Places in the text are offsets, in
-UTF-16, as browsers count them.
+``python -m epicycle.runner.interface.studio.worker MODEL.yaml SECONDS EVENTS [FILE.py ...]``.  Places in the text are
+offsets, in UTF-16, as browsers count them.
 """
 
 from __future__ import annotations

@@ -27,7 +27,7 @@ class Dialect:
 
     @classmethod
     def director(cls) -> Any:
-        """The subclass of ``epicycle.runner.execution.engine.Director`` that fires a model in which the dialect is used.
+        """The subclass of ``epicycle.runner.execution.engine.Director`` that fires a model of the dialect.
 
         None is the usual one.
         """

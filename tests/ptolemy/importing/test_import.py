@@ -281,7 +281,8 @@ def test_a_refused_model_is_not_written(tmp_path: Path, capsys: pytest.CaptureFi
 
 
 def test_help_does_not_load_much() -> None:
-    code = "import sys; from epicycle.runner.interface.cli import main\ntry:\n main(['import', '--help'])\nexcept SystemExit: pass\n"
+    code = "import sys; from epicycle.runner.interface.cli import main\n"
+    code += "try:\n main(['import', '--help'])\nexcept SystemExit: pass\n"
     code += "assert 'numpy' not in sys.modules and 'epicycle.ptolemy.importing' not in sys.modules"
     subprocess.run([sys.executable, "-c", code], check=True, stdout=subprocess.DEVNULL)
 
