@@ -10,11 +10,12 @@ from pathlib import Path
 from .judge.study_results import StudyResults
 from .plan.plan import Plan
 from .run.backlog import Backlog, Task
+from .run.locking import lock
 from .run.making import Recorder, make_in, recording
 from .run.manifest import manifest_text
 from .run.processes import Processes
 from .run.runner import Runner
-from .run.store import BEST_FIRST, Row, lock, prepare, replace_file
+from .run.store import BEST_FIRST, Row, prepare, replace_file
 from .session import manifest_of
 
 

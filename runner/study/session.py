@@ -17,10 +17,12 @@ from .judge.study_results import StudyResults
 from .plan.plan import Plan, epicycle_version
 from .provenance import git_revision, machine, versions
 from .run.backlog import RETRIED, Backlog
+from .run.locking import lock
 from .run.making import Recorder, make_here, recording
 from .run.manifest import FORMAT, StoreError, read_manifest
 from .run.progress import duration
-from .run.store import lock, prepare
+from .run.share import ALL, Share
+from .run.store import merge, prepare
 
 LOCAL, DASK = "local", "dask"  # executors
 MANY = 100_000  # runs; larger studies need confirmation
@@ -39,7 +41,7 @@ class Outcome:
     there: int
     failed: int  # new and existing
     stopped_early: int
-    table: Path
+    table: Path | None  # none for a share of the runs: the folder may lack those of others
 
 
 def run_study(
@@ -52,23 +54,30 @@ def run_study(
     tell: Callable[[Backlog], None] | None = None,
     executor: str = LOCAL,
     scheduler: str | None = None,
+    share: Share = ALL,
+    others: Iterable[Path] = (),
 ) -> Outcome:
     """Make all runs of a plan that are not yet in the folder, in ``jobs`` processes at a time (default: one per core).
 
     A run that raises gets a row with the status ``failed``, one that takes longer than ``timeout`` seconds a row
     ``timeout``.  One whose process dies is repeated, and after three attempts gets a row ``killed``; ``retry`` repeats
     both kinds.  ``tell`` is called now and then.  ``executor``: ``local``, or ``dask`` for the workers of the Dask
-    ``scheduler`` at that address or, without one, a cluster on this machine. Raises ``StoreError`` and ``WorkerError``,
-    and ``EpicycleError`` if Dask is requested but not installed.
+    ``scheduler`` at that address or, without one, a cluster on this machine.  With a ``share`` of the runs, others may
+    write to the folder at the same time, if it is a whole session that ends the study.  The rows of ``others``, results
+    folders of the same study, are taken first.  Raises ``StoreError`` and ``WorkerError``, and ``EpicycleError`` if
+    Dask is requested but not installed.
     """
     make = _maker(executor, scheduler)  # before anything is written
-    with lock(folder):
-        store = prepare(folder, manifest_of(plan))
-        known = store.known(plan.decides)
-        backlog = Backlog(plan, {key: done for key, done in known.items() if not (retry and done.status in RETRIED)})
+    with lock(folder, share):
+        store = prepare(folder, manifest_of(plan), share)
+        for other in others:
+            merge(store, other)
+        known = store.known(plan.decides, journals=share == ALL)
+        known = {key: done for key, done in known.items() if not (retry and done.status in RETRIED)}
+        backlog = Backlog(plan, known, share=share)
         with recording(store, backlog, timeout) as recorder:
             make(recorder, jobs or available_cores(), lambda: None if tell is None else tell(backlog))
-        table = StudyResults(folder).write_table()
+        table = StudyResults(folder).write_table() if share == ALL else None
     made, there = backlog.made.total(), backlog.there.total()
     return Outcome(made, there, backlog.failed, backlog.stopped_early, table)
 

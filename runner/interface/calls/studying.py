@@ -64,12 +64,21 @@ def study(
     jobs: Annotated[int | None, JOBS] = None,
     run_timeout: Annotated[float | None, RUN_TIMEOUT] = None,
     retry: Annotated[bool, option("repeat runs that took too long, or whose process was killed")] = False,
+    part: Annotated[
+        str | None,
+        option("make only a share of the runs, such as 3/16, while other machines make the others", "N/PARTS"),
+    ] = None,
+    merge: Annotated[
+        Iterable[str | Path],
+        repeated("take the runs of another results folder of the study, such as that of a part", "DIR"),
+    ] = (),
     show_progress: bool = True,
 ) -> StudyResults:
     """Make the runs of a study that are not yet in its results folder (default: results/NAME), and return its results.
 
     ``study`` is a packaged study, a file, a results folder, or a mapping with the keys of such a file.  Runs are made
-    in separate processes, ``jobs`` at a time (default: one per core).
+    in separate processes, ``jobs`` at a time (default: one per core).  Parts may share a folder; a call without
+    ``part`` makes what they have left, and writes the table.
 
     >>> results = epicycle.study({"study": "load", "model": "mm1", "vary": {"load": [0.5, 0.7]}, "replications": 20})
     >>> results.means("mean_wait")
@@ -78,6 +87,7 @@ def study(
 
     from ...study.judge.study_results import open_study
     from ...study.run.progress import progress
+    from ...study.run.share import ALL, Share
     from ...study.session import run_study
 
     plan, folder = plan_of(study, set=set, replications=replications, seed=seed, out=out, types=types)
@@ -91,6 +101,8 @@ def study(
             tell=tell,
             executor=executor,
             scheduler=scheduler,
+            share=ALL if part is None else Share.named(part),
+            others=map(Path, merge),
         )
     return open_study(folder)
 

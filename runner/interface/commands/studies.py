@@ -40,7 +40,8 @@ def study(options: argparse.Namespace) -> int:
     from ...study.session import available_cores, check_size
 
     given = arguments(studying.study, options)
-    session = {name: given.pop(name, None) for name in ("executor", "scheduler", "jobs", "run_timeout", "retry")}
+    names = ("executor", "scheduler", "jobs", "run_timeout", "retry", "part", "merge")
+    session = {name: given.pop(name, None) for name in names}
     if (scheduler := session["scheduler"]) is not None:
         if session["executor"] != "dask":
             raise EpicycleError(f"--scheduler {scheduler} is for --executor dask")
@@ -64,9 +65,11 @@ def _session(plan: Plan, folder: Path, options: argparse.Namespace, session: dic
     from ...study.run.processes import WorkerError
     from ...study.run.progress import progress
     from ...study.run.runner import again
+    from ...study.run.share import ALL, Share
     from ...study.run.store import WriteError
     from ...study.session import run_study
 
+    share = ALL if session["part"] is None else Share.named(session["part"])
     try:
         with progress(plan.study.name) as told:
             outcome = run_study(
@@ -78,6 +81,8 @@ def _session(plan: Plan, folder: Path, options: argparse.Namespace, session: dic
                 tell=told,
                 executor=session["executor"] or "local",
                 scheduler=session["scheduler"],
+                share=share,
+                others=map(Path, session["merge"] or ()),
             )
     except KeyboardInterrupt:
         complain(f"interrupted; finished runs are kept: 'epicycle study {folder}' continues")
@@ -89,7 +94,14 @@ def _session(plan: Plan, folder: Path, options: argparse.Namespace, session: dic
         f"{plan.study.name}: {counted(plan.conditions, 'condition')}, {counted(outcome.made, 'new run')}, "
         f"{outcome.there:,} already there"
         + (f", {outcome.stopped_early:,} not needed" if outcome.stopped_early else "")
+        + ("" if share == ALL else f", in part {share}")
     )
+    if outcome.table is None:
+        tell(f"once all parts are over, 'epicycle study {folder}' makes what they have left and writes the table")
+        if not outcome.failed:
+            return DONE
+        complain(f"error: {counted(outcome.failed, 'run')} failed: epicycle status {folder}")
+        return FAILED
     results = open_study(folder)
     for said in _about_others(results):
         complain(said)
@@ -141,7 +153,7 @@ def _about_others(results: StudyResults) -> Iterator[str]:
 def status(options: argparse.Namespace) -> int:
     """Show the progress of a study, also while it is running."""
     from ...study.judge.study_results import open_study
-    from ...study.run.store import is_running
+    from ...study.run.locking import is_running
 
     def counted(statuses: Counter[str]) -> str:
         return ", ".join(f"{number:,} {status}" for status, number in sorted(statuses.items()))

@@ -11,6 +11,7 @@ from itertools import chain
 
 from ..inference import half_width
 from ..plan.plan import Condition, Plan
+from .share import ALL, Share
 
 OK, FAILED, TIMEOUT, KILLED = "ok", "failed", "timeout", "killed"
 RETRIED = (TIMEOUT, KILLED)  # these depend on the machine, not only on the model
@@ -42,9 +43,12 @@ class Backlog:
     on neither the number of workers nor their speed.
     """
 
-    def __init__(self, plan: Plan, known: Mapping[str, Done], chosen: Iterable[Task] | None = None) -> None:
+    def __init__(
+        self, plan: Plan, known: Mapping[str, Done], chosen: Iterable[Task] | None = None, share: Share = ALL
+    ) -> None:
         """``chosen`` runs are made instead of all."""
         self.plan = plan
+        self.share = share
         self.known = known
         self.there: Counter[str] = Counter()  # runs that already existed, by status
         self.made: Counter[str] = Counter()  # new runs, by status
@@ -59,7 +63,7 @@ class Backlog:
     @property
     def total(self) -> int:
         """The number of all runs, existing and possible."""
-        return self.plan.size - self.stopped_early
+        return self.share.size(self.plan) - self.stopped_early
 
     @property
     def over(self) -> int:
@@ -81,8 +85,9 @@ class Backlog:
         """How many of the known runs the plan asks for; a folder may hold others, too."""
         if not self.known:
             return 0
-        replications = range(self.plan.replications)
-        return sum(self.plan.key(each, one) in self.known for each in self.plan for one in replications)
+        plan, replications = self.plan, range(self.plan.replications)
+        runs = ((each, one) for each in plan for one in replications if self.share.has(plan, each.index, one))
+        return sum(plan.key(*run) in self.known for run in runs)
 
     def next(self) -> Task | None:
         """The next run; None if there is none at present, or none left."""
@@ -112,8 +117,9 @@ class Backlog:
         index, most, until = condition.index, self.plan.replications, self.plan.study.until
         values = self._values[index] = []
         batch = most if until is None else until.batch
-        for start in range(0, most, batch):
-            for replication in range(start, min(start + batch, most)):
+        ours = [replication for replication in range(most) if self.share.has(self.plan, index, replication)]
+        for start in range(0, len(ours), batch):
+            for replication in ours[start : start + batch]:
                 key = self.plan.key(condition, replication)
                 if (done := self.known.get(key)) is not None:
                     self._note(index, done, self.there)

@@ -13,13 +13,12 @@ from dataclasses import astuple
 from operator import call
 from pkgutil import resolve_name
 from typing import Any
-from uuid import uuid4
 
 from epicycle.actors import EpicycleError
 
 from .backlog import Task
 from .making import Recorder
-from .parcel import SENT, environment, make_on_worker, mismatch, pack, parcel_key
+from .parcel import SENT, ParcelOnWorker, environment, mismatch, pack
 from .processes import DONE, Outcome, WorkerError
 
 CONNECT = 10.0  # s for a scheduler to answer
@@ -55,10 +54,8 @@ class Cluster:
         self._backlog = recorder.backlog
         self._jobs = jobs
         self._scheduler = scheduler
-        self._study = f"epicycle-{uuid4().hex}"
-        self._parcel = b""
-        self._sent: dict[str, Any] = {}  # parcels, by worker
-        self._batches = 0
+        self._parcel: Any = None  # a future: Dask brings it to the workers, and makes it again if it is lost
+        self._checked: set[str] = set()  # workers
         self._running: dict[asyncio.Future[list[Outcome]], list[Task]] = {}
         self._wanted = 1  # batches submitted at a time
         self._seconds = _BATCH  # estimated s of a run
@@ -73,8 +70,9 @@ class Cluster:
     async def _run(self, first: list[Task], tell: Callable[[], None]) -> None:
         async with self._client() as client:
             try:
-                self._parcel = pack(self._backlog.plan)
                 await self._look(client)
+                kind = client.submit(resolve_name, _name(ParcelOnWorker), pure=False)
+                self._parcel = client.submit(call, kind, pack(self._backlog.plan), pure=False)
                 self._begin(client, first)
                 self._fill(client)
                 while self._running:
@@ -128,10 +126,9 @@ class Cluster:
             return
         self._looked = now
         threads: dict[str, int] = await self._asked(client.nthreads())
-        for address in self._sent.keys() - threads.keys():
-            del self._sent[address]
-        if new := sorted(threads.keys() - self._sent.keys()):
-            await self._welcome(client, new)
+        if new := sorted(threads.keys() - self._checked):
+            await self._check(client, new)
+        self._checked = {*threads}
         # More than the workers take: the rest waits at the scheduler for the first free worker.
         self._wanted = 2 * sum(threads.values()) + 4
         if threads:
@@ -142,8 +139,8 @@ class Cluster:
                 f"   help: 'dask worker {self._scheduler}' starts one"
             )
 
-    async def _welcome(self, client: Any, workers: list[str]) -> None:
-        """Send new workers the parcel; raises ``WorkerError`` if one differs from this machine."""
+    async def _check(self, client: Any, workers: list[str]) -> None:
+        """Raise ``WorkerError`` if a new worker differs from this machine."""
         options = {"workers": workers, "on_error": "return"}
         for address, there in (await self._asked(client.run(resolve_name, _name(environment), **options))).items():
             if isinstance(there, ImportError | AttributeError):
@@ -151,10 +148,6 @@ class Cluster:
         for address, there in (await self._asked(client.run(environment, **options))).items():
             if isinstance(there, dict) and (unlike := mismatch(there, environment())):
                 raise WorkerError(f"the Dask worker {address} {unlike}")
-        # Each worker gets the parcel before any work, so that none is preferred for having it, or waited for.
-        for address in workers:
-            parcel = {parcel_key(self._study, address): self._parcel}
-            self._sent[address] = await self._asked(client.scatter(parcel, workers=[address]))
 
     async def _asked(self, question: Any) -> Any:
         """The scheduler's answer; raises ``WorkerError`` if there is none."""
@@ -189,12 +182,8 @@ class Cluster:
 
     def _begin(self, client: Any, batch: list[Task]) -> None:
         """Send a batch.  The scheduler sees only types of Python itself, so it need not have Epicycle."""
-        self._batches += 1
-        key = f"{self._study}-{self._batches}"
-        make = (resolve_name, _name(make_on_worker))
-        tasks = [astuple(each) for each in batch]
-        given = {"study": self._study, "timeout": self._recorder.timeout, "tasks": tasks}
-        (future,) = client.get({key: (call, make, json.dumps(given))}, [key], sync=False)
+        given = {"timeout": self._recorder.timeout, "tasks": [astuple(each) for each in batch]}
+        future = client.submit(call, self._parcel, json.dumps(given), pure=False)
         self._running[asyncio.ensure_future(future.result())] = batch
 
     def _end(self, over: asyncio.Future[list[Outcome]], batch: list[Task]) -> None:

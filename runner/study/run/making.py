@@ -59,7 +59,7 @@ class Recorder:
 @contextmanager
 def recording(store: Store, backlog: Backlog, timeout: float | None) -> Iterator[Recorder]:
     """An interrupted session leaves its journal, which the next one to open the folder turns into a part."""
-    writer = Writer(store)
+    writer = Writer(store, backlog.share)
     try:
         yield Recorder(store, backlog, timeout, writer)
         with writing(store.folder):

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 FORMAT = 4
+OF_SESSION = ("versions", "machine", "git", "date", "checksum")  # entries that do not say what the study is
 
 
 class StoreError(EpicycleError):

@@ -11,11 +11,9 @@ import os
 import pickle
 import platform
 import threading
-import time
+import weakref
 import zlib
-from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
-from dataclasses import dataclass
+from collections.abc import Mapping
 from functools import lru_cache
 from importlib import import_module
 from pathlib import Path
@@ -38,8 +36,6 @@ _CODE = ("epicycle.actors", "epicycle.aspects", "epicycle.runner")
 _SOURCES = (".py", ".pyx", ".pxd")  # including those of compiled modules
 _NO_MATTER = ("pyarrow",)  # workers write no files
 _OPTIONAL = ("casadi",)  # takes part in runs, where installed
-_SOON = 0.05  # s
-_IDLE = 20.0  # s after which processes without work are ended: their study has finished
 
 
 def pack(plan: Plan) -> bytes:
@@ -164,75 +160,42 @@ class ParcelWorker:
         return text.replace(self._root, "")
 
 
-@dataclass
-class _Pool:
-    """The processes of one study on this worker, the number of batches they work on, and what ends them."""
+class ParcelOnWorker:
+    """A parcel as a value that Dask keeps on workers while a study wants it; called with runs, it makes them there.
 
-    processes: Processes
-    batches: int = 0
-    timer: threading.Timer | None = None
-
-
-_pools: dict[str, _Pool] = {}  # by study
-_guard = threading.Lock()
-
-
-def parcel_key(study: str, address: str) -> str:
-    """The name under which the worker at an address stores the parcel of a study."""
-    return f"{study}-parcel-{address}"
-
-
-def make_on_worker(batch: str) -> list[Outcome]:
-    """Make runs on a Dask worker; raises ``WorkerError`` if it cannot.
-
-    It returns plain values, which a scheduler without Epicycle can pass on.
+    Its processes end when Dask drops it: when the study is over, or whoever ran it is gone.
     """
-    from distributed import get_worker
 
-    worker = get_worker()
-    key = worker.get_current_task()
+    def __init__(self, parcel: bytes) -> None:
+        self._parcel = parcel
+        self._guard = threading.Lock()
+        self._processes: Processes | None = None
 
-    def is_wanted() -> bool:
-        state = worker.state.tasks.get(key)
-        return state is not None and state.state not in ("cancelled", "released")
+    def __reduce__(self) -> tuple[type[ParcelOnWorker], tuple[bytes]]:
+        return ParcelOnWorker, (self._parcel,)
 
-    given = json.loads(batch)
-    try:
-        while (parcel := worker.data.get(parcel_key(given["study"], worker.address))) is None:
-            if not is_wanted():
-                raise UnwantedError
-            time.sleep(_SOON)  # the parcel arrives soon after a new worker
-        with _at_work(given["study"], parcel, worker.local_directory) as processes:
-            return [processes.make(Task(*each), given["timeout"], is_wanted) for each in given["tasks"]]
-    except UnwantedError:
-        return []  # nobody will read it
-    except WorkerError as error:
-        raise WorkerError(f"the Dask worker {worker.address} {error}") from None
+    def __call__(self, batch: str) -> list[Outcome]:
+        """Make runs; raises ``WorkerError`` if this worker cannot.
 
+        It takes and returns plain values, which a scheduler without Epicycle can pass on.
+        """
+        from distributed import get_worker
 
-@contextmanager
-def _at_work(study: str, parcel: bytes, place: str) -> Iterator[Processes]:
-    """The processes of a study, which are ended when there has been no work for a while."""
-    with _guard:
-        if (pool := _pools.get(study)) is None:
-            pool = _pools[study] = _Pool(Processes(ParcelWorker, parcel, place=place))
-        if pool.timer is not None:
-            pool.timer.cancel()
-        pool.batches += 1
-    try:
-        yield pool.processes
-    finally:
-        with _guard:
-            pool.batches -= 1
-            if not pool.batches:
-                pool.timer = threading.Timer(_IDLE, _close, (study,))
-                pool.timer.daemon = True
-                pool.timer.start()
+        worker = get_worker()
+        key = worker.get_current_task()
 
+        def is_wanted() -> bool:
+            state = worker.state.tasks.get(key)
+            return state is not None and state.state not in ("cancelled", "released")
 
-def _close(study: str) -> None:
-    with _guard:
-        if (pool := _pools.get(study)) is None or pool.batches:
-            return  # work has just arrived
-        del _pools[study]
-    pool.processes.end()
+        given = json.loads(batch)
+        with self._guard:
+            if self._processes is None:
+                self._processes = Processes(ParcelWorker, self._parcel, place=worker.local_directory)
+                weakref.finalize(self, self._processes.end)
+        try:
+            return [self._processes.make(Task(*each), given["timeout"], is_wanted) for each in given["tasks"]]
+        except UnwantedError:
+            return []  # nobody will read it
+        except WorkerError as error:
+            raise WorkerError(f"the Dask worker {worker.address} {error}") from None

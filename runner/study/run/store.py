@@ -7,12 +7,15 @@
                            rows of runs; a part appears all at once, and is never changed
     journals/<name>.jsonl  the rows of a session since its last part, a line each: checksum, row
     table.parquet          all rows in the order of the plan, written at the end
-    lock                   held by the process that writes
+    lock, lock-<share>     held by those who write: one process, or one for each share of the runs
     damaged/               files that did not match their checksums
 
 A run counts as finished once its line is in a journal, before anybody is notified: the line is handed to the operating
 system at once, where no ``kill`` can reach it, and brought to the disk at most once a second.  The next session to open
 the folder turns every journal left behind into a part.  A row in two places counts once.
+
+Processes on several machines may write at the same time if each makes a share of the runs: each writes journals and
+parts of its own, and reads only what no longer changes.  The table is written by a session without a share.
 
 The manifest contains its checksum, a part has it in its name, a row of a journal before it, and nothing is used before
 its checksum is verified.  Readers get an error about damage; a session that continues the study sets the damaged file
@@ -29,26 +32,24 @@ import time
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import IO, TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any
 from uuid import uuid4
 
 from epicycle.actors import counted, irregular, read_regular
 
 from .backlog import FAILED, KILLED, OK, TIMEOUT, Done
-from .manifest import DamagedError, StoreError, checksum, manifest_text, read_manifest, schema_of
+from .manifest import OF_SESSION, DamagedError, StoreError, checksum, manifest_text, read_manifest, schema_of
+from .share import ALL, Share
 
 if TYPE_CHECKING:
     import pyarrow as pa
-
-try:
-    import fcntl
-except ImportError:  # Windows: nothing keeps two processes from writing to one folder
-    fcntl = None  # type: ignore[assignment]
 
 _LOGGER = logging.getLogger("epicycle")
 
 ROWS_OF_A_PART = 1_000
 SECONDS_TO_THE_DISK = 1.0
+_OURS = ("lock", "parts", "journals", "damaged", "manifest.json")  # how names in a folder begin that is just being made
+_ANOTHER = "\n   help: choose another folder with --out"
 BEST_FIRST = (OK, FAILED, TIMEOUT, KILLED)  # of two rows of a run, the better one counts
 
 Row = dict[str, Any]
@@ -66,7 +67,7 @@ class Store:
         self.manifest = read_manifest(folder)
         self.schema = schema_of(self.manifest)
 
-    def rows(self, columns: list[str] | None = None) -> Iterator[pa.RecordBatch]:
+    def rows(self, columns: list[str] | None = None, *, journals: bool = True) -> Iterator[pa.RecordBatch]:
         """All rows, part by part; a run that was written twice comes twice."""
         import pyarrow as pa
         import pyarrow.parquet as pq
@@ -79,20 +80,19 @@ class Store:
                     told = f"{path} lacks the columns of {self.folder}/manifest.json: it belongs to another study"
                     raise StoreError(told)
                 yield from file.iter_batches(columns=columns)
-        for path in sorted(self.folder.glob("journals/*.jsonl")):
+        for path in sorted(self.folder.glob("journals/*.jsonl") if journals else ()):
             with suppress(FileNotFoundError):  # its writer has just turned it into a part
                 rows, damage = read_journal(path, self.schema)
                 self._check(path, damage)
                 if rows:
                     yield pa.RecordBatch.from_pylist(rows, self.schema).select(columns or self.schema.names)
 
-    def known(self, value: str | None = None) -> dict[str, Done]:
+    def known(self, value: str | None = None, *, journals: bool = True) -> dict[str, Done]:
         """The existing runs by key; ``value`` names the metric to return of each."""
         found: dict[str, Done] = {}
-        for batch in self.rows(["run", "status", *([value] if value else [])]):
+        for batch in self.rows(["run", "status", *([value] if value else [])], journals=journals):
             for key, status, *number in zip(*(column.to_pylist() for column in batch.columns), strict=True):
-                before = found.get(key)
-                if before is None or BEST_FIRST.index(status) < BEST_FIRST.index(before.status):
+                if _is_better(status, found.get(key)):
                     found[key] = Done(status, *number)
         return found
 
@@ -105,13 +105,13 @@ class Store:
 # -- opening it for writing -------------------------------------------------------------------------------------------
 
 
-def prepare(folder: Path, manifest: Mapping[str, Any]) -> Store:
+def prepare(folder: Path, manifest: Mapping[str, Any], share: Share = ALL) -> Store:
     """Make a results folder, or check that an existing one holds results of the same study; journals become parts.
 
-    Raises ``StoreError``.  The caller holds the lock, so whoever left a journal behind no longer runs.
+    Raises ``StoreError``.  The caller holds the lock, so whoever left a journal behind no longer runs; beside other
+    shares, only what belongs to this one is touched.
     """
     path = folder / "manifest.json"
-    another = "\n   help: choose another folder with --out"
     before: Mapping[str, Any] | None = None
     if path.exists():
         try:
@@ -120,31 +120,23 @@ def prepare(folder: Path, manifest: Mapping[str, Any]) -> Store:
             if not (folder / "parts").is_dir():  # it may never have been one of ours
                 raise
             _LOGGER.warning("%s is damaged and is being rewritten", path)
-    elif folder.is_dir() and any(
-        each.name not in ("lock", "parts", "journals", "damaged") and not each.name.startswith(".manifest.json")
-        for each in folder.iterdir()
-    ):
-        raise StoreError(f"{folder} is not empty, and holds no results of a study{another}")
+    elif folder.is_dir() and any(not each.name.lstrip(".").startswith(_OURS) for each in folder.iterdir()):
+        raise StoreError(f"{folder} is not empty, and holds no results of a study{_ANOTHER}")
     if before is not None:
-        name = manifest["study"]
-        if before["study"] != name:
-            raise StoreError(f"{folder} holds results of the study {before['study']!r}, not of {name!r}{another}")
-        for what in ("factors", "metrics"):
-            if list(before[what].items()) != list(manifest[what].items()):
-                had, has = _shown(before[what]), _shown(manifest[what])
-                raise StoreError(f"{folder} was made when {name} had different {what}: {had}, not {has}{another}")
+        _check_same(folder, before, manifest)
     with writing(folder):
         for name in ("parts", "journals"):
             (folder / name).mkdir(exist_ok=True)
-        _replace(path, manifest_text(manifest).encode())
-        for pattern in ("parts/.*.parquet.*", ".manifest.json.*", ".table.parquet.*"):
+        if share == ALL or before is None or _plan_in(before) != _plan_in(manifest):
+            _replace(path, manifest_text(manifest).encode())
+        for pattern in ("parts/.*.parquet.*", ".manifest.json.*", ".table.parquet.*") if share == ALL else ():
             for aside in folder.glob(pattern):
                 aside.unlink()  # left by a process that was killed while writing
         store = Store(folder)
         for part in sorted(folder.glob("parts/*.parquet")):
             if damage := read_part(part)[1]:
                 _put_aside(part, f"{damage}; its runs are repeated")
-        for journal in sorted(folder.glob("journals/*.jsonl")):
+        for journal in sorted(folder.glob(f"journals/{'*' if share == ALL else f'{share.file_name}-*'}.jsonl")):
             if kind := irregular(journal):
                 _put_aside(journal, f"is {kind}")
                 continue
@@ -158,6 +150,37 @@ def prepare(folder: Path, manifest: Mapping[str, Any]) -> Store:
     return store
 
 
+def merge(store: Store, folder: Path) -> None:
+    """Add the rows of another results folder of the same study; raises ``StoreError`` for one of another study."""
+    other, known = Store(folder), store.known()
+    _check_same(folder, other.manifest, store.manifest)
+    for batch in other.rows():
+        rows = [row for row in batch.to_pylist() if _is_better(row["status"], known.get(row["run"]))]
+        if rows:
+            with writing(store.folder):
+                write_part(store, uuid4().hex, rows)
+
+
+def _is_better(status: str, before: Done | None) -> bool:
+    return before is None or BEST_FIRST.index(status) < BEST_FIRST.index(before.status)
+
+
+def _check_same(folder: Path, before: Mapping[str, Any], manifest: Mapping[str, Any]) -> None:
+    """Raise ``StoreError`` if a folder holds results of a study unlike that of a manifest."""
+    name = manifest["study"]
+    if before["study"] != name:
+        raise StoreError(f"{folder} holds results of the study {before['study']!r}, not of {name!r}{_ANOTHER}")
+    for what in ("factors", "metrics"):
+        if list(before[what].items()) != list(manifest[what].items()):
+            had, has = _shown(before[what]), _shown(manifest[what])
+            raise StoreError(f"{folder} was made when {name} had different {what}: {had}, not {has}{_ANOTHER}")
+
+
+def _plan_in(manifest: Mapping[str, Any]) -> str:
+    """The entries of a manifest that say what the study is, not when and where it is made."""
+    return json.dumps({name: value for name, value in manifest.items() if name not in OF_SESSION}, sort_keys=True)
+
+
 def _shown(columns: Mapping[str, str]) -> str:
     return ", ".join(name if name == what else f"{name} ({what})" for name, what in columns.items()) or "none"
 
@@ -166,44 +189,9 @@ def _put_aside(path: Path, damage: str) -> None:
     """Move a damaged file to where it does no harm, and report it."""
     aside = path.parent.parent / "damaged"
     aside.mkdir(exist_ok=True)
-    os.replace(path, aside / path.name)
+    with suppress(FileNotFoundError):  # another session has just done it
+        os.replace(path, aside / path.name)
     _LOGGER.warning("%s %s\n   the damaged file is kept in %s", path, damage, aside)
-
-
-@contextmanager
-def lock(folder: Path) -> Iterator[None]:
-    """Keep others from writing to a results folder; the lock ends with the process, however it ends."""
-    with writing(folder):
-        folder.mkdir(parents=True, exist_ok=True)
-        if (folder / "lock").exists() and (kind := irregular(folder / "lock")):
-            raise StoreError(f"{folder / 'lock'} is {kind}: delete it")
-        file = (folder / "lock").open("a+")
-    with file:
-        if not _is_locked(file):
-            file.seek(0)
-            raise StoreError(f"{folder} is in use: another process is writing to it ({file.read().strip()})")
-        file.truncate(0)
-        file.write(f"pid {os.getpid()}\n")
-        file.flush()
-        yield
-
-
-def is_running(folder: Path) -> bool:
-    """Whether somebody holds the lock."""
-    if not (folder / "lock").is_file():
-        return False
-    with (folder / "lock").open("a+") as file:
-        return not _is_locked(file)
-
-
-def _is_locked(file: IO[str]) -> bool:
-    """Lock a file unless somebody else holds the lock."""
-    try:
-        if fcntl is not None:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except OSError:
-        return False
-    return True
 
 
 # -- writing ----------------------------------------------------------------------------------------------------------
@@ -224,8 +212,9 @@ def writing(folder: Path) -> Iterator[None]:
 class Writer:
     """Writes rows; raises ``OSError`` if it cannot, and then leaves nothing incomplete."""
 
-    def __init__(self, store: Store) -> None:
+    def __init__(self, store: Store, share: Share = ALL) -> None:
         self._store = store
+        self._name = share.file_name
         self._rows: list[Row] = []
         self._journal: int | None = None
         self._path = store.folder
@@ -234,7 +223,7 @@ class Writer:
     def add(self, row: Row) -> None:
         """Write a row; when this returns, the row outlives the process."""
         if self._journal is None:
-            self._path = self._store.folder / "journals" / f"{uuid4().hex}.jsonl"
+            self._path = self._store.folder / "journals" / f"{self._name}-{uuid4().hex}.jsonl".lstrip("-")
             self._journal = os.open(self._path, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o666)
             _sync_folder(self._path.parent)
         text = json.dumps(row).encode()
@@ -297,7 +286,7 @@ def replace_file(path: Path, data: bytes) -> None:
 
 def _replace(path: Path, data: bytes) -> None:
     """Write a temporary file, bring it to the disk, and move it into its place."""
-    aside = path.with_name(f".{path.name}.{os.getpid()}")
+    aside = path.with_name(f".{path.name}.{uuid4().hex}")  # other machines may write to the folder, too
     try:
         with aside.open("wb") as file:
             file.write(data)

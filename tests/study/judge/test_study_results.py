@@ -13,8 +13,8 @@ from scipy import stats
 from epicycle.actors import EpicycleError
 from epicycle.runner import open_study
 from epicycle.runner.interface.cli import main
+from epicycle.runner.study.run.locking import lock
 from epicycle.runner.study.run.manifest import StoreError
-from epicycle.runner.study.run.store import lock
 from epicycle.runner.study.session import run_study
 from tests.study.study_commands import message, study
 from tests.study.study_parts import STUDY, plan_of, write

@@ -16,8 +16,9 @@ import pytest
 from epicycle.actors import EpicycleError
 from epicycle.runner.interface.cli import main
 from epicycle.runner.study.judge.study_results import open_study
+from epicycle.runner.study.run.locking import lock
 from epicycle.runner.study.run.manifest import StoreError, checksum, manifest_text, read_manifest
-from epicycle.runner.study.run.store import Store, lock, prepare
+from epicycle.runner.study.run.store import Store, prepare
 from epicycle.runner.study.session import manifest_of, run_study
 from tests.study.study_parts import plan_of, write
 

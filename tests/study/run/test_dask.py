@@ -12,7 +12,7 @@ import subprocess
 import sys
 import time
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -28,6 +28,7 @@ from epicycle.runner.study.run.backlog import Backlog
 from epicycle.runner.study.run.parcel import environment, pack
 from epicycle.runner.study.run.runner import Runner
 from tests.study.dask_cluster import Cluster, a_cluster, without_epicycle
+from tests.study.run.test_kills import members
 from tests.study.study_commands import study
 from tests.study.study_parts import STUDY, THIS, command, write
 
@@ -121,6 +122,31 @@ def test_a_cluster_of_its_own(tmp_path: Path) -> None:
     assert without_progress(said) == f"interrupted; finished runs are kept: 'epicycle study {out}' continues\n"
     assert process.returncode == 130
     assert 0 < len(open_study(out).table()) < 10
+
+
+@pytest.mark.slow
+def test_processes_on_workers_end_with_what_wants_their_runs(cluster: Cluster, tmp_path: Path) -> None:
+    """A study that is over, and one that is killed with the process that reads its rows."""
+    write(tmp_path, STUDY.replace("replications: 5", "replications: 100"))
+    arguments = ("study", tmp_path / "walks.yaml", "--types", THIS, "--executor", "dask")
+    arguments = (*arguments, "--scheduler", cluster.address, "--out", tmp_path / "out")
+
+    def busy() -> list[int]:
+        return [each for worker in cluster.workers for each in members(worker.pid)]
+
+    def wait_until(is_so: Callable[[], bool]) -> None:
+        deadline = time.monotonic() + 60
+        while not is_so() and time.monotonic() < deadline:
+            time.sleep(0.05)
+        assert is_so()
+
+    subprocess.run(command(*arguments, "--replications", "1"), check=True, stdout=subprocess.DEVNULL)
+    wait_until(lambda: not busy())
+    process = subprocess.Popen(command(*arguments, "--set", "pause=0.5"))
+    wait_until(lambda: len(busy()) == 2 and any(path.stat().st_size for path in (tmp_path / "out").glob("journals/*")))
+    process.kill()
+    process.wait()
+    wait_until(lambda: not busy())
 
 
 # -- what travels -----------------------------------------------------------------------------------------------------
@@ -298,7 +324,6 @@ def test_the_code_that_has_to_be_the_same_is_all_that_runs(tmp_path: Path, monke
     assert parcel._code() == seen[-1]
 
 
-@pytest.mark.slow
 @pytest.mark.slow
 def test_workers_that_are_missing_or_have_no_epicycle(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch

@@ -13,8 +13,9 @@ import pytest
 from epicycle.runner import open_study
 from epicycle.runner.interface.cli import main
 from epicycle.runner.study.run import store as store_module
+from epicycle.runner.study.run.locking import lock
 from epicycle.runner.study.run.manifest import checksum, manifest_text
-from epicycle.runner.study.run.store import Store, Writer, lock, prepare
+from epicycle.runner.study.run.store import Store, Writer, prepare
 from epicycle.runner.study.session import manifest_of, run_study
 from tests.study.study_commands import message, study
 from tests.study.study_parts import STUDY, plan_of, write
