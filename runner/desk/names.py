@@ -6,6 +6,7 @@ import re
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 from epicycle.actors.expression import ExpressionError, names_in
 
@@ -87,9 +88,14 @@ class Names:
                 for declared, entry, _ in each.entries(section):
                     sections[kind].setdefault(declared, entry)
             self._declared[name] = sections
-        self.uses: list[Use] = []
+
+    @cached_property
+    def uses(self) -> list[Use]:
+        """Where names stand; found when somebody asks, which takes longer than to read what is declared."""
+        self._found: list[Use] = []
         for name in self.classes:
             self._collect(name)
+        return self._found
 
     def _add(self, node: MappingNode) -> None:
         if "composites" in node.entries and isinstance(found := node.entries["composites"].value, MappingNode):
@@ -169,7 +175,7 @@ class Names:
     def _use(self, names: Iterable[Name | None], position: Position | None, declares: bool = False) -> None:
         found = frozenset(each for each in names if each is not None)
         if found and position is not None:
-            self.uses.append(Use(found, position, declares))
+            self._found.append(Use(found, position, declares))
 
     def _collect(self, owner: str) -> None:
         for section, kind in SECTIONS.items():

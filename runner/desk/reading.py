@@ -22,6 +22,7 @@ from ..model.text.document import read as read_node
 from ..model.text.files import opened
 from ..model.text.kinds import FILE
 from ..model.text.problems import ModelError, Problem, Problems
+from ..support.collection import without_collection
 
 Texts = Mapping[Path, str]
 NO_TEXTS: Texts = MappingProxyType({})
@@ -63,7 +64,7 @@ def read(name: str | Path, texts: Texts = NO_TEXTS, types: Iterable[type] = (), 
     path = Path(name) if is_file else packaged_models().get(str(name), Path(name))
     types, loading = tuple(types), Loading()
     found, more = list[Problem](), False
-    with opened(texts) as known:
+    with opened(texts) as known, without_collection():
         try:
             if is_file:
                 _passes(path, types, loading, changes)

@@ -17,7 +17,7 @@ from ..support.tables import Table
 from .answer import Answer, listed
 
 if TYPE_CHECKING:
-    from ..show.view.pages import Page
+    from ..show.view.pages import Page, Watch
 
 AS_IT_WAS, INSTEAD = "as it was", "what if"
 _FEW = 8  # actors in a sentence
@@ -166,6 +166,7 @@ def future_of(
     seed: int | None,
     until: float | None,
     progress: bool,
+    watch: Watch | None = None,
 ) -> WhatIf:
     """Run a model as it is, and ``other`` by the rules; both must be the same before the tag."""
     from ..show.view.differing import affected, difference, fired, first_firing
@@ -178,6 +179,7 @@ def future_of(
         names=[AS_IT_WAS, INSTEAD],
         acts=[None, rules],
         progress=progress,
+        watch=watch,
     )
     if any(isinstance(each, KeyboardInterrupt) for each in page.errors):
         raise KeyboardInterrupt

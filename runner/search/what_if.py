@@ -6,7 +6,7 @@ import copy
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 from epicycle.actors import EpicycleError, ParameterError, Tag, declared_parameters, did_you_mean, to_nanoseconds
 from epicycle.aspects import ClockAspect, ExecutionAspect, JoinPoint, PortAspect
@@ -20,10 +20,14 @@ from ..model.language.settings import settings_of
 from ..model.text.document import plain
 from ..model.text.patterns import PatternError, select
 from ..model.text.problems import Problems
-from ..study.run_spec import RunSpec, opened, seconds, spec_of
+from ..study.run_spec import opened, seconds, spec_of
 from ..support.shown import short
 from .future import WhatIf, future_of
 
+if TYPE_CHECKING:
+    from ..show.view.pages import Watch
+
+_LET_THROUGH = re.compile(r"(?P<aspect>[^@#]+)(?:@(?P<place>[^#]+))?(?:#(?P<number>[1-9]\d{0,8}))?")
 _TAG = re.compile(r"\(?\s*(?P<time>[^,()]+?)\s*(?:,\s*(?:microstep\s+)?(?P<microstep>\d{1,9})\s*)?\)?")
 
 
@@ -31,7 +35,8 @@ _TAG = re.compile(r"\(?\s*(?P<time>[^,()]+?)\s*(?:,\s*(?:microstep\s+)?(?P<micro
 class Changes:
     """What is other from a tag on: ``change`` are parameters, ``remove`` aspects, ``lose`` ports.
 
-    ``let_through`` are aspects, or ``ASPECT@PLACE``: what each does next does not happen.
+    ``let_through`` are aspects, ``ASPECT@PLACE`` or ``ASPECT@PLACE#N``: what each does next does not happen, or the
+    N-th that it does there.
     """
 
     change: Iterable[str] | Mapping[str, object] = ()
@@ -41,11 +46,23 @@ class Changes:
 
 
 def what_if(
-    model: Model, at: Tag, changes: Changes, *, seed: int | None, until: float | None, progress: bool = True
+    model: Model,
+    at: Tag,
+    changes: Changes,
+    *,
+    seed: int | None,
+    until: float | None,
+    progress: bool = True,
+    watch: Watch | None = None,
 ) -> WhatIf:
-    """Run a model as it is, and with changes from a tag on; raises ``EpicycleError``."""
-    fork = forked(model, at, changes, seed=seed, until=until)
-    return future_of(model, fork.model, fork.acts, at, fork.words, seed=seed, until=until, progress=progress)
+    """Run a model as it is, and with changes from a tag on; raises ``EpicycleError``.
+
+    ``watch`` gives what is called with the time of each run now and then, in place of a bar.
+    """
+    fork = forked(model, at, changes, seed=seed, until=until, watch=watch)
+    return future_of(
+        model, fork.model, fork.acts, at, fork.words, seed=seed, until=until, progress=progress, watch=watch
+    )
 
 
 class Fork(NamedTuple):
@@ -56,7 +73,15 @@ class Fork(NamedTuple):
     words: list[str]
 
 
-def forked(model: Model, at: Tag, changes: Changes, *, seed: int | None = None, until: float | None = None) -> Fork:
+def forked(
+    model: Model,
+    at: Tag,
+    changes: Changes,
+    *,
+    seed: int | None = None,
+    until: float | None = None,
+    watch: Watch | None = None,
+) -> Fork:
     """The model with changes from a tag on; raises ``EpicycleError``."""
     other, words, always = copy.copy(model), list[str](), set[str]()
 
@@ -77,7 +102,7 @@ def forked(model: Model, at: Tag, changes: Changes, *, seed: int | None = None, 
     for port in changes.lose:
         weave(_Lost(), {"ports": _ports(model, port)})
         words.append(f"the next token at {port} is lost")
-    acts = _next_acts(model, at, changes.let_through, seed, until)
+    acts = _next_acts(model, at, changes.let_through, seed, until, watch)
     words += [f"{act.name.aspect} lets token {act.name.token} at {act.name.place} through" for act in acts]
     rules = Interventions(
         model.exactly,
@@ -110,14 +135,14 @@ def _parameters(model: Model, change: Iterable[str] | Mapping[str, object]) -> d
     be of parameters of the model, too.
     """
     problems = Problems()
-    settings = settings_of(change, problems)
+    settings = settings_of(change, problems, "--change")
     problems.raise_if_any()
     if not settings:
         return {}
     spec = spec_of(model, None, None)
     if spec is None or spec.study:
         return _given(model, {each.path: plain(each.node) for each in settings})
-    changed = opened(spec.changed(RunSpec.of("", None, None, {"set": settings}))).model
+    changed = opened(spec, more=settings).model
     found = {}
     for each in difference(model, changed).changes:
         if each.section in ("parameters", "figures"):
@@ -195,28 +220,40 @@ def _ports(model: Model, pattern: str) -> list[str]:
     return _selected("lose", pattern, list(model.graph.ports), f"{model.name} has no port")
 
 
-def _next_acts(model: Model, at: Tag, names: Sequence[str], seed: int | None, until: float | None) -> list[Act]:
+def _next_acts(
+    model: Model, at: Tag, names: Sequence[str], seed: int | None, until: float | None, watch: Watch | None
+) -> list[Act]:
     """What aspects do next, at a tag or after it; a name that is given twice means the next two acts."""
+    wanted = []
     for each in names:
-        _aspect(model, each.partition("@")[0])
-    if not names:
+        if (said := _LET_THROUGH.fullmatch(each)) is None:
+            raise EpicycleError(f"let through {each!r}: expected an aspect, such as lossy, lossy@gain.input or lossy#2")
+        _aspect(model, said["aspect"])
+        wanted.append((said["aspect"], said["place"] or "", int(said["number"] or 1)))
+    if not wanted:
         return []
-    noted = Simulation(model, seed=seed, acts=Interventions(model.exactly)).run(until=until).acts
+    simulation = Simulation(model, seed=seed, acts=Interventions(model.exactly))
+    noted = simulation.run(until=until, progress=watch(None) if watch else None).acts
     found: list[Act] = []
-    for each in names:
-        aspect, _, place = each.partition("@")
-        mine = [act for act in noted if act.name.aspect == aspect and place in ("", act.name.place)]
+    for aspect, place, number in wanted:
+        # An act at a single connection is also one at the port where this ends.
+        mine = [
+            act
+            for act in noted
+            if act.name.aspect == aspect and place in ("", act.name.place, act.name.place.rpartition(" -> ")[2])
+        ]
         # Times are compared as they are shown, so that one can be copied.
         left = [act for act in mine if float(f"{act.time / 1e9:.9g}") >= at.seconds and act not in found]
-        if not left:
+        if len(left) < number:
             last = max((act.time for act in mine), default=None)
             when = (
                 "in the whole run"
                 if last is None
                 else f"at {at.seconds:.9g} s or later: the last time is {last / 1e9:.9g} s"
             )
-            raise EpicycleError(f"{aspect} does nothing{' at ' + place if place else ''} {when}")
-        found.append(min(left, key=lambda act: act.time))
+            what = f"does not act {number} times" if number > 1 else "does nothing"
+            raise EpicycleError(f"{aspect} {what}{' at ' + place if place else ''} {when}")
+        found.append(sorted(left, key=lambda act: act.time)[number - 1])
     return found
 
 

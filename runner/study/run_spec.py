@@ -168,11 +168,11 @@ def is_reference(name: str | Path) -> bool:
     return path.is_dir() or (len(path.parts) > 1 and not path.exists() and _is_study(path.parent))
 
 
-def opened(said: RunSpec, flag: str = "--until") -> OpenedRun:
+def opened(said: RunSpec, flag: str = "--until", more: Iterable[Setting] = ()) -> OpenedRun:
     """The run of ``said.model``, which is a model, the results folder of a run, or a study's folder and a run in it.
 
-    What else is said counts on top.  Code that a folder names is run only if ``said`` names it, too.  Raises
-    ``EpicycleError``.
+    What else is said counts on top, and ``more`` settings of a model on top of that.  Code that a folder names is run
+    only if ``said`` names it, too.  Raises ``EpicycleError``.
     """
     path, digest, spec = Path(said.model), "", said
     if said.study:
@@ -190,7 +190,7 @@ def opened(said: RunSpec, flag: str = "--until") -> OpenedRun:
         return _of_study(spec)
     model = load_model(
         spec.model,
-        set=spec.set,
+        set=(*spec.set, *more),
         overrides=spec.overrides,
         disturb=spec.disturb,
         aspects=spec.aspects,

@@ -34,8 +34,9 @@ def what_if(
     let_through: Annotated[
         str | Iterable[str],
         repeated(
-            "let through what an aspect, anywhere or at one of its places, would next lose, delay or alter",
-            "ASPECT[@PLACE]",
+            "let through what an aspect, anywhere or at one of its places, would next lose, delay or alter; #N is the "
+            "N-th from then on",
+            "ASPECT[@PLACE][#N]",
         ),
     ] = (),
     lose: Annotated[str | Iterable[str], repeated("lose the next token at a port", "PORT")] = (),

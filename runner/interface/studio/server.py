@@ -29,7 +29,7 @@ from ...model.text.document import MAX_BYTES
 from ...show.view import PARTS, part, replace_file, script
 from .workers import Workers
 
-OWN = ("socket", "text", "wiring", "fields", "running", "arrange")  # in this order
+OWN = ("socket", "text", "wiring", "fields", "running", "what_if", "arrange")  # in this order
 LONGEST = 2 * MAX_BYTES + 100_000  # bytes of a message, in which a character may take several
 READING, GRACE = 30.0, 10.0  # s that reading a text may take, and that a run may take beyond its limit
 OF_READING = frozenset({"read", "complete", "hover", "colours", "types", "fields", "edit"})
@@ -75,7 +75,8 @@ class Studio:
         self.document = document
         given = [str(document.path), str(seconds), str(events), *map(str, types)]
         self.reader = Workers("reading of the text", given, READING)
-        self.runner = Workers("run", given, seconds + GRACE)
+        self.runner = Workers("run", given, seconds + GRACE, stops=True)
+        self.forker = Workers("what if", given, 3 * seconds + GRACE, stops=True)
         self.token = secrets.token_urlsafe(32)
         self.nonce = secrets.token_urlsafe(16)
         self.hosts: frozenset[str] = frozenset()
@@ -197,8 +198,8 @@ class Studio:
             found = self.save(message)
         elif ask in OF_READING:
             found = await self.reader.ask(message, tell)
-        elif ask == "run":
-            found = await self.runner.ask(message, tell)
+        elif ask in ("run", "what_if"):
+            found = await (self.runner if ask == "run" else self.forker).ask(message, tell)
         else:
             found = {"error": "there is no such question"}
         await asyncio.gather(*sending)
@@ -216,6 +217,7 @@ class Studio:
     def close(self) -> None:
         self.reader.stop()
         self.runner.stop()
+        self.forker.stop()
 
 
 def _response(text: str, kind: str, more: dict[str, str] | None = None) -> Response:

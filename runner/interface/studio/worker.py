@@ -6,6 +6,7 @@ offsets, in UTF-16, as browsers count them.
 
 from __future__ import annotations
 
+import gc
 import json
 import os
 import queue
@@ -13,12 +14,12 @@ import re
 import sys
 import threading
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, TextIO
 
-from epicycle.actors import EpicycleError
+from epicycle.actors import EpicycleError, Tag
 
 from ...desk import (
     EditError,
@@ -36,16 +37,21 @@ from ...desk import (
 )
 from ...execution.engine import ActorError, LoopError
 from ...model.build.figures import figures_of
+from ...model.build.model import Model
 from ...model.text.document import MAX_BYTES
+from ...model.text.files import opened
 from ...model.text.problems import Position, Problems
+from ...search.what_if import Changes, what_if
 from ...show.view import Recording, data_of, drawn
-from ...support.collection import seldom_collecting
+from ...study.run_spec import RunSpec, named
+from ...support.collection import keep_for_good, seldom_collecting
 from ...support.shown import in_words
 from ..calls.changes import classes
 
 MEMORY = 4 << 30  # bytes that a worker may take
 MOST = 100_000  # firings that a run shows
 BEAT = 0.2  # s between two messages of a run
+REST = 0.1  # s without a question
 _BREAKS = re.compile("\r\n|[\n\r\x85\u2028\u2029]")
 
 Message = dict[str, Any]
@@ -85,13 +91,22 @@ class Offsets:
 class Worker:
     """Everything that a process knows: the text under work, and the limits of runs."""
 
-    def __init__(self, path: Path, seconds: float, events: int, types: tuple[type, ...], say: Callable[..., None]):
+    def __init__(self, path: Path, seconds: float, events: int, files: Sequence[str], say: Callable[..., None]):
         self.path = path
         self.seconds = seconds
         self.events = events
-        self.session = Session(types)
+        self.files = tuple(files)
+        self.session = Session(tuple(classes(self.files)))
+        self.ended = ""  # why the latest run was ended
         self.say = say
         self.waiting: queue.Queue[Message | None] = queue.Queue()
+
+    def next(self) -> Message | None:
+        """The next question; what the ones before have left is cleared away when nobody waits."""
+        with suppress(queue.Empty):
+            return self.waiting.get(timeout=REST)
+        gc.collect()
+        return self.waiting.get()
 
     def answer(self, asked: Message) -> Message:
         """The answer to a question; what is wrong with it is said in words."""
@@ -228,34 +243,32 @@ class Worker:
 
     # -- runs -----------------------------------------------------------------------------------------------------
 
+    @property
+    def model(self) -> Model:
+        """The model, if it is valid."""
+        reading = self.knowledge.reading
+        if not reading.is_valid or reading.loading.model is None:
+            raise EpicycleError("the model is not valid")
+        return reading.loading.model
+
     def run(self, asked: Message) -> Message:
         """Run the model, if it is valid, within the limits; metrics are sent on the way."""
-        reading = self.knowledge.reading
-        model = reading.loading.model
-        if not reading.is_valid or model is None:
-            return {"error": "the model is not valid"}
+        model = self.model
         problems = Problems()
         recording = Recording(model, figures_of(model, problems), most=MOST)
         problems.raise_if_any()
         started = last = time.monotonic()
-        ended = error = ""
+        error, within = "", self._within(recording)
 
         def progress(now: float) -> None:
-            nonlocal last, ended
-            if not self.waiting.empty():
-                raise StaleError
-            moment = time.monotonic()
-            if moment - started > self.seconds:
-                ended = f"ended after {self.seconds:g} s: a run in the studio takes no longer (--seconds)"
-            elif recording.records > self.events:
-                ended = f"ended after {self.events:,} events: a run in the studio has no more (--events)"
-            if ended:
-                raise KeyboardInterrupt
-            if moment - last > BEAT:
+            nonlocal last
+            within(now)
+            if (moment := time.monotonic()) - last > BEAT:
                 last = moment
                 share = None if model.stop is None else now / model.stop
                 self.say({"share": share, "metrics": _metrics(recording), "records": recording.records})
 
+        self.ended = ""
         try:
             recording.run(progress=progress)
         except KeyboardInterrupt:
@@ -275,9 +288,55 @@ class Worker:
             "seconds": time.monotonic() - started,
             "stopped": results.stopped,
             "failed": error,
-            "ended": ended,
+            "ended": self.ended,
             "view": data_of([recording]),
         }
+
+    def _within(self, recording: Recording | None) -> Callable[[float], None]:
+        """What ends a run that has reached the limits, or for which nobody waits any more."""
+        started = time.monotonic()
+
+        def look(now: float) -> None:
+            if not self.waiting.empty():
+                raise StaleError
+            if time.monotonic() - started > self.seconds:
+                self.ended = f"ended after {self.seconds:g} s: a run in the studio takes no longer (--seconds)"
+            elif recording is not None and recording.records > self.events:
+                self.ended = f"ended after {self.events:,} events: a run in the studio has no more (--events)"
+            else:
+                return
+            raise KeyboardInterrupt
+
+        return look
+
+    def what_if(self, asked: Message) -> Message:
+        """Both futures of the model's run, as data of a page, if they differ."""
+        time_, microstep = asked["at"]
+        until = asked.get("until")
+        changes = Changes(**{key: _texts(asked.get(key, [])) for key in ("change", "remove", "let_through", "lose")})
+        model = named(self.model, RunSpec(str(self.path), types=self.files))
+        try:
+            with opened(self.session.texts):
+                found = what_if(
+                    model,
+                    Tag(int(time_), int(microstep)),
+                    changes,
+                    seed=None,
+                    until=None if until is None else float(until),
+                    progress=False,
+                    watch=self._within,
+                )
+        except KeyboardInterrupt:
+            return {"error": self.ended}
+        page = found.page()
+        view = None if found.is_same else data_of(page.recordings, names=page.names, story=page.story)
+        return {"sentence": found.sentence, "view": view}
+
+
+def _texts(given: Any) -> list[str]:
+    if not isinstance(given, list) or not all(isinstance(each, str) for each in given):
+        raise EpicycleError("this change cannot be read")
+    return given
 
 
 def _metrics(recording: Recording) -> list[list[Any]]:
@@ -302,6 +361,7 @@ ASKED: Mapping[str, Callable[[Worker, Message], Message]] = {
     "fields": Worker.fields,
     "edit": Worker.edit,
     "run": Worker.run,
+    "what_if": Worker.what_if,
 }
 
 
@@ -336,10 +396,11 @@ def main(arguments: list[str]) -> None:
             os._exit(0)
 
     _limit()
-    worker = Worker(Path(path).resolve(), float(seconds), int(events), tuple(classes(files)), say)
+    keep_for_good()
+    worker = Worker(Path(path).resolve(), float(seconds), int(events), files, say)
     threading.Thread(target=_listen, args=(sys.stdin, worker), daemon=True).start()
     with seldom_collecting():
-        while (asked := worker.waiting.get()) is not None:
+        while (asked := worker.next()) is not None:
             if asked["ask"] == "stop":  # only a run in progress heeds it
                 continue
             current = asked

@@ -15,12 +15,16 @@ LONGEST = 64 << 20  # bytes of an answer
 
 
 class Workers:
-    """One process at a time; of the questions that wait, only the latest of each kind is asked."""
+    """One process at a time; of the questions that wait, only the latest of each kind is asked.
 
-    def __init__(self, name: str, arguments: Sequence[str], patience: float) -> None:
+    With ``stops``, a question ends the one that is being answered.
+    """
+
+    def __init__(self, name: str, arguments: Sequence[str], patience: float, *, stops: bool = False) -> None:
         self.name = name
         self.arguments = [*arguments]
         self.patience = patience  # s
+        self.stops = stops
         self._numbers = itertools.count()
         self._process: asyncio.subprocess.Process | None = None
         self._turn = asyncio.Lock()
@@ -31,7 +35,7 @@ class Workers:
         number = next(self._numbers)
         kind = str(question["ask"])
         self._latest[kind] = number
-        if kind == "run" and self._process is not None:
+        if self.stops and self._process is not None:
             await self._send({"ask": "stop"})  # a run looks whether anything waits
         async with self._turn:
             if self._latest[kind] != number:

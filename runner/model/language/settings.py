@@ -107,10 +107,12 @@ def settings_in(node: Mapping, problems: Problems) -> list[Setting]:
     ]
 
 
-def settings_of(given: Iterable[str | Setting] | AnyMapping[str, object], problems: Problems) -> list[Setting]:
-    """Settings as a call or a command gives them."""
+def settings_of(
+    given: Iterable[str | Setting] | AnyMapping[str, object], problems: Problems, flag: str = "--set"
+) -> list[Setting]:
+    """Settings as a call or a command gives them, the latter with a flag."""
     if not isinstance(given, AnyMapping):
-        read = (parse_setting(each, problems) if isinstance(each, str) else each for each in given)
+        read = (parse_setting(each, problems, flag) if isinstance(each, str) else each for each in given)
         return [setting for setting in read if setting is not None]
     node = node_of(given, call_site())
     assert isinstance(node, Mapping)

@@ -171,6 +171,7 @@ _BEGINNING = 50_000  # characters of a broken text that are read again by the sl
 _SCALAR = "scalar"  # the scope of a problem with a value as such: others at its place would be consequences
 _INDEXED = re.compile(r"\w\[(?:\d+|\*)\]")
 _ARROW = re.compile(r"\s*[-=]>")
+_BRACKET = re.compile(r"[\[\]{}]")
 _PROPERTIES = re.compile(r"(?:[&!]\S*[ \t]+)+")
 
 _HELP_FOR_SYNTAX: Final = (
@@ -229,7 +230,7 @@ class _Builder:
             for event in yaml.parse(self._text, Loader=_LOADER):
                 self._take(event)
         except yaml.MarkedYAMLError as error:
-            if not self._is_too_deep():
+            if not (self._may_be_deep() and self._is_too_deep()):
                 self._add_syntax(error)
             return None
         except yaml.YAMLError as error:
@@ -242,6 +243,15 @@ class _Builder:
             self._problems.add(f"{self._name} is empty")
             return None
         return root
+
+    def _may_be_deep(self) -> bool:
+        """Whether so many brackets are open somewhere; those in quotes and comments count, too."""
+        depth = 0
+        for bracket in _BRACKET.finditer(self._text, 0, _BEGINNING):
+            depth += 1 if bracket[0] in "[{" else -1 if depth else 0
+            if depth > MAX_DEPTH:
+                return True
+        return False
 
     def _is_too_deep(self) -> bool:
         """Report nesting that libyaml itself refuses, which newer versions do before they give us any event."""

@@ -7,7 +7,7 @@ composite is one flat drawing with a frame around it.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 
@@ -112,9 +112,16 @@ class Drawing:
     cut: int = 0  # wires shown by names at their ends
 
 
-def draw(outline: Outline) -> Drawing:
-    """Lay out an outline."""
-    scope = _Scope(outline.root, (), ())
+def draw(outline: Outline, known: dict[str, Scope] | None = None) -> Drawing:
+    """Lay out an outline.
+
+    ``known`` are composites of an earlier one: those that have not changed are laid out no second time.  Afterwards
+    they are those of this one.
+    """
+    known = {} if known is None else known
+    scope = Scope(outline.root, (), (), known)
+    known.clear()
+    known.update(scope.all_inside())
     drawing = Drawing(outline, scope.width + 2 * MARGIN, scope.height + 2 * MARGIN)
     scope.put(drawing, MARGIN, MARGIN, 0)
     return drawing
@@ -124,13 +131,15 @@ def pill_width(words: str) -> float:
     return text_width(words, PILL) + 8.0
 
 
-class _Scope:
-    """The inside of one open composite, or of the model."""
+class Scope:
+    """The inside of one open composite, or of the model, with its ports in the order in which they stand."""
 
-    def __init__(self, box: Box, inputs: Sequence[Port], outputs: Sequence[Port]) -> None:
+    def __init__(self, box: Box, inputs: Sequence[Port], outputs: Sequence[Port], known: Mapping[str, Scope]) -> None:
         self.box = box
+        self.known = known
+        self.key = ""
         self.top = TITLE + MARGIN if box.path else 0.0  # where the inside starts
-        self.inner: dict[Box, _Scope] = {}
+        self.inner: dict[Box, Scope] = {}
         self.ends: dict[Pin, Port] = {}
         self.pins: dict[str, Pin] = {}  # by the paths of their ports
         frame = []
@@ -197,9 +206,10 @@ class _Scope:
     def _measure(self, child: Box, cell: Cell) -> None:
         """Set the size of a box and the positions of its ports; an open composite is laid out to do so."""
         if child.is_open:
-            scope = self.inner[child] = _Scope(
-                child, [self.ends[pin] for pin in cell.left], [self.ends[pin] for pin in cell.right]
-            )
+            inputs, outputs = [self.ends[pin] for pin in cell.left], [self.ends[pin] for pin in cell.right]
+            key = repr((child, inputs, outputs))  # all that it depends on
+            scope = self.inner[child] = self.known.get(key) or Scope(child, inputs, outputs, self.known)
+            scope.key = key
             cell.width, cell.height = scope.width, scope.height
             for pin in (*cell.left, *cell.right):
                 inside = scope.pins[self.ends[pin].path]
@@ -255,6 +265,12 @@ class _Scope:
         else:
             x = 0.0 if cell.kind == "entry" else self.width
         return x, pin.y
+
+    def all_inside(self) -> Iterator[tuple[str, Scope]]:
+        """All open composites below this one, by their keys."""
+        for each in self.inner.values():
+            yield each.key, each
+            yield from each.all_inside()
 
     def put(self, drawing: Drawing, x: float, y: float, level: int) -> None:
         """Add everything to a drawing, with the top left corner of this scope at (x, y)."""

@@ -5,10 +5,11 @@ from __future__ import annotations
 from typing import Any
 
 from ...model.build.model import Model
-from ..graph import MOST_BOXES, Drawing, Outline, draw, outline
+from ..graph import MOST_BOXES, Drawing, Outline, Scope, draw, outline
 
 FEW = 8  # instances of an array that are drawn one by one
 _latest: dict[str, Drawing] = {}  # by the outline in words
+_scopes: dict[str, Scope] = {}  # what it consists of
 
 
 def drawn(model: Model) -> dict[str, Any]:
@@ -65,11 +66,11 @@ def _drawing(model: Model) -> tuple[Drawing, str]:
 
 
 def _laid_out(found: Outline) -> Drawing:
-    """The drawing of an outline; that of the latest one is kept, as most changes of a text leave the graph alone."""
+    """The drawing of an outline; the latest one is kept, as most changes of a text leave the graph, or most of it, alone."""
     key = repr(found.root)
     if key not in _latest:
         _latest.clear()
-        _latest[key] = draw(found)
+        _latest[key] = draw(found, _scopes)
     return _latest[key]
 
 

@@ -29,7 +29,7 @@ from .recording import Recording
 from .writing import ViewError, replace_file
 
 # In this order, because each uses the ones before it; a program that arranges them follows.
-PARTS = ("data", "causes", "paint", "state", "space", "graph", "timeline", "lanes", "chart", "details")
+PARTS = ("data", "causes", "paint", "state", "space", "graph", "timeline", "lanes", "chart", "details", "viewer")
 
 
 def write_page(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import html
 import tempfile
 import webbrowser
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 from pathlib import Path
 
@@ -20,6 +20,8 @@ from ...support.printing import complain
 from ..watching import watched
 from .page import page_of, write_page
 from .recording import Recording
+
+Watch = Callable[[Recording | None], Callable[[float], None]]  # for a run that is recorded, or for one that is not
 
 
 class Page:
@@ -68,10 +70,12 @@ def recorded(
     names: Sequence[str] = (),
     acts: Sequence[Interventions | None] = (),
     progress: bool = True,
+    watch: Watch | None = None,
 ) -> Page:
     """The page of these models' runs; seeds and stop times apply to all, or are given for each.
 
-    ``acts`` say which acts of aspects happen in each.
+    ``acts`` say which acts of aspects happen in each; ``watch`` gives what is called with the time of a run now and
+    then, in place of a bar.
     """
     recordings, errors = [], list[EpicycleError | KeyboardInterrupt]()
     for number, model in enumerate(models):
@@ -93,7 +97,8 @@ def recorded(
                 acts=acts[number] if acts else None,
             )
         )
-        with watched(model, stop, SOON) if progress else nullcontext() as report:
+        look = nullcontext(watch(recordings[-1])) if watch else nullcontext()
+        with watched(model, stop, SOON) if progress else look as report:
             try:
                 recordings[-1].run(until=stop, progress=report)
             except (ActorError, LoopError) as error:  # what led to the error is the very thing to look at

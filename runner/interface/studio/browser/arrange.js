@@ -11,8 +11,9 @@ class Studio {
     this.version = 0; // of the text
     this.editing = Promise.resolve();
     this.typesKnown = { actors: [], aspects: [] };
-    this.running = new Running(link, { shown: (data) => this.showRun(data) });
-    this.views = new Views();
+    this.running = new Running(link, { shown: (data, run) => this.showRun(data, run) });
+    this.whatIf = new WhatIf(link, { page, aspects: () => [...this.aspects.rows.keys()], names: () => this.parameterNames() });
+    this.views = new Views(this.whatIf);
     this.build(hello);
     this.read();
     this.loadTypes();
@@ -173,12 +174,19 @@ class Studio {
     this.views.show(state, { runs: state.runs });
   }
 
-  showRun(data) {
+  showRun(data, { text, until }) {
     const state = new State(data), { drawing } = state.run;
     if (this.views.state.time && this.views.state.end === state.end) state.setTime(this.views.state.time);
+    this.whatIf.show({ text, until, state });
     this.drawn = JSON.stringify(drawing);
     this.showGraph(state, drawing);
     this.page.dataset.run = String(this.version);
+  }
+
+  // What a run can change: parameters of the model, and of the chosen actor.
+  parameterNames() {
+    const chosen = this.diagram.chosen?.path;
+    return [...this.parameters.rows.keys(), ...(chosen && this.fields ? [...this.fields.rows.keys()].map((name) => `${chosen}.${name}`) : [])];
   }
 
   // A new actor: its type, its name, and the button that writes it.
@@ -291,21 +299,16 @@ function begin() {
     page.dataset.ended = "yes";
     studio?.say(`${reason}: what you have written is still here, to be copied`);
   });
-  let before = performance.now();
-  const frame = (now) => {
+  eachFrame((seconds) => {
     const state = studio?.state;
-    if (state) {
-      state.advance(Math.min(0.1, (now - before) / 1000));
-      if (state.isDirty) {
-        state.isDirty = false;
-        studio.diagram.paint();
-        studio.views.paint();
-      }
-    }
-    before = now;
-    requestAnimationFrame(frame);
-  };
-  requestAnimationFrame(frame);
+    if (!state) return;
+    studio.whatIf.advance(seconds);
+    state.advance(seconds);
+    if (!state.isDirty) return;
+    state.isDirty = false;
+    studio.diagram.paint();
+    studio.views.paint();
+  });
 }
 
 begin();

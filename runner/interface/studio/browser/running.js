@@ -48,7 +48,7 @@ class Running {
       ...(moved ? [element("b", { text: moved, className: this.before.digest === found.digest ? "same" : "moved" }), " "] : []),
       element("code", { text: found.digest.slice(0, 16), title: `digest of the event log: ${found.digest}` }));
     const data = await readData(found.view);
-    if (number === this.latest) this.shown(data);
+    if (number === this.latest) this.shown(data, { text, until: found.ended ? data.runs[0].end / 1e9 : null });
   }
 
   // The text has changed: what is shown belongs to the one before.
@@ -73,16 +73,17 @@ class Running {
 
 // The views of a run over time, one of them at a time.
 class Views {
-  constructor() {
+  constructor(whatIf) {
+    this.whatIf = whatIf;
     this.tabs = element("div", { className: "tabs" });
     this.holder = element("div", { className: "holder" });
     this.strip = element("div", { className: "scrub" });
-    this.time = element("output", { id: "now" });
+    this.time = element("output", { className: "now" });
     this.play = button("▶", () => this.state.play(!this.state.isPlaying), "play");
     this.play.setAttribute("aria-label", "play");
     this.box = element("div", { className: "views" },
       element("div", { className: "viewbar" }, button("|◀", () => this.state.setTag(0)), button("◀", () => this.state.step(-1)), this.play,
-        button("▶|", () => this.state.step(1)), this.time, this.tabs), this.strip, this.holder);
+        button("▶|", () => this.state.step(1)), this.time, this.tabs), this.whatIf.box, this.strip, this.holder);
     this.wanted = "";
   }
 
@@ -125,6 +126,7 @@ class Views {
     this.scrubber.paint();
     this.known[this.name].paint?.();
     this.play.textContent = state.isPlaying ? "❚❚" : "▶";
-    this.time.textContent = state.isPlaying || state.tag < 0 ? secondsText(Math.round(state.time / 1e3) * 1e3) : state.run.tagText(state.tag);
+    this.time.textContent = state.nowText;
+    this.whatIf.tell();
   }
 }

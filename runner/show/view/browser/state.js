@@ -30,6 +30,10 @@ class State {
     return this.tags[this.active];
   }
 
+  get nowText() {
+    return this.isPlaying || this.tag < 0 ? secondsText(Math.round(this.time / 1e3) * 1e3) : this.run.tagText(this.tag);
+  }
+
   changed() {
     this.isDirty = true;
   }
