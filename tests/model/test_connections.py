@@ -47,9 +47,6 @@ CASES = [
         '{from: "c[2, 0].output, c[1].output", to: "s[0, 1].input, s[2].input"}',
         "c2-s0 c0-s1 c2-s2 c0-s2 c1-s0 c1-s1 c1-s2",
     ),
-        '{from: "c[2, 0].output, c[1].output", to: "s[0, 1].input, s[2].input"}',
-        "c2-s0 c0-s1 c2-s2 c0-s2 c1-s0 c1-s1 c1-s2",
-    ),
 ]
 
 
