@@ -1,12 +1,13 @@
 """Runs the cases of the board, and tells which published values they meet.
 
 A source is a file beside this one: ``title``, ``source``, what is ``undecided``, and ``cases``.  A case is made in one
-of four ways, each a command of Epicycle:
+of these ways:
 
 - ``study: NAME``: replications.  A true or false is a share with Wilson's interval, a number a mean with Student's.
 - ``run: NAME``: one long run, whose metrics have intervals by batch means.
 - ``rare: NAME`` with ``monitor``, ``guide``, ``runs``: importance splitting.
 - ``check: NAME``: one run, in which all monitors must hold.
+- ``program: NAME``: an example of SimPy, which must print what it prints there.
 
 ``published`` has a list for each parameter that is varied and for each metric.  Every seed is fixed; the figures are
 those of Epicycle's own statistics, so that they are the same on every machine.
@@ -29,9 +30,11 @@ from epicycle.runner import Simulation
 from epicycle.runner.study.inference import mean, rate
 from epicycle.runner.support.shown import rounded
 
+from . import programs
+
 HERE = Path(__file__).parent
 ROOT = HERE.parent.parent
-SOURCES = ("stochastic", "queues", "superdense")
+SOURCES = ("stochastic", "simpy", "queues", "superdense")
 RESULTS = Path("results/truth")
 LEAST, MOST = 90.0, 99.0  # % of 95 % intervals that should hold the published value
 
@@ -58,7 +61,7 @@ def source(name: str) -> Mapping[str, Any]:
 
 def lines_of(name: str, jobs: int | None = None) -> list[Line]:
     """All cases of a source, made now unless they have been made before."""
-    kinds = {"study": _of_study, "run": _of_run, "rare": _of_rare, "check": _of_check}
+    kinds = {"study": _of_study, "run": _of_run, "rare": _of_rare, "check": _of_check, "program": _of_program}
     lines: list[Line] = []
     for case in source(name)["cases"]:
         kind = next(each for each in kinds if each in case)
@@ -119,6 +122,17 @@ def _of_check(name: str, case: Mapping[str, Any], jobs: int | None) -> Iterator[
     ours = f"{', '.join(broken)} broken" if broken else "holds"
     command = f"epicycle run {file.relative_to(ROOT)} --check"
     yield Line(case["check"], asked, case["published"], ours, not broken, command, is_interval=False)
+
+
+def _of_program(name: str, case: Mapping[str, Any], jobs: int | None) -> Iterator[Line]:
+    wanted, found = programs.published(case["program"]), programs.printed(case["program"])
+    pairs = enumerate(zip(found, wanted, strict=False), start=1)
+    ours = next((f"line {number} is {here!r}, not {there!r}" for number, (here, there) in pairs if here != there), "")
+    if not ours and len(found) != len(wanted):
+        ours = f"{len(found)} lines instead of {len(wanted)}"
+    command = f"python -m benchmarks.truth.programs {case['program']}"
+    told = ours or "the same lines"
+    yield Line(case["program"], case["asked"], f"{len(wanted)} lines", told, not ours, command, is_interval=False)
 
 
 def _published(

@@ -14,7 +14,7 @@ from epicycle.actors import EpicycleError, counted, did_you_mean
 
 from ..execution.engine import ActorError, LoopError, Simulation
 from ..model.build.model import Model
-from ..study.inference import Estimate, holm, mean, paired_difference, with_interval
+from ..study.inference import Estimate, average, holm, paired_difference, with_interval
 from ..support.shown import finite
 from ..support.tables import Table, pandas_module
 from .answer import Answer
@@ -85,6 +85,11 @@ class Comparison(Answer):
         found = {seed: results.metrics.get(metric) for seed, results in self.runs[variant].items()}
         return {seed: float(each) for seed, each in found.items() if isinstance(each, (int, float))}
 
+    def _average(self, variant: str, metric: str) -> Estimate:
+        found = [results.metrics.get(metric) for results in self.runs[variant].values()]
+        is_share = all(each is None or isinstance(each, bool) for each in found)
+        return average(list(self.values(variant, metric).values()), is_share=is_share)
+
     def differences(self) -> list[Difference]:
         """Each metric in each variant, and its difference from the first variant."""
         first, *others = self.runs
@@ -97,7 +102,7 @@ class Comparison(Answer):
         found = []
         for metric in self.metrics:
             for variant in self.runs:
-                test, own = tested.get((metric, variant)), mean(list(self.values(variant, metric).values()))
+                test, own = tested.get((metric, variant)), self._average(variant, metric)
                 p = corrected.get((metric, variant), math.nan)
                 found.append(Difference(metric, variant, own, None if test is None else test.estimate, p))
         return found

@@ -42,6 +42,14 @@ def half_width(values: Sequence[float], level: float = LEVEL) -> float:
     return student_quantile((1 + level) / 2, count - 1) * _standard_error(values) if count > 1 else math.inf
 
 
+def half_of(values: Sequence[float], level: float = LEVEL, *, is_share: bool = False) -> float:
+    """Half the width of the interval of ``average``; infinite for fewer than two values."""
+    if not is_share or len(values) < 2:
+        return half_width(values, level)
+    found = average(values, level, is_share=True)
+    return (found.high - found.low) / 2
+
+
 def _standard_error(values: Sequence[float]) -> float:
     return _deviation(values) / math.sqrt(len(values)) if len(values) > 1 else math.nan
 
@@ -61,11 +69,19 @@ def mean(values: Sequence[float], level: float = LEVEL) -> Estimate:
     return Estimate(value, _standard_error(values), value - half, value + half, count)
 
 
+def average(values: Sequence[float], level: float = LEVEL, *, is_share: bool = False) -> Estimate:
+    """The mean with Student's interval; of what is true or false (1 or 0), the share that is true with Wilson's."""
+    return rate(round(math.fsum(values)), len(values), level) if is_share else mean(values, level)
+
+
 def with_interval(estimate: Estimate) -> str:
-    """A mean with half of its 95 % interval."""
-    width = estimate.high - estimate.low
-    value = rounded(estimate.value, width)
-    return f"{value} ± {rounded(width / 2, width)}" if math.isfinite(width) and width > 0 else value
+    """A mean with its interval, rounded to two digits of that: ``4.81 ± 0.06``; a share: ``0.02 (0.01 to 0.07)``."""
+    width, value = estimate.high - estimate.low, rounded(estimate.value, estimate.high - estimate.low)
+    if estimate.count == 0 or not math.isfinite(width) or width == 0:
+        return value
+    if math.isclose(estimate.high - estimate.value, estimate.value - estimate.low):
+        return f"{value} ± {rounded(width / 2, width)}"
+    return f"{value} ({rounded(estimate.low, width)} to {rounded(estimate.high, width)})"
 
 
 def bootstrap_mean(values: Sequence[float], level: float = LEVEL, *, resamples: int = 9_999) -> Estimate:

@@ -14,7 +14,7 @@ from epicycle.runner.execution.results import Results
 from epicycle.runner.interface.cli import main
 from epicycle.runner.model.build.model import Model
 from epicycle.runner.model.text.problems import ModelError
-from tests.engine.engine_parts import load
+from tests.engine.engine_parts import load, simulate
 from tests.engine.test_monitors import Steps
 
 
@@ -182,3 +182,17 @@ def test_a_ratio_is_given_in_percent() -> None:
     results = Simulation(made).run()
     assert results.metrics == {"first": 1000.0, "second": 20, "ratio": 5000.0}
     assert results.units == {"first": "%", "second": "", "ratio": "%"}
+
+
+def test_a_formula_uses_parameters_in_their_si_units() -> None:
+    text = (
+        "parameters: {length: {value: 1, unit: h}, times: 3}\n"
+        "actors: {t: {type: Ticker, period: 0.5}}\n"
+        "run: {stop: 10 s}\n"
+        "metrics:\n"
+        "  ticks: {of: t.output, take: count}\n"
+        "  share: {from: 'times * ticks / ${length}'}\n"
+        "  twice: {from: 'ticks * ${times} > ${2 * times}'}\n"
+    ).replace("times * ticks", "${times} * ticks")
+    _, results = simulate(text)
+    assert results.metrics == {"ticks": 21, "share": 3 * 21 / 3600, "twice": True}

@@ -118,6 +118,41 @@ def test_what_holds_before_the_first_token_is_given_or_does_not_count() -> None:
     assert measured(tokens, 10 * SECOND, take="share", when="value == 'up'", initial="up").value == 0.6
 
 
+def test_an_integral_is_of_values_times_seconds() -> None:
+    tokens = [("a.out", 2 * SECOND, 3), ("a.out", 6 * SECOND, -0.5)]
+    assert measured(tokens, 10 * SECOND, take="integral").value == 10.0  # 4 * 3 - 4 * 0.5
+    assert measured(tokens, 10 * SECOND, take="integral", initial=1, after=1.0).value == 11.0
+    assert measured(tokens, 10 * SECOND, take="integral", unit="W", to="mW*h").value == pytest.approx(10 / 3.6)
+    states = [("a.out", 2 * SECOND, "up"), ("a.out", 6 * SECOND, "down"), ("a.out", 9 * SECOND, "up")]
+    assert measured(states, 10 * SECOND, take="duration", when="value == 'up'").value == 5.0
+    assert measured(states, 10 * SECOND, take="duration", when="value == 'up'", initial="up", to="ms").value == 7000.0
+    assert [MetricSpec(**each).own_unit for each in ({"take": "integral"}, {"take": "integral", "unit": "m/s"})] == [
+        "",
+        "m/s*s",
+    ]
+
+
+@given(SEQUENCES, st.integers(0, 20 * SECOND), st.sampled_from(sorted(TAKES)), st.sampled_from([None, 7]))
+def test_until_is_as_if_the_run_had_stopped_then(
+    sequence: list[tuple[int, Any]], until: int, take: str, initial: int | None
+) -> None:
+    tokens, kind = timed(sequence), TAKES[take]
+    options: dict[str, Any] = {"p": {"p": 0.5}, "when": {"when": "value > 0"}}.get(kind.needs, {})
+    options |= {"initial": initial} if "initial" in kind.options else {}
+    options |= {"interval": 0.9} if "interval" in kind.options else {}
+    end = max(tokens[-1][1], until) + SECOND
+    early = [each for each in tokens if each[1] <= until]
+    assert measured(tokens, end, take=take, until=until / SECOND, **options) == measured(
+        early, until, take=take, **options
+    )
+
+
+def test_the_value_at_a_time_is_the_last_until_then() -> None:
+    tokens = [("a.out", 2 * SECOND, "on"), ("a.out", 5 * SECOND, "off")]
+    at = {until: measured(tokens, 9 * SECOND, initial="new", until=until).value for until in (1.0, 2.0, 4.9, 5.0)}
+    assert at == {1.0: "new", 2.0: "on", 4.9: "on", 5.0: "off"}
+
+
 def test_of_several_ports_each_counts_for_its_own_time() -> None:
     tokens = [("a", 0, 1), ("b", 5 * SECOND, 4)]
     ports = ("a", "b")
@@ -137,6 +172,8 @@ def test_of_several_ports_each_counts_for_its_own_time() -> None:
         ({"take": "mean", "after": 9.0}, [(0, 1.0)], "the run ended at 2 s, before its warm-up of 9 s was over"),
         ({"take": "rate", "after": 9.0}, [(0, 1.0)], "the run ended at 2 s, before its warm-up of 9 s was over"),
         ({"take": "rate", "after": 2.0}, [], "no time passed"),
+        ({"take": "last", "until": 3.0}, [(0, 1.0)], "the run ended at 2 s, before 3 s"),
+        ({"take": "integral", "until": 1.0}, [(2, 1.0)], "no token came"),
         ({"take": "mean"}, [(1, math.nan)], "a.out sent nan at 1 s"),
         ({"take": "max"}, [(1, math.nan)], "a.out sent nan at 1 s"),
         ({"take": "time_std"}, [(0, 1.0), (1, -math.inf)], "a.out sent -inf at 1 s"),

@@ -43,6 +43,10 @@ CASES = [
     ("c[0..${n - 2}].output -> s[${k}..${n - 1}].input", "c0-s1 c1-s2"),
     ("c[2, 0].output, c[1].output -> s[0, 1].input, s[2].input", "c2-s0 c0-s1 c2-s2 c0-s2 c1-s0 c1-s1 c1-s2"),
     ("'[c[0].output, c[1].output] -> [s[0].input]'", "c0-s0 c1-s0"),
+    (
+        '{from: "c[2, 0].output, c[1].output", to: "s[0, 1].input, s[2].input"}',
+        "c2-s0 c0-s1 c2-s2 c0-s2 c1-s0 c1-s1 c1-s2",
+    ),
 ]
 
 

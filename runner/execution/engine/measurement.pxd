@@ -10,6 +10,7 @@ cdef class Measurement:
     cdef public _Kept _kept
     cdef public _Taking _taking
     cdef public dict _holds
+    cdef public long long _until
     cdef public bint _is_beyond, _is_of_floats, _is_of_numbers
     cpdef add(self, str port, long long time, token)
     @cython.locals(number=cython.double)

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
-from epicycle.actors import Quantity, to_nanoseconds, to_seconds
+from epicycle.actors import NEVER, Quantity, to_nanoseconds, to_seconds
 from epicycle.actors.expression import Formula
 
 from ...model.catalogue.metrics import MSER5, TIME, MetricSpec
@@ -33,11 +33,22 @@ class _Unfit:
 class Measurement:
     """Takes in the tokens that the ports of a metric send."""
 
-    __slots__ = ("_holds", "_is_beyond", "_is_of_floats", "_is_of_numbers", "_kept", "_measure", "_ports", "_taking")
+    __slots__ = (
+        "_holds",
+        "_is_beyond",
+        "_is_of_floats",
+        "_is_of_numbers",
+        "_kept",
+        "_measure",
+        "_ports",
+        "_taking",
+        "_until",
+    )
 
     def __init__(self, metric: Metric) -> None:
         measure = self._measure = metric.measure
         self._ports = metric.ports
+        self._until = NEVER if measure.until is None else to_nanoseconds(measure.until)
         self._kept: _Kept | None = None
         self._is_beyond = False  # of all numbers
         # The values of most tokens are known at once: floats as they are, whole numbers as floats or not.
@@ -54,6 +65,8 @@ class Measurement:
 
     def add(self, port: str, time: int, token: Any) -> None:
         """Take in a token at a time (ns)."""
+        if time > self._until:
+            return
         value = self._value(token)
         if type(value) is _Unfit:
             value = _Unfit(f"{port} sent {value.reason} at {to_seconds(time):.9g} s")
@@ -95,6 +108,11 @@ class Measurement:
         return self._converted(found)
 
     def _outcome(self, end: int) -> Outcome:
+        if self._until != NEVER:
+            if end < self._until:
+                ended, until = to_seconds(end), to_seconds(self._until)
+                return Outcome(missing=f"the run ended at {ended:.6g} s, before {until:.6g} s")
+            end = self._until
         if self._kept is None:
             return self._taking.outcome(end)
         taking = self._kept.settled(self._measure, self._ports, end)
@@ -193,6 +211,8 @@ class _Tokens(_Taking):
             return Outcome(missing=missing)
         after = to_seconds(self.start)
         if found is None:
+            if self._count == 0 and self._measure.initial is not None:
+                return Outcome(self._measure.initial, after=after)
             few = "no token came" if self._count == 0 else "one token has no spread"
             return Outcome(missing=few + (f" after {after:.6g} s" if after else ""))
         if self._batches is None:

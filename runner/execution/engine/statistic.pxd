@@ -2,7 +2,7 @@
 
 cimport cython
 
-cdef double MOST
+cdef double MOST, NANOSECONDS
 cdef Py_ssize_t _KEPT
 
 

@@ -16,6 +16,7 @@ from typing import Any
 from ...model.catalogue.metrics import MetricSpec
 
 MOST = sys.float_info.max
+NANOSECONDS = 1e9  # in a second
 _KEPT = 512  # numbers until they are summed up
 
 
@@ -157,6 +158,16 @@ class Mean(Statistic):
         return self._total.value / self._weight if self._weight else None
 
 
+class Integral(Mean):
+    """Their sum with each weighted by the seconds that it lasts."""
+
+    __slots__ = ()
+
+    @property
+    def value(self) -> float | None:
+        return self._total.value / NANOSECONDS if self._weight else None
+
+
 class Spread(Statistic):
     """Their standard deviation: of a sample or, with weights, of the population.  Source: D. H. D. West (1979)."""
 
@@ -237,6 +248,8 @@ def statistic_of(measure: MetricSpec) -> Statistic:
         return Count()
     if take == "sum":
         return Sum()
+    if take in ("integral", "duration"):
+        return Integral()
     if take in ("std", "time_std"):
         return Spread(sample=take == "std")
     if take in ("quantile", "time_quantile"):

@@ -23,6 +23,7 @@ from ..language.ports import ParameterText
 from ..language.values import Locals, Values
 from ..temporal import Requirement, RequirementOptions
 from ..text.document import Mapping as MappingNode
+from ..text.document import Scalar
 from ..text.problems import Position, Problems
 from ..text.program import call_site
 from ..text.reading import NAME, NAMES_HAVE, Text, within
@@ -182,7 +183,7 @@ class Model(Building, Scope, Tabled):
             reader = OutputReader(self.graph, Values(problems), problems, self.output)
             texts = (each if isinstance(each, str) else each.path for each in ports)
             of_ports = tuple(Text(each, within(position, each)) for each in texts)
-            source = Text(formula, within(position, formula)) if formula else None
+            source = Scalar(formula, formula, False, within(position, formula)) if formula else None
             given: dict[str, object] = {"take": take, **options}
             entries = reader.options(MetricSpec, f"metric {name}", given, position)
             reader.metric(MetricText(name, of_ports, source, entries, position), Locals(), given)

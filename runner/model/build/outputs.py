@@ -7,9 +7,10 @@ from graphlib import CycleError, TopologicalSorter
 from types import MappingProxyType
 from typing import Any
 
-from epicycle.actors import Parameter, accepts, declared_parameters, did_you_mean, type_name
-from epicycle.actors.expression import ExpressionError, Formula
+from epicycle.actors import Parameter, ParameterError, accepts, declared_parameters, did_you_mean, type_name
+from epicycle.actors.expression import Formula, as_text
 
+from ...support.shown import short
 from ..catalogue.metrics import MetricSpec
 from ..graph.model_graph import ModelGraph
 from ..graph.outputs import Metric, OutputSpec
@@ -41,7 +42,8 @@ class OutputReader:
         self._outputs = PathIndex(outputs, self.graph.limits)
         self._recorded = set(self.found.recorded)
         self._watched = 0
-        self._formulas: dict[str, Text] = {}  # of metrics that are computed from others
+        self._wrong: set[str] = set()  # metrics about which something has been said
+        self._formulas: dict[str, Scalar] = {}  # of metrics that are computed from others
 
     def read(self, text: ModelText, names: dict[str, object]) -> OutputSpec:
         """Everything that the model file declares about it."""
@@ -92,9 +94,10 @@ class OutputReader:
         make, at = MetricSpec.fitting, text.position
         measure = configure(MetricSpec, text.values, local, what, at, self.values, make=make, evaluated=given)
         if text.formula is not None:
-            self._compute(text, text.formula, measure)
+            self._compute(text, text.formula, measure, local)
             return
         if not measure:
+            self._wrong.add(text.name)
             return
         chosen = {path: each for each in reversed(text.ports) for path in self.select(each, what)}
         paths = self._outputs.in_order(chosen)
@@ -115,19 +118,17 @@ class OutputReader:
                     self.problems.add(message, chosen[path].position, "name a port that sends numbers, or take 'count'")
                     return
 
-    def _compute(self, text: MetricText, source: Text, measure: MetricSpec | Poison) -> None:
+    def _compute(self, text: MetricText, source: Scalar, measure: MetricSpec | Poison, local: Locals) -> None:
         """Compute a number from other metrics; ``check_formulas`` says whether there are such."""
         name, what = text.name, f"metric {text.name}"
-        try:
-            formula = Formula(source.text)
-        except ExpressionError as error:
-            wrong = source.text[error.offset : error.offset + max(error.length, 1)]
-            self.problems.add(f"{what}: {error}", within(source.position, wrong) if wrong else source.position)
+        formula: Formula | Poison = self.values.converted(source, local, what, _formula)
+        if not formula or not measure:
+            self._wrong.add(name)
             return
         if not formula.names:
             hint = "write an expression over others, such as 'delivered / sent'"
-            self.problems.add(f"{what}: {source.text!r} names no metric", source.position, hint)
-        elif measure:
+            self.problems.add(f"{what}: {formula.source!r} names no metric", source.position, hint)
+        else:
             self._formulas[name] = source
             self.found.metrics.append(Metric(name, [], measure, formula=formula))
 
@@ -140,7 +141,7 @@ class OutputReader:
             assert formula is not None
             sorter.add(name, *formula.names)
             for each in formula.names:
-                if each not in names:
+                if each not in names and each not in self._wrong:
                     near = each, [other for other in names if other != name]
                     hint = f"metrics of the model: {', '.join(other for other in names if other != name) or 'none'}"
                     message = f"metric {name}: there is no metric {each!r}"
@@ -192,6 +193,12 @@ class OutputReader:
             message, hints = f"{what}: {text.text} is an input port, but an output port is needed", ()
         self.problems.add(message, text.position, *hints, near=self._outputs.near(text.text))
         return []
+
+
+def _formula(value: object) -> Formula:
+    if not isinstance(value, (str, bool, int, float)):
+        raise ParameterError(f"{short(value)} is not an expression")
+    return Formula(str(as_text(value)))
 
 
 _WORDS = ("take", "unit", "to", "doc", "label")

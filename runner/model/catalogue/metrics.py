@@ -33,7 +33,7 @@ class Reduction:
     over: str
     doc: str
     of: str = "numbers"  # or "any" tokens, or "single" values: numbers and texts
-    options: tuple[str, ...] = ()  # besides 'after', 'to' and the options of all metrics
+    options: tuple[str, ...] = ()  # besides 'after', 'until', 'to' and the options of all metrics
     needs: str = ""  # an option that it requires
     unit: str = ""
     settles: bool = True  # whether MSER-5 can detect when it has settled
@@ -42,7 +42,7 @@ class Reduction:
 # The keys of TAKES, and what a MetricSpec declares besides 'take', as type checkers know them.
 TakeName: TypeAlias = Literal[
     "last", "first", "count", "min", "max", "sum", "mean", "std", "quantile", "rate", "time_mean", "time_std",
-    "time_quantile", "share",
+    "time_quantile", "share", "integral", "duration",
 ]  # fmt: skip
 
 
@@ -53,6 +53,7 @@ class MetricOptions(TypedDict, total=False):
     when: str | Formula
     initial: object
     after: float | str
+    until: float | str
     interval: float | str
     across: str
     unit: str
@@ -62,7 +63,7 @@ class MetricOptions(TypedDict, total=False):
 
 
 TAKES = {
-    "last": Reduction(TOKENS, "the last one", of="single", settles=False),
+    "last": Reduction(TOKENS, "the last one", of="single", options=("initial",), settles=False),
     "first": Reduction(TOKENS, "the first one", of="single", settles=False),
     "count": Reduction(TOKENS, "how many there are", of="any", settles=False),
     "min": Reduction(TOKENS, "the least"),
@@ -96,6 +97,21 @@ TAKES = {
         options=("when", "initial", "interval"),
         needs="when",
         unit="1",
+    ),
+    "integral": Reduction(
+        TIME,
+        "the integral over time: the sum of each value times the seconds that it lasts",
+        options=("initial",),
+        settles=False,
+    ),
+    "duration": Reduction(
+        TIME,
+        "how long 'when' holds in all",
+        of="any",
+        options=("when", "initial"),
+        needs="when",
+        unit="s",
+        settles=False,
     ),
 }
 
@@ -135,6 +151,9 @@ class MetricSpec(Configurable):
         object, None, doc="the value before the first token; without it, time counts from that token on"
     )
     after = WarmUpParameter(0.0, doc="the warm-up, which does not count: its length, or mser5 to detect it")
+    until: Parameter[float | None] = Parameter(
+        float, None, unit="s", min=0.0, doc="the last time that counts (default: the end of the run)"
+    )
     interval: Parameter[float | None] = Parameter(
         float, None, unit="1", min=0.5, max=0.9999, doc="level of a confidence interval, by batch means"
     )
@@ -156,7 +175,8 @@ class MetricSpec(Configurable):
     @property
     def own_unit(self) -> str:
         """Its unit before conversion."""
-        return self.kind.unit or unit_before(self.unit, self.to)
+        unit = self.kind.unit or unit_before(self.unit, self.to)
+        return f"{unit}*s" if unit and self.take == "integral" else unit
 
     @classmethod
     def fitting(cls, **values: object) -> MetricSpec:
@@ -186,6 +206,9 @@ class MetricSpec(Configurable):
         if self.after == MSER5 and not kind.settles:
             message = f"{MSER5} cannot detect when {self.take!r} has settled"
             yield Fault(message, ("after",), help=("give the warm-up as a time",))
+        if self.until is not None and isinstance(self.after, float) and self.until < self.after:
+            message = f"until: {self.until:g} s is before the end of the warm-up, which is at {self.after:g} s"
+            yield Fault(message, ("until",))
         is_number = isinstance(self.initial, (bool, int, float))
         if self.initial is not None and kind.of == "numbers" and not is_number:
             yield Fault(f"initial: {self.initial!r} is not a number", ("initial",))

@@ -8,7 +8,7 @@ from typing import Any
 from epicycle.actors import Parameter, declared_parameters
 
 from ..catalogue.metrics import TAKES, MetricSpec, take_fault
-from ..text.document import Entry
+from ..text.document import Entry, Scalar
 from ..text.kinds import CHOICE, MISSING_KEY
 from ..text.problems import POISON, Poison, Position
 from ..text.reading import NodeReader, Text
@@ -22,7 +22,7 @@ class MetricText:
 
     name: str
     ports: tuple[Text, ...]
-    formula: Text | None
+    formula: Scalar | None
     values: dict[str, Entry]
     position: Position
 
@@ -41,7 +41,10 @@ METRIC = Record(
             TEXTS.described(one_or_more(PATTERN_SCHEMA)),
             "The output port, a pattern for several, or a list of these.",
         ),
-        "from": Field(AT, "An expression over other metrics of the model, such as 'delivered / sent'."),
+        "from": Field(
+            AT,
+            "An expression over other metrics, such as 'delivered / sent', with '${...}' for values of the model.",
+        ),
         **{key: _of_metric(key, each) for key, each in declared_parameters(MetricSpec).items()},
     },
     type="object",
@@ -62,9 +65,11 @@ def _metric(reader: NodeReader, name: str, entry: Entry) -> MetricText | Poison:
             if key not in _WITH_FORMULA:
                 message = f"{what}: {key!r} cannot be used with 'from'"
                 reader.problems.add(message, entries[key].key.position, f"it can have {', '.join(_WITH_FORMULA[1:])}")
-        formula = said["from"]
+        formula = entries["from"].value
         values = {key: each for key, each in entries.items() if key in _WITH_FORMULA[1:]}
-        return POISON if formula is POISON else MetricText(name, (), formula, values, entry.key.position)
+        if said["from"] is POISON or not isinstance(formula, Scalar):
+            return POISON
+        return MetricText(name, (), formula, values, entry.key.position)
     ports = said.get("of", ())
     if ports == ():
         hint = "add 'of: actor.port', or 'from: delivered / sent' over other metrics"

@@ -48,7 +48,12 @@ PORT_SCHEMA: Schema = {
         "expected actor.port, array[*].port, array[0].port, array[1..3].port or a port of this composite",
     ),
 }
-PORTS_SCHEMA: Schema = {"anyOf": [ref("port"), {"type": "array", "items": ref("port"), "minItems": 1}]}
+PORTS_SCHEMA: Schema = {
+    "anyOf": [
+        {"type": "string", **looks_like(f"^{_SIDE}$", "expected actor.port, or several of these with commas between")},
+        {"type": "array", "items": ref("port"), "minItems": 1},
+    ]
+}
 PATTERN_SCHEMA: Schema = {
     "type": "string",
     **looks_like(
@@ -96,7 +101,13 @@ def endpoints(reader: NodeReader, texts: Iterable[Text] | Poison) -> tuple[Endpo
     return POISON if texts is POISON or len(sound) < len(found) else sound
 
 
-_ENDS = Reader(ref("ports"), lambda reader, node, what: endpoints(reader, reader.texts(node, what)))
+def _ends(reader: NodeReader, node: Node, what: str) -> tuple[Endpoint, ...] | Poison:
+    if isinstance(node, Scalar) and isinstance(node.value, str):
+        return endpoints(reader, _side(node, node.value, 0, len(node.value)))
+    return endpoints(reader, reader.texts(node, what))
+
+
+_ENDS = Reader(ref("ports"), _ends)
 
 
 @dataclass(frozen=True)

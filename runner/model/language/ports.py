@@ -173,12 +173,20 @@ PARAMETER = Record.of(
 _NO_PARAMETERS = {"index", *CONSTANTS, *FUNCTIONS}
 
 
+def _meaning(name: str) -> str:
+    """What a name means in all expressions; empty if nothing."""
+    if name == "index":
+        return "the index of an instance in its array"
+    if iskeyword(name):
+        return "a keyword, as in Python"
+    return "a function" if name in FUNCTIONS else "a constant" if name in CONSTANTS else ""
+
+
 def _parameter(reader: NodeReader, name: str, entry: Entry) -> ParameterText:
     """``name: value`` or ``name: {value: ..., unit: ..., min: ..., max: ..., choices: ..., doc: ...}``."""
-    if name in _NO_PARAMETERS or iskeyword(name):
-        meaning = "the index of an instance in its array" if name == "index" else "something else"
-        message = f"a parameter cannot be called {name!r}: in expressions, that name means {meaning}"
-        reader.problems.add(message, entry.key.position, "give it another name", kind=NOT_A_NAME)
+    if meaning := _meaning(name):
+        message = f"a parameter cannot be called {name!r}: in expressions, that is {meaning}"
+        reader.problems.add(message, entry.key.position, f"call it {name}_, for example", kind=NOT_A_NAME)
     if not isinstance(entry.value, Mapping):
         says_nothing = is_empty(entry.value) and not (isinstance(entry.value, Scalar) and entry.value.text)
         return ParameterText(name, entry.key.position, entry.value, given=() if says_nothing else ("value",))

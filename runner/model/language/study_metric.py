@@ -22,7 +22,8 @@ class StudyMetric:
     """A column of the table, filled by an expression, such as the name of a metric of the model.
 
     In an expression, ``aspects['packet_loss']['dropped']`` is what an aspect reports, and ``signals['server.size']`` a
-    recorded signal as ``{'time': [...], 'value': [...]}``; ``end``, ``events`` and ``firings`` are those of the run.
+    recorded signal as ``{'time': [...], 'value': [...]}``; ``end`` is the time (s) up to which the run went, ``events``
+    and ``firings`` are its numbers of these.
     """
 
     name: str

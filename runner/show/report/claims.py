@@ -8,6 +8,7 @@ from collections.abc import Iterable, Sequence
 from epicycle.actors import counted
 
 from ...model.language.claims import ALWAYS
+from ...study.inference import with_interval
 from ...study.judge.claims import (
     CONFIRMED,
     NOT_REPRODUCED,
@@ -21,7 +22,7 @@ from ...study.judge.claims import (
 from ...study.judge.guideline import Recommendation
 from ...support.html import Content, Html, note, tag, wide_table
 from ...support.shown import rounded
-from .data import Data, Names, estimated, mean_of, shown
+from .data import Data, Names, mean_of, shown
 
 
 def claims(names: Names, judgements: Sequence[ClaimVerdict]) -> Iterable[Html]:
@@ -172,7 +173,7 @@ def _row(each: Recommendation) -> list[Content]:
     return [
         *where,
         tag("b", shown(each.best)),
-        estimated(best.estimate),
+        with_interval(best.estimate),
         f"{each.confidence:.0%}",
         ", ".join(map(shown, each.not_worse)),
         shown(each.sufficient),

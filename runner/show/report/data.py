@@ -12,12 +12,12 @@ from typing import Any
 from epicycle.actors import abridged, visible
 
 from ...model.language.dimensions import Factor
-from ...study.inference import Estimate
+from ...study.inference import Estimate, average
 from ...study.judge.study_results import StudyResults
 from ...study.plan.columns import Column
 from ...study.plan.plan import Plan
 from ...study.run.backlog import OK
-from ...support.shown import in_words, rounded
+from ...support.shown import in_words
 
 MAX_LISTED = 12  # levels in a message
 MAX_LABEL, MAX_LEVEL = 80, 40  # letters of a column's name, and of a level
@@ -53,6 +53,10 @@ class Data:
         self.conditions: dict[int, Condition] = {}
         for index, rows in groupby(self.rows, key=itemgetter("condition")):
             self.conditions[index] = Condition(index, self.plan.condition(index).values, [*rows])
+
+    def average(self, condition: Condition, metric: str) -> Estimate:
+        """The mean of a metric with its interval; of one that is true or false, a share."""
+        return average(condition.numbers(metric), is_share=metric in self.plan.shares)
 
     def where(self, fixed: Mapping[str, Any]) -> list[Condition]:
         """The conditions with these levels."""
@@ -110,14 +114,6 @@ class Names:
 def shown(value: Factor) -> str:
     """A level in the form that people write."""
     return abridged(visible(in_words(value)), MAX_LEVEL)
-
-
-def estimated(estimate: Estimate) -> str:
-    """A number with its interval, rounded to two digits of the interval: ``4.81 ± 0.06``."""
-    width = estimate.high - estimate.low
-    if estimate.count == 0 or not math.isfinite(width) or width == 0:
-        return rounded(estimate.value, width)
-    return f"{rounded(estimate.value, width)} ± {rounded(width / 2, width)}"
 
 
 def is_numeric(plan: Plan, factor: str) -> bool:

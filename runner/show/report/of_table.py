@@ -12,10 +12,10 @@ from typing import Any, NamedTuple
 from epicycle.actors import EpicycleError, Fault, Parameter, counted, texts_parameter
 
 from ...model.language.dimensions import Factor
-from ...study.inference import Estimate, mean
+from ...study.inference import Estimate, with_interval
 from ...study.plan.plan import Plan
 from ..sheet import LIMIT, Sheet, set_log
-from .data import Condition, Data, Names, estimated, is_numeric, mean_of
+from .data import Condition, Data, Names, is_numeric, mean_of
 from .figure import Layout, Panel, RunKey, StudyFigure
 
 BOXES, CURVES = "boxes", "curves"
@@ -33,8 +33,8 @@ class TableFigure(StudyFigure):
 
 
 class Means(TableFigure):
-    """The mean of a metric over a factor, with 95 % intervals (Student): a line for each level of another factor, and
-    a panel for each level of a third.
+    """The mean of a metric over a factor, with 95 % intervals (Student; of shares Wilson): a line for each level of
+    another factor, and a panel for each level of a third.
 
     Several metrics each get a row of panels, or become the lines of one panel.
     """
@@ -64,17 +64,19 @@ class Means(TableFigure):
         sheet, panels = by_metric(arranged, self.metric[:1] if self.together else self.metric, self.same_scale)
         for axes, (metric, panel) in zip(sheet.axes, panels, strict=True):
             for number, (level, conditions) in enumerate(panel.lines.items()):
-                points = self._points(axis, conditions, str(level) if self.together else metric)
+                points = self._points(data, axis, conditions, str(level) if self.together else metric)
                 self._line(sheet, axes, axis, arranged, panel, number, points)
             axis.dress(axes, sheet.columns, is_log=self.log_x)
             set_log(axes, x=self.log_x, y=self.log_y)
             what = f"mean ({names.unit(metric)})" if names.unit(metric) else "mean"
             sheet.call(axes, axis.name, what if self.together else mean_of(names.axis(metric)))
-        said = f"{mean_of(listed(map(names.words, self.metric)))} with 95 % intervals (Student)."
+        shares = data.plan.shares.intersection(self.metric)
+        kind = "Student" if not shares else "Wilson" if shares.issuperset(self.metric) else "Student; of shares Wilson"
+        said = f"{mean_of(listed(map(names.words, self.metric)))} with 95 % intervals ({kind})."
         return arranged.finish(sheet, paths, capitalised(said), counts(arranged.chosen, self.metric, names))
 
-    def _points(self, axis: _Axis, conditions: Iterable[Condition], metric: str) -> list[_Point]:
-        points = [_Point(axis.place(each), each, metric, mean(each.numbers(metric))) for each in conditions]
+    def _points(self, data: Data, axis: _Axis, conditions: Iterable[Condition], metric: str) -> list[_Point]:
+        points = [_Point(axis.place(each), each, metric, data.average(each, metric)) for each in conditions]
         known = [point for point in points if point.estimate.count]
         return sorted(known, key=lambda point: point.place) if axis.is_numeric else known
 
@@ -89,13 +91,13 @@ class Means(TableFigure):
         handle = axes.errorbar(
             [place for place, _ in places],
             [value for _, value in places],
-            yerr=[point.half for point in points],
+            yerr=[[point.below for point in points], [point.above for point in points]],
             elinewidth=1.0,
             **(look if axis.is_connected else {**look, "linestyle": "none"}),
         )
         arranged.show(arranged.levels[number], handle)
         for place, point in zip(places, points, strict=True):
-            value = f"{estimated(point.estimate)} {names.unit(point.metric)}".rstrip()
+            value = f"{with_interval(point.estimate)} {names.unit(point.metric)}".rstrip()
             said = f"{mean_of(names.words(point.metric))}: {value} ({counted(point.estimate.count, 'run')})"
             sheet.tip(axes, [place], [f"{said}\n{names.place(point.condition.values)}"])
 
@@ -109,10 +111,18 @@ class _Point(NamedTuple):
     estimate: Estimate
 
     @property
-    def half(self) -> float:
-        """Half of its interval, if it has one."""
-        half = self.estimate.high - self.estimate.value
-        return half if math.isfinite(half) else 0.0
+    def below(self) -> float:
+        """How far its interval reaches below it."""
+        return _finite(self.estimate.value - self.estimate.low)
+
+    @property
+    def above(self) -> float:
+        """How far its interval reaches above it."""
+        return _finite(self.estimate.high - self.estimate.value)
+
+
+def _finite(length: float) -> float:
+    return length if math.isfinite(length) else 0.0
 
 
 def by_metric(arranged: Layout, metrics: Sequence[str], same_y: bool = True) -> tuple[Sheet, list[tuple[str, Panel]]]:

@@ -13,13 +13,13 @@ from epicycle.actors import counted
 
 from ...model.language.dimensions import Factor
 from ...model.text.document import plain
-from ...study.inference import mean
+from ...study.inference import with_interval
 from ...study.judge.claims import REPRODUCED, UNDECIDED, ClaimVerdict
 from ...study.judge.guideline import Recommendation
 from ...support.html import Content, Html, note, page, tag, wide_table
 from ..sheet import tips_of
 from .claims import claims, class_of, guideline
-from .data import Condition, Data, estimated, shown
+from .data import Condition, Data, shown
 from .indices import indices
 
 MAX_ROWS = 400  # of one table
@@ -228,8 +228,8 @@ def _means(data: Data) -> Iterable[Html]:
     if not data.conditions or not metrics:
         return
     yield note(
-        "Mean with its 95 % interval (Student). A number of runs below a mean states how many of the finished runs "
-        "have a value."
+        "Mean with its 95 % interval (Student; of what is true or false, Wilson). A number of runs below it says how "
+        "many of the finished runs have a value."
     )
     columns = data.levels(factors[-1]) if factors else []
     is_grid = all(len(each.columns) == 1 for each in data.plan.study.dimensions)
@@ -258,7 +258,8 @@ def _pivot(data: Data, metric: str) -> Iterable[Html]:
         found.setdefault(place, {})[condition.values[column]] = condition
     head = [*map(names.axis, rows), *(f"{names.words(column)} {names.level(column, level)}" for level in levels)]
     body = (
-        [*map(shown, place), *(_cell(across.get(level), metric) for level in levels)] for place, across in found.items()
+        [*map(shown, place), *(_cell(data, across.get(level), metric) for level in levels)]
+        for place, across in found.items()
     )
     return _long_table(head, body, len(rows), len(found))
 
@@ -268,7 +269,7 @@ def _flat(data: Data) -> Iterable[Html]:
     body = (
         [
             *(shown(each.values[name]) for name in factors),
-            *(_cell(each, metric) for metric in metrics),
+            *(_cell(data, each, metric) for metric in metrics),
             f"{len(each.rows):,}",
         ]
         for each in data.conditions.values()
@@ -283,10 +284,9 @@ def _long_table(head: list[str], rows: Iterable[list[Content]], names: int, coun
         yield note(f"... and {counted(count - MAX_ROWS, 'row')} more; table.parquet has them all.")
 
 
-def _cell(condition: Condition | None, metric: str) -> Content:
+def _cell(data: Data, condition: Condition | None, metric: str) -> Content:
     """A mean with its interval, and the number of runs behind it if some have no value."""
     if condition is None:
         return ""
-    values = condition.numbers(metric)
-    few = tag("small", f"{len(values)} of {len(condition.rows)}") if len(values) < len(condition.rows) else None
-    return [estimated(mean(values)), few]
+    found, runs = data.average(condition, metric), len(condition.rows)
+    return [with_interval(found), tag("small", f"{found.count} of {runs}") if found.count < runs else None]

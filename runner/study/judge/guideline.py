@@ -87,7 +87,7 @@ def _recommended(guideline: Guideline, home: int, rest: Place, samples: Samples)
     options = [
         Option(
             factor,
-            mean(list(numbers[index].values())),
+            samples.average(conditions[index], metric),
             mean([]) if best is None else paired_difference(costs[best], costs[index]).estimate,
             missing[index],
             index in fit,

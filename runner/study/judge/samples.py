@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from functools import cache, cached_property
 from itertools import product
 from typing import TYPE_CHECKING, TypeAlias
@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, TypeAlias
 from ...model.language.claims import Selection
 from ...model.language.dimensions import Factor
 from ...model.language.study import Study
+from ..inference import LEVEL, Estimate, average
 from ..plan.plan import index_of
 from ..run.backlog import OK
 
@@ -25,8 +26,10 @@ MISSING = 0.05  # share of replications that may lack a number; beyond it, a mea
 class Samples:
     """The contents of a table, run by run, with failed runs and missing numbers marked."""
 
-    def __init__(self, study: Study, table: pa.Table) -> None:
+    def __init__(self, study: Study, table: pa.Table, shares: Collection[str] = ()) -> None:
+        """``shares`` are the metrics that are true or false."""
         self.study = study
+        self.shares = shares
         self.dimensions = study.dimensions
         self._column = cache(lambda name: table[name].to_pylist())
         self.runs: dict[int, dict[int, int | None]] = {}  # rows, by condition and replication
@@ -92,6 +95,10 @@ class Samples:
         column = self._column(metric)
         values = {one: None if row is None else column[row] for one, row in self.over(condition).items()}
         return {one: value for one, value in values.items() if value is not None and math.isfinite(value)}
+
+    def average(self, condition: int, metric: str, level: float = LEVEL) -> Estimate:
+        """The mean of a metric with its interval; of one that is true or false, a share."""
+        return average([*self.numbers(condition, metric).values()], level, is_share=metric in self.shares)
 
     def rows(self, condition: int, metrics: Iterable[str]) -> list[dict[str, float | None] | None]:
         """The metrics of each finished run, None where there is no number; None for a failed run."""

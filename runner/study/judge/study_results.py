@@ -16,7 +16,8 @@ from epicycle.actors import EpicycleError, counted, did_you_mean, read_regular
 from ...model.language.dimensions import Factor
 from ...support.shown import in_words
 from ...support.tables import Table, Tabled, pandas_module
-from ..inference import LEVEL, holm, mean, paired_difference, with_interval
+from ..inference import LEVEL, holm, paired_difference, with_interval
+from ..plan.columns import Column
 from ..plan.plan import Plan
 from ..run.backlog import OK
 from ..run.manifest import StoreError
@@ -101,12 +102,8 @@ class StudyResults(Tabled):
                 for name in ("condition", "replication")
             )
             table = table.filter(pa.chunked_array([pa.array([True]), *pc.or_(*changes).chunks]))
-        columns = {name: asdict(column).items() for name, column in self.plan.columns.items()}
-        fields = [
-            each.with_metadata({key: text for key, text in columns.get(each.name, ()) if text})
-            for each in table.schema
-            if each.name != "_rank"
-        ]
+        columns = {name: _described(column) for name, column in self.plan.columns.items()}
+        fields = [each.with_metadata(columns.get(each.name, {})) for each in table.schema if each.name != "_rank"]
         left = runs - table.num_rows
         return table.drop_columns(["_rank"]).combine_chunks().cast(pa.schema(fields)), left
 
@@ -167,6 +164,7 @@ class StudyResults(Tabled):
     def means(self, metric: str, level: float = LEVEL) -> list[dict[str, Any]]:
         """A row for each condition: the varied values, the mean with its standard error and interval, run counts.
 
+        The interval of numbers is Student's; that of a metric that is true or false is Wilson's interval of the share.
         ``runs`` counts the finished runs, ``count`` those among them that have a number.
         """
         self._check("metric", metric, self.metrics)
@@ -174,7 +172,7 @@ class StudyResults(Tabled):
         return [
             {
                 **self.plan.condition(condition).values,
-                **asdict(mean(list(samples.numbers(condition, metric).values()), level)),
+                **asdict(samples.average(condition, metric, level)),
                 "runs": len(runs),
             }
             for condition, runs in samples.runs.items()
@@ -202,7 +200,7 @@ class StudyResults(Tabled):
         return [{**row, "p_holm": p} for row, p in zip(rows, corrected, strict=True)]
 
     def _samples(self) -> Samples:
-        return Samples(self.plan.study, self.table())
+        return Samples(self.plan.study, self.table(), self.plan.shares)
 
     def _check(self, what: str, name: str, known: list[str]) -> None:
         if name not in known:
@@ -276,7 +274,7 @@ class StudyResults(Tabled):
         rows = []
         for condition, runs in samples.runs.items():
             levels = (in_words(each) for each in self.plan.condition(condition).values.values())
-            found = (mean(list(samples.numbers(condition, name).values())) for name in self.metrics)
+            found = (samples.average(condition, name) for name in self.metrics)
             rows.append((*levels, *map(with_interval, found), str(len(runs))))
         units = {name: columns[name].unit for name in (*self.factors, *self.metrics)}
         names = (f"{name} ({unit})" if unit not in ("", "1") else name for name, unit in units.items())
@@ -307,6 +305,11 @@ class StudyResults(Tabled):
             return is_of_another and bool(file.read().equals(table))
         except (OSError, ValueError, pa.ArrowException):  # ValueError: a text in it is not UTF-8
             return False
+
+
+def _described(column: Column) -> dict[str, str]:
+    """A column's metadata."""
+    return {key: said for key in ("unit", "doc", "label") if (said := getattr(column, key))}
 
 
 def _with(table: pa.Table, name: str, values: Any) -> pa.Table:

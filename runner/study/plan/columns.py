@@ -12,6 +12,7 @@ from epicycle.actors.expression import operand
 from ...execution.engine import Results
 from ...model.build.model import Model
 from ...model.catalogue.metrics import conversion_fault, unit_before
+from ...model.graph.outputs import Metric
 from ...model.language.dimensions import Dimension, split_number
 from ...model.language.study_metric import ASPECTS, NUMBERS, SIGNALS, StudyMetric, asks_for_none
 from ...model.text.patterns import select
@@ -21,11 +22,12 @@ from ...model.text.reading import inside
 
 @dataclass(frozen=True)
 class Column:
-    """A column of the table: its unit (empty if unknown), doc and label."""
+    """A column of the table: its unit (empty if unknown), doc and label; a mean of what is true or false is a share."""
 
     unit: str = ""
     doc: str = ""
     label: str = ""
+    is_share: bool = False
 
 
 # -- metrics ----------------------------------------------------------------------------------------------------------
@@ -76,7 +78,7 @@ def value_of(metric: StudyMetric, results: Results) -> float | None:
     Raises ``EpicycleError`` if it cannot be evaluated, or is not a number.
     """
     names: dict[str, Any] = {name: operand(value) for name, value in results.metrics.items()}
-    names |= {name: getattr(results, name) for name in NUMBERS}
+    names |= {"end": results.until, "events": results.events, "firings": results.firings}
     asked = [names[name] for name in metric.formula.names if name in names]
     asked += [results.aspects.get(aspect, {}).get(figure) for aspect, figure in metric.figures]
     asked += [results.signals.get(signal) for signal in metric.signals]
@@ -115,13 +117,26 @@ def columns_of(dimensions: Iterable[Dimension], metrics: Iterable[StudyMetric], 
                 unit = si_unit(written[1]) if written is not None and written[1] else declared.unit
                 found[setting.path] = Column(unit, declared.doc)
     own = {
-        metric.name: Column(metric.unit, metric.measure.doc, metric.measure.label) for metric in model.output.metrics
+        each.name: Column(each.unit, each.measure.doc, each.measure.label, _is_condition(each, model))
+        for each in model.output.metrics
     }
     for metric in metrics:
         known = own.get(metric.source.strip(), Column())
         unit = metric.to or known.unit or metric.unit
-        found[metric.name] = Column(unit, metric.doc or known.doc, metric.label or known.label)
+        is_share = not metric.to and (known.is_share or metric.formula.is_condition)
+        found[metric.name] = Column(unit, metric.doc or known.doc, metric.label or known.label, is_share)
     return found
+
+
+def _is_condition(metric: Metric, model: Model) -> bool:
+    """Whether its value is true or false in each run."""
+    if metric.monitor:
+        return metric.name == metric.monitor
+    if metric.formula is not None:
+        return metric.formula.is_condition
+    sources = [port for path in metric.ports for port in model.graph.source_of(path)]
+    is_token = metric.measure.take in ("first", "last", "min", "max") and metric.measure.across not in ("sum", "mean")
+    return is_token and bool(sources) and all(port.type is bool for port in sources)
 
 
 def _declared(path: str, model: Model) -> Column:

@@ -87,6 +87,11 @@ class Plan:
     search: Search | None = None  # what chose the conditions, if they were not known from the start
     denied: str = ""  # why the code of its types must not be run
 
+    @property
+    def shares(self) -> frozenset[str]:
+        """The metrics that are true or false in each run."""
+        return frozenset(name for name, column in self.columns.items() if column.is_share)
+
     # -- making one -----------------------------------------------------------------------------------------------
 
     @classmethod

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from itertools import chain
 
-from ..inference import half_width
+from ..inference import half_of
 from ..plan.plan import Condition, Plan
 from .share import ALL, Share
 
@@ -128,9 +128,11 @@ class Backlog:
                     yield Task(index, replication, self.plan.seed(condition, replication), key)
             while self._running[index]:
                 yield None
-            if until is not None and not half_width(values) >= until.half_width:
-                self.stopped_early += max(0, most - start - batch)
-                break
+            if until is not None:
+                is_share = until.metric in self.plan.shares
+                if not half_of(values, is_share=is_share) >= until.half_width:
+                    self.stopped_early += max(0, most - start - batch)
+                    break
         del self._open[index], self._values[index], self._running[index]
 
     def _note(self, condition: int, done: Done, counts: Counter[str]) -> None:

@@ -30,6 +30,8 @@ class DamagedError(StoreError):
 # The entries from which a plan is restored, and their shapes: a type, some of the values, a list or mapping of these
 # (of two of the same, if there are two), a record, or (in a tuple) one of several.
 _KINDS = frozenset({"bool", "int", "float", "text"})
+_COLUMN = {"unit": str, "doc": str}
+_COLUMNS = ({**_COLUMN, "label": str, "is_share": bool}, {**_COLUMN, "label": str}, _COLUMN)
 _SHAPE: dict[str, Any] = {
     "epicycle": str,
     "study": str,
@@ -42,7 +44,7 @@ _SHAPE: dict[str, Any] = {
     "lender": (None, [str, str]),
     "factors": {str: _KINDS},
     "metrics": {str: str},
-    "columns": {str: ({"unit": str, "doc": str, "label": str}, {"unit": str, "doc": str})},
+    "columns": {str: _COLUMNS},
     "model": {str: str},
     "sources": {str: str},
     "level_sources": [{str: {str: str}}],

@@ -13,6 +13,7 @@ from scipy import stats
 from epicycle.actors import EpicycleError
 from epicycle.runner import open_study
 from epicycle.runner.interface.cli import main
+from epicycle.runner.study.judge.study_results import StudyResults
 from epicycle.runner.study.run.locking import lock
 from epicycle.runner.study.run.manifest import StoreError
 from epicycle.runner.study.session import run_study
@@ -55,6 +56,24 @@ def test_means_and_differences_are_those_of_the_table(done: Path) -> None:
         results.means("plaec")
     with pytest.raises(StoreError, match="has no factor 'drfit', did you mean 'drift'"):
         results.differences("place", over="drfit")
+
+
+def test_the_mean_of_what_is_true_or_false_is_a_share_with_wilsons_interval(tmp_path: Path) -> None:
+    metrics = "place: place\n  far: place > 10\n  far_in_numbers: {value: 1 if place > 10 else 0}"
+    text = STUDY.replace("place: place", metrics)
+    run_study(plan_of(write(tmp_path, text)), tmp_path / "out", jobs=1)
+    results = open_study(tmp_path / "out")
+    numbers = [row["far"] for row in results.table().to_pylist()]
+    assert numbers == [row["far_in_numbers"] for row in results.table().to_pylist()]
+    for row, drift, number in zip(results.means("far"), (numbers[:5], numbers[5:]), (0, 1), strict=True):
+        found = stats.binomtest(round(sum(drift)), 5).proportion_ci(method="wilson")
+        assert (row["low"], row["high"]) == pytest.approx((found.low, found.high), abs=1e-12), number
+        assert 0.0 <= row["low"] <= row["value"] <= row["high"] <= 1.0
+    assert results.means("far_in_numbers")[0]["low"] <= 0.0
+    assert results.plan.shares == {"far"}
+    again = StudyResults(tmp_path / "out")
+    assert again.plan.shares == {"far"}
+    assert " to " in str(results).splitlines()[-1]
 
 
 def test_xarray_is_an_extra(done: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -141,3 +141,11 @@ metrics:
         "      |                                      ^^\n"
         "4 errors in walks.yaml"
     )
+
+
+def test_the_end_is_the_stop_time_of_a_run_that_came_to_it(tmp_path: Path) -> None:
+    model = MODEL.replace("record: [walk.output]", "record: [walk.output], stop: 40 s")
+    model = model.replace("  scale:", "  clock: {type: Clock, period: 15 s}\n  scale:")
+    write(tmp_path, STUDY.replace("place: place", "end: {value: end, unit: s}"), model)
+    run_study(plan_of(tmp_path / "walks.yaml"), tmp_path / "out", jobs=1)
+    assert {row["end"] for row in open_study(tmp_path / "out").table().to_pylist()} == {40.0}
