@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import signal
 import subprocess
@@ -48,6 +49,13 @@ def pytest_sessionstart(session: pytest.Session) -> None:
     head = "from epicycle.actors.robotics.numerics import warm_up; "
     for each in [subprocess.Popen([sys.executable, "-c", head + program]) for program in KERNELS]:
         each.wait()
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _what_is_there_stays() -> None:
+    """Python need not look for garbage in what earlier modules have left, such as all that they have imported."""
+    gc.collect()
+    gc.freeze()
 
 
 def pytest_terminal_summary(terminalreporter: Any) -> None:
