@@ -3,11 +3,12 @@
 async function main() {
   const holder = document.getElementById("data"), page = document.getElementById("page");
   readTheme();
+  /** @type {Page} */
   let data;
   try {
     data = await readData(holder.textContent);
   } catch (error) {
-    page.replaceChildren(element("p", { className: "note", text: `This browser cannot read the page's data (${error.message}); it needs DecompressionStream, which browsers have had since 2023.` }));
+    page.replaceChildren(element("p", { className: "note", text: `This browser cannot read the page's data (${error instanceof Error ? error.message : error}); it needs DecompressionStream, which browsers have had since 2023.` }));
     return;
   }
   holder.remove();
@@ -18,16 +19,18 @@ async function main() {
     run.firstChange = data.difference?.firings[i] ?? NOTHING; // the first firing that is not the same in the other run
   });
   const state = new State(data), scrubber = new Scrubber(state), lanes = new Lanes(state), chart = new Chart(state);
-  const camera = { scale: 0, extent: Space.extent(data.runs) }, hasSpace = data.runs.some((run) => run.marks.length);
+  const camera = { scale: 0, x: 0, y: 0, extent: Space.extent(data.runs) }, hasSpace = data.runs.some((run) => run.marks.length);
   const spaces = hasSpace ? data.runs.map((_, i) => new Space(state, i, camera)) : [];
   const graphs = data.runs.map((_, i) => new Graph(state, i)), details = new Details(state, lanes);
+  /** @param {string} name @param {string} title @param {...Node} content */
   const pane = (name, title, ...content) => {
     const made = element("section", { className: `pane ${name}` }, element("h1", { text: title }), ...content);
     made.dataset.pane = name;
     return made;
   };
+  /** @param {(Space | Graph)[]} views @param {string} what */
   const named = (views, what) => views.map((view, i) => pane(`${what} of${i}`, data.runs.length > 1 ? `${what}: ${data.runs[i].name}` : what,
-    ...(view.note ? [element("p", { className: "note", text: view.note })] : []), view.canvas));
+    ...("note" in view && view.note ? [element("p", { className: "note", text: view.note })] : []), view.canvas));
   const panes = element("div", { id: "panes", className: `runs${data.runs.length}${hasSpace ? "" : " flat"}` },
     ...named(spaces, "space"), ...named(graphs, "graph"),
     pane("chart", "sequence", coneOnly(state, chart), chart.canvas), pane("lanes", "signals", picker(state, lanes), lanes.canvas),
@@ -48,7 +51,7 @@ async function main() {
     chart.reveal(run.firing_actor[run.firstChange]);
   }
   let before = performance.now();
-  const frame = (now) => {
+  const frame = (/** @type {number} */ now) => {
     state.advance(Math.min(0.1, (now - before) / 1000));
     before = now;
     if (state.isDirty) {
@@ -64,19 +67,21 @@ async function main() {
   page.dataset.ready = "yes";
 }
 
+/** @param {State} state @param {Page} data */
 function bar(state, data) {
   const [first] = data.runs, play = button("▶", () => state.play(!state.isPlaying), "play");
   play.id = "play";
   const speed = element("select", { label: "model seconds per second", id: "speed" });
   for (const each of [...new Set([...SPEEDS, state.speed])].sort((a, b) => a - b)) speed.append(element("option", { value: each, text: `×${each}` }));
-  speed.value = state.speed;
+  speed.value = String(state.speed);
   speed.addEventListener("change", () => { state.speed = Number(speed.value); });
   const axis = element("select", { label: "time axis", id: "axis" }, element("option", { value: "time", text: "by time" }), element("option", { value: "tag", text: "by tag" }));
   axis.addEventListener("change", () => state.setByTag(axis.value === "tag"));
+  /** @param {"back" | "ahead"} name @param {string} words */
   const toggle = (name, words) => {
     const made = button(words, () => {
       state.directions[name] = !state.directions[name];
-      made.setAttribute("aria-pressed", state.directions[name]);
+      made.setAttribute("aria-pressed", String(state.directions[name]));
       state.findCone();
       for (const listener of state.listeners) listener();
     }, `toggle ${name}`);
@@ -85,8 +90,8 @@ function bar(state, data) {
   };
   const runs = data.runs.length < 2 ? [] : data.runs.map((run, i) => {
     const made = button(run.name, () => state.activate(i), "toggle");
-    state.listeners.push(() => made.setAttribute("aria-pressed", state.active === i));
-    made.setAttribute("aria-pressed", state.active === i);
+    state.listeners.push(() => made.setAttribute("aria-pressed", String(state.active === i)));
+    made.setAttribute("aria-pressed", String(state.active === i));
     return made;
   });
   return element("header", {},
@@ -97,15 +102,18 @@ function bar(state, data) {
     element("span", { className: "group" }, toggle("back", "what led to it"), toggle("ahead", "what came of it")));
 }
 
+/** @param {State} state */
 function tell(state) {
   const { run, tag } = state;
   const now = state.isPlaying || tag < 0 ? secondsText(Math.round(state.time / 1e3) * 1e3) : run.tagText(tag);
   document.getElementById("now").textContent = now;
   document.getElementById("play").textContent = state.isPlaying ? "❚❚" : "▶";
-  document.getElementById("speed").value = state.speed;
-  document.getElementById("axis").value = state.axis.byTag ? "tag" : "time";
+  const select = (/** @type {string} */ id) => /** @type {HTMLSelectElement} */ (document.getElementById(id));
+  select("speed").value = String(state.speed);
+  select("axis").value = state.axis.byTag ? "tag" : "time";
 }
 
+/** @param {State} state @param {Chart} chart */
 function coneOnly(state, chart) {
   const box = element("input", { type: "checkbox", id: "cone-only" });
   box.addEventListener("change", () => {
@@ -115,6 +123,7 @@ function coneOnly(state, chart) {
   return element("label", { className: "option", title: "show only actors of the cone" }, box, " cone only");
 }
 
+/** @param {State} state @param {Lanes} lanes */
 function picker(state, lanes) {
   const select = element("select", { label: "signals to show or hide", className: "option" }, element("option", { value: "", text: "signals…" }));
   const fill = () => {
@@ -133,25 +142,28 @@ function picker(state, lanes) {
 }
 
 // A narrow screen shows one pane at a time.
+/** @param {HTMLElement} panes @param {boolean} hasSpace @param {State} state */
 function tabs(panes, hasSpace, state) {
   const names = [...(hasSpace ? ["space"] : []), "graph", "chart", "lanes", "about"], made = element("nav", {});
   for (const name of names) {
     const tab = button(name === "chart" ? "sequence" : name === "lanes" ? "signals" : name === "about" ? "details" : name, () => {
       panes.dataset.tab = name;
-      for (const each of made.children) each.setAttribute("aria-pressed", each === tab);
+      for (const each of made.children) each.setAttribute("aria-pressed", String(each === tab));
       state.changed();
     }, "toggle");
-    tab.setAttribute("aria-pressed", name === names[0]);
+    tab.setAttribute("aria-pressed", String(name === names[0]));
     made.append(tab);
   }
   panes.dataset.tab = names[0];
   return made;
 }
 
+/** @param {State} state */
 function keys(state) {
   document.addEventListener("keydown", (event) => {
-    if (event.target.matches("select, input") || event.altKey || event.ctrlKey || event.metaKey) return;
+    if (!(event.target instanceof Element) || event.target.matches("select, input") || event.altKey || event.ctrlKey || event.metaKey) return;
     const size = state.axis.high - state.axis.low, last = state.run.times.length - 1;
+    /** @type {{ [key: string]: () => void }} */
     const acts = {
       " ": () => state.play(!state.isPlaying),
       ArrowRight: () => state.step(event.shiftKey ? 20 : 1),
