@@ -19,7 +19,7 @@ help:
 	@echo "make portable  every digest under settings that stand for other machines (10 min)"
 	@echo "make core   compile the core, or recompile it after a change of its sources"
 	@echo "make cores  100,000 random networks: does each core make the same runs? (20 min)"
-	@echo "make lint   check style, formatting, portable arithmetic, prose, the order of imports, and types"
+	@echo "make lint   check style, formatting, portable arithmetic, prose, the order of imports, and types, of JavaScript too if node is there"
 	@echo "make check  lint and every test, including the slow ones"
 	@echo "make bench  benchmarks against peers, into benchmarks/RESULTS.md (20 min; keep the machine otherwise idle)"
 	@echo "make truth  what others have published beside what we find, into benchmarks/TRUTH.md (15 min; can be interrupted)"
@@ -79,6 +79,7 @@ lint: $(DEV)
 	$(BIN)/python -m tests.arithmetic
 	$(BIN)/python -m tests.prose
 	$(BIN)/python -m tests.layers
+	$(BIN)/python -m tests.scripts
 	$(BIN)/mypy
 
 reference: $(DEV)

@@ -8,8 +8,11 @@
 const NEAREST = 300; // firings of a cone, nearest in time first
 
 // Each as {firing, kind, record}: the send of its token, or the act that lost it, if there is one.
+/** @param {Run} run @param {number} firing @returns {Cause[]} */
 function causesOf(run, firing) {
-  const found = [], actor = run.firing_actor[firing];
+  /** @type {Cause[]} */
+  const found = [];
+  const actor = run.firing_actor[firing];
   for (const arrival of run.arrivalsOf.of(firing)) {
     const record = run.arrival_record[arrival];
     if (record >= 0 && run.record_firing[record] >= 0)
@@ -22,6 +25,7 @@ function causesOf(run, firing) {
 }
 
 // The firings of the actor just before this one that sent nothing; for a resumed process, always the previous one.
+/** @param {Run} run @param {number} firing @param {number} actor */
 function absorbed(run, firing, actor) {
   const rows = run.firingsOf.of(actor), found = [];
   let place = search(rows.length, (i) => rows[i] >= firing) - 1;
@@ -31,8 +35,11 @@ function absorbed(run, firing, actor) {
   return found;
 }
 
+/** @param {Run} run @param {number} firing @returns {Cause[]} */
 function effectsOf(run, firing) {
-  const found = [], actor = run.firing_actor[firing];
+  /** @type {Cause[]} */
+  const found = [];
+  const actor = run.firing_actor[firing];
   for (const record of run.recordsOf.of(firing))
     for (const arrival of run.arrivalsFrom.of(record))
       found.push({ firing: run.arrival_firing[arrival], kind: "token", record });
@@ -51,6 +58,7 @@ function effectsOf(run, firing) {
 }
 
 // The acts that kept a token from an actor between its previous firing and this one.
+/** @param {Run} run @param {number} firing */
 function lossesBefore(run, firing) {
   const actor = run.firing_actor[firing], losses = run.lossesOf.get(actor) ?? [], rows = run.firingsOf.of(actor);
   const place = search(rows.length, (i) => rows[i] >= firing), tag = run.firing_tag[firing];
@@ -62,6 +70,7 @@ function lossesBefore(run, firing) {
 
 // All causes and effects of a selection: firings by direction, and the edges between them.
 class Cone {
+  /** @param {Run} run @param {Chosen} selection @param {{ back: boolean, ahead: boolean }} directions */
   constructor(run, selection, directions) {
     this.run = run;
     this.back = new Map(); // firing -> how it was reached
@@ -84,6 +93,7 @@ class Cone {
     }
   }
 
+  /** @param {Map<number, boolean>} found @param {number} start @param {(run: Run, firing: number) => Cause[]} next @param {(one: number, other: number) => number} order */
   grow(found, start, next, order) {
     const isBack = found === this.back, waiting = [{ firing: start, wakes: true }];
     found.set(start, true);
@@ -108,6 +118,7 @@ class Cone {
     }
   }
 
+  /** @param {number} firing */
   has(firing) {
     return this.back.has(firing) || this.ahead.has(firing);
   }
@@ -118,6 +129,7 @@ class Cone {
 }
 
 // The firing whose send a record concerns.
+/** @param {Run} run @param {number} record */
 function senderOf(run, record) {
   if (run.record_firing[record] >= 0) return run.record_firing[record];
   const about = run.record_about[record];
@@ -125,6 +137,7 @@ function senderOf(run, record) {
 }
 
 // The next firings of the actors that a loss affects.
+/** @param {Run} run @param {number} record */
 function deprived(run, record) {
   const port = run.ports[run.record_port[record]];
   return port.leads.map((actor) => run.nextFiring(actor, run.record_tag[record])).filter((firing) => firing >= 0);

@@ -5,6 +5,7 @@ const AT_FIRST = 600; // arrows that are in sight when a page opens, at most
 const BIN = 4; // px in which firings of an actor are counted where they are dense
 
 class Chart extends Timeline {
+  /** @param {State} state */
   constructor(state) {
     super(state, "Sequence chart: who sent what to whom");
     this.canvas.dataset.view = "chart";
@@ -26,6 +27,7 @@ class Chart extends Timeline {
   }
 
   // Scrolls to the lane of an actor, before the first drawing.
+  /** @param {number} actor */
   reveal(actor) {
     this.scroll = Math.max(0, ((this.rows().at.get(actor) ?? 0) - 3) * ROW);
   }
@@ -42,10 +44,12 @@ class Chart extends Timeline {
     return this.known;
   }
 
+  /** @param {number} row */
   y(row) {
     return RULER + ROW / 2 + row * ROW - this.scroll;
   }
 
+  /** @param {Paper} paper */
   draw(paper) {
     const { state } = this, { run } = state, { shown, at } = this.rows();
     this.tall = RULER + ROW * shown.length + 8;
@@ -66,6 +70,7 @@ class Chart extends Timeline {
     const [from, to] = this.tagsInSight(run);
     const begin = search(run.firing_tag.length, (firing) => run.firing_tag[firing] >= from);
     const end = search(run.firing_tag.length, (firing) => run.firing_tag[firing] > to);
+    /** @type {[x: number, y: number, target: { firing: number, record: number }][]} */
     this.hits = [];
     this.arrows(begin, end, at);
     this.dots(from, to, first, last);
@@ -75,11 +80,13 @@ class Chart extends Timeline {
     this.cursor();
   }
 
+  /** @param {number} begin @param {number} end @param {Map<number, number>} at */
   arrows(begin, end, at) {
     const { run, cone, selection } = this.state, isCone = cone && selection.run === this.state.active;
     const first = search(run.arrival_firing.length, (i) => run.arrival_firing[i] >= begin);
     const last = search(run.arrival_firing.length, (i) => run.arrival_firing[i] >= end);
     const isCrowded = last - first > ARROWS, plain = [];
+    /** @param {number} from @param {number} to @param {string} colour @param {number} width @param {number[]} [dash] */
     const arrow = (from, to, colour, width, dash) => {
       const [ax, ay, bx, by] = [...this.spot(from, at), ...this.spot(to, at)];
       if (Number.isNaN(ay + by)) return;
@@ -101,11 +108,13 @@ class Chart extends Timeline {
       }
   }
 
+  /** @param {number} firing @param {Map<number, number>} at */
   spot(firing, at) {
     const { run } = this.state, row = at.get(run.firing_actor[firing]);
     return [this.x(this.state.place(run, run.firing_tag[firing])), row === undefined ? NaN : this.y(row)];
   }
 
+  /** @param {number} ax @param {number} ay @param {number} bx @param {number} by @param {string} colour */
   head(ax, ay, bx, by, colour) {
     const { paper } = this, angle = Math.atan2(by - ay, bx - ax), [x, y] = [bx - 4 * Math.cos(angle), by - 4 * Math.sin(angle)];
     paper.beginPath();
@@ -116,11 +125,12 @@ class Chart extends Timeline {
   }
 
   // A firing that stands alone is a dot; where they are dense, bars say how many there are, the darker, the more.
+  /** @param {number} from @param {number} to @param {number} first @param {number} last */
   dots(from, to, first, last) {
     const { state } = this, { run, cone, selection, active } = state, isCone = cone && selection.run === active, { shown } = this.rows();
     const bins = [];
     for (let row = first; row < last; row++) {
-      const rows = run.firingsOf.of(shown[row]), y = this.y(row), place = (i) => state.place(run, run.firing_tag[rows[i]]);
+      const rows = run.firingsOf.of(shown[row]), y = this.y(row), place = (/** @type {number} */ i) => state.place(run, run.firing_tag[rows[i]]);
       let i = search(rows.length, (each) => run.firing_tag[rows[each]] >= from), before = null;
       while (i < rows.length && run.firing_tag[rows[i]] <= to) {
         const x = this.x(place(i)), next = this.at(x + BIN), begin = i;
@@ -151,6 +161,7 @@ class Chart extends Timeline {
   }
 
   // A ring around the first firing that is not the same in the other run.
+  /** @param {Map<number, number>} at */
   firstChange(at) {
     const { run } = this.state;
     if (!(run.firstChange >= 0)) return;
@@ -161,6 +172,7 @@ class Chart extends Timeline {
     this.hits.push([x, y, { firing: run.firstChange, record: NOTHING }]);
   }
 
+  /** @param {number} from @param {number} to @param {Map<number, number>} at */
   losses(from, to, at) {
     const { run, selection, active } = this.state, { losses } = run;
     const first = search(losses.length, (i) => run.record_tag[losses[i].record] >= from);
@@ -178,6 +190,7 @@ class Chart extends Timeline {
     }
   }
 
+  /** @param {number} x @param {number} y */
   pick(x, y) {
     let best = null, least = 14;
     for (const [hx, hy, what] of this.hits ?? []) {
@@ -190,6 +203,7 @@ class Chart extends Timeline {
 }
 
 // The end of a path, which says more than its start.
+/** @param {Path} path @param {number} letters */
 function fromEnd(path, letters) {
   return path.length <= letters ? path : `…${path.slice(path.length - letters + 1)}`;
 }

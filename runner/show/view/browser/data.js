@@ -2,6 +2,7 @@
 
 const MISSING = -2, NOTHING = -1;
 
+/** @param {string} text @returns {Promise<Page>} */
 async function readData(text) {
   const packed = atob(text.trim()), bytes = new Uint8Array(packed.length);
   for (let i = 0; i < packed.length; i++) bytes[i] = packed.charCodeAt(i);
@@ -10,11 +11,12 @@ async function readData(text) {
   const size = new DataView(buffer).getUint32(0, true);
   const head = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, size)));
   const body = new Uint8Array(buffer, 4 + size);
-  head.runs = head.runs.map((each) => new Run(each, (column) => readColumn(body, column)));
+  head.runs = head.runs.map((/** @type {PackedRun} */ each) => new Run(each, (column) => readColumn(body, column)));
   return head;
 }
 
 // Whole numbers are stored as differences from the previous one; bytes of equal significance are stored together.
+/** @param {Uint8Array} body @param {Column} parts */
 function readColumn(body, [kind, start, count]) {
   if (kind === "b") return body.subarray(start, start + count);
   const width = kind === "d" ? 8 : 4, whole = new Uint8Array(width * count);
@@ -31,6 +33,7 @@ function readColumn(body, [kind, start, count]) {
 
 // For each number from 0 to count, the rows that have it in a column; rows with a negative number are left out.
 class Index {
+  /** @param {Numbers} column @param {number} count */
   constructor(column, count) {
     this.starts = new Int32Array(count + 1);
     for (const number of column) if (number >= 0) this.starts[number + 1]++;
@@ -40,12 +43,14 @@ class Index {
     column.forEach((number, row) => { if (number >= 0) this.rows[next[number]++] = row; });
   }
 
+  /** @param {number} number */
   of(number) {
     return this.rows.subarray(this.starts[number], this.starts[number + 1]);
   }
 }
 
 // The first index for which a condition holds, given that it also holds for all later ones.
+/** @param {number} count @param {(index: number) => boolean} isSo */
 function search(count, isSo) {
   let low = 0, high = count;
   while (low < high) {
@@ -57,9 +62,10 @@ function search(count, isSo) {
 }
 
 class Run {
+  /** @param {PackedRun} head @param {(column: Column) => any} read */
   constructor(head, read) {
     Object.assign(this, head);
-    for (const [name, column] of Object.entries(head.columns)) this[name] = read(column);
+    for (const [name, column] of Object.entries(head.columns)) Object.assign(this, { [name]: read(column) });
     this.times = read(head.tags[0]); // ns
     this.microsteps = read(head.tags[1]);
     this.textBytes = read(head.texts[0]);
@@ -87,27 +93,32 @@ class Run {
     this.findFlights();
   }
 
+  /** @param {number} port */
   portPath(port) {
     const { place, name } = this.ports[port];
     return name ? `${this.places[place]}.${name}` : this.places[place];
   }
 
+  /** @param {number} record */
   text(record) {
     const text = this.record_text[record], start = text ? this.textEnds[text - 1] : 0;
     return new TextDecoder().decode(this.textBytes.subarray(start, this.textEnds[text]));
   }
 
   // The last tag at or before a time (ns); -1 before the first.
+  /** @param {number} time */
   tagAt(time) {
     return search(this.times.length, (tag) => this.times[tag] > time) - 1;
   }
 
   // The last firing of an actor at or before a tag, and the first one at or after it; -1 if there is none.
+  /** @param {number} actor @param {number} tag */
   lastFiring(actor, tag) {
     const rows = this.firingsOf.of(actor), place = search(rows.length, (i) => this.firing_tag[rows[i]] > tag);
     return place ? rows[place - 1] : -1;
   }
 
+  /** @param {number} actor @param {number} tag */
   nextFiring(actor, tag) {
     const rows = this.firingsOf.of(actor), place = search(rows.length, (i) => this.firing_tag[rows[i]] >= tag);
     return place < rows.length ? rows[place] : -1;
@@ -158,6 +169,7 @@ class Run {
 
   // Tokens with a travel time, in order of sending, and the longest of these times (ns).
   findFlights() {
+    /** @type {{ arrival: number, record: number, sent: number, arrived: number }[]} */
     const flights = [];
     this.arrival_record.forEach((record, arrival) => {
       if (record < 0) return;
@@ -168,21 +180,25 @@ class Run {
     this.flights = flights.sort((one, other) => one.sent - other.sent);
   }
 
+  /** @param {number} tag */
   tagText(tag) {
     const micro = this.microsteps[tag];
     return `${secondsText(this.times[tag])}${micro > 1 ? `, microstep ${micro}` : ""}`;
   }
 
+  /** @param {number} firing */
   actorName(firing) {
     return this.places[this.firing_actor[firing]];
   }
 
   // The name of a port with its channel.
+  /** @param {number} port @param {number} channel */
   portText(port, channel) {
     return this.portPath(port) + (channel >= 0 && this.ports[port].multi ? `[${channel}]` : "");
   }
 }
 
+/** @param {number} nanoseconds */
 function secondsText(nanoseconds) {
   return `${parseFloat((nanoseconds / 1e9).toPrecision(9))} s`;
 }

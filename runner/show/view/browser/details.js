@@ -1,6 +1,7 @@
 // Details of the selection, in words: what it took, what it sent, what it did not get, and links to follow.
 
 class Details {
+  /** @param {State} state @param {Lanes} lanes */
   constructor(state, lanes) {
     this.state = state;
     this.lanes = lanes;
@@ -43,6 +44,7 @@ class Details {
 
   difference() {
     const { data, runs } = this.state, { difference } = data;
+    /** @type {HTMLElement[]} */
     const parts = [element("h2", { text: "First difference" })];
     parts.push(table(runs.map((run, i) => [run.name, difference.texts[i]]), "difference"));
     const place = runs[this.state.active].tagOfDifference;
@@ -61,6 +63,7 @@ class Details {
     return parts;
   }
 
+  /** @param {Chosen} given */
   selected({ firing, record }) {
     const { state } = this, { run } = state, parts = [];
     if (record >= 0 && firing < 0) parts.push(...this.act(run, record));
@@ -69,8 +72,10 @@ class Details {
     return parts;
   }
 
+  /** @param {Run} run @param {number} firing */
   fired(run, firing) {
     const actor = run.actorName(firing), outside = ["", "SimPy resumed the process", "an aspect released what it had held"];
+    /** @type {HTMLElement[]} */
     const parts = [
       element("h2", { text: actor }),
       element("p", { text: `fired at ${run.tagText(run.firing_tag[firing])}${run.firing_outside[firing] ? `: ${outside[run.firing_outside[firing]]}` : ""}` }),
@@ -83,7 +88,7 @@ class Details {
       took.push(this.item("wake-up", tag < 0 ? "requested in initialize" : `requested at ${run.tagText(tag)}`, asker, NOTHING));
     }
     parts.push(...list("took", took));
-    const missed = lossesBefore(run, firing).map((record) => this.loss(run, record));
+    const missed = lossesBefore(run, firing).map((/** @type {number} */ record) => this.loss(run, record));
     parts.push(...list("did not get", missed));
     const kept = absorbed(run, firing, run.firing_actor[firing]).filter(() => run.hasSent[firing]).slice(0, 20).map((before) =>
       this.item("earlier", `what it took at ${run.tagText(run.firing_tag[before])}`, before, NOTHING));
@@ -93,6 +98,7 @@ class Details {
     return parts;
   }
 
+  /** @param {Run} run @param {number} firing @param {number} arrival */
   arrival(run, firing, arrival) {
     const port = run.portText(run.arrival_port[arrival], run.arrival_channel[arrival]).split(".").at(-1), record = run.arrival_record[arrival];
     if (record < 0) return this.item(port, "sent in a part of the run that is not shown", NOTHING, NOTHING);
@@ -102,11 +108,13 @@ class Details {
     return this.item(port, `${run.text(record)} from ${run.portPath(run.record_port[record])}${late}${marks.length ? ` (${marks.join(", ")})` : ""}`, run.record_firing[record], NOTHING);
   }
 
+  /** @param {Run} run @param {number} record */
   loss(run, record) {
     const about = run.record_about[record], sent = about >= 0 ? `${run.portPath(run.record_port[about])} of ${run.tagText(run.record_tag[about])}` : "a token";
     return this.item(run.portPath(run.record_port[record]), `${sent}: ${run.events[run.record_event[record]]} by ${run.aspects[run.record_aspect[record]]}`, NOTHING, record);
   }
 
+  /** @param {Run} run @param {number} record */
   sent(run, record) {
     const port = run.portText(run.record_port[record], run.record_channel[record]), takers = new Set([...run.arrivalsFrom.of(record)].map((arrival) => run.arrival_firing[arrival]));
     const acts = run.isSend[record] ? [] : [`${run.events[run.record_event[record]]} by ${run.aspects[run.record_aspect[record]]}`];
@@ -118,8 +126,10 @@ class Details {
     return line;
   }
 
+  /** @param {Run} run @param {number} record */
   act(run, record) {
     const about = run.record_about[record], sender = senderOf(run, record);
+    /** @type {HTMLElement[]} */
     const parts = [
       element("h2", { text: `${run.events[run.record_event[record]]} by ${run.aspects[run.record_aspect[record]]}` }),
       element("p", { text: `at ${run.portText(run.record_port[record], run.record_channel[record])}, ${run.tagText(run.record_tag[record])}` }),
@@ -132,9 +142,10 @@ class Details {
     return parts;
   }
 
+  /** @param {Cone} cone */
   cone(cone) {
     const { state } = this, { run } = state, words = [];
-    const since = (firings) => {
+    const since = (/** @type {Map<number, boolean>} */ firings) => {
       const tags = [...firings.keys()].map((firing) => run.firing_tag[firing]);
       return `${firings.size.toLocaleString("en")} firings, ${secondsText(run.times[Math.min(...tags)])} to ${secondsText(run.times[Math.max(...tags)])}`;
     };
@@ -145,32 +156,38 @@ class Details {
     return made;
   }
 
+  /** @param {number} firing @param {number} step */
   neighbour(firing, step) {
     const { run, active } = this.state, rows = run.firingsOf.of(run.firing_actor[firing]), place = rows.indexOf(firing) + step;
     if (place >= 0 && place < rows.length) this.state.goTo({ run: active, firing: rows[place], record: NOTHING });
   }
 
+  /** @param {string} name @param {string} words @param {number} firing @param {number} record */
   item(name, words, firing, record) {
     const line = element("li", {}, element("b", { text: name }), " ");
     line.append(firing >= 0 || record >= 0 ? this.link(words, firing, record) : words);
     return line;
   }
 
+  /** @param {string} words @param {number} firing @param {number} record */
   link(words, firing, record) {
     return button(words, () => this.state.goTo({ run: this.state.active, firing, record }), "link");
   }
 }
 
+/** @param {string} words @param {() => void} act */
 function button(words, act, className = "") {
   const made = element("button", { type: "button", text: words, className });
   made.addEventListener("click", act);
   return made;
 }
 
+/** @param {string} title @param {Node[]} items @returns {HTMLElement[]} */
 function list(title, items) {
   return items.length ? [element("h3", { text: title }), element("ul", {}, ...items)] : [];
 }
 
+/** @param {(string | number)[][]} rows @param {string} className */
 function table(rows, className) {
   const made = element("table", { className });
   for (const row of rows) made.append(element("tr", {}, ...row.map((cell, i) => element(i ? "td" : "th", { text: String(cell) }))));

@@ -3,6 +3,7 @@
 const LEGIBLE = 5; // px of a letter; below this, composites close and words are left out
 
 class Graph extends View {
+  /** @param {State} state @param {number} number */
   constructor(state, number) {
     super(state, "Model graph: actors, wires and aspects");
     this.number = number;
@@ -13,14 +14,17 @@ class Graph extends View {
     this.camera = { scale: 0, x: 0, y: 0 };
     this.shut = new Map(); // composites that were closed (true) or opened (false) by hand
     this.boxes = new Map(this.drawing.boxes.map((box) => [box.path, box]));
+    /** @type {Map<Path, Placed>} */
     this.ports = new Map();
     for (const box of this.drawing.boxes)
       for (const [path, , side, x, y] of box.ports) this.ports.set(path, { path, side, x, y, box });
+    /** @type {Map<Path, Wire[]>} */
     this.wiresFrom = new Map();
     for (const wire of this.drawing.wires) {
       if (!this.wiresFrom.has(wire.source)) this.wiresFrom.set(wire.source, []);
       this.wiresFrom.get(wire.source).push(wire);
     }
+    /** @type {Map<number, Route | null>} */
     this.routes = new Map();
     const aspects = [...new Set(this.drawing.pills.map((pill) => pill[1]).filter(Boolean))];
     this.colours = new Map(aspects.map((name, i) => [name, PALETTE[(i + 1) % PALETTE.length]]));
@@ -42,6 +46,7 @@ class Graph extends View {
     });
   }
 
+  /** @param {number} factor @param {number} x @param {number} y */
   zoom(factor, x, y) {
     const { camera } = this;
     camera.x += (x / camera.scale) * (1 - factor);
@@ -60,12 +65,14 @@ class Graph extends View {
     camera.y = Math.min(0, (drawing.height - this.height / camera.scale) / 2);
   }
 
+  /** @param {Box} box */
   isShut(box) {
     if (!box.composite) return false;
     return this.shut.get(box.path) ?? this.camera.scale * 9 < LEGIBLE * 0.62;
   }
 
   // The outermost closed composite around something, if there is one; its content is not visible.
+  /** @param {Path} path */
   cover(path) {
     for (let at = path.indexOf("."); at >= 0; at = path.indexOf(".", at + 1)) {
       const box = this.boxes.get(path.slice(0, at));
@@ -75,6 +82,7 @@ class Graph extends View {
   }
 
   // The visible box for a path; arrays that are one box use that of their first instance, what is not drawn that around it.
+  /** @param {Path} path */
   boxOf(path) {
     for (let at = path; at; at = at.slice(0, Math.max(at.lastIndexOf("."), 0))) {
       const box = this.boxes.get(at) ?? this.boxes.get(at.replace(/\[\d+\]/g, "[0]"));
@@ -83,6 +91,7 @@ class Graph extends View {
     return null;
   }
 
+  /** @param {Paper} paper */
   draw(paper) {
     this.look();
     const { camera } = this;
@@ -100,6 +109,7 @@ class Graph extends View {
     paper.restore();
   }
 
+  /** @param {Rect | [number, number, number, number]} parts */
   isSeen([x, y, width, height]) {
     const [left, top, right, bottom] = this.sight;
     return x < right && y < bottom && x + width > left && y + height > top;
@@ -118,6 +128,7 @@ class Graph extends View {
     return lit;
   }
 
+  /** @param {Paper} paper @param {Box} box */
   box(paper, box) {
     const [x, y, width, height] = box.at, isShut = this.isShut(box), lit = this.lit.get(box.path) ?? 0;
     const { selection } = this.state;
@@ -130,7 +141,7 @@ class Graph extends View {
       paper.globalAlpha = 1;
     }
     if (isOpen) return;
-    const isOf = (firing) => this.boxOf(this.run.actorName(firing)) === box;
+    const isOf = (/** @type {number} */ firing) => this.boxOf(this.run.actorName(firing)) === box;
     const isOwn = selection && selection.run === this.number;
     const colour = isOwn && selection.firing >= 0 && isOf(selection.firing) ? theme.ink : this.coneColour(box);
     if (colour) {
@@ -141,16 +152,18 @@ class Graph extends View {
   }
 
   // The colour of the cone that a box belongs to.
+  /** @param {Box} box */
   coneColour(box) {
     const { cone, selection } = this.state;
     if (!cone || selection.run !== this.number) return null;
     if (this.coned?.cone !== cone || this.coned.scale !== this.camera.scale) {
-      const paths = (firings) => new Set([...firings.keys()].map((firing) => this.boxOf(this.run.actorName(firing))));
+      const paths = (/** @type {Map<number, boolean>} */ firings) => new Set([...firings.keys()].map((firing) => this.boxOf(this.run.actorName(firing))));
       this.coned = { cone, scale: this.camera.scale, back: paths(cone.back), ahead: paths(cone.ahead) };
     }
     return this.coned.back.has(box) ? theme.back : this.coned.ahead.has(box) ? theme.ahead : null;
   }
 
+  /** @param {Paper} paper @param {number} x @param {number} y @param {number} width @param {number} height @param {string} fill */
   frame(paper, x, y, width, height, fill, rim = 1) {
     paper.fillStyle = fill;
     paper.strokeStyle = theme.soft;
@@ -161,6 +174,7 @@ class Graph extends View {
     paper.stroke();
   }
 
+  /** @param {Box} box */
   labels(box) {
     const [x, y, width, height] = box.at, isShut = this.isShut(box), { scale } = this.camera;
     const isOpen = box.composite && !isShut;
@@ -189,6 +203,7 @@ class Graph extends View {
     }
   }
 
+  /** @param {number} x @param {number} y @param {boolean} isShut */
   sign(x, y, isShut) {
     const { paper } = this;
     paper.strokeStyle = theme.soft;
@@ -198,6 +213,7 @@ class Graph extends View {
     if (isShut) this.line([x + 3.5, y + 1.5, x + 3.5, y + 5.5], theme.soft, 0.8);
   }
 
+  /** @param {Paper} paper */
   wires(paper) {
     paper.strokeStyle = theme.soft;
     paper.lineWidth = 1;
@@ -224,6 +240,7 @@ class Graph extends View {
   }
 
   // A wire belongs to the composite that contains its ends, or whose ports they are.
+  /** @param {Wire} wire */
   isHidden(wire) {
     if (wire.scope === undefined) {
       const owners = [wire.source, ...wire.targets].map((path) => path.replace(/\.[^.]*$/, ""));
@@ -235,6 +252,7 @@ class Graph extends View {
     return (box && this.isShut(box)) || this.cover(wire.scope) !== null;
   }
 
+  /** @param {Paper} paper */
   pills(paper) {
     const { run, state } = this, last = state.tags[this.number], acts = new Map();
     const end = search(run.acts.length, (i) => run.record_tag[run.acts[i]] > last);
@@ -262,6 +280,7 @@ class Graph extends View {
     }
   }
 
+  /** @param {number} x @param {number} y */
   isPillHidden(x, y) {
     for (const box of this.drawing.boxes) {
       const [left, top, width, height] = box.at;
@@ -296,11 +315,13 @@ class Graph extends View {
     }
   }
 
+  /** @param {number} record @param {number} firing */
   isFlight(record, firing) {
     const { run } = this;
     return run.times[run.record_tag[record]] < run.times[run.firing_tag[firing]];
   }
 
+  /** @param {number} record @param {number} arrival @param {number} share @param {number} alpha */
   token(record, arrival, share, alpha) {
     const { run } = this, route = this.route(run.record_port[record], run.arrival_port[arrival]);
     if (!route) return;
@@ -325,11 +346,13 @@ class Graph extends View {
     return this.shutNow.boxes;
   }
 
+  /** @param {number} x @param {number} y */
   covers(x, y) {
     return this.shutBoxes.some(([left, top, width, height]) =>
       x > left + 1 && x < left + width - 1 && y > top + 1 && y < top + height - 1);
   }
 
+  /** @param {() => void} draw */
   outsideOfShut(draw) {
     const { paper } = this, [left, top, right, bottom] = this.sight;
     paper.save();
@@ -342,28 +365,32 @@ class Graph extends View {
   }
 
   // The route along wires from an output port to an input port, through ports of composites.
+  /** @param {number} from @param {number} to */
   route(from, to) {
     const key = from * 65536 + to;
     if (!this.routes.has(key)) this.routes.set(key, this.findRoute(this.portOf(from), this.portOf(to)));
     return this.routes.get(key);
   }
 
+  /** @param {number} number */
   portOf(number) {
     const path = this.run.portPath(number);
     return this.ports.get(path) ?? this.ports.get(path.replace(/\[\d+\]/g, "[0]"));
   }
 
+  /** @param {Placed | undefined} source @param {Placed | undefined} target */
   findRoute(source, target) {
     if (!source || !target) return null;
-    const waiting = [[source.path, null]], came = new Map([[source.path, null]]);
+    /** @type {Map<Path, { path: Path, wire: Wire, place: number } | null>} */
+    const came = new Map([[source.path, null]]), waiting = [source.path];
     while (waiting.length) {
-      const [path] = waiting.shift();
+      const path = waiting.shift();
       if (path === target.path) break;
       for (const wire of this.wiresFrom.get(path) ?? [])
         wire.targets.forEach((next, place) => {
           if (came.has(next)) return;
           came.set(next, { path, wire, place });
-          waiting.push([next]);
+          waiting.push(next);
         });
     }
     if (!came.has(target.path)) return null;
@@ -378,6 +405,7 @@ class Graph extends View {
 
   // -- clicks --
 
+  /** @param {number} px @param {number} py */
   pick(px, py) {
     const { camera, run, state } = this, x = px / camera.scale + camera.x, y = py / camera.scale + camera.y;
     const pill = this.drawing.pills.find(([, aspect, left, middle, width, place]) =>
@@ -401,6 +429,7 @@ class Graph extends View {
   }
 
   // The last act of an aspect at a place until now, otherwise its first.
+  /** @param {string} aspect @param {Path} place */
   pickAct(aspect, place) {
     const { run, state } = this, last = state.tags[this.number];
     const acts = run.acts.filter((record) =>
@@ -410,16 +439,18 @@ class Graph extends View {
   }
 }
 
+/** @param {string} aspect */
 function shortName(aspect) {
   return aspect.replace(/^.*\./, "");
 }
 
 // The part of a wire's tree from its source to one of its ends.
+/** @param {Wire} wire @param {Placed} source @param {Dot} head */
 function branch(wire, source, head) {
-  const key = (x, y) => `${x},${y}`;
+  const key = (/** @type {number[]} */ ...point) => point.join();
   if (!wire.tree) {
     wire.tree = new Map();
-    const link = (from, line) => {
+    const link = (/** @type {string} */ from, /** @type {number[]} */ line) => {
       if (!wire.tree.has(from)) wire.tree.set(from, []);
       wire.tree.get(from).push(line);
     };
@@ -447,9 +478,11 @@ function branch(wire, source, head) {
 }
 
 // The point of a route at a fraction of its length.
+/** @param {Route} route @param {number} share @returns {Dot} */
 function along({ points, lengths }, share) {
   const wanted = share * lengths.at(-1), i = Math.max(1, search(lengths.length, (at) => lengths[at] >= wanted));
-  if (i >= lengths.length) return points.slice(-2);
+  if (i >= lengths.length) return [points.at(-2), points.at(-1)];
   const part = (wanted - lengths[i - 1]) / (lengths[i] - lengths[i - 1] || 1);
-  return [0, 1].map((axis) => points[2 * i - 2 + axis] + part * (points[2 * i + axis] - points[2 * i - 2 + axis]));
+  const at = (/** @type {number} */ axis) => points[2 * i - 2 + axis] + part * (points[2 * i + axis] - points[2 * i - 2 + axis]);
+  return [at(0), at(1)];
 }

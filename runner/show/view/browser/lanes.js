@@ -3,6 +3,7 @@
 const LANE = 46, ACTS = 17, RULER = 18, MODES = 8;
 
 class Lanes extends Timeline {
+  /** @param {State} state */
   constructor(state) {
     super(state, "Signals and acts of aspects over time");
     this.canvas.dataset.view = "lanes";
@@ -13,6 +14,7 @@ class Lanes extends Timeline {
   }
 
   // Ports that send words, such as modes of machines, have lanes even if they are not recorded.
+  /** @param {Run} run */
   addModes(run) {
     const modes = [...run.ports.keys()].filter((port) => {
       const rows = run.recordsAt.of(port).slice(0, 40).filter((row) => run.isSend[row]);
@@ -22,6 +24,7 @@ class Lanes extends Timeline {
   }
 
   // Shows or hides a signal, or the numbers or words that an unrecorded port sent.
+  /** @param {Path} path @param {boolean} [isShown] */
   toggle(path, isShown = !this.shown.has(path)) {
     if (!isShown) this.shown.delete(path);
     else {
@@ -33,6 +36,7 @@ class Lanes extends Timeline {
     this.state.changed();
   }
 
+  /** @param {Paper} paper */
   draw(paper) {
     const { state } = this;
     this.ruler();
@@ -58,6 +62,7 @@ class Lanes extends Timeline {
   }
 
   // A click near an act selects it.
+  /** @param {number} x @param {number} y */
   pick(x, y) {
     const { state } = this, { run } = state, aspect = Math.floor((y + this.scroll - RULER) / ACTS);
     let best = NOTHING, least = 8;
@@ -73,6 +78,7 @@ class Lanes extends Timeline {
     else super.pick(x);
   }
 
+  /** @param {number} number @param {string} name @param {number} y */
   acts(number, name, y) {
     const { run } = this.state, { acts } = run, [first, last] = this.tagsInSight(run);
     this.text(name, 4, y + 12, { size: 10.5, colour: theme.soft, width: this.margin - 8 });
@@ -88,6 +94,7 @@ class Lanes extends Timeline {
     }
   }
 
+  /** @param {string} name @param {number} y */
   lane(name, y) {
     const { state } = this;
     this.line([0, y, this.width, y], theme.faint, 0.5);
@@ -106,11 +113,13 @@ class Lanes extends Timeline {
   }
 
   // The position of a sample on the axis.
+  /** @param {Run} run @param {number} seconds */
   sampleX(run, seconds) {
     if (!this.state.axis.byTag) return this.x(seconds * 1e9);
     return this.x(search(run.times.length, (tag) => run.times[tag] >= seconds * 1e9 - 0.5));
   }
 
+  /** @param {Lane} lane */
   inSight(lane) {
     const { axis, run } = this.state;
     const [low, high] = axis.byTag
@@ -122,6 +131,7 @@ class Lanes extends Timeline {
     ];
   }
 
+  /** @param {(Lane | undefined)[]} lanes @param {number} y */
   numbers(lanes, y) {
     let low = Infinity, high = -Infinity;
     for (const lane of lanes)
@@ -134,14 +144,16 @@ class Lanes extends Timeline {
           }
       }
     if (low > high) return;
-    const size = high - low || Math.abs(high) || 1, up = (value) => y + LANE - 5 - ((value - low) / size) * (LANE - 12);
+    const size = high - low || Math.abs(high) || 1, up = (/** @type {number} */ value) => y + LANE - 5 - ((value - low) / size) * (LANE - 12);
     this.paper.save();
     this.paper.beginPath();
     this.paper.rect(this.margin, y, this.span + 8, LANE);
     this.paper.clip();
     lanes.forEach((lane, number) => {
       if (!lane || lane.states) return;
-      const run = this.state.runs[number], [from, to] = this.inSight(lane), points = [];
+      const run = this.state.runs[number], [from, to] = this.inSight(lane);
+      /** @type {number[]} */
+      const points = [];
       for (let i = from; i < to; i++) {
         const x = this.sampleX(run, lane.times[i]), value = up(lane.values[i]);
         if (!lane.line && points.length) points.push(x, points.at(-1));
@@ -156,6 +168,7 @@ class Lanes extends Timeline {
         this.text(numberText(value), this.width - 6, at, { size: 9, align: "right", colour: theme.soft, isApart: true });
   }
 
+  /** @param {Lane} lane @param {number} number @param {number} y @param {number} tall */
   strip(lane, number, y, tall) {
     const run = this.state.runs[number], [from, to] = this.inSight(lane);
     for (let i = from; i < to; i++) {
@@ -170,10 +183,12 @@ class Lanes extends Timeline {
 }
 
 // What a port sent in the kept firings.
+/** @param {Run} run @param {Path} path */
 function laneOf(run, path) {
   const rows = run.recordsAt.of(run.portOf.get(path)).filter((row) => run.isSend[row]);
   const times = Float64Array.from(rows, (row) => run.times[run.record_tag[row]] / 1e9);
   const numbers = Float64Array.from(rows, (row) => parseFloat(run.text(row)));
+  /** @type {Lane} */
   const lane = { name: path, times, values: numbers, states: null, line: false, left_out: 0 };
   if (numbers.some((number) => !Number.isNaN(number))) return lane;
   const words = Array.from(rows, (row) => run.text(row).replace(/^"|"$/g, "")), states = [...new Set(words)];

@@ -3,11 +3,12 @@
 async function main() {
   const holder = document.getElementById("data"), page = document.getElementById("page");
   readTheme();
+  /** @type {Page} */
   let data;
   try {
     data = await readData(holder.textContent);
   } catch (error) {
-    page.replaceChildren(element("p", { className: "note", text: `This browser cannot read the page's data (${error.message}); it needs DecompressionStream, which browsers have had since 2023.` }));
+    page.replaceChildren(element("p", { className: "note", text: `This browser cannot read the page's data (${error instanceof Error ? error.message : error}); it needs DecompressionStream, which browsers have had since 2023.` }));
     return;
   }
   holder.remove();

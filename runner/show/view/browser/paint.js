@@ -1,7 +1,12 @@
 // Canvases that fit their boxes, colours of the theme, and gestures shared by all views.
 
+/** @type {string[]} */
 const PALETTE = []; // also of figures; filled by main
 
+/**
+ * @template {keyof HTMLElementTagNameMap} Name
+ * @param {Name} name @param {{ [name: string]: any }} [options] @param {...(Node | string | null)} children
+ */
 function element(name, options = {}, ...children) {
   const { text, label, ...rest } = options, made = document.createElement(name);
   if (text !== undefined) made.textContent = text;
@@ -12,6 +17,7 @@ function element(name, options = {}, ...children) {
 }
 
 // The colours of the page's style, read again when the theme changes.
+/** @type {{ [name: string]: string }} */
 const theme = {};
 function readTheme() {
   const style = getComputedStyle(document.documentElement);
@@ -26,6 +32,7 @@ function unit() {
 
 class View {
   // A canvas in a box; `draw` paints it in CSS pixels, or in larger units on a very wide screen.
+  /** @param {State} state @param {string} label */
   constructor(state, label) {
     this.state = state;
     this.canvas = element("canvas", { label, tabIndex: 0, className: "view" });
@@ -55,6 +62,7 @@ class View {
     this.draw(this.paper);
   }
 
+  /** @param {string} words @param {number} x @param {number} y @param {TextStyle} style */
   text(words, x, y, { colour = theme.ink, size = 11, align = "left", bold = false, width = Infinity, isApart = false } = {}) {
     const { paper } = this;
     paper.font = `${bold ? "600 " : ""}${size}px system-ui, sans-serif`;
@@ -74,6 +82,7 @@ class View {
     paper.fillText(words, x, y);
   }
 
+  /** @param {number[]} points @param {string} colour @param {number} [width] @param {number[]} [dash] */
   line(points, colour, width = 1, dash = []) {
     const { paper } = this;
     if (points.length < 4) return;
@@ -87,6 +96,7 @@ class View {
     paper.setLineDash([]);
   }
 
+  /** @param {number} x @param {number} y @param {number} radius @param {string} colour @param {string | null} rim */
   dot(x, y, radius, colour, rim = null) {
     const { paper } = this;
     paper.beginPath();
@@ -100,6 +110,7 @@ class View {
     }
   }
 
+  /** @param {number} x @param {number} y @param {number} size @param {string} colour */
   cross(x, y, size, colour) {
     this.line([x - size, y - size, x + size, y + size], colour, 2);
     this.line([x - size, y + size, x + size, y - size], colour, 2);
@@ -108,9 +119,16 @@ class View {
 
 // Drags, wheel and pinches of a canvas: `move(dx, dy, x, y)`, `zoom(factor, x, y)`, `click(x, y)`; a drag starts with
 // `grab(x, y)`, which may return another function to continue it until `drop(x, y)`.
+/** @param {HTMLCanvasElement} canvas @param {Gestures} given */
 function gestures(canvas, { move, zoom, click, grab, drop, hover }) {
+  /** @type {Map<number, Dot>} */
   const held = new Map();
-  let start = null, way = null, spread = 0;
+  /** @type {Dot | null} */
+  let start = null;
+  /** @type {((x: number, y: number) => void) | null} */
+  let way = null;
+  let spread = 0;
+  /** @param {MouseEvent} event @returns {Dot} */
   const at = (event) => {
     const box = canvas.getBoundingClientRect();
     return [(event.clientX - box.left) / unit(), (event.clientY - box.top) / unit()];
@@ -138,7 +156,7 @@ function gestures(canvas, { move, zoom, click, grab, drop, hover }) {
       else if (!start) move?.(place[0] - before[0], place[1] - before[1], ...place);
     }
   });
-  const end = (event) => {
+  const end = (/** @type {PointerEvent} */ event) => {
     if (!held.delete(event.pointerId)) return;
     if (way && event.type === "pointerup") drop?.(...at(event));
     if (start && event.type === "pointerup") click?.(...start);
@@ -157,6 +175,7 @@ function gestures(canvas, { move, zoom, click, grab, drop, hover }) {
 }
 
 // Ticks at round numbers.
+/** @param {number} low @param {number} high @param {number} count */
 function ticks(low, high, count) {
   const raw = (high - low) / Math.max(1, count), power = 10 ** Math.floor(Math.log10(raw));
   const step = power * ([1, 2, 5, 10].find((each) => each * power >= raw) ?? 10), found = [];
@@ -164,10 +183,12 @@ function ticks(low, high, count) {
   return { step, at: found };
 }
 
+/** @param {number} value */
 function numberText(value) {
   return Number.isFinite(value) ? String(parseFloat(value.toPrecision(6))) : String(value);
 }
 
+/** @param {string} colour @param {number} share */
 function faded(colour, share) {
   const number = parseInt(colour.slice(1), 16);
   return `rgba(${number >> 16}, ${(number >> 8) & 255}, ${number & 255}, ${share})`;

@@ -1,6 +1,7 @@
 // Space: the positions of things, as figures of the model place them.
 
 class Space extends View {
+  /** @param {State} state @param {number} number @param {Camera & { extent: Rect }} camera */
   constructor(state, number, camera) {
     super(state, "Space: bodies, estimates, plans and goals");
     this.number = number;
@@ -18,6 +19,7 @@ class Space extends View {
     });
   }
 
+  /** @param {Run[]} runs @returns {Rect} */
   static extent(runs) {
     let [left, right, low, high] = [Infinity, -Infinity, Infinity, -Infinity];
     for (const { marks } of runs)
@@ -43,20 +45,24 @@ class Space extends View {
     }
   }
 
+  /** @param {number} x */
   x(x) {
     return this.width / 2 + (x - this.camera.x) * this.camera.scale;
   }
 
+  /** @param {number} y */
   y(y) {
     return this.height / 2 - (y - this.camera.y) * this.camera.scale;
   }
 
+  /** @param {number} dx @param {number} dy */
   pan(dx, dy) {
     this.camera.x -= dx / this.camera.scale;
     this.camera.y += dy / this.camera.scale;
     this.state.changed();
   }
 
+  /** @param {number} factor @param {number} x @param {number} y */
   zoom(factor, x, y) {
     const { camera } = this, dx = x - this.width / 2, dy = this.height / 2 - y;
     camera.x += (dx / camera.scale) * (1 - factor);
@@ -65,20 +71,24 @@ class Space extends View {
     this.state.changed();
   }
 
+  /** @param {Mark} mark */
   colour(mark) {
     return mark.colour === null ? theme.limit : PALETTE[mark.colour % PALETTE.length];
   }
 
   // The row of a mark that is valid at a time (s); -1 before the first.
+  /** @param {Mark} mark @param {number} time */
   row(mark, time) {
     return search(mark.times.length, (row) => mark.times[row] > time + 1e-12) - 1;
   }
 
   // Whether a row is older than the usual interval between rows.
+  /** @param {Mark} mark @param {number} row @param {number} time */
   isStale(mark, row, time) {
     return time - mark.times[row] > 1.6 * mark.interval;
   }
 
+  /** @param {Mark} mark @param {number} time */
   place(mark, time) {
     const row = this.row(mark, time), { rows, width, times } = mark;
     if (row < 0) return null;
@@ -89,10 +99,12 @@ class Space extends View {
     return [0, 1].map((i) => now[i] + share * (rows[(row + 1) * width + i] - now[i]));
   }
 
+  /** @param {Paper} paper */
   draw(paper) {
     this.look();
     this.grid();
     const time = this.state.time / 1e9;
+    /** @type {{ [shape: string]: "sight" | "tube" | "ellipse" | "goal" | "body" }} */
     const painters = { line: "sight", tube: "tube", ellipse: "ellipse", goal: "goal", body: "body" };
     for (const mark of this.marks) if (mark.shape === "body") this.trail(mark, time);
     for (const [shape, painter] of Object.entries(painters))
@@ -113,9 +125,10 @@ class Space extends View {
     }
   }
 
+  /** @param {Mark} mark @param {number} time */
   trail(mark, time) {
     const now = this.row(mark, time), { rows, width } = mark, colour = this.colour(mark);
-    const points = (from, to) => {
+    const points = (/** @type {number} */ from, /** @type {number} */ to) => {
       const found = [], skip = Math.max(1, Math.floor((to - from) / 4000));
       for (let row = from; row < to; row += skip) found.push(this.x(rows[row * width]), this.y(rows[row * width + 1]));
       return found;
@@ -126,6 +139,7 @@ class Space extends View {
     this.line(way, faded(colour, 0.8), 1.8);
   }
 
+  /** @param {Paper} paper @param {Mark} mark @param {number} time */
   body(paper, mark, time) {
     const place = this.place(mark, time), colour = this.colour(mark);
     if (!place) return;
@@ -137,6 +151,7 @@ class Space extends View {
     this.text(mark.name.replace(/\.[^.]*$/, ""), x + 9, y - 8, { bold: isChosen, size: 11.5 });
   }
 
+  /** @param {Paper} paper @param {Mark} mark */
   goal(paper, mark) {
     const [x, y] = [this.x(mark.rows[0]), this.y(mark.rows[1])];
     paper.beginPath();
@@ -150,6 +165,7 @@ class Space extends View {
     this.text(mark.name, x + 12, y + 4, { colour: theme.soft });
   }
 
+  /** @param {Paper} paper @param {Mark} mark @param {number} time */
   ellipse(paper, mark, time) {
     const row = this.row(mark, time), colour = this.colour(mark);
     if (row < 0) return;
@@ -166,6 +182,7 @@ class Space extends View {
   }
 
   // The circles of a plan as one shape, and the path through their centres.
+  /** @param {Paper} paper @param {Mark} mark @param {number} time */
   tube(paper, mark, time) {
     const row = this.row(mark, time), { rows, width } = mark, colour = this.colour(mark), way = [];
     if (row < 0) return;
@@ -183,6 +200,7 @@ class Space extends View {
     for (let i = 0; i < way.length; i += 2) this.dot(way[i], way[i + 1], 1.6, faded(colour, 0.8 * share));
   }
 
+  /** @param {Paper} paper @param {Mark} mark @param {number} time */
   sight(paper, mark, time) {
     const row = this.row(mark, time);
     if (row < 0 || this.isStale(mark, row, time)) return;
@@ -191,6 +209,7 @@ class Space extends View {
     this.dot(this.x(bx), this.y(by), 2, faded(colour, 0.7));
   }
 
+  /** @param {Mark} mark */
   isChosen(mark) {
     const { selection } = this.state, run = this.state.runs[this.number];
     if (!selection || selection.run !== this.number || !mark.port) return false;
@@ -199,6 +218,7 @@ class Space extends View {
   }
 
   // A click on a body selects the firing that last gave its position.
+  /** @param {number} x @param {number} y */
   pick(x, y) {
     const run = this.state.runs[this.number], time = this.state.time / 1e9;
     let best = null, least = 24;

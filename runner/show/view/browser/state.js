@@ -4,6 +4,7 @@ const SPEEDS = [0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1, 2, 5, 10, 20, 50, 100, 200, 
 const GLOW = 0.35; // s of real time for which a firing is visible
 
 class State {
+  /** @param {Page} data */
   constructor(data) {
     this.runs = data.runs;
     this.data = data;
@@ -18,6 +19,7 @@ class State {
     this.cone = null;
     this.directions = { back: true, ahead: true };
     this.isDirty = true;
+    /** @type {(() => void)[]} */
     this.listeners = [];
     this.setTime(0);
   }
@@ -38,6 +40,7 @@ class State {
     this.isDirty = true;
   }
 
+  /** @param {number} time */
   setTime(time) {
     this.time = Math.min(this.end, Math.max(0, time));
     this.tags = this.runs.map((run) => run.tagAt(this.time));
@@ -45,6 +48,7 @@ class State {
   }
 
   // Moves to one tag of the active run; later microsteps of its time may still follow.
+  /** @param {number} tag */
   setTag(tag) {
     const run = this.run;
     if (!run.times.length) return;
@@ -54,17 +58,20 @@ class State {
     this.keepInSight();
   }
 
+  /** @param {number} count */
   step(count) {
     this.isPlaying = false;
     this.setTag(this.tag + count);
   }
 
+  /** @param {boolean} isPlaying */
   play(isPlaying) {
     if (isPlaying && this.time >= this.end) this.setTime(0);
     this.isPlaying = isPlaying;
     this.changed();
   }
 
+  /** @param {number} seconds */
   advance(seconds) {
     if (!this.isPlaying) return;
     this.setTime(this.time + seconds * this.speed * 1e9);
@@ -73,6 +80,7 @@ class State {
   }
 
   // How strongly to show what happened at a tag of a run: 1 now, fading afterwards, 0 before.
+  /** @param {Run} run @param {number} tag */
   glow(run, tag) {
     const now = this.tags[this.runs.indexOf(run)];
     if (tag > now) return 0;
@@ -87,6 +95,7 @@ class State {
 
   // -- the time axis: seconds, or one step for each tag --
 
+  /** @param {Run} run @param {number} tag */
   place(run, tag) {
     return this.axis.byTag ? tag : run.times[tag];
   }
@@ -99,24 +108,28 @@ class State {
     return tag + (gap > 0 ? Math.min(0.999, (this.time - run.times[tag]) / gap) : 0);
   }
 
+  /** @type {[low: number, high: number]} */
   get extent() {
     return this.axis.byTag ? [-0.5, Math.max(1, this.run.times.length) - 0.5] : [0, this.end];
   }
 
+  /** @param {number} place */
   setCursor(place) {
     if (this.axis.byTag) this.setTag(Math.round(place));
     else this.setTime(place);
   }
 
+  /** @param {boolean} byTag */
   setByTag(byTag) {
     if (this.axis.byTag === byTag) return;
-    const { run } = this, toTag = (time) => search(run.times.length, (tag) => run.times[tag] >= time);
+    const { run } = this, toTag = (/** @type {number} */ time) => search(run.times.length, (tag) => run.times[tag] >= time);
     const { low, high } = this.axis;
     this.axis.byTag = byTag;
     if (byTag) this.show(toTag(low) - 0.5, Math.max(toTag(low) + 4, toTag(high)) - 0.5);
     else this.show(run.times[Math.max(0, Math.ceil(low))] ?? 0, run.times[Math.floor(high)] ?? this.end);
   }
 
+  /** @param {number} low @param {number} high */
   show(low, high) {
     const [first, last] = this.extent, least = this.axis.byTag ? 4 : Math.min(100, last - first);
     let size = Math.min(last - first, Math.max(least, high - low));
@@ -125,6 +138,7 @@ class State {
     this.changed();
   }
 
+  /** @param {number} factor @param {number} place */
   zoom(factor, place) {
     const { low, high } = this.axis;
     this.show(place - (place - low) * factor, place + (high - place) * factor);
@@ -137,6 +151,7 @@ class State {
 
   // -- the selection --
 
+  /** @param {Chosen} selection */
   select(selection) {
     this.selection = selection;
     if (selection && selection.run !== this.active) this.activate(selection.run);
@@ -144,6 +159,7 @@ class State {
     for (const listener of this.listeners) listener();
   }
 
+  /** @param {Chosen} selection */
   goTo(selection) {
     this.isPlaying = false;
     this.select(selection);
@@ -151,6 +167,7 @@ class State {
     this.setTag(selection.firing >= 0 ? run.firing_tag[selection.firing] : run.record_tag[selection.record]);
   }
 
+  /** @param {number} number */
   activate(number) {
     const { byTag } = this.axis;
     if (byTag) this.setByTag(false);
@@ -170,6 +187,7 @@ class State {
 }
 
 // A speed at which a run takes about twenty seconds.
+/** @param {number} seconds */
 function speedFor(seconds) {
   return SPEEDS.find((speed) => seconds / speed <= 30) ?? SPEEDS.at(-1);
 }

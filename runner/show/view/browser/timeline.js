@@ -3,6 +3,7 @@
 const MARGIN = 168; // px at the left, for names
 
 class Timeline extends View {
+  /** @param {State} state @param {string} label */
   constructor(state, label) {
     super(state, label);
     this.scroll = 0;
@@ -26,23 +27,27 @@ class Timeline extends View {
     return this.width - this.margin - 8;
   }
 
+  /** @param {number} place */
   x(place) {
     const { low, high } = this.state.axis;
     return this.margin + ((place - low) / (high - low)) * this.span;
   }
 
+  /** @param {number} x */
   at(x) {
     const { low, high } = this.state.axis;
     return low + ((x - this.margin) / this.span) * (high - low);
   }
 
   // The visible tags of a run.
+  /** @param {Run} run */
   tagsInSight(run) {
     const { low, high, byTag } = this.state.axis;
     if (byTag) return [Math.max(0, Math.floor(low)), Math.min(run.times.length - 1, Math.ceil(high))];
     return [search(run.times.length, (tag) => run.times[tag] >= low), run.tagAt(high)];
   }
 
+  /** @param {number} dy */
   scrollBy(dy) {
     const most = Math.max(0, (this.tall ?? 0) - this.height);
     this.scroll = Math.min(most, Math.max(0, this.scroll + dy));
@@ -85,7 +90,8 @@ class Timeline extends View {
     }
   }
 
-  pick(x) {
+  /** @param {number} x @param {number} [y] */
+  pick(x, y) {
     if (x >= this.margin) {
       this.state.isPlaying = false;
       this.state.setCursor(this.at(x));
@@ -95,12 +101,13 @@ class Timeline extends View {
 
 // The whole run in one strip: how much happens when, the visible part, and the cursor.
 class Scrubber extends View {
+  /** @param {State} state */
   constructor(state) {
     super(state, "The whole run: drag to move through time");
     this.canvas.dataset.view = "scrubber";
     gestures(this.canvas, {
       grab: (x) => {
-        const move = (to) => {
+        const move = (/** @type {number} */ to) => {
           state.isPlaying = false;
           const [low, high] = state.extent;
           state.setCursor(low + (to / this.width) * (high - low));
@@ -117,9 +124,10 @@ class Scrubber extends View {
     this.counted = null;
   }
 
+  /** @param {Paper} paper */
   draw(paper) {
     const { state } = this, { run, axis } = state, [low, high] = state.extent;
-    const x = (place) => ((place - low) / (high - low)) * this.width;
+    const x = (/** @type {number} */ place) => ((place - low) / (high - low)) * this.width;
     if (this.counted?.run !== run || this.counted.byTag !== axis.byTag) this.count(run, x);
     const most = Math.max(1, ...this.counted.firings);
     this.counted.firings.forEach((count, i) => {
@@ -138,9 +146,10 @@ class Scrubber extends View {
     this.line([x(state.cursor), 0, x(state.cursor), this.height], theme.now, 2.5);
   }
 
+  /** @param {Run} run @param {(place: number) => number} x */
   count(run, x) {
     const parts = Math.ceil(this.width / 2), firings = new Float64Array(parts), losses = new Uint8Array(parts);
-    const part = (tag) => Math.min(parts - 1, Math.max(0, Math.floor(x(this.state.place(run, tag)) / 2)));
+    const part = (/** @type {number} */ tag) => Math.min(parts - 1, Math.max(0, Math.floor(x(this.state.place(run, tag)) / 2)));
     for (const tag of run.firing_tag) firings[part(tag)]++;
     for (const { record } of run.losses) losses[part(run.record_tag[record])] = 1;
     this.counted = { run, byTag: this.state.axis.byTag, firings, losses };
