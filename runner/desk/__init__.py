@@ -13,7 +13,7 @@ from .completion import Suggestion, complete
 from .editing import Splice, splices
 from .kinds_page import page
 from .knowledge import Knowledge
-from .meaning import Symbol, definition, hover, path_of, references, symbols
+from .meaning import Symbol, definition, hover, links, path_of, references, symbols
 from .parts import EditError
 from .places import lines_of
 from .problem_data import as_data, of_problems, report
@@ -44,6 +44,7 @@ __all__ = [
     "fix_all",
     "hover",
     "lines_of",
+    "links",
     "of_problems",
     "page",
     "path_of",

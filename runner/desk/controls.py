@@ -31,7 +31,7 @@ def so_far(reading: Reading, texts: Texts = NO_TEXTS) -> Reading:
         lines = lines_of(text)
         lines[at.line - 1] = ""
         text = "\n".join(lines)
-        tried = read(reading.path, {**texts, reading.path.resolve(): text}, reading.types)
+        tried = read(reading.path, {**texts, reading.path.resolve(): text}, reading.types, before=reading)
     return reading if tried.loading.model is None else tried
 
 

@@ -20,6 +20,9 @@ from .names import MODEL, SECTIONS, Name, Use
 from .places import place_at
 from .schema import allowed, language
 
+# The keys of a file that name others, and of which kind those are that may be packaged; a study names a model, too.
+_FILES = {"include": "", "extends": "model"}
+
 
 @dataclass(frozen=True)
 class Symbol:
@@ -33,17 +36,26 @@ class Symbol:
 
 def definition(knowledge: Knowledge, line: int, column: int) -> list[Position]:
     """Where what stands at a line and column of the file is declared; they count from 0."""
-    names = knowledge.names
-    if (use := names.at(knowledge.file, line, column)) is not None:
+    if (use := knowledge.names.at(knowledge.file, line, column)) is not None:
         return [each.position for each in _uses(knowledge, use) if each.declares]
-    place = place_at(knowledge.text, line, column)
-    keys = [key for key in place.keys if isinstance(key, str)] if place is not None and not place.is_key else []
-    if place is None or keys not in (["extends"], ["include"]):
-        return []
-    said = Text(place.whole, Position(knowledge.file, line + 1, column + 1, 0, ""))
-    folder = Path(knowledge.file).parent
-    path = named_file(said, folder, "model", Problems()) if keys == ["extends"] else folder / place.whole
-    return [Position(str(path), 1, 1, 0, "")] if path is not None and path.is_file() else []
+    for at, path in links(knowledge):
+        if at.line == line + 1 and at.column - 1 <= column <= at.column - 1 + at.length:
+            return [Position(str(path), 1, 1, 0, "")]
+    return []
+
+
+def links(knowledge: Knowledge) -> Iterator[tuple[Position, Path]]:
+    """Where the file names another one, which it includes, extends or runs, and that file's path."""
+    root, folder = knowledge.reading.nodes.get(knowledge.file), Path(knowledge.file).parent
+    entries = root.entries if isinstance(root, Mapping) else {}
+    for key, kind in {**_FILES, **({"model": "model"} if "study" in entries else {})}.items():
+        node = entries[key].value if key in entries else None
+        for each in node.items if isinstance(node, Sequence) else (node,):
+            if isinstance(each, Scalar):
+                said = Text(each.text, each.position)
+                path = named_file(said, folder, kind, Problems()) if kind else folder / each.text
+                if path is not None and path.is_file():
+                    yield each.position, path
 
 
 def references(knowledge: Knowledge, line: int, column: int) -> list[Position]:

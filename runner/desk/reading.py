@@ -23,6 +23,7 @@ from ..model.text.files import opened
 from ..model.text.kinds import FILE
 from ..model.text.problems import ModelError, Problem, Problems
 from ..support.collection import without_collection
+from .again import read_again
 
 Texts = Mapping[Path, str]
 NO_TEXTS: Texts = MappingProxyType({})
@@ -43,6 +44,7 @@ class Reading:
     files: Mapping[str, tuple[Path, str]]
     types: tuple[type, ...] = ()
     nodes: Mapping[str, Node] = field(default_factory=dict)
+    parsed: Mapping[str, tuple[str, Node]] = field(default_factory=dict)  # the latest texts without problems
 
     @property
     def is_valid(self) -> bool:
@@ -54,17 +56,29 @@ class Reading:
         return str(self.path)
 
 
-def read(name: str | Path, texts: Texts = NO_TEXTS, types: Iterable[type] = (), **changes: Any) -> Reading:
+def read(
+    name: str | Path,
+    texts: Texts = NO_TEXTS,
+    types: Iterable[type] = (),
+    *,
+    before: Reading | None = None,
+    **changes: Any,
+) -> Reading:
     """Read a model, a study, a disturbance, or a file of composite classes; never raises because of what it holds.
 
     ``texts`` are read in place of files, by their resolved paths; ``types`` are classes that the model may name, and
-    ``changes`` those of ``load_model``.
+    ``changes`` those of ``load_model``.  Of what was read ``before``, that is taken which has not changed.
     """
     is_file = isinstance(name, Path) or is_path(name)
     path = Path(name) if is_file else packaged_models().get(str(name), Path(name))
     types, loading = tuple(types), Loading()
     found, more = list[Problem](), False
-    with opened(texts) as known, without_collection():
+    parsed = {} if before is None else dict(before.parsed)
+
+    def recall(name: str, text: str) -> Node | None:
+        return read_again(text, name, *parsed[name]) if name in parsed else None
+
+    with opened(texts, recall) as known, without_collection():
         try:
             if is_file:
                 _passes(path, types, loading, changes)
@@ -84,6 +98,7 @@ def read(name: str | Path, texts: Texts = NO_TEXTS, types: Iterable[type] = (), 
         known.read,
         types,
         {name: node for name, node in nodes.items() if node is not None},
+        parsed | {name: (known.read[name][1], node) for name, node in known.nodes.items()},
     )
 
 

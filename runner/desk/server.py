@@ -293,6 +293,12 @@ def make_server(version: str, types: tuple[type, ...] = ()) -> Server:
 
         return [symbol(each) for each in meaning.symbols(known.reading.nodes.get(known.file))]
 
+    @server.feature(lsp.TEXT_DOCUMENT_DOCUMENT_LINK)
+    def links(params: lsp.DocumentLinkParams) -> list[lsp.DocumentLink]:
+        if (known := server.known(params.text_document.uri, alone=True)) is None:
+            return []
+        return [lsp.DocumentLink(server.range_of(known, at), uri_of(path)) for at, path in meaning.links(known)]
+
     @server.feature(
         lsp.TEXT_DOCUMENT_CODE_ACTION, lsp.CodeActionOptions(code_action_kinds=[lsp.CodeActionKind.QuickFix, _FIX_ALL])
     )

@@ -18,6 +18,7 @@ from epicycle.runner.desk import (
     definition,
     fix_all,
     hover,
+    links,
     read,
     references,
     rename,
@@ -255,10 +256,28 @@ def test_definition_and_references(tmp_path: Path) -> None:
     assert (Path(found.file).name, found.source) == (NAME, "  Observer:")
     (found,) = definition(knowledge, *place(text, "include: robots/mob", "ile"))
     assert Path(found.file).name == "mobile_robot.yaml"
+    assert [(at.source, at.column, at.length, path.name) for at, path in links(knowledge)] == [
+        ("include: robots/mobile_robot.yaml", 10, 24, "mobile_robot.yaml")
+    ]
     lines = [each.line for each in references(knowledge, *place(text, "  con", "tact:\n    type"))]
     written = [number for number, line in enumerate(text.splitlines(), 1) if "contact." in line]
     assert sorted(set(lines)) == sorted({*written, text.splitlines().index("  contact:") + 1})
     assert definition(knowledge, 0, 0) == references(knowledge, 0, 0) == []
+
+
+def test_links_lead_to_the_files_that_are_named(tmp_path: Path) -> None:
+    def found(name: str, text: str) -> list[tuple[str, int, int, str]]:
+        path = tmp_path / name
+        path.write_text(text, encoding="utf-8")
+        return [(at.source, at.column, at.length, to.name) for at, to in links(known(path))]
+
+    named = [("extends: mm1", 10, 3, "mm1.yaml")]
+    assert found("one.yaml", "model: one\nextends: mm1\n") == named
+    assert found("mm1.yaml", "model: mm1\ninclude: [one.yaml, none.yaml]\n") == [
+        ("include: [one.yaml, none.yaml]", 11, 8, "one.yaml")
+    ]
+    assert found("two.yaml", "study: two\nmodel: mm1\nvary: {load: [0.5]}\n") == [("model: mm1", 8, 3, "mm1.yaml")]
+    assert found("broken.yaml", "model: [\nextends: mm1\n") == []
 
 
 def test_symbols() -> None:

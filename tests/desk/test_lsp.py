@@ -64,6 +64,15 @@ def test_a_dialogue_over_a_model_of_300_lines(tmp_path: Path) -> None:
         (found,) = await client.text_document_definition_async(lsp.DefinitionParams(**sensor))  # type: ignore[misc]
         assert found.uri == library.resolve().as_uri()
 
+        # The include is a link.
+        identifier = lsp.TextDocumentIdentifier(path.resolve().as_uri())
+        (link,) = await client.text_document_document_link_async(lsp.DocumentLinkParams(identifier))  # type: ignore[misc]
+        line = text.splitlines().index("include: robots/mobile_robot.yaml")
+        assert (link.range, link.target) == (
+            lsp.Range(lsp.Position(line, 9), lsp.Position(line, 33)),
+            library.resolve().as_uri(),
+        )
+
         # Rename over the include and the pointcuts; what is open and what is on disk.
         edit: Any = await client.text_document_rename_async(lsp.RenameParams(**sensor, new_name="eye"))
         assert set(edit.changes) == {path.resolve().as_uri(), library.resolve().as_uri()}

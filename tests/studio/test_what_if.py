@@ -63,11 +63,8 @@ def test_a_lost_plan_is_let_through_by_two_clicks(studio: Callable[..., Writer],
     assert tab.locator(".whatif .through").is_disabled()
 
     # The first click: a lost plan.  The second: let it through.
-    click(
-        writer,
-        "sequence",
-        "view.hits.find(([,, { record }]) => record >= 0 && run.portPath(run.record_port[record]) === 'main.peer_plan')",
-    )
+    port = "run.portPath(run.record_port[what.record])"
+    click(writer, "sequence", f"view.hits.find(([,, what]) => what.record >= 0 && {port} === 'main.peer_plan')")
     assert "wifi_loss: dropped at main.peer_plan" in tab.locator(".whatif .through").get_attribute("title")
     tab.locator(".whatif .through").click()
     tab.locator(".futures").wait_for()

@@ -146,7 +146,7 @@ def check_connections(graph: ModelGraph, problems: Problems) -> None:
                     about=("missing", in_general(port.path)),
                     kind=UNCONNECTED,
                 )
-            if not port.multi and len(graph.channels_to(port)) > 1:
+            if len(wires) > 1 and not port.multi and len(graph.channels_to(port)) > 1:
                 times = Counter(wire.source.path for wire in wires)
                 writers = ", ".join(
                     f"{path} ({number} times)" if number > 1 else path for path, number in times.items()

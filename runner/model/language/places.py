@@ -165,7 +165,7 @@ def connection(reader: NodeReader, node: Node, what: str = "") -> ConnectionText
 
 def _arrow(reader: NodeReader, node: Scalar) -> ConnectionText | Poison:
     text, advice = node.value if isinstance(node.value, str) else node.text, "write 'actor.port -> actor.port'"
-    places = [(start, end) for arrow in ("->", "=>") for start, end in split(text, arrow)[1:]]
+    places = [(start, end) for arrow in ("->", "=>") if arrow in text for start, end in split(text, arrow)[1:]]
     if len(places) != 1:
         return reader.problems.add(f"{text!r} is not a connection", node.position, advice)
     right = places[0][0]
@@ -185,7 +185,7 @@ def _side(node: Scalar, text: str, start: int, end: int) -> list[Text]:
     if side.strip().startswith("[") and side.strip().endswith("]"):
         start, end = start + side.index("[") + 1, start + side.rindex("]")
     found = []
-    for first, last in split(text[start:end], ","):
+    for first, last in split(text[start:end], ",") if "," in text[start:end] else [(0, end - start)]:
         part = text[start + first : start + last]
         if name := part.strip():
             offset = start + first + len(part) - len(part.lstrip())

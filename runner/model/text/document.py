@@ -24,7 +24,7 @@ from yaml.events import (
 
 from epicycle.actors import MAX_DEPTH, did_you_mean, irregular, open_regular
 
-from .files import known_nodes, note_file, note_text, opened_text
+from .files import note_file, note_text, opened_text, present
 from .kinds import FILE, KEY, SIZE, SYNTAX, Kind
 from .problems import Position, Problems
 from .scalars import SCALAR_TAGS, TAG_PREFIX, Value, resolve, short
@@ -80,13 +80,12 @@ def read(path: Path, problems: Problems, shown_as: str | None = None) -> Node | 
     if text is None:
         return None
     note_text(path, name, text)
-    known, before = known_nodes(), len(problems)
-    if name not in known:
-        node = parse(text, name, problems)
-        if node is None or len(problems) > before:
-            return node
-        known[name] = node
-    found: Node = known[name]
+    if (opened := present()) is None:
+        return parse(text, name, problems)
+    before = len(problems)
+    found: Node | None = opened.nodes.get(name) or opened.recall(name, text) or parse(text, name, problems)
+    if found is not None and len(problems) == before:
+        opened.nodes[name] = found
     return found
 
 
@@ -115,16 +114,17 @@ def _text_of(path: Path, name: str, problems: Problems) -> str | None:
         return None
 
 
-def parse(text: str, name: str, problems: Problems, shown_as: str | None = None) -> Node | None:
+def parse(text: str, name: str, problems: Problems, shown_as: str | None = None, *, depth: int = 0) -> Node | None:
     """Turn YAML text into nodes; None if it cannot be parsed.
 
-    `name` is the file in messages, `shown_as` the line that contains a text of one line.
+    `name` is the file in messages, `shown_as` the line that contains a text of one line; `depth` is how many lists and
+    mappings are around it.
     """
     if len(text) > MAX_BYTES:
         problems.add(_too_large(name), kind=SIZE)
         return None
     with problems.looking_for(SYNTAX):
-        return _Builder(text.removeprefix("\ufeff"), name, problems, shown_as).build()
+        return _Builder(text.removeprefix("\ufeff"), name, problems, shown_as, depth).build()
 
 
 def plain(node: Node) -> object:
@@ -155,7 +155,7 @@ def _add_undecodable(data: bytes, offset: int, name: str, problems: Problems) ->
         return
     before = data[:offset].decode("utf-8")  # valid, as the first bad byte is at the offset
     rest = data[offset:].split(b"\n", 1)[0].decode("utf-8", "backslashreplace")
-    lines = _LINE_BREAK.split(before)
+    lines = LINE_BREAK.split(before)
     position = Position(name, len(lines), len(lines[-1]) + 1, 4, lines[-1] + rest.rstrip("\r"))
     message = f"this is not UTF-8 text: it has the byte 0x{data[offset]:02x}"
     problems.add(message, position, "save the file as UTF-8")
@@ -164,7 +164,7 @@ def _add_undecodable(data: bytes, offset: int, name: str, problems: Problems) ->
 # --- the builder --------------------------------------------------------------------------------------
 
 # libyaml counts lines this way; ours must agree with its marks.
-_LINE_BREAK = re.compile("\r\n|[\n\r\x85\u2028\u2029]")
+LINE_BREAK = re.compile("\r\n|[\n\r\x85\u2028\u2029]")
 _CONTROL = re.compile("[^\t\n\r\x20-\x7e]")  # of an ASCII text
 _UNPRINTABLE = "[^\t\n\r\x20-\x7e\x85\xa0-\ud7ff\ue000-\ufefe\uff00-\ufffd\U00010000-\U0010ffff]"
 _BEGINNING = 50_000  # characters of a broken text that are read again by the slow parser, in a second at most
@@ -208,20 +208,21 @@ class _Frame:
 class _Builder:
     """Builds nodes from parser events with a stack of its own, so that no depth can overflow Python's."""
 
-    def __init__(self, text: str, name: str, problems: Problems, shown_as: str | None) -> None:
+    def __init__(self, text: str, name: str, problems: Problems, shown_as: str | None, depth: int) -> None:
         self._text = text
         self._name = name
         self._problems = problems
-        self._lines = _LINE_BREAK.split(text) if shown_as is None else [shown_as]
+        self._lines = LINE_BREAK.split(text) if shown_as is None else [shown_as]
         self._stack: list[_Frame] = []
         self._root: Node | None = None
         self._anchors: dict[str, tuple[Node, int, int] | None] = {}  # None: still open
         self._nodes = 0
+        self._most_open = MAX_DEPTH - depth
 
     def build(self) -> Node | None:
         # Few texts need the second, which is slow to compile.
         if found := (_CONTROL.search(self._text) if self._text.isascii() else re.search(_UNPRINTABLE, self._text)):
-            before = _LINE_BREAK.split(self._text[: found.start()])
+            before = LINE_BREAK.split(self._text[: found.start()])
             at = self._at(len(before) - 1, len(before[-1]))
             message = f"YAML does not allow the character U+{ord(found[0]):04X}"
             self._problems.add(message, at, 'write it as an escape in "..."')
@@ -307,7 +308,7 @@ class _Builder:
         position = self._span(event)
         is_mapping = isinstance(event, MappingStartEvent)
         self._count(1, position)
-        if len(self._stack) >= MAX_DEPTH:
+        if len(self._stack) >= self._most_open:
             self._stop(f"nested deeper than {MAX_DEPTH} levels", position, SIZE)
         expected, kind = ("map", "mapping") if is_mapping else ("seq", "list")
         if event.tag is not None and event.tag != TAG_PREFIX + expected:
@@ -337,7 +338,7 @@ class _Builder:
             self._stop(f"the alias *{name} is inside &{name} itself", position)
         node, weight, height = known
         self._count(weight, position)
-        if len(self._stack) + height > MAX_DEPTH:
+        if len(self._stack) + height > self._most_open:
             self._stop(f"nested deeper than {MAX_DEPTH} levels by the alias *{name}", position, SIZE)
         # Problems of the node itself are reported where it is used, those inside it where it is written.
         self._add(dataclasses.replace(node, position=position), weight, height)

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeAlias
 
 from epicycle.actors import ParameterError, check_allowed, did_you_mean, irregular, read_regular
 
@@ -17,14 +17,19 @@ from .problems import Position
 COMMAND_LINE = "command line"  # the file of a position in an option
 
 
+Recall: TypeAlias = Callable[[str, str], Any]
+
+
 @dataclass
 class Opened:
     """Texts read in place of files, by their resolved paths, and everything that is read, by its name in messages.
 
-    ``nodes`` are what texts without problems hold: several passes read them, but they are parsed once.
+    ``nodes`` are what texts without problems hold: several passes read them, but they are parsed once.  ``recall`` may
+    know what a text, by name, holds without parsing it; otherwise it returns None.
     """
 
     texts: Mapping[Path, str]
+    recall: Recall
     read: dict[str, tuple[Path, str]] = field(default_factory=dict)
     nodes: dict[str, Any] = field(default_factory=dict)
 
@@ -33,9 +38,9 @@ _opened: ContextVar[Opened | None] = ContextVar("opened", default=None)
 
 
 @contextmanager
-def opened(texts: Mapping[Path, str]) -> Iterator[Opened]:
+def opened(texts: Mapping[Path, str], recall: Recall = lambda name, text: None) -> Iterator[Opened]:
     """Texts that are read in place of files, such as those of an editor."""
-    found = Opened(texts)
+    found = Opened(texts, recall)
     token = _opened.set(found)
     try:
         yield found
@@ -59,9 +64,9 @@ def note_text(path: Path, name: str, text: str) -> None:
         found.read[name] = (path, text)
 
 
-def known_nodes() -> dict[str, Any]:
-    """What texts that were read for whoever opened others hold, by name."""
-    return {} if (found := _opened.get()) is None else found.nodes
+def present() -> Opened | None:
+    """What is known of the texts that are read for whoever opened others."""
+    return _opened.get()
 
 
 @dataclass

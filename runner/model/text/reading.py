@@ -103,7 +103,7 @@ def inside(node: Scalar, text: str, offset: int, part: str) -> Position:
     start = at.column - 1 + (0 if node.plain else 1)
     if not at.source.startswith(text, start):
         return at
-    return replace(at, column=start + offset + 1, length=len(part))
+    return Position(at.file, at.line, start + offset + 1, len(part), at.source)
 
 
 def is_empty(node: Node) -> bool:

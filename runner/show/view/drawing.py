@@ -66,7 +66,7 @@ def _drawing(model: Model) -> tuple[Drawing, str]:
 
 
 def _laid_out(found: Outline) -> Drawing:
-    """The drawing of an outline; the latest one is kept, as most changes of a text leave the graph, or most of it, alone."""
+    """The drawing of an outline; of the latest one, everything is kept that is the same."""
     key = repr(found.root)
     if key not in _latest:
         _latest.clear()

@@ -1,0 +1,124 @@
+"""A text that is read again after a change: what its other lines hold is taken from before.
+
+The change is in some entries of a mapping, or items of a list, that stand in lines of their own.  These lines alone are
+parsed; what they hold is what they would hold among the others, because an entry ends where the next one begins.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from typing import TypeVar
+
+from ..model.text.document import LINE_BREAK, MAX_NODES, Entry, Mapping, Node, Scalar, Sequence, parse
+from ..model.text.problems import Position, Problems
+
+# Anchors, and what ends a document or begins an odd key, mean something beyond their lines.
+_ODD = re.compile(r"&|^(?:---|\.\.\.|%|[ \t-]*\?(?:\s|\Z))", re.MULTILINE)
+_DASH = re.compile(r" *-[ \t]+\Z")
+
+N = TypeVar("N", bound=Node)
+
+
+@dataclass(frozen=True)
+class _Change:
+    """A stretch of lines, of which the first one is ``first``; it ended before ``old`` and ends before ``new``."""
+
+    text: str
+    name: str
+    starts: list[int]  # where the lines begin
+    first: int
+    old: int
+    new: int
+
+    def read(self, start: int, end: int, depth: int) -> Node | None:
+        """What lines hold that ended before ``end``, all that is different among them; None if something is wrong."""
+        lines = self.text[self.starts[start] : self.starts[end + self.new - self.old]]
+        problems = Problems()
+        node = parse("\n" * start + lines, self.name, problems, depth=depth)
+        return None if problems.found else node
+
+
+def read_again(text: str, name: str, before: str, root: Node) -> Node | None:
+    """What a text holds, by what it held before a change; None if it must be read as a whole."""
+    if text == before:
+        return root
+    # Without anchors, a text has fewer nodes than characters.
+    if len(text) >= MAX_NODES or _ODD.search(text) or _ODD.search(before):
+        return None
+    old, new = LINE_BREAK.split(before), LINE_BREAK.split(text)
+    most = min(len(old), len(new))
+    first = next((at for at in range(most) if old[at] != new[at]), most)
+    behind = next((at for at in range(most - first) if old[-1 - at] != new[-1 - at]), most - first)
+    starts = [0, *(found.end() for found in LINE_BREAK.finditer(text)), len(text)]
+    change = _Change(text, name, starts, first, len(old) - behind, len(new) - behind)
+    return _changed(root, change, len(old), 0)
+
+
+def _changed(node: Node, change: _Change, end: int, depth: int) -> Node | None:
+    """A mapping or list, whose lines ended before ``end``, after a change within it."""
+    if isinstance(node, Scalar) or node.position.source[node.position.column - 1 :][:1] in ("{", "["):
+        return None
+    if isinstance(node, Mapping):
+        keys, values = list(node.entries), [each.value for each in node.entries.values()]
+        places = [each.key.position for each in node.entries.values()]
+    else:
+        keys, values, places = [], list(node.items), [each.position for each in node.items]
+    lines = [place.line - 1 for place in places]
+    if not lines or change.first < lines[0]:
+        return None
+    # Before the first line of an entry, there may be another line of the text that the one before ends with.
+    one = max(0, sum(line < change.first for line in lines) - 1)
+    other = next((number for number, line in enumerate(lines) if number > one and line >= change.old), len(lines))
+    stop = lines[other] if other < len(lines) else end
+    if other == one + 1 and (inner := _changed(values[one], change, stop, depth + 1)) is not None:
+        made: Node = inner
+        if isinstance(node, Mapping):
+            made = Mapping({keys[one]: Entry(node.entries[keys[one]].key, inner)}, node.position)
+        else:
+            made = Sequence((inner,), node.position)
+    else:
+        edges = [places[one], *places[other : other + 1]]
+        if not all(_begins_line(each, isinstance(node, Mapping)) for each in edges):
+            return None
+        read = change.read(lines[one], stop, depth)
+        if type(read) is not type(node) or read.position.column != node.position.column:
+            return None
+        made = read
+    by = change.new - change.old
+    at = node.position if one else made.position
+    if isinstance(node, Mapping) and isinstance(made, Mapping):
+        entries = {key: node.entries[key] for key in keys[:one]} | made.entries
+        entries |= {key: moved_entry(node.entries[key], by) for key in keys[other:]}
+        known = one + len(made.entries) + len(keys) - other
+        return Mapping(entries, at) if len(entries) == known else None
+    if isinstance(node, Sequence) and isinstance(made, Sequence):
+        return Sequence((*values[:one], *made.items, *(moved(each, by) for each in values[other:])), at)
+    return None
+
+
+def _begins_line(at: Position, is_key: bool) -> bool:
+    """Whether nothing but a dash stands before an entry or item on its line."""
+    before = at.source[: at.column - 1]
+    return not before.strip(" ") if is_key else _DASH.match(before) is not None
+
+
+# -- other lines ------------------------------------------------------------------------------------------------------
+
+
+def moved_entry(entry: Entry, by: int) -> Entry:
+    """An entry that stands so many lines below."""
+    return Entry(moved(entry.key, by), moved(entry.value, by)) if by else entry
+
+
+def moved(node: N, by: int) -> N:
+    """A node that stands so many lines below."""
+    if not by:
+        return node
+    at = node.position
+    place = Position(at.file, at.line + by, at.column, at.length, at.source)
+    if isinstance(node, Scalar):
+        return Scalar(node.value, node.text, node.plain, place)
+    if isinstance(node, Sequence):
+        return Sequence(tuple([moved(each, by) for each in node.items]), place)
+    return Mapping({key: moved_entry(each, by) for key, each in node.entries.items()}, place)
