@@ -7,6 +7,7 @@ of these ways:
 - ``run: NAME``: one long run, whose metrics have intervals by batch means.
 - ``rare: NAME`` with ``monitor``, ``guide``, ``runs``: importance splitting.
 - ``check: NAME``: one run, in which all monitors must hold.
+- ``beside: NAME``: runs whose data Stone Soup gets, too.
 - ``program: NAME``: an example of SimPy, which must print what it prints there.
 
 ``published`` has a list for each parameter that is varied and for each metric.  Every seed is fixed; the figures are
@@ -30,11 +31,11 @@ from epicycle.runner import Simulation
 from epicycle.runner.study.inference import mean, rate
 from epicycle.runner.support.shown import rounded
 
-from . import programs
+from . import programs, stone_soup
 
 HERE = Path(__file__).parent
 ROOT = HERE.parent.parent
-SOURCES = ("stochastic", "simpy", "queues", "superdense")
+SOURCES = ("stochastic", "simpy", "queues", "superdense", "tracking")
 RESULTS = Path("results/truth")
 LEAST, MOST = 90.0, 99.0  # % of 95 % intervals that should hold the published value
 
@@ -61,7 +62,14 @@ def source(name: str) -> Mapping[str, Any]:
 
 def lines_of(name: str, jobs: int | None = None) -> list[Line]:
     """All cases of a source, made now unless they have been made before."""
-    kinds = {"study": _of_study, "run": _of_run, "rare": _of_rare, "check": _of_check, "program": _of_program}
+    kinds = {
+        "study": _of_study,
+        "run": _of_run,
+        "rare": _of_rare,
+        "check": _of_check,
+        "program": _of_program,
+        "beside": _beside,
+    }
     lines: list[Line] = []
     for case in source(name)["cases"]:
         kind = next(each for each in kinds if each in case)
@@ -133,6 +141,13 @@ def _of_program(name: str, case: Mapping[str, Any], jobs: int | None) -> Iterato
     command = f"python -m benchmarks.truth.programs {case['program']}"
     told = ours or "the same lines"
     yield Line(case["program"], case["asked"], f"{len(wanted)} lines", told, not ours, command, is_interval=False)
+
+
+def _beside(name: str, case: Mapping[str, Any], jobs: int | None) -> Iterator[Line]:
+    file = HERE / name / f"{case['beside']}.yaml"
+    command = f"epicycle run {file.relative_to(ROOT)}"
+    for each in stone_soup.compared(file, case["of"], case["runs"]):
+        yield Line(case["beside"], each.asked, each.theirs, each.ours, each.is_met, command, is_interval=False)
 
 
 def _published(
