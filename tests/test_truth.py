@@ -11,6 +11,7 @@ import pytest
 import epicycle
 from benchmarks.truth import board, stone_soup
 from epicycle.runner import Simulation
+from website.truth import draw_truth, truth_page
 
 FILES = sorted(path for name in board.SOURCES for path in (board.HERE / name).glob("*.yaml"))
 STUDIES = sorted(path for name in board.SOURCES for path in (board.HERE / name / "studies").glob("*.yaml"))
@@ -173,6 +174,32 @@ def test_studies_run(path: Path, tmp_path: Path) -> None:
         each for name in board.SOURCES for each in board.source(name)["cases"] if each.get("study") == path.stem
     )
     assert {*case["published"]} == {*results.factors, *results.metrics} - {"replication"}
+
+
+def test_lines_are_read_as_they_were_written() -> None:
+    numbers = board._line("m", {"c": 1, "d": 2}, "share", (0.5, 0.41234567, 0.2, 0.6), "epicycle study a")
+    assert numbers == board.Line(
+        "m c=1, d=2", "share", "0.5", "0.41 (0.20 to 0.60)", True, "epicycle study a",
+        numbers=(0.5, 0.41, 0.2, 0.6),
+    )  # fmt: skip
+    found = {"queues": [numbers], "simpy": [board.Line("x", "y", "1", "2", False, "z", is_interval=False)]}
+    assert board.of_text(board.as_text(found)) == found
+
+
+def test_what_was_found_is_the_committed_page() -> None:
+    found = board.of_text(board.FOUND.read_text(encoding="utf-8"))
+    assert list(found) == list(board.SOURCES)
+    assert board.page(found) == (board.HERE.parent / "TRUTH.md").read_text(encoding="utf-8")
+
+
+def test_the_page_of_the_site_has_a_picture_of_each_source_with_numbers(tmp_path: Path) -> None:
+    made = draw_truth(tmp_path)
+    assert [path.name for path in made] == ["stochastic.svg", "queues.svg", "tracking.svg"]
+    text = truth_page()
+    assert [line for line in text.splitlines() if line.startswith("![")] == [
+        f"![What is published, and ours](truth/{path.name}){{ .wide }}" for path in made
+    ]
+    assert all(path.read_text(encoding="utf-8").rstrip().endswith("</svg>") for path in made)
 
 
 def test_a_line_says_what_is_met() -> None:

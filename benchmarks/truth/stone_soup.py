@@ -41,6 +41,7 @@ class Beside:
     theirs: str
     ours: str
     is_met: bool
+    numbers: tuple[float, ...] = ()  # theirs, ours, and its interval
 
 
 def compared(file: Path, kind: str, runs: int) -> Iterator[Beside]:
@@ -149,13 +150,11 @@ def _trackers(found: Sequence[tuple[Model, Results]]) -> Iterator[Beside]:
         worse = mean([cost(b) - cost(a) for a, b in zip(theirs, ours, strict=True)])
         gap = mean([b - a for a, b in zip(theirs, ours, strict=True)])
         base, width = mean(theirs).value, gap.high - gap.low
-        value, low, high = (rounded(base + each, width) for each in (gap.value, gap.low, gap.high))
-        yield Beside(
-            f"{metric}, mean of {len(theirs)} runs",
-            rounded(base, width),
-            f"{value} ({low} to {high})",
-            worse.low <= 0.0,
-        )
+        numbers = base, base + gap.value, base + gap.low, base + gap.high
+        told, value, low, high = (rounded(each, width) for each in numbers)
+        asked = f"{metric}, mean of {len(theirs)} runs"
+        drawn = tuple(map(float, (told, value, low, high)))
+        yield Beside(asked, told, f"{value} ({low} to {high})", worse.low <= 0.0, drawn)
 
 
 def _of_ours(results: Results) -> list[Any]:
