@@ -27,7 +27,12 @@ if "ptolemy" not in ABSENT:
     ABOVE["ptolemy_room.md"] = "ptolemy/README.md"
 REFERENCE = (ROOT / "docs" / "reference.md").read_text(encoding="utf-8")
 SPLIT = reference(REFERENCE)
-MADE = {"gallery/index.md", "tutorial/14_notebook.md", *(f"{FOLDER}/{name}" for name in SPLIT.pages)}  # by website/
+MADE = {
+    "gallery/index.md",
+    "truth.md",
+    "tutorial/14_notebook.md",
+    *(f"{FOLDER}/{name}" for name in SPLIT.pages),
+}  # by website/
 
 
 def pages(nav: list[Any]) -> Iterator[str]:

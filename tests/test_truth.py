@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from math import factorial, prod
+from math import exp, factorial, prod
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import epicycle
-from benchmarks.truth import board
+from benchmarks.truth import board, stone_soup
 from epicycle.runner import Simulation
+from website.truth import draw_truth, truth_page
 
 FILES = sorted(path for name in board.SOURCES for path in (board.HERE / name).glob("*.yaml"))
 STUDIES = sorted(path for name in board.SOURCES for path in (board.HERE / name / "studies").glob("*.yaml"))
@@ -30,6 +32,42 @@ def erlang_c(load: float, servers: int) -> float:
 def number(load: float, servers: int = 1) -> float:
     """The mean number in M/M/c."""
     return load + erlang_c(load, servers) * load / (servers - load)
+
+
+def polling(queues: int, load: float, walk: float, discipline: str) -> float:
+    """The mean wait at queues that are visited in turn; services and walks have exponential times (Takagi)."""
+    sign, slow = {"exhaustive": (-1, 0.0), "gated": (1, 0.0), "limited": (1, load * walk)}[discipline]
+    return walk / 2 + (2 * load + walk * (queues + sign * load) + slow * walk) / (2 * (1 - load - slow))
+
+
+def impatient(load: float, servers: int, patience: float) -> tuple[float, float]:
+    """The share of calls that are given up, and how many wait (birth and death)."""
+    weights = [1.0]
+    for n in range(1, 400):
+        weights.append(weights[-1] * load / (min(n, servers) + max(n - servers, 0) / patience))
+    waiting = sum(max(n - servers, 0) * weight for n, weight in enumerate(weights)) / sum(weights)
+    return waiting / patience / load, waiting
+
+
+def time_to_deadlock(arrivals: float, services: float, again: float, places: int) -> float:
+    """The mean time from an empty queue until a served customer wants to join a full one (linear equations)."""
+    rates, ones = np.zeros((places + 1, places + 1)), np.ones(places + 1)
+    for n in range(places + 1):
+        up, down = arrivals * (n < places), services * (1 - again) * (n > 0)
+        rates[n, n] = up + down + services * again * (n == places)
+        if n < places:
+            rates[n, n + 1] = -up
+        if n > 0:
+            rates[n, n - 1] = -down
+    return float(np.linalg.solve(rates, ones)[0])
+
+
+def clocked(load: float) -> float:
+    """The mean stay in D/M/1: a fixed point."""
+    share = 0.5
+    for _ in range(1000):
+        share = exp(-(1 - share) / load)
+    return 1 / (1 - share)
 
 
 def expected() -> dict[str, dict[str, list[float]]]:
@@ -63,6 +101,34 @@ def expected() -> dict[str, dict[str, list[float]]]:
             "first": [2 * load / (1 - load) for load in (0.3, 0.4)],
             "second": [2 * load / (1 - load) / (1 - 2 * load) for load in (0.3, 0.4)],
         },
+        "priority_unequal": {
+            "first": [0.8 / (1 - urgent) for urgent in (0.2, 0.6)],
+            "second": [0.8 / (1 - urgent) / 0.2 for urgent in (0.2, 0.6)],
+        },
+        "preemptive": {
+            "first": [urgent / (1 - urgent) for urgent in (0.3, 0.6)],
+            "second": [other / (1 - urgent) / (1 - urgent - other) for urgent, other in ((0.3, 0.4), (0.6, 0.2))],
+        },
+        "polling_cyclic": {
+            "wait": [
+                polling(*system, discipline)
+                for discipline in ("exhaustive", "gated", "limited")
+                for system in ((3, 0.5, 0.5), (5, 0.6, 0.25))
+            ]
+        },
+        "deadlock": {"deadlock": [time_to_deadlock(6, 5, 0.5, 4), time_to_deadlock(4, 5, 0.25, 4)]},
+        "blocking": {"throughput": [(buffer + 2) / (buffer + 3) for buffer in (0, 1, 4)]},
+        "erlang_a": {
+            name: [impatient(*line)[number] for line in ((4, 4, 2), (6, 5, 1))]
+            for number, name in enumerate(("abandoned", "waiting"))
+        },
+        "vacations": {"wait": [load / (1 - load) + pause for load, pause in ((0.5, 2), (0.7, 1))]},
+        "shortest_first": {
+            "short": [rate / (1 - 0.4 * rate) for rate in (0.5, 0.7)],
+            "long": [rate / (1 - 0.4 * rate) / (1 - rate) for rate in (0.5, 0.7)],
+        },
+        "dm1": {"stay": [clocked(load) for load in (0.5, 0.8)]},
+        "batches": {"number": [load * (1 + group) / 2 / (1 - load) for load, group in ((0.5, 3), (0.7, 2))]},
         "retrial": {"orbit": [0.5 * (0.5 + 0.5 / pause) / (0.5 / pause) for pause in (1, 5)], "busy": [0.5, 0.5]},
     }
 
@@ -110,6 +176,32 @@ def test_studies_run(path: Path, tmp_path: Path) -> None:
     assert {*case["published"]} == {*results.factors, *results.metrics} - {"replication"}
 
 
+def test_lines_are_read_as_they_were_written() -> None:
+    numbers = board._line("m", {"c": 1, "d": 2}, "share", (0.5, 0.41234567, 0.2, 0.6), "epicycle study a")
+    assert numbers == board.Line(
+        "m c=1, d=2", "share", "0.5", "0.41 (0.20 to 0.60)", True, "epicycle study a",
+        numbers=(0.5, 0.41, 0.2, 0.6),
+    )  # fmt: skip
+    found = {"queues": [numbers], "simpy": [board.Line("x", "y", "1", "2", False, "z", is_interval=False)]}
+    assert board.of_text(board.as_text(found)) == found
+
+
+def test_what_was_found_is_the_committed_page() -> None:
+    found = board.of_text(board.FOUND.read_text(encoding="utf-8"))
+    assert list(found) == list(board.SOURCES)
+    assert board.page(found) == (board.HERE.parent / "TRUTH.md").read_text(encoding="utf-8")
+
+
+def test_the_page_of_the_site_has_a_picture_of_each_source_with_numbers(tmp_path: Path) -> None:
+    made = draw_truth(tmp_path)
+    assert [path.name for path in made] == ["stochastic.svg", "queues.svg", "tracking.svg"]
+    text = truth_page()
+    assert [line for line in text.splitlines() if line.startswith("![")] == [
+        f"![What is published, and ours](truth/{path.name}){{ .wide }}" for path in made
+    ]
+    assert all(path.read_text(encoding="utf-8").rstrip().endswith("</svg>") for path in made)
+
+
 def test_a_line_says_what_is_met() -> None:
     """Of a value inside and one outside of an interval."""
     lines = [
@@ -123,6 +215,26 @@ def test_a_line_says_what_is_met() -> None:
         "| m c=2 | share | 0.5 | 0.3 (0.2 to 0.4) | **no** | `epicycle study a` |",
         "| m c=1 | share | 0.5 | 0.4 (0.3 to 0.5) | yes | `epicycle study a` |",
     ]  # fmt: skip
+
+
+@pytest.mark.slow
+def test_a_filter_beside_stone_soups(monkeypatch: pytest.MonkeyPatch) -> None:
+    file = board.HERE / "tracking" / "late.yaml"
+    (line,) = stone_soup.compared(file, "filter", 1)
+    assert line.is_met
+    assert line.theirs == line.ours == "7.092013"
+    exact = stone_soup._in_order
+    monkeypatch.setattr(stone_soup, "_in_order", lambda *run: [each + 0.001 for each in exact(*run)])
+    (line,) = stone_soup.compared(file, "filter", 1)
+    assert (line.is_met, line.ours) == (False, "7.092013; estimates are up to 0.001 apart")
+
+
+@pytest.mark.slow
+def test_a_tracker_beside_stone_soups() -> None:
+    found = list(stone_soup.compared(board.HERE / "tracking" / "crossing.yaml", "tracker", 3))
+    assert [each.asked for each in found] == [f"{metric}, mean of 3 runs" for metric in stone_soup.METRICS]
+    assert all(each.is_met for each in found)
+    assert all(float(each.ours.split()[0]) < 5.0 for each in found)
 
 
 def test_herman_begins_with_three_tokens() -> None:

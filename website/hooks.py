@@ -13,6 +13,7 @@ from mkdocs.structure.files import File, Files, InclusionLevel
 from website.gallery import exhibits, index
 from website.notebook import page as notebook_page
 from website.reference import FOLDER, reference
+from website.truth import draw_truth, truth_page
 
 ROOT = Path(__file__).parents[1]
 PARTS = ROOT / "site-parts"  # temporary files; mkdocs.yml names the folder, too
@@ -50,6 +51,9 @@ def on_files(files: Files, *, config: Any) -> Files:
         files.remove(files.src_uris[place])
         content = notebook_page(notebook)
         files.append(File.generated(config, place.replace(".ipynb", ".md"), content=content))
+    files.append(File.generated(config, "truth.md", content=truth_page()))
+    for picture in draw_truth(PARTS / "truth"):
+        files.append(File.generated(config, f"truth/{picture.name}", abs_src_path=os.fspath(picture)))
     shown = exhibits(PARTS / "gallery")
     files.append(File.generated(config, "gallery/index.md", content=index(shown)))
     for each in shown:
@@ -69,7 +73,7 @@ def on_post_build(config: Any) -> None:
 
 def as_page(document: str) -> str:
     """A document outside docs/ with its links adapted to its place on the site."""
-    for source, page in ABOVE.items():
+    for source, page in {**ABOVE, "benchmarks/TRUTH.md": "truth.md"}.items():
         document = document.replace(f"]({source}", f"]({page}")
     return linked(re.sub(r"\]\((\.\./)?docs/", "](", document))
 

@@ -1,4 +1,4 @@
-"""The truth board: what others have published, beside what Epicycle finds, into benchmarks/TRUTH.md.
+"""The truth board: what others have published, beside what Epicycle finds, into benchmarks/TRUTH.md and TRUTH.json.
 
     python -m benchmarks.truth [SOURCE ...] [--jobs N] [--check]
 
@@ -12,7 +12,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from benchmarks.truth.board import HERE, SOURCES, lines_of, page, section, source
+from benchmarks.truth.board import FOUND, HERE, SOURCES, as_text, lines_of, page, section, source
 
 PAGE = HERE.parent / "TRUTH.md"
 
@@ -28,11 +28,12 @@ def main() -> None:
     if given.sources:
         print("\n\n".join(section(source(name), lines) for name, lines in found.items()))
         return
-    text = page(found)
-    if given.check:
-        sys.exit(0 if PAGE.read_text(encoding="utf-8") == text else f"{PAGE.name} is not what was found now")
-    PAGE.write_text(text, encoding="utf-8")
-    print(f"wrote {Path('benchmarks') / PAGE.name}")
+    for path, text in ((PAGE, page(found)), (FOUND, as_text(found))):
+        if not given.check:
+            path.write_text(text, encoding="utf-8")
+            print(f"wrote {Path('benchmarks') / path.name}")
+        elif path.read_text(encoding="utf-8") != text:
+            sys.exit(f"{path.name} is not what was found now")
 
 
 if __name__ == "__main__":

@@ -7,6 +7,7 @@ of these ways:
 - ``run: NAME``: one long run, whose metrics have intervals by batch means.
 - ``rare: NAME`` with ``monitor``, ``guide``, ``runs``: importance splitting.
 - ``check: NAME``: one run, in which all monitors must hold.
+- ``beside: NAME``: runs whose data Stone Soup gets, too.
 - ``program: NAME``: an example of SimPy, which must print what it prints there.
 
 ``published`` has a list for each parameter that is varied and for each metric.  Every seed is fixed; the figures are
@@ -15,26 +16,29 @@ those of Epicycle's own statistics, so that they are the same on every machine.
 
 from __future__ import annotations
 
+import json
 import shlex
 import sys
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import cache
 from pathlib import Path
+from types import MappingProxyType
 from typing import Any
 
 import yaml
 
 import epicycle
 from epicycle.runner import Simulation
-from epicycle.runner.study.inference import mean, rate
+from epicycle.runner.study.inference import average
 from epicycle.runner.support.shown import rounded
 
-from . import programs
+from . import programs, stone_soup
 
 HERE = Path(__file__).parent
 ROOT = HERE.parent.parent
-SOURCES = ("stochastic", "simpy", "queues", "superdense")
+SOURCES = ("stochastic", "simpy", "queues", "superdense", "tracking")
+FOUND = HERE.parent / "TRUTH.json"
 RESULTS = Path("results/truth")
 LEAST, MOST = 90.0, 99.0  # % of 95 % intervals that should hold the published value
 
@@ -50,6 +54,7 @@ class Line:
     is_met: bool
     command: str
     is_interval: bool = True
+    numbers: tuple[float, ...] = ()  # what was published, ours, and its interval, for a plot
 
 
 @cache
@@ -61,7 +66,14 @@ def source(name: str) -> Mapping[str, Any]:
 
 def lines_of(name: str, jobs: int | None = None) -> list[Line]:
     """All cases of a source, made now unless they have been made before."""
-    kinds = {"study": _of_study, "run": _of_run, "rare": _of_rare, "check": _of_check, "program": _of_program}
+    kinds = {
+        "study": _of_study,
+        "run": _of_run,
+        "rare": _of_rare,
+        "check": _of_check,
+        "program": _of_program,
+        "beside": _beside,
+    }
     lines: list[Line] = []
     for case in source(name)["cases"]:
         kind = next(each for each in kinds if each in case)
@@ -81,9 +93,9 @@ def _of_study(name: str, case: Mapping[str, Any], jobs: int | None) -> Iterator[
         for metric, value in published.items():
             numbers = [float(row[metric]) for row in rows if row[metric] is not None]
             is_share = metric in case.get("shares", ()) or set(numbers) <= {0.0, 1.0}
-            found = rate(round(sum(numbers)), len(numbers)) if is_share else mean(numbers)
-            told = _told(found.value, found.low, found.high), found.low <= value <= found.high
-            yield _line(case["study"], values, metric, value, told, f"epicycle study {file.relative_to(ROOT)}")
+            found = average(numbers, is_share=is_share)
+            command = f"epicycle study {file.relative_to(ROOT)}"
+            yield _line(case["study"], values, metric, (value, found.value, found.low, found.high), command)
 
 
 def _of_run(name: str, case: Mapping[str, Any], jobs: int | None) -> Iterator[Line]:
@@ -93,10 +105,9 @@ def _of_run(name: str, case: Mapping[str, Any], jobs: int | None) -> Iterator[Li
         found = Simulation(epicycle.load(file, set=settings)).run()
         for metric, value in published.items():
             interval = found.intervals[metric]
-            told = _told(found.metrics[metric], interval.low, interval.high), interval.low <= value <= interval.high
-            yield _line(
-                case["run"], values, metric, value, told, f"epicycle run {file.relative_to(ROOT)}{_sets(settings)}"
-            )
+            command = f"epicycle run {file.relative_to(ROOT)}{_sets(settings)}"
+            numbers = value, found.metrics[metric], interval.low, interval.high
+            yield _line(case["run"], values, metric, numbers, command)
 
 
 def _of_rare(name: str, case: Mapping[str, Any], jobs: int | None) -> Iterator[Line]:
@@ -109,8 +120,7 @@ def _of_rare(name: str, case: Mapping[str, Any], jobs: int | None) -> Iterator[L
             f"epicycle rare {file.relative_to(ROOT)} --monitor {monitor} --guide {shlex.quote(guide)} --runs {runs}"
         )
         for metric, value in published.items():
-            told = _told(found.probability, low, high), low <= value <= high
-            yield _line(case["rare"], values, metric, value, told, command + _sets(values))
+            yield _line(case["rare"], values, metric, (value, found.probability, low, high), command + _sets(values))
 
 
 def _of_check(name: str, case: Mapping[str, Any], jobs: int | None) -> Iterator[Line]:
@@ -135,6 +145,13 @@ def _of_program(name: str, case: Mapping[str, Any], jobs: int | None) -> Iterato
     yield Line(case["program"], case["asked"], f"{len(wanted)} lines", told, not ours, command, is_interval=False)
 
 
+def _beside(name: str, case: Mapping[str, Any], jobs: int | None) -> Iterator[Line]:
+    file = HERE / name / f"{case['beside']}.yaml"
+    command = f"epicycle run {file.relative_to(ROOT)}"
+    for each in stone_soup.compared(file, case["of"], case["runs"]):
+        yield Line(case["beside"], each.asked, each.theirs, each.ours, each.is_met, command, False, each.numbers)
+
+
 def _published(
     case: Mapping[str, Any], factors: Sequence[str] | None = None
 ) -> Iterator[tuple[dict[str, Any], dict[str, float]]]:
@@ -157,26 +174,27 @@ def _sets(settings: Mapping[str, Any]) -> str:
     return "".join(f" --set {shlex.quote(f'{key}={value}')}" for key, value in settings.items())
 
 
-def _told(value: float, low: float, high: float) -> str:
-    """A number with its interval, to as many digits as that deserves."""
+def _digits(value: float, low: float, high: float) -> list[str]:
+    """A number and its interval, to as many digits as that deserves."""
     width = high - low
-    if value < 1e-3:
-        return f"{value:.2g} ({low:.2g} to {high:.2g})"
-    return f"{rounded(value, width)} ({rounded(low, width)} to {rounded(high, width)})"
+    return [f"{each:.2g}" if value < 1e-3 else rounded(each, width) for each in (value, low, high)]
 
 
 def _line(
-    case: str, values: Mapping[str, Any], metric: str, value: float, told: tuple[str, bool], command: str
+    case: str, values: Mapping[str, Any], metric: str, numbers: tuple[float, float, float, float], command: str
 ) -> Line:
     condition = ", ".join(f"{key}={each}" for key, each in values.items())
-    return Line(f"{case} {condition}".strip(), metric, f"{value:.6g}", told[0], told[1], command)
+    published, _, low, high = numbers
+    told, is_met = [f"{published:.6g}", *_digits(*numbers[1:])], low <= published <= high
+    ours, drawn = f"{told[1]} ({told[2]} to {told[3]})", tuple(float(each.replace(",", "")) for each in told)
+    return Line(f"{case} {condition}".strip(), metric, told[0], ours, is_met, command, numbers=drawn)
 
 
 # -- the page -----------------------------------------------------------------------------------------------------
 
 
-def section(said: Mapping[str, Any], lines: Sequence[Line]) -> str:
-    """The table of a source, misses first."""
+def section(said: Mapping[str, Any], lines: Sequence[Line], picture: str = "") -> str:
+    """The table of a source, misses first, after its picture."""
     head = "| case | what | published | ours (95 % interval) | met | repeat with |\n|---|---|---|---|---|---|"
     rows = [
         f"| {line.case} | {line.asked} | {line.published} | {line.ours} | {'yes' if line.is_met else '**no**'} | "
@@ -186,12 +204,26 @@ def section(said: Mapping[str, Any], lines: Sequence[Line]) -> str:
     told = [f"## {said['title']}", said["source"], f"{sum(line.is_met for line in lines)} of {len(lines)} are met."]
     if "undecided" in said:
         told.append(f"Not compared: {said['undecided']}")
-    told += [f"- {note}" for note in said.get("misses", ())]
+    told += ["\n".join(f"- {note}" for note in said["misses"])] if "misses" in said else []
+    told += [f"![What is published, and ours]({picture}){{ .wide }}"] if picture else []
     return "\n\n".join([*told, "\n".join([head, *rows])])
 
 
-def page(found: Mapping[str, Sequence[Line]]) -> str:
-    """The whole page."""
+def as_text(found: Mapping[str, Sequence[Line]]) -> str:
+    """The lines of all sources as JSON, from which the page of the site is made."""
+    return json.dumps({name: [asdict(line) for line in lines] for name, lines in found.items()}, indent=1) + "\n"
+
+
+def of_text(text: str) -> dict[str, list[Line]]:
+    """The lines in a JSON text."""
+    found = json.loads(text)
+    return {
+        name: [Line(**{**each, "numbers": tuple(each["numbers"])}) for each in lines] for name, lines in found.items()
+    }
+
+
+def page(found: Mapping[str, Sequence[Line]], pictures: Mapping[str, str] = MappingProxyType({})) -> str:
+    """The whole page, with pictures of some of the sources."""
     lines = [line for each in found.values() for line in each]
     intervals = [line for line in lines if line.is_interval]
     covered = 100.0 * sum(line.is_met for line in intervals) / len(intervals)
@@ -202,4 +234,7 @@ def page(found: Mapping[str, Sequence[Line]]) -> str:
         f"{len(lines)} values are compared. Of {len(intervals)} intervals of 95 %, {covered:.1f} % hold the published "
         f"value, which is {verdict} ({LEAST:g} to {MOST:g} %)."
     )
-    return "\n\n".join([head, *(section(source(name), each) for name, each in found.items())]) + "\n"
+    return (
+        "\n\n".join([head, *(section(source(name), each, pictures.get(name, "")) for name, each in found.items())])
+        + "\n"
+    )
