@@ -79,5 +79,5 @@ def _numbers(name: str, given: Any) -> Axis:
 
 def _number(value: Any) -> float:
     if isinstance(value, bool) or not isinstance(value, (int, float)):
-        raise TypeError(f"interpolate needs numbers, not {type(value).__name__}")
+        raise TypeError(f"interpolate needs numbers, not {'a text' if isinstance(value, str) else repr(value)}")
     return value.si if isinstance(value, Quantity) else float(value)
