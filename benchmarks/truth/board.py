@@ -1,7 +1,7 @@
 """Runs the cases of the board, and tells which published values they meet.
 
 A source is a file beside this one: ``title``, ``source``, what is ``undecided``, and ``cases``.  A case is made in one
-of four ways, each a command of Epicycle:
+of these ways, each a command of Epicycle, or in those of ``falsifying.py``:
 
 - ``study: NAME``: replications.  A true or false is a share with Wilson's interval, a number a mean with Student's.
 - ``run: NAME``: one long run, whose metrics have intervals by batch means.
@@ -29,9 +29,11 @@ from epicycle.runner import Simulation
 from epicycle.runner.study.inference import mean, rate
 from epicycle.runner.support.shown import rounded
 
+from .falsifying import replays, searches
+
 HERE = Path(__file__).parent
 ROOT = HERE.parent.parent
-SOURCES = ("stochastic", "queues", "superdense")
+SOURCES = ("stochastic", "queues", "superdense", "falsification")
 RESULTS = Path("results/truth")
 LEAST, MOST = 90.0, 99.0  # % of 95 % intervals that should hold the published value
 
@@ -58,7 +60,14 @@ def source(name: str) -> Mapping[str, Any]:
 
 def lines_of(name: str, jobs: int | None = None) -> list[Line]:
     """All cases of a source, made now unless they have been made before."""
-    kinds = {"study": _of_study, "run": _of_run, "rare": _of_rare, "check": _of_check}
+    kinds = {
+        "study": _of_study,
+        "run": _of_run,
+        "rare": _of_rare,
+        "check": _of_check,
+        "replay": _of_replay,
+        "search": _of_search,
+    }
     lines: list[Line] = []
     for case in source(name)["cases"]:
         kind = next(each for each in kinds if each in case)
@@ -119,6 +128,18 @@ def _of_check(name: str, case: Mapping[str, Any], jobs: int | None) -> Iterator[
     ours = f"{', '.join(broken)} broken" if broken else "holds"
     command = f"epicycle run {file.relative_to(ROOT)} --check"
     yield Line(case["check"], asked, case["published"], ours, not broken, command, is_interval=False)
+
+
+def _of_replay(name: str, case: Mapping[str, Any], jobs: int | None) -> Iterator[Line]:
+    file = HERE / name / f"{case['replay']}.yaml"
+    *told, command = replays(file, case)
+    yield Line(case["replay"], *told, f"epicycle run {file.relative_to(ROOT)}{command}", is_interval=False)
+
+
+def _of_search(name: str, case: Mapping[str, Any], jobs: int | None) -> Iterator[Line]:
+    file = HERE / name / f"{case['search']}.yaml"
+    for *told, command in searches(file, case, ROOT / RESULTS / name, jobs):
+        yield Line(case["search"], *told, f"epicycle search {file.relative_to(ROOT)}{command}", is_interval=False)
 
 
 def _published(
