@@ -70,7 +70,7 @@ def _of_signals(widths: Sequence[int], seed: int, guided: bool) -> Proposals:
         (least, start), most = min(found, key=lambda each: each[0]), max(each[0] for each in found)
         found = []
         if guided and least < most:  # or there is no slope to follow
-            yield from _descent(start, seed, number, SMALL)
+            yield from _descent(start, seed, number, SMALL, diagonal=True)
 
 
 def stepped(widths: Sequence[int], seed: int, number: int) -> list[Point]:
@@ -113,8 +113,8 @@ def spread(axes: int, seed: int, number: int) -> list[Point]:
     return list(zip(*columns, strict=True)) if columns else [()] * BATCH
 
 
-def _descent(start: Point, seed: int, number: int, together: int) -> Proposals:
-    """Points of CMA-ES from a point on, until its step is small."""
+def _descent(start: Point, seed: int, number: int, together: int, diagonal: bool = False) -> Proposals:
+    """Points of CMA-ES from a point on, until its step is small; a ``diagonal`` one learns a step for each axis alone."""
     import cma
     import numpy as np
 
@@ -125,6 +125,7 @@ def _descent(start: Point, seed: int, number: int, together: int) -> Proposals:
 
     width = max(len(start), 2)  # the library knows no fewer; the rest is for nothing
     options = {"bounds": [0.0, 1.0], "randn": normal, "seed": math.nan, "tolx": FINE, "verbose": -9}
+    options |= {"CMA_diagonal": diagonal, "tolfunhist": 0.0}  # the least of each batch is the same: its rank
     options |= {"popsize": together, "maxiter": LONGEST * BATCH // together}
     strategy = cma.CMAEvolutionStrategy([*start, *[0.5] * (width - len(start))], STEP, options)
     while not strategy.stop():
