@@ -46,8 +46,7 @@ class ODE(Actor):
     An expression that is zero at the start does not cross there.  Crossings of one kind that follow each other within
     ``min_interval`` end the run with an error: a ball that comes to rest bounces without end (Zeno).
 
-    What several expressions need is said once under ``where``: ``where: {slip: wheel / rpm}`` gives ``slip`` a meaning in
-    all of them.
+    What several expressions need is said once: ``where: {slip: wheel / rpm}`` gives ``slip`` a meaning in all of them.
 
     The solution does not depend on when it is requested, and has the same bits on every processor.  Numbers have no
     units: the model chooses them; time is in s.
@@ -55,9 +54,9 @@ class ODE(Actor):
     Methods: ``RK23`` (Bogacki-Shampine), ``RK45`` (Dormand-Prince) and ``DOP853`` (Hairer) are explicit Runge-Kutta
     methods.  ``Radau`` (Radau IIA of order 5) and ``BDF`` (order 1 to 5) are for stiff systems: ``Radau`` is more exact
     at loose tolerances, ``BDF`` takes fewer evaluations at tight ones.  The steps are those of SciPy's solvers of these
-    names, but the arithmetic is our own.  ``Euler`` goes along straight lines in steps of ``max_step``, as many published
-    models of controllers are simulated; it knows no tolerances.  No method is needed where each derivative is, by its form, linear in its own
-    state and depends on nothing else that moves: a line or an exponential is exact.
+    names, but the arithmetic is our own.  ``Euler`` goes along straight lines in steps of ``max_step``, as many
+    published models are simulated; it knows no tolerances.  No method is needed where each derivative is, by its form,
+    linear in its own state and depends on nothing else that moves: a line or an exponential is exact.
 
     Steps are as long as the tolerances allow, but longer than 1 s only where nothing can hide in them: bounds on the
     derivatives along the step (interval arithmetic) must show that they stay near the values that the step has

@@ -119,7 +119,7 @@ class _Replacing(ast.NodeTransformer):
     def visit_ListComp(self, node: ast.ListComp) -> ast.expr:
         bound = set().union(*(targets(each) or () for each in node.generators))
         for name in sorted(bound & {*self._defined, *(used for each in self._defined.values() for used in each.names)}):
-            raise ExpressionError(f"{name!r} has another meaning outside of this list; rename it here")
+            raise ExpressionError(f"{name!r} has another meaning outside of this list; rename it")
         self.generic_visit(node)
         return node
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from bisect import bisect_left
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Any, Final
 
 from ..core import Quantity, counted
@@ -59,7 +60,7 @@ def across(x: float, y: float, at_x: Axis, at_y: Axis, rows: tuple[Axis, ...]) -
 
 def _axis(name: str, given: Any) -> Axis:
     numbers = _numbers(name, given)
-    if len(numbers) < _LEAST or any(not one < other for one, other in zip(numbers, numbers[1:], strict=False)):
+    if len(numbers) < _LEAST or any(not one < other for one, other in pairwise(numbers)):
         raise ValueError(f"interpolate needs at least two rising numbers in {name}")
     return numbers
 

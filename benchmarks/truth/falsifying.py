@@ -1,9 +1,9 @@
 """The cases of the board that are about falsification, in two ways:
 
 - ``replay: NAME`` with ``monitor``: inputs that are published as breaking it do, and what the port ``of`` sends then is
-  ``within`` so much of what is published (``falsification/counterexamples/published.yaml``).
+  ``within`` so much of what is published there.
 - ``search: NAME`` with ``monitor`` and ``vary``: searches with several seeds, each of at most as many runs as were
-  published; ``published`` has in how many of 50 searches something was ``found``, and the ``mean`` number of runs of these.
+  published; ``published`` has in how many of 50 something was ``found``, and the ``mean`` number of runs of these.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ def deviation(found: Results, case: Mapping[str, Any], example: Mapping[str, Any
 
 
 def replays(file: Path, case: Mapping[str, Any]) -> tuple[str, str, str, bool, str]:
-    """What is asked, published and found for published inputs, whether that is the same, and the command for the first."""
+    """What is asked, published and found for published inputs, whether it is the same, and a command."""
     examples = counterexamples(file.parent)[case["monitor"]]
     broken, furthest = 0, 0.0
     for example in examples:
@@ -83,7 +83,7 @@ def replays(file: Path, case: Mapping[str, Any]) -> tuple[str, str, str, bool, s
 def searches(
     file: Path, case: Mapping[str, Any], folder: Path, jobs: int | None, searches: int = SEARCHES
 ) -> Iterator[tuple[str, str, str, bool, str]]:
-    """How often searches find something, and after how many runs; what is asked, published, found, whether it is met."""
+    """How often searches find something, and after how many runs: asked, published, found, whether it is met."""
     runs = []
     until = case.get("until")
     for number in range(searches):

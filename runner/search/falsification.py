@@ -270,7 +270,8 @@ def _covered(found: Falsification) -> Iterator[str]:
             unit = f" {axis.unit}" if axis.unit else ""
             yield f"{axis.path} {min(numbers):f} to {max(numbers):f}{unit}"
         elif isinstance(axis, Signal):
-            yield f"{axis.path} with {counted(axis.width, 'number')} from {axis.of.low:f} to {axis.of.high:f}{axis.of.unit and ' '}{axis.of.unit}"
+            ends = f"from {axis.of.low:f} to {axis.of.high:f} {axis.of.unit}".rstrip()
+            yield f"{axis.path} with {counted(axis.width, 'number')} {ends}"
         else:
             tried = {each.level.values[axis.path] for each in runs}
             texts = [_text(node) for node in axis.nodes if axis.factor(node) in tried]

@@ -114,7 +114,7 @@ def spread(axes: int, seed: int, number: int) -> list[Point]:
 
 
 def _descent(start: Point, seed: int, number: int, together: int, diagonal: bool = False) -> Proposals:
-    """Points of CMA-ES from a point on, until its step is small; a ``diagonal`` one learns a step for each axis alone."""
+    """Points of CMA-ES from a point on, until its step is small; if ``diagonal``, with a step for each axis alone."""
     import cma
     import numpy as np
 

@@ -458,7 +458,7 @@ def test_quantities_are_said_once() -> None:
         ({"x": "1"}, "where: 'x' is the name of something else; choose another"),
         (
             {"a": "x + 1", "b": "[a for a in [1]][0] + a"},
-            "where: b, with the quantities of 'where' in it: 'a' has another meaning outside of this list; rename it here",
+            "where: b, with the quantities of 'where' in it: 'a' has another meaning outside of this list; rename it",
         ),
     ],
 )
