@@ -387,7 +387,7 @@ class Normal(_Normal):
 
 class ODE(_ODE):
     """A system of ordinary differential equations `dx/dt = f(x, u, t)` that is solved between events."""
-    def __init__(self, path: str, *, initial: abc.Mapping[str, _Number], derivatives: abc.Mapping[str, str | float | Formula], crossings: abc.Mapping[str, str | float | Formula] = ..., directions: abc.Mapping[str, Literal['rising', 'falling', 'both']] = ..., resets: abc.Mapping[str, abc.Mapping[str, str | float | Formula]] = ..., held: abc.Mapping[str, _Number] = ..., method: Literal['RK45', 'RK23', 'DOP853', 'Radau', 'BDF'] = ..., relative_tolerance: _Number = ..., absolute_tolerance: _Number = ..., max_step: _Number | None = ..., min_interval: _Number = ...) -> None: ...
+    def __init__(self, path: str, *, initial: abc.Mapping[str, _Number], derivatives: abc.Mapping[str, str | float | Formula], where: abc.Mapping[str, str | float | Formula] = ..., crossings: abc.Mapping[str, str | float | Formula] = ..., directions: abc.Mapping[str, Literal['rising', 'falling', 'both']] = ..., resets: abc.Mapping[str, abc.Mapping[str, str | float | Formula]] = ..., held: abc.Mapping[str, _Number] = ..., method: Literal['RK45', 'RK23', 'DOP853', 'Radau', 'BDF', 'Euler'] = ..., relative_tolerance: _Number = ..., absolute_tolerance: _Number = ..., max_step: _Number | None = ..., min_interval: _Number = ...) -> None: ...
 
 class PID(_PID):
     """A controller with a proportional, an integral and a derivative part, which acts at each measurement."""
@@ -547,7 +547,7 @@ class Spread(_Spread):
 
 class StateMachine(_StateMachine):
     """A state machine with one transition per line, and variables that may flow."""
-    def __init__(self, path: str, *, modes: object, transitions: object = ..., initial: str | None = ..., variables: abc.Mapping[str, object] = ..., held: abc.Mapping[str, object] = ..., method: Literal['RK45', 'RK23', 'DOP853', 'Radau', 'BDF'] = ..., relative_tolerance: _Number = ..., absolute_tolerance: _Number = ..., max_step: _Number | None = ...) -> None: ...
+    def __init__(self, path: str, *, modes: object, transitions: object = ..., initial: str | None = ..., variables: abc.Mapping[str, object] = ..., held: abc.Mapping[str, object] = ..., method: Literal['RK45', 'RK23', 'DOP853', 'Radau', 'BDF', 'Euler'] = ..., relative_tolerance: _Number = ..., absolute_tolerance: _Number = ..., max_step: _Number | None = ...) -> None: ...
 
 class StateSpace(_StateSpace):
     """A linear system in state space, `dx/dt = A x + B u`, `y = C x + D u`."""

@@ -17,8 +17,8 @@ from .core import (
     Wake,
     did_you_mean,
 )
-from .expression import Formula, FormulaParameter, operand
-from .integration import STEPPERS
+from .expression import ExpressionError, Formula, FormulaParameter, operand
+from .integration import STEPPERS, check_step
 from .trajectory import Trajectory, number_of
 
 
@@ -46,14 +46,17 @@ class ODE(Actor):
     An expression that is zero at the start does not cross there.  Crossings of one kind that follow each other within
     ``min_interval`` end the run with an error: a ball that comes to rest bounces without end (Zeno).
 
+    What several expressions need is said once: ``where: {slip: wheel / rpm}`` gives ``slip`` a meaning in all of them.
+
     The solution does not depend on when it is requested, and has the same bits on every processor.  Numbers have no
     units: the model chooses them; time is in s.
 
     Methods: ``RK23`` (Bogacki-Shampine), ``RK45`` (Dormand-Prince) and ``DOP853`` (Hairer) are explicit Runge-Kutta
     methods.  ``Radau`` (Radau IIA of order 5) and ``BDF`` (order 1 to 5) are for stiff systems: ``Radau`` is more exact
     at loose tolerances, ``BDF`` takes fewer evaluations at tight ones.  The steps are those of SciPy's solvers of these
-    names, but the arithmetic is our own.  No method is needed where each derivative is, by its form, linear in its own
-    state and depends on nothing else that moves: a line or an exponential is exact.
+    names, but the arithmetic is our own.  ``Euler`` goes along straight lines in steps of ``max_step``, as many
+    published models are simulated; it knows no tolerances.  No method is needed where each derivative is, by its form,
+    linear in its own state and depends on nothing else that moves: a line or an exponential is exact.
 
     Steps are as long as the tolerances allow, but longer than 1 s only where nothing can hide in them: bounds on the
     derivatives along the step (interval arithmetic) must show that they stay near the values that the step has
@@ -70,6 +73,9 @@ class ODE(Actor):
 
     initial = MappingParameter(Parameter(float), doc="the states and their values at the start")
     derivatives = MappingParameter(FormulaParameter(), doc="the derivative of each state, per s")
+    where = MappingParameter(
+        FormulaParameter(), {}, doc="names for quantities in the expressions; each may use those before it"
+    )
     crossings = MappingParameter(FormulaParameter(), {}, doc="expressions whose zero crossings are events")
     directions = MappingParameter(
         Parameter(str, choices=("rising", "falling", "both")),
@@ -98,6 +104,7 @@ class ODE(Actor):
         self._states = tuple(self.initial)
         if not self._states:
             raise ParameterError("initial: the mapping is empty; give at least one state")
+        check_step(self.method, self.max_step)
         _same_names("derivatives", self.derivatives, "state", self._states, all_of_them=True)
         _same_names("directions", self.directions, "crossing", self.crossings)
         _same_names("resets", self.resets, "crossing", self.crossings)
@@ -107,7 +114,10 @@ class ODE(Actor):
         _same_names("held", self.held, "input", [name for name in self.inputs if name != "trigger"])
 
     def own_ports(self) -> dict[str, InputPort[Any] | OutputPort[Any]]:
-        formulas: list[Mapping[str, Formula]] = [self.derivatives, self.crossings, *self.resets.values()]
+        self._rates = self._defined("derivatives", self.derivatives)
+        self._crossed = self._defined("crossings", self.crossings)
+        self._reset = {name: self._defined(f"resets: {name}", each) for name, each in self.resets.items()}
+        formulas: list[Mapping[str, Formula]] = [self._rates, self._crossed, *self._reset.values()]
         ports: dict[str, InputPort[Any] | OutputPort[Any]] = {}
         for state in self.initial:
             ports[state] = OutputPort(float, depends_on=("trigger",), doc="a state")
@@ -123,6 +133,15 @@ class ODE(Actor):
                     ports[name] = InputPort(doc="an input, held between tokens")
         return ports
 
+    def _defined(self, label: str, formulas: Mapping[str, Formula]) -> dict[str, Formula]:
+        """Formulas with what ``where`` says in the place of its names."""
+        known: dict[str, Formula] = {}
+        for name, formula in self.where.items():
+            if name in (*self.initial, *self.crossings, "time", "trigger"):
+                raise ParameterError(f"where: {name!r} is the name of something else; choose another")
+            known[name] = _replaced(f"where: {name}", formula, known)
+        return {name: _replaced(f"{label}: {name}", formula, known) for name, formula in formulas.items()}
+
     # -- the run --------------------------------------------------------------------------------------------------
 
     def initialize(self) -> None:
@@ -132,13 +151,13 @@ class ODE(Actor):
         self._jumps: dict[int, int] = {}
         self._wake: Wake | None = None
         self._trajectory = Trajectory(
-            {name: self.derivatives[name] for name in self._states},
+            {name: self._rates[name] for name in self._states},
             self._held,
             method=self.method,
             tolerance=(self.relative_tolerance, self.absolute_tolerance),
             max_step=self.max_step,
         )
-        for name, formula in self.crossings.items():
+        for name, formula in self._crossed.items():
             way = self.directions.get(name, "both")
             self._trajectory.watch(formula, f"crossing {name}", rising=way != "falling", falling=way != "rising")
         start = [self.initial[name] for name in self._states]
@@ -175,7 +194,7 @@ class ODE(Actor):
         for number, name in enumerate(self.crossings):
             if number in crossed:
                 self._count(name, names["time"])
-                for target, formula in self.resets.get(name, {}).items():
+                for target, formula in self._reset.get(name, {}).items():
                     after[target] = number_of(formula, names, f"reset of {target} at {name}")
         start = [after[name] for name in self._states]
         trajectory.begin_at(at, start)
@@ -235,6 +254,13 @@ class ODE(Actor):
             self._wake = self.wake_in(0)
         elif self.crossings:
             self._wake = self.context.wake(self, self._trajectory.next_look(self.tag.time))
+
+
+def _replaced(label: str, formula: Formula, known: Mapping[str, Formula]) -> Formula:
+    try:
+        return formula.replacing(known)
+    except ExpressionError as error:
+        raise ParameterError(f"{label}, with the quantities of 'where' in it: {error}") from None
 
 
 def _same_names(label: str, given: Mapping[str, object], kind: str, known: Any, *, all_of_them: bool = False) -> None:

@@ -17,7 +17,7 @@ from itertools import pairwise
 from typing import Final, NamedTuple
 
 from .core import EpicycleError
-from .integration import STEPPERS, Bounds, Derivative, Exact, Limits, Piece, State, Stepper
+from .integration import STEPPERS, Bounds, Derivative, Euler, Exact, Limits, Piece, State, Stepper
 
 WINDOW: Final = 1.0  # s, within which things may hide
 CELLS: Final = 8  # parts of a window in which changes of sign are searched
@@ -79,13 +79,13 @@ class Solution:
         self._window = WINDOW if max_step is None else max_step
         self._patience, self._taken = 1, 0  # steps to take before longer ones are tried; steps taken
         self._watched: Stepper | None = None  # the stepper, if it must not pass over anything
-        self._stepper: Stepper | Exact
+        self._stepper: Stepper | Euler | Exact
         if exact is not None:
             self._stepper = exact
         else:
             limits = Limits(*tolerance, LONGEST if max_step is None else max_step)
             self._stepper = stepper = STEPPERS[method](rates, state, limits)
-            self._watched = stepper if max_step is None else None
+            self._watched = stepper if max_step is None and isinstance(stepper, Stepper) else None
         self._guards = guards
         self._start = state
         self._piece: Piece | Exact | None = None

@@ -15,6 +15,7 @@ from .integration import Bounds, Exact, State
 from .solution import Guard, Solution, sign_of
 
 _MAX_STEPS: Final = 10_000
+_EXACT: Final = 2**31  # whole numbers up to here give the same as floats in what a float can hold
 _AHEAD: Final = 64  # parts of a step that are searched for crossings at once
 
 
@@ -53,7 +54,9 @@ class Trajectory:
         """Start a solution at ``time`` ns plus a fraction of a nanosecond in s, so that no rounding accumulates over
         crossings."""
         self.time, self.fraction = time, fraction
-        self._fixed = list(self._held.values())
+        self._fixed = [
+            float(value) if type(value) is int and abs(value) <= _EXACT else value for value in self._held.values()
+        ]
         self._function, exact = None, self._exact(state)
         if exact is None and all(type(value) is float for value in (*state, *self._fixed)):
             sources = tuple(formula.source for formula in self._formulas.values())

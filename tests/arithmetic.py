@@ -63,6 +63,8 @@ EXCEPTIONS = {  # file or folder: what it may use, and why
     "runner/execution/results/encoding.py": (("sum",), "only asks whether a sum is NaN"),
     "runner/model/build/checks.py": (("sum",), WHOLE),
     "runner/recorded/disturbed.py": (("sum",), WHOLE),
+    "runner/search/proposals.py": (("sum",), WHOLE),
+    "runner/search/space.py": (("sum",), WHOLE),
     "runner/model/text/problems.py": (("sum",), WHOLE),
     "runner/execution/results/arrow.py": (("numpy.cumsum",), WHOLE),
     "runner/recorded/delays.py": ((), FITTED),

@@ -6,13 +6,14 @@ A ``Formula`` is over names, a ``PortFormula`` over the latest tokens of ports: 
 from __future__ import annotations
 
 import ast
+import copy
 import re
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, TypeVar
 
 from ..core import REQUIRED, EpicycleError, Parameter, ParameterError, counted_in_si
 from .evaluation import evaluate
-from .syntax import ExpressionError, free_names, parse
+from .syntax import ExpressionError, free_names, parse, targets
 from .tokens import operand, value_at
 from .translation import UNDECIDED, translated, undecided_by
 from .values import CONSTANTS, FUNCTIONS
@@ -85,6 +86,13 @@ class Formula:
             given = ", ".join(f"{name} = {values[name]!r}" for name in self.names if name in values)
             raise EpicycleError(f"{self.source!r}: {error}{f', with {given}' if given else ''}") from None
 
+    def replacing(self, defined: Mapping[str, Formula]) -> Formula:
+        """The formula with others in the place of their names; raises ``ExpressionError`` if that is too long."""
+        if defined.keys().isdisjoint(self.names):
+            return self
+        tree = _Replacing(defined).visit(copy.deepcopy(parse(self.source)))
+        return Formula(ast.unparse(tree))
+
     def __reduce__(self) -> tuple[type[Formula], tuple[str]]:
         return Formula, (self.source,)
 
@@ -96,6 +104,28 @@ class Formula:
 
     def __hash__(self) -> int:
         return hash(self.source)
+
+
+class _Replacing(ast.NodeTransformer):
+    """Puts formulas in the place of their names."""
+
+    def __init__(self, defined: Mapping[str, Formula]) -> None:
+        self._defined = defined
+
+    def visit_Call(self, node: ast.Call) -> ast.expr:
+        node.args = [self.visit(each) for each in node.args]
+        return node
+
+    def visit_ListComp(self, node: ast.ListComp) -> ast.expr:
+        bound = set().union(*(targets(each) or () for each in node.generators))
+        for name in sorted(bound & {*self._defined, *(used for each in self._defined.values() for used in each.names)}):
+            raise ExpressionError(f"{name!r} has another meaning outside of this list; rename it")
+        self.generic_visit(node)
+        return node
+
+    def visit_Name(self, node: ast.Name) -> ast.expr:
+        formula = self._defined.get(node.id)
+        return node if formula is None else copy.deepcopy(parse(formula.source))
 
 
 def _is_condition(node: ast.expr) -> bool:

@@ -18,6 +18,7 @@ from ..core import Quantity, elementary
 from . import operations
 from .evaluation import evaluate
 from .syntax import ExpressionError, free_names, parse
+from .tables import across, along, looked_up, tables_of
 from .values import BINARY, CONSTANTS, FUNCTIONS, MAX_INT, MAX_STEPS
 
 UNDECIDED: Final = operations.UNDECIDED  # what a function raises where the evaluator must decide
@@ -28,8 +29,8 @@ _SIGNS: Final[dict[type[ast.AST], str]] = {
 }  # fmt: skip
 _OF_FLOATS: Final = frozenset(("abs", "atan2", "cos", "exp", "hypot", "log", "max", "min", "sin", "sqrt", "tan"))
 _GIVE_NUMBERS: Final = frozenset(
-    ("abs", "atan2", "ceil", "cos", "degrees", "exp", "float", "floor", "hypot", "int", "log", "radians", "round",
-     "sin", "sqrt", "sum", "tan")
+    ("abs", "atan2", "ceil", "cos", "degrees", "exp", "float", "floor", "hypot", "int", "interpolate", "log",
+     "radians", "round", "sin", "sqrt", "sum", "tan")
 )  # fmt: skip
 # Kinds of values: a float that may be infinite or NaN, a number, a truth value, any token as it came.
 _FLOAT, _NUMBER, _TRUTH, _ANY = "float", "number", "truth value", "any"
@@ -37,6 +38,7 @@ _SIMPLE: Final = (
     ast.Constant, ast.Name, ast.UnaryOp, ast.BinOp, ast.BoolOp, ast.Compare, ast.IfExp,
     ast.operator, ast.unaryop, ast.boolop, ast.cmpop, ast.expr_context,
 )  # fmt: skip
+_LITERAL: Final = (ast.List, ast.Tuple, ast.Constant, ast.UnaryOp, ast.unaryop, ast.expr_context)
 _SPENT: Final = 1_000  # more than what an expression of 500 parts and 2,000 characters takes without its lists
 _LARGEST: Final = f"{float(MAX_INT)!r}"
 
@@ -125,7 +127,7 @@ KNOWN: Final[dict[str, Any]] = {
     "__builtins__": {}, "type": type, "float": float, "dict": dict, "list": list, "str": str, "size": len,
     "NUMBERS": operations.NUMBERS, "LIGHT": operations.LIGHT, "power": BINARY[ast.Pow],
     "undecided": operations.undecided, "handed": operations.handed, "weighed": operations.weighed,
-    "sin": elementary.sin, "cos": elementary.cos,
+    "sin": elementary.sin, "cos": elementary.cos, "along": along, "across": across, "looked_up": looked_up,
     "plain": operations.plain, "part": operations.part, "cut": operations.cut, "turns": operations.turns,
     **{f"by_{kind.__name__}": function for kind, function in operations.OPERATORS.items()},
     **{f"f_{name}": function for name, function in FUNCTIONS.items()},
@@ -351,6 +353,8 @@ class _Writer:
         )
 
     def _called(self, name: str, arguments: list[ast.expr]) -> Written:
+        if name == "interpolate" and (found := self._interpolated(arguments)):
+            return found
         parts = [self.settled(each) for each in arguments]
         if name in _OF_FLOATS and {kind for _, kind in parts} == {_FLOAT}:
             own = name if name in ("sin", "cos") else f"f_{name}"  # these check nothing, and take floats alone
@@ -366,6 +370,24 @@ class _Writer:
             name in ("min", "max") and {kind for _, kind in parts} <= {_FLOAT, _NUMBER}
         )
         return (text, _NUMBER) if is_number else self._weighed(text)
+
+    def _interpolated(self, arguments: list[ast.expr]) -> Written | None:
+        """A table of constants, which is checked here once."""
+        many = len(arguments) // 2
+        numbers = [self.settled(each) for each in arguments[:many]]
+        tables = arguments[many:]
+        if len(arguments) not in (3, 5) or any(
+            not isinstance(part, _LITERAL) for each in tables for part in ast.walk(each)
+        ):
+            return None
+        try:
+            given = tables_of([evaluate(self._source[each.col_offset : each.end_col_offset], {}) for each in tables])
+        except (ExpressionError, TypeError, ValueError):  # the evaluator says what is wrong
+            raise _UnfitError from None
+        if {kind for _, kind in numbers} == {_FLOAT}:
+            texts = [text for text, _ in numbers] + [repr(each) for each in given]
+            return f"{'along' if many == 1 else 'across'}({', '.join(texts)})", _FLOAT
+        return f"looked_up({given!r}, {', '.join(text for text, _ in numbers)})", _NUMBER
 
     def _list_of(self, node: ast.ListComp) -> Written:
         """A list comprehension over one list."""

@@ -9,6 +9,7 @@ from collections.abc import Callable
 from typing import Any, Final
 
 from ..core import MAX_DEPTH, Quantity, counted, did_you_mean, elementary
+from .tables import interpolate
 
 MAX_STEPS = 100_000
 MAX_ELEMENTS = 100_000
@@ -437,6 +438,7 @@ FUNCTIONS: Final[dict[str, Callable[..., Any]]] = {
         ("min", _extreme("min", min), 1, math.inf),
         ("max", _extreme("max", max), 1, math.inf),
         ("sum", _sum),
+        ("interpolate", interpolate, 3, 5),
         ("len", _len),
         ("range", _range, 1, 3),
         ("int", _converted(int, "a whole number")),

@@ -21,7 +21,7 @@ from ..core import (
     to_seconds,
 )
 from ..expression import UNDECIDED, Formula, operand
-from ..integration import STEPPERS
+from ..integration import STEPPERS, check_step
 from ..trajectory import number_of
 from .borders import Borders
 from .chart import Chart, Rule
@@ -148,6 +148,7 @@ class StateMachine(ModalActor):
         return [each for mode in self.modes.values() for each in (*mode.entry, *mode.exit)]
 
     def check(self) -> None:
+        check_step(self.method, self.max_step)
         rules = [
             Rule(
                 each.from_, each.to, each.on, each.when, each.after, each.probability, each.do or None,

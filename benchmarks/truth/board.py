@@ -1,7 +1,7 @@
 """Runs the cases of the board, and tells which published values they meet.
 
 A source is a file beside this one: ``title``, ``source``, what is ``undecided``, and ``cases``.  A case is made in one
-of these ways:
+of these ways, or in those of ``falsifying.py``:
 
 - ``study: NAME``: replications.  A true or false is a share with Wilson's interval, a number a mean with Student's.
 - ``run: NAME``: one long run, whose metrics have intervals by batch means.
@@ -34,10 +34,11 @@ from epicycle.runner.study.inference import average
 from epicycle.runner.support.shown import rounded
 
 from . import programs, stone_soup
+from .falsifying import replays, searches
 
 HERE = Path(__file__).parent
 ROOT = HERE.parent.parent
-SOURCES = ("stochastic", "simpy", "queues", "superdense", "tracking")
+SOURCES = ("stochastic", "simpy", "queues", "superdense", "falsification", "tracking")
 FOUND = HERE.parent / "TRUTH.json"
 RESULTS = Path("results/truth")
 LEAST, MOST = 90.0, 99.0  # % of 95 % intervals that should hold the published value
@@ -73,6 +74,8 @@ def lines_of(name: str, jobs: int | None = None) -> list[Line]:
         "check": _of_check,
         "program": _of_program,
         "beside": _beside,
+        "replay": _of_replay,
+        "search": _of_search,
     }
     lines: list[Line] = []
     for case in source(name)["cases"]:
@@ -150,6 +153,18 @@ def _beside(name: str, case: Mapping[str, Any], jobs: int | None) -> Iterator[Li
     command = f"epicycle run {file.relative_to(ROOT)}"
     for each in stone_soup.compared(file, case["of"], case["runs"]):
         yield Line(case["beside"], each.asked, each.theirs, each.ours, each.is_met, command, False, each.numbers)
+
+
+def _of_replay(name: str, case: Mapping[str, Any], jobs: int | None) -> Iterator[Line]:
+    file = HERE / name / f"{case['replay']}.yaml"
+    *told, command = replays(file, case)
+    yield Line(case["replay"], *told, f"epicycle run {file.relative_to(ROOT)}{command}", is_interval=False)
+
+
+def _of_search(name: str, case: Mapping[str, Any], jobs: int | None) -> Iterator[Line]:
+    file = HERE / name / f"{case['search']}.yaml"
+    for *told, command in searches(file, case, ROOT / RESULTS / name, jobs):
+        yield Line(case["search"], *told, f"epicycle search {file.relative_to(ROOT)}{command}", is_interval=False)
 
 
 def _published(

@@ -32,7 +32,7 @@ from .answer import Answer, listed
 from .faults import FaultSpace
 from .monitored import with_monitors
 from .proposals import BATCH, SPREAD
-from .space import Interval, Space
+from .space import Interval, Signal, Space
 from .spec import Break, SearchSpec
 
 SHOWN = 5  # runs in the table
@@ -96,8 +96,7 @@ class Falsification(Answer):
     @property
     def unguided(self) -> bool:
         """Whether it would have been guided by now, were the library there."""
-        has_ranges = any(isinstance(axis, Interval) for axis in self.space.axes)
-        return has_ranges and not self.guided and len(self.runs) > SPREAD * BATCH
+        return self.space.has_ranges and not self.guided and len(self.runs) > SPREAD * BATCH
 
     def add(self, run: Run) -> None:
         """Another run is over."""
@@ -270,6 +269,9 @@ def _covered(found: Falsification) -> Iterator[str]:
             numbers = [number[0] for each in nodes if (number := split_number(each)) is not None]
             unit = f" {axis.unit}" if axis.unit else ""
             yield f"{axis.path} {min(numbers):f} to {max(numbers):f}{unit}"
+        elif isinstance(axis, Signal):
+            ends = f"from {axis.of.low:f} to {axis.of.high:f} {axis.of.unit}".rstrip()
+            yield f"{axis.path} with {counted(axis.width, 'number')} {ends}"
         else:
             tried = {each.level.values[axis.path] for each in runs}
             texts = [_text(node) for node in axis.nodes if axis.factor(node) in tried]

@@ -22,7 +22,7 @@ from .faults import FaultSpace
 from .growing import Growing, place_of, text_of
 from .monitored import AD_HOC, monitors_named, property_of
 from .proposals import Point, is_guided, proposals
-from .space import Interval, read_space
+from .space import read_space
 from .spec import MAX_RUNS, Break, SearchSpec
 
 FILE = Path("falsify")  # what the study of a search has for a file, so that paths are relative to the working directory
@@ -88,13 +88,13 @@ class _Searching:
             stop=spec.until,
         )
         self.growing = Growing(study, keys, searched, Search(runs=goal.runs, command=list(spec.command)))
-        guided = is_guided() and any(isinstance(axis, Interval) for axis in space.axes)
+        guided = is_guided() and space.has_ranges
         self.found = Falsification(spec, goal, model.name, monitors, searched, guided)
         self.found.folder = folder
         self._proposals = (
             searched.proposals(self._seed)
             if isinstance(searched, FaultSpace)
-            else proposals(len(space.axes), self._seed, guided)
+            else proposals(space.widths, self._seed, guided)
         )
         self._latest: list[float | None] | None = None
 

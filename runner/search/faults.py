@@ -26,6 +26,7 @@ class FaultSpace:
     """All sets of at most ``most`` of some acts; a point has their places among ``acts``."""
 
     axes: tuple[Axis, ...] = ()
+    has_ranges = False
 
     def __init__(self, acts: Sequence[ActName], most: int) -> None:
         self.acts = tuple(acts)

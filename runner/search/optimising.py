@@ -25,7 +25,7 @@ from ..study.session import available_cores
 from .growing import Growing, place_of, text_of
 from .optimum import Optimum, Outcome, Tested
 from .proposals import Point, is_guided, proposals
-from .space import Interval, read_space
+from .space import read_space
 from .spec import Maximise, Minimise, SearchSpec
 
 FILE = Path("optimise")  # the file of the study of a search over a model: paths are relative to the working directory
@@ -49,7 +49,7 @@ def optimise(
     """
     work = _Optimising(spec, goal, folder)
     found = work.found
-    chosen = proposals(len(found.space.axes), work.seed, found.guided, _TOGETHER)
+    chosen = proposals(found.space.widths, work.seed, found.guided, _TOGETHER)
     points = next(chosen)[: goal.points]
     work.growing.add(points)
     with open_search_runs(work.growing.whole(), folder, jobs or available_cores(), timeout) as made:
@@ -92,7 +92,7 @@ class _Optimising:
         self._others = base.conditions
         runs = (goal.points + 1) * self._others * study.replications
         self.growing = Growing(study, keys, space, Search(runs=runs, command=list(spec.command)))
-        guided = is_guided() and any(isinstance(each, Interval) for each in space.axes)
+        guided = is_guided() and space.has_ranges
         self.found = Optimum(goal, space, guided)
         self.found.folder = folder
 

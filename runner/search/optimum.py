@@ -139,7 +139,7 @@ class Optimum(Answer):
         if unknown := sum(each.outcome.value is None for each in self.tested):
             have = "has" if unknown == 1 else "have"
             yield f"{counted(unknown, 'point')} {have} no mean: runs failed or have no number."
-        if not self.guided and any(isinstance(each, Interval) for each in self.space.axes):
+        if not self.guided and self.space.has_ranges:
             yield (
                 "All points were spread evenly: the library that guides a search is not installed "
                 "(pip install 'epicycle[falsify]')."

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Iterable, Sequence
+from itertools import count, product
 from typing import Any
 
 from epicycle.actors import random_stream
@@ -13,6 +14,9 @@ SPREAD = 3  # batches that are spread before the first ones that are guided
 STEP = 0.2  # of the edge of the unit cube: how far the first guided points are from the best known one
 FINE = 1e-3  # the step at which a descent ends
 LONGEST = 15  # batches of a descent
+FEW = 4  # signals of which all corners are tried
+SMALL = 10  # points of a batch where axes are signals
+CHANGES = 3  # of a signal, at most, unless it is guided
 
 Point = tuple[float, ...]  # of the unit cube
 Proposals = Generator[list[Point], list[float | None], None]
@@ -27,13 +31,15 @@ def is_guided() -> bool:
     return True
 
 
-def proposals(axes: int, seed: int, guided: bool, together: int = BATCH) -> Proposals:
+def proposals(widths: Sequence[int], seed: int, guided: bool, together: int = BATCH) -> Proposals:
     """Batches of points, without end; each is sent the robustness that was found at its points.
 
-    Guided points are chosen so many ``together``.
-
-    Each batch depends on nothing but the seed and what was found before it.
+    An axis has as many numbers as it is wide: one, or those of a signal.  Guided points are chosen so many
+    ``together``.  Each batch depends on nothing but the seed and what was found before it.
     """
+    axes = sum(widths)
+    if axes > len(widths):
+        yield from _of_signals(widths, seed, guided)
     spreads, descents = 0, 0
     while True:
         found: list[tuple[float, Point]] = []
@@ -47,6 +53,57 @@ def proposals(axes: int, seed: int, guided: bool, together: int = BATCH) -> Prop
             descents += 1
 
 
+def _of_signals(widths: Sequence[int], seed: int, guided: bool) -> Proposals:
+    """Points where axes are signals: constant ones at the ends of their ranges, and then such as rarely change.
+
+    What breaks a property often lies there, and few of the points that are spread evenly do.
+    """
+    found: list[tuple[float, Point]] = []
+    if len(widths) <= FEW:
+        corners = list(product((0.0, 1.0), repeat=len(widths)))
+        order = random_stream(seed, "corners").permutation(len(corners)).tolist()
+        points = [_point(widths, ([share] for share in corners[place])) for place in order]
+        found = list(zip(map(_number, (yield points)), points, strict=True))
+    for number in count():
+        points = stepped(widths, seed, number)
+        found += zip(map(_number, (yield points)), points, strict=True)
+        (least, start), most = min(found, key=lambda each: each[0]), max(each[0] for each in found)
+        found = []
+        if guided and least < most:  # or there is no slope to follow
+            yield from _descent(start, seed, number, SMALL, diagonal=True)
+
+
+def stepped(widths: Sequence[int], seed: int, number: int) -> list[Point]:
+    """Points whose signals change at most as often as there are points before: a small batch.
+
+    Of every two points, one has its values at the ends of the ranges.
+    """
+    points = []
+    for place in range(SMALL):
+        stream = random_stream(seed, f"stepped {number}", str(place))
+        levels = []
+        for width in widths:
+            values = [stream.random() for _ in range(1 + int(stream.random() * min(width, CHANGES + 1)))]
+            levels.append([float(value < 0.5) for value in values] if place % 2 else values)
+        points.append(_point(widths, levels, stream))
+    return points
+
+
+def _point(widths: Sequence[int], levels: Iterable[Sequence[float]], stream: Any = None) -> Point:
+    """The point of signals that have these levels one after the other, and change at random places."""
+    shares: list[float] = []
+    for width, values in zip(widths, levels, strict=True):
+        places = (
+            [0, *sorted(1 + each for each in stream.permutation(width - 1).tolist()[: len(values) - 1])]
+            if stream and width > 1
+            else [0]
+        )
+        ends = [*places[1:], width]
+        for value, start, end in zip(values, places, ends, strict=False):
+            shares += [value] * (end - start)
+    return tuple(shares)
+
+
 def spread(axes: int, seed: int, number: int) -> list[Point]:
     """Points of which, on each axis, each of as many slices has one: a Latin hypercube."""
     columns = []
@@ -56,8 +113,8 @@ def spread(axes: int, seed: int, number: int) -> list[Point]:
     return list(zip(*columns, strict=True)) if columns else [()] * BATCH
 
 
-def _descent(start: Point, seed: int, number: int, together: int) -> Proposals:
-    """Points of CMA-ES from a point on, until its step is small."""
+def _descent(start: Point, seed: int, number: int, together: int, diagonal: bool = False) -> Proposals:
+    """Points of CMA-ES from a point on, until its step is small; if ``diagonal``, with a step for each axis alone."""
     import cma
     import numpy as np
 
@@ -68,6 +125,7 @@ def _descent(start: Point, seed: int, number: int, together: int) -> Proposals:
 
     width = max(len(start), 2)  # the library knows no fewer; the rest is for nothing
     options = {"bounds": [0.0, 1.0], "randn": normal, "seed": math.nan, "tolx": FINE, "verbose": -9}
+    options |= {"CMA_diagonal": diagonal, "tolfunhist": 0.0}  # the least of each batch is the same: its rank
     options |= {"popsize": together, "maxiter": LONGEST * BATCH // together}
     strategy = cma.CMAEvolutionStrategy([*start, *[0.5] * (width - len(start))], STEP, options)
     while not strategy.stop():

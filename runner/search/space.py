@@ -7,6 +7,8 @@ from collections.abc import Iterable
 from collections.abc import Sequence as Many
 from dataclasses import dataclass
 from decimal import Decimal
+from itertools import islice
+from typing import ClassVar
 
 from epicycle.actors import UnitError, counted, declared_parameters, parse_unit
 
@@ -54,6 +56,11 @@ class Interval:
         return "int" if self.is_whole else "float"
 
     @property
+    def width(self) -> int:
+        """How many shares lead to a value."""
+        return 1
+
+    @property
     def ends(self) -> list[Node]:
         """The first and the last number."""
         return [self._node(self.low), self._node(self.high)]
@@ -87,6 +94,11 @@ class Choice:
     position: Position
 
     @property
+    def width(self) -> int:
+        """How many shares lead to a value."""
+        return 1
+
+    @property
     def ends(self) -> list[Node]:
         """All values."""
         return list(self.nodes)
@@ -100,7 +112,40 @@ class Choice:
         return as_factor(node, self.kind)
 
 
-Axis = Interval | Choice
+@dataclass(frozen=True)
+class Signal:
+    """All lists of so many numbers of a range, such as the values of an input one after the other."""
+
+    of: Interval
+    width: int  # how many shares lead to a value, which is how many numbers it has
+
+    kind: ClassVar[str] = "text"
+
+    @property
+    def path(self) -> str:
+        """The parameter."""
+        return self.of.path
+
+    @property
+    def position(self) -> Position:
+        """Where it is said."""
+        return self.of.position
+
+    @property
+    def ends(self) -> list[Node]:
+        """Nothing but the first number, and nothing but the last."""
+        return [self.node(*[share] * self.width) for share in (0.0, 1.0)]
+
+    def node(self, *shares: float) -> Node:
+        """The numbers at shares of the range."""
+        return Sequence(tuple(map(self.of.node, shares)), self.position)
+
+    def factor(self, node: Node) -> Factor:
+        """A list as the table has it."""
+        return as_factor(node, self.kind)
+
+
+Axis = Interval | Choice | Signal
 
 
 class Space:
@@ -108,8 +153,10 @@ class Space:
 
     def __init__(self, axes: Many[Axis]) -> None:
         self.axes = tuple(axes)
-        self.width = len(self.axes)  # numbers in the text of a study that a point takes
+        self.widths = [axis.width for axis in self.axes]
+        self.width = sum(self.widths)  # shares that lead to a point, and numbers in the text of a study that it takes
         self.content = counted(len(self.axes), "parameter")
+        self.has_ranges = any(not isinstance(axis, Choice) for axis in self.axes)
 
     @property
     def columns(self) -> dict[str, str]:
@@ -118,7 +165,8 @@ class Space:
 
     def level(self, shares: Many[float]) -> Level:
         """The point at these shares of the axes."""
-        nodes = [axis.node(share) for axis, share in zip(self.axes, shares, strict=True)]
+        left = iter(shares)
+        nodes = [axis.node(*islice(left, axis.width)) for axis in self.axes]
         pairs = list(zip(self.axes, nodes, strict=True))
         settings = tuple(Setting(axis.path, node, axis.position) for axis, node in pairs)
         return Level(settings, {axis.path: axis.factor(node) for axis, node in pairs})
@@ -174,7 +222,9 @@ def read_space(
 def _axis(setting: Setting, model: Model, problems: Problems) -> Axis | None:
     node = setting.node
     if isinstance(node, Scalar) and (found := _RANGE.fullmatch(node.text)) is not None:
-        return _interval(setting, found[1], found[2], counts(setting.path, model), problems)
+        width = _length(setting.path, model)
+        axis = _interval(setting, found[1], found[2], width is None and counts(setting.path, model), problems)
+        return axis if axis is None or width is None else Signal(axis, width)
     if not (isinstance(node, Sequence) or (isinstance(node, Mapping) and node.entries.keys() & RANGE.keys.keys())):
         problems.add(f"{setting.path!r} has neither a range nor a list of values", setting.position, HINT)
         return None
@@ -196,6 +246,15 @@ def _axis(setting: Setting, model: Model, problems: Problems) -> Axis | None:
         problems.add(message, setting.position)
         return None
     return Choice(setting.path, tuple(nodes), kinds.pop(), setting.position)
+
+
+def _length(path: str, model: Model) -> int | None:
+    """How many numbers a parameter of the model has that is a list of numbers; None if it is not."""
+    for name, declared in model.declared.items():
+        if matches(path, name) and isinstance(declared.value, Sequence):
+            numbers = [split_number(each) for each in declared.value.items]
+            return len(numbers) if numbers and None not in numbers else None
+    return None
 
 
 def counts(path: str, model: Model) -> bool:

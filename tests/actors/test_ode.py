@@ -411,11 +411,61 @@ def test_the_solution_does_not_depend_on_when_it_is_looked_at(method: str) -> No
         "method": method,
         "relative_tolerance": 1e-5,
         "absolute_tolerance": 1e-7,
+        **({"max_step": 0.01} if method == "Euler" else {}),
     }
     _, alone, _ = feed(actor, {"trigger": [(30.0, 0)]}, until=30.0)
     _, watched, _ = feed(actor, {"trigger": ticks(0.3, 30.0)}, until=30.0)
     assert watched["zero"] == alone["zero"] != []
     assert watched["v"][-1] == alone["v"][-1]
+
+
+def test_euler_goes_along_straight_lines() -> None:
+    actor = {"type": "ODE", "initial": {"x": 1, "y": 0}, "derivatives": {"x": "x * y", "y": "1"}}
+    euler = {**actor, "method": "Euler", "max_step": 0.5}
+    _, sent, _ = feed(euler, {"trigger": [(0.5, 0), (0.75, 0), (1.0, 0), (1.5, 0)]}, until=2.0)
+    assert [value for _, value in sent["x"]] == [1.0, 1.125, 1.25, 1.875]
+    with pytest.raises(ModelError, match="max_step: it is missing; Euler takes steps of this length"):
+        feed({**actor, "method": "Euler"}, {}, until=1.0)
+
+
+def test_quantities_are_said_once() -> None:
+    actor = {
+        "type": "ODE",
+        "initial": {"x": 1, "v": 0},
+        "where": {"pull": "k * x", "force": "pull + 2 * v"},
+        "derivatives": {"x": "v", "v": "-force"},
+        "crossings": {"weak": "force - 0.5"},
+        "resets": {"weak": {"x": "x + pull"}},
+        "held": {"k": 3},
+    }
+    plain = {
+        **actor,
+        "where": {},
+        "derivatives": {"x": "v", "v": "-(k * x + 2 * v)"},
+        "crossings": {"weak": "(k * x + 2 * v) - 0.5"},
+        "resets": {"weak": {"x": "x + k * x"}},
+    }
+    asked = {"trigger": [(0.7, 0), (1.3, 0)], "k": [(0.0, 3)]}
+    _, short, _ = feed(actor, asked, until=2.0)
+    _, long, _ = feed(plain, asked, until=2.0)
+    assert short == long
+    assert short["weak"]
+
+
+@pytest.mark.parametrize(
+    ("where", "message"),
+    [
+        ({"x": "1"}, "where: 'x' is the name of something else; choose another"),
+        (
+            {"a": "x + 1", "b": "[a for a in [1]][0] + a"},
+            "where: b, with the quantities of 'where' in it: 'a' has another meaning outside of this list; rename it",
+        ),
+    ],
+)
+def test_names_of_quantities(where: dict[str, str], message: str) -> None:
+    with pytest.raises(ModelError) as told:
+        feed({"type": "ODE", "initial": {"x": 1}, "derivatives": {"x": "x"}, "where": where}, {}, until=1.0)
+    assert message in str(told.value)
 
 
 def test_a_run_ends_at_the_first_crossing() -> None:

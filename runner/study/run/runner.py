@@ -70,7 +70,21 @@ class Runner:
         # Recording costs time and memory, and most studies need none of it.
         wanted = {signal for metric in self.plan.metrics for signal in metric.signals}
         model.output.recorded = [name for name in model.output.recorded if name in wanted]
+        self._watch_only_what_counts(model)
         return condition, model
+
+    def _watch_only_what_counts(self, model: Model) -> None:
+        """Leave out monitors of which nobody asks for the verdict, and which end no run."""
+        output = model.output
+        asked = {name for metric in self.plan.metrics for name in metric.formula.names}
+        asked |= {name for metric in output.metrics if metric.formula for name in metric.formula.names}
+        kept = {
+            each.name
+            for each in output.monitors
+            if each.requirement.stop or not asked.isdisjoint(metric.name for metric in each.metrics)
+        }
+        output.monitors = [each for each in output.monitors if each.name in kept]
+        output.metrics = [each for each in output.metrics if not each.monitor or each.monitor in kept]
 
 
 def empty_row(plan: Plan, condition: Condition, task: Task) -> Row:

@@ -1,0 +1,114 @@
+"""The cases of the board that are about falsification, in two ways:
+
+- ``replay: NAME`` with ``monitor``: inputs that are published as breaking it do, and what the port ``of`` sends then is
+  ``within`` so much of what is published there.
+- ``search: NAME`` with ``monitor`` and ``vary``: searches with several seeds, each of at most as many runs as were
+  published; ``published`` has in how many of 50 something was ``found``, and the ``mean`` number of runs of these.
+"""
+
+from __future__ import annotations
+
+import shlex
+from collections.abc import Iterator, Mapping
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+import epicycle
+from epicycle.runner import Simulation
+from epicycle.runner.execution.results import Results
+
+PUBLISHED = "counterexamples/published.yaml"
+SEGMENT = 5.0  # s
+SEARCHES = 5  # of each property; 50 were published, and take hours
+APART = 1_000  # between the seeds of searches
+MOST = 300  # runs of a search
+OF = 50  # published searches
+
+
+@cache
+def counterexamples(folder: Path) -> Mapping[str, Any]:
+    """What is published of each property."""
+    found: Mapping[str, Any] = yaml.safe_load((folder / PUBLISHED).read_text(encoding="utf-8"))
+    return found
+
+
+def replayed(file: Path, case: Mapping[str, Any], example: Mapping[str, Any]) -> Results:
+    """The run of a published counterexample, with no monitor but the one that it breaks."""
+    inputs = {name: example[name] for name in ("throttle", "brake")}
+    model = epicycle.load(file, set={**case.get("set", {}), **inputs})
+    output = model.output
+    output.monitors = [each for each in output.monitors if each.name == case["monitor"]]
+    output.metrics = [each for each in output.metrics if each.monitor == case["monitor"]]
+    return Simulation(model).run(until=case["until"])
+
+
+def deviation(found: Results, case: Mapping[str, Any], example: Mapping[str, Any]) -> float:
+    """The largest difference from what is published.
+
+    The published plants are a step behind: their first step has no length.
+    """
+    signal = found[case["of"]]
+    step = float(signal.times[1])
+    far = []
+    for number, value in enumerate(example["sent"], 1):
+        place = round(min(number * SEGMENT, case["until"]) / step) - 1
+        far.append(abs(float(signal.tokens[place]) - value))
+    return max(far)
+
+
+def replays(file: Path, case: Mapping[str, Any]) -> tuple[str, str, str, bool, str]:
+    """What is asked, published and found for published inputs, whether it is the same, and a command."""
+    examples = counterexamples(file.parent)[case["monitor"]]
+    broken, furthest = 0, 0.0
+    for example in examples:
+        found = replayed(file, case, example)
+        broken += found.monitors[case["monitor"]].holds is False
+        furthest = max(furthest, deviation(found, case, example))
+    asked = f"{case['monitor']} with published inputs; {case['of']}"
+    ours = f"broken in {broken} of {len(examples)}; within {furthest:.3f}"
+    settings = {**case.get("set", {}), "throttle": examples[0]["throttle"], "brake": examples[0]["brake"]}
+    sets = "".join(f" --set {shlex.quote(f'{name}={value}')}" for name, value in settings.items())
+    return (
+        asked,
+        f"broken in {len(examples)} of {len(examples)}; to {case['within']:g}",
+        ours,
+        broken == len(examples) and furthest <= case["within"],
+        f"{sets} --until {case['until']} --check",
+    )
+
+
+def searches(
+    file: Path, case: Mapping[str, Any], folder: Path, jobs: int | None, searches: int = SEARCHES
+) -> Iterator[tuple[str, str, str, bool, str]]:
+    """How often searches find something, and after how many runs: asked, published, found, whether it is met."""
+    runs = []
+    until = case.get("until")
+    for number in range(searches):
+        found = epicycle.search(
+            file, epicycle.Break(case["monitor"], runs=MOST), vary=case["vary"], set=case.get("set", {}), until=until,
+            seed=number * APART, out=folder / f"{case['monitor']}_{number}", jobs=jobs, progress=False,
+        )  # fmt: skip
+        runs.append(found.broken.number if found.broken is not None else None)
+    made = [each for each in runs if each is not None]
+    published = case["published"]
+    vary = "".join(f" --vary {name}={values}" for name, values in case["vary"].items())
+    sets = "".join(f" --set {shlex.quote(f'{name}={value}')}" for name, value in case.get("set", {}).items())
+    command = f" --break {case['monitor']}{vary}{sets}{f' --until {shlex.quote(until)}' if until else ''} --runs {MOST}"
+    yield (
+        f"{case['monitor']} falsified",
+        f"{published['found']} of {OF} searches",
+        f"{len(made)} of {searches} searches",
+        len(made) / searches >= published["found"] / OF,
+        command,
+    )
+    mean = sum(made) / len(made) if made else None
+    yield (
+        f"mean number of runs until {case['monitor']} is broken",
+        f"{published['mean']:.3g}",
+        "none" if mean is None else f"{mean:.3g}",
+        mean is not None and mean <= published["mean"],
+        command,
+    )
