@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from typing import TypeVar
+from typing import TypeVar, cast
 
 from ..model.text.document import LINE_BREAK, MAX_NODES, Entry, Mapping, Node, Scalar, Sequence, parse
 from ..model.text.problems import Position, Problems
@@ -117,8 +117,11 @@ def moved(node: N, by: int) -> N:
         return node
     at = node.position
     place = Position(at.file, at.line + by, at.column, at.length, at.source)
+    made: Node
     if isinstance(node, Scalar):
-        return Scalar(node.value, node.text, node.plain, place)
-    if isinstance(node, Sequence):
-        return Sequence(tuple([moved(each, by) for each in node.items]), place)
-    return Mapping({key: moved_entry(each, by) for key, each in node.entries.items()}, place)
+        made = Scalar(node.value, node.text, node.plain, place)
+    elif isinstance(node, Sequence):
+        made = Sequence(tuple([moved(each, by) for each in node.items]), place)
+    else:
+        made = Mapping({key: moved_entry(each, by) for key, each in node.entries.items()}, place)
+    return cast(N, made)  # of the same class

@@ -213,7 +213,8 @@ error: x: director.drift: 0 is out of bounds, expected a number from 1e-06 to 10
    help: give this another name
 
 error: metric 'total' cannot take 'men', did you mean 'mean'?
-   help: valid: last, first, count, min, max, sum, mean, std, quantile, rate, time_mean, time_std, time_quantile, share, integral, duration
+   help: valid: last, first, count, min, max, sum, mean, std, quantile, rate, time_mean, time_std, time_quantile, \
+share, integral, duration
 2 errors""",
     ),
 }

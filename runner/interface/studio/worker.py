@@ -293,7 +293,7 @@ class Worker:
         }
 
     def _within(self, recording: Recording | None) -> Callable[[float], None]:
-        """What ends a run that has reached the limits, or for which nobody waits any more."""
+        """What ends a run that has reached the limits, or for which nobody waits."""
         started = time.monotonic()
 
         def look(now: float) -> None:
