@@ -29,7 +29,7 @@ def named() -> Iterator[tuple[str, set[Path]]]:
             continue
         package = re.match(r"\| `(\w+)` ", line)
         of_row = [ROOT / place / package[1] for place in PLACES if place] if package else []
-        beside = next((path for path in of_row if path.is_dir()), None)
+        beside = next((path for path in of_row if (path / "__init__.py").is_file()), None)
         for name in re.findall(r"`([\w/*]+(?:/|\.\w+))`", line):
             found = {path for place in PLACES for path in (ROOT / place).glob(name.rstrip("/"))}
             if beside is not None and "/" not in name[:-1]:

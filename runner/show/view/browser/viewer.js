@@ -1,6 +1,7 @@
 // One run or two, with all their views, buttons and keys.
 
 class Viewer {
+  /** @param {Page} data */
   constructor(data) {
     PALETTE.splice(0, Infinity, ...data.palette.map((colour) => (colour === "#000000" ? "#8c6bb1" : colour))); // black is invisible in the dark theme
     data.runs.forEach((run, i) => {
@@ -9,18 +10,20 @@ class Viewer {
       run.firstChange = data.difference?.firings[i] ?? NOTHING; // the first firing that is not the same in the other run
     });
     const state = this.state = new State(data), scrubber = new Scrubber(state), lanes = new Lanes(state), chart = new Chart(state);
-    const camera = { scale: 0, extent: Space.extent(data.runs) }, hasSpace = data.runs.some((run) => run.marks.length);
+    const camera = { scale: 0, x: 0, y: 0, extent: Space.extent(data.runs) }, hasSpace = data.runs.some((run) => run.marks.length);
     const spaces = hasSpace ? data.runs.map((_, i) => new Space(state, i, camera)) : [];
     const graphs = data.runs.map((_, i) => new Graph(state, i));
     this.details = new Details(state, lanes);
     this.views = { scrubber, spaces, graphs, chart, lanes };
+    /** @param {string} name @param {string} title @param {...Node} content */
     const pane = (name, title, ...content) => {
       const made = element("section", { className: `pane ${name}` }, element("h1", { text: title }), ...content);
       made.dataset.pane = name;
       return made;
     };
+    /** @param {(Space | Graph)[]} views @param {string} what */
     const named = (views, what) => views.map((view, i) => pane(`${what} of${i}`, data.runs.length > 1 ? `${what}: ${data.runs[i].name}` : what,
-      ...(view.note ? [element("p", { className: "note", text: view.note })] : []), view.canvas));
+      ...("note" in view && view.note ? [element("p", { className: "note", text: view.note })] : []), view.canvas));
     const panes = element("div", { id: "panes", className: `runs${data.runs.length}${hasSpace ? "" : " flat"}` },
       ...named(spaces, "space"), ...named(graphs, "graph"),
       pane("chart", "sequence", coneOnly(state, chart), chart.canvas), pane("lanes", "signals", picker(state, lanes), lanes.canvas),
@@ -38,7 +41,7 @@ class Viewer {
     }
   }
 
-  // Lets time pass while it plays, and paints what has changed.
+  /** Lets time pass while it plays, and paints what has changed. @param {number} seconds */
   advance(seconds) {
     const { state } = this;
     state.advance(seconds);
@@ -49,10 +52,10 @@ class Viewer {
   }
 }
 
-// Calls a function for each frame, with the seconds since the one before.
+/** Calls a function for each frame, with the seconds since the one before. @param {(seconds: number) => void} act */
 function eachFrame(act) {
   let before = performance.now();
-  const frame = (now) => {
+  const frame = (/** @type {number} */ now) => {
     act(Math.min(0.1, (now - before) / 1000));
     before = now;
     requestAnimationFrame(frame);
@@ -60,19 +63,21 @@ function eachFrame(act) {
   requestAnimationFrame(frame);
 }
 
+/** @param {State} state @param {Page} data */
 function bar(state, data) {
   const [first] = data.runs, play = button("▶", () => state.play(!state.isPlaying), "play");
   play.id = "play";
   const speed = element("select", { label: "model seconds per second", id: "speed" });
   for (const each of [...new Set([...SPEEDS, state.speed])].sort((a, b) => a - b)) speed.append(element("option", { value: each, text: `×${each}` }));
-  speed.value = state.speed;
+  speed.value = String(state.speed);
   speed.addEventListener("change", () => { state.speed = Number(speed.value); });
   const axis = element("select", { label: "time axis", id: "axis" }, element("option", { value: "time", text: "by time" }), element("option", { value: "tag", text: "by tag" }));
   axis.addEventListener("change", () => state.setByTag(axis.value === "tag"));
+  /** @param {"back" | "ahead"} name @param {string} words */
   const toggle = (name, words) => {
     const made = button(words, () => {
       state.directions[name] = !state.directions[name];
-      made.setAttribute("aria-pressed", state.directions[name]);
+      made.setAttribute("aria-pressed", String(state.directions[name]));
       state.findCone();
       for (const listener of state.listeners) listener();
     }, `toggle ${name}`);
@@ -81,8 +86,8 @@ function bar(state, data) {
   };
   const runs = data.runs.length < 2 ? [] : data.runs.map((run, i) => {
     const made = button(run.name, () => state.activate(i), "toggle");
-    state.listeners.push(() => made.setAttribute("aria-pressed", state.active === i));
-    made.setAttribute("aria-pressed", state.active === i);
+    state.listeners.push(() => made.setAttribute("aria-pressed", String(state.active === i)));
+    made.setAttribute("aria-pressed", String(state.active === i));
     return made;
   });
   const now = element("output", { id: "now" });
@@ -95,12 +100,13 @@ function bar(state, data) {
   const tell = () => {
     now.textContent = state.nowText;
     play.textContent = state.isPlaying ? "❚❚" : "▶";
-    speed.value = state.speed;
+    speed.value = String(state.speed);
     axis.value = state.axis.byTag ? "tag" : "time";
   };
   return { box, tell };
 }
 
+/** @param {State} state @param {Chart} chart */
 function coneOnly(state, chart) {
   const box = element("input", { type: "checkbox", id: "cone-only" });
   box.addEventListener("change", () => {
@@ -110,6 +116,7 @@ function coneOnly(state, chart) {
   return element("label", { className: "option", title: "show only actors of the cone" }, box, " cone only");
 }
 
+/** @param {State} state @param {Lanes} lanes */
 function picker(state, lanes) {
   const select = element("select", { label: "signals to show or hide", className: "option" }, element("option", { value: "", text: "signals…" }));
   const fill = () => {
@@ -128,25 +135,28 @@ function picker(state, lanes) {
 }
 
 // A narrow screen shows one pane at a time.
+/** @param {HTMLElement} panes @param {boolean} hasSpace @param {State} state */
 function tabs(panes, hasSpace, state) {
   const names = [...(hasSpace ? ["space"] : []), "graph", "chart", "lanes", "about"], made = element("nav", {});
   for (const name of names) {
     const tab = button(name === "chart" ? "sequence" : name === "lanes" ? "signals" : name === "about" ? "details" : name, () => {
       panes.dataset.tab = name;
-      for (const each of made.children) each.setAttribute("aria-pressed", each === tab);
+      for (const each of made.children) each.setAttribute("aria-pressed", String(each === tab));
       state.changed();
     }, "toggle");
-    tab.setAttribute("aria-pressed", name === names[0]);
+    tab.setAttribute("aria-pressed", String(name === names[0]));
     made.append(tab);
   }
   panes.dataset.tab = names[0];
   return made;
 }
 
+/** @param {State} state @param {AddEventListenerOptions} [options] */
 function keys(state, options = {}) {
   document.addEventListener("keydown", (event) => {
-    if (event.target.matches("select, input") || event.altKey || event.ctrlKey || event.metaKey) return;
+    if (!(event.target instanceof Element) || event.target.matches("select, input") || event.altKey || event.ctrlKey || event.metaKey) return;
     const size = state.axis.high - state.axis.low, last = state.run.times.length - 1;
+    /** @type {{ [key: string]: () => void }} */
     const acts = {
       " ": () => state.play(!state.isPlaying),
       ArrowRight: () => state.step(event.shiftKey ? 20 : 1),
