@@ -13,13 +13,14 @@ from matplotlib.figure import Figure
 
 from benchmarks.truth.board import FOUND, Line, of_text, page
 
+_WIDE = "---\nhide: [navigation, toc]\n---\n\n"
 MET, MISSED = "#1f5fa8", "#c8321e"
 
 
 def truth_page() -> str:
     """The page as Markdown."""
     found = of_text(FOUND.read_text(encoding="utf-8"))
-    return page(found, {name: f"truth/{name}.svg" for name, lines in found.items() if _drawn(lines)})
+    return _WIDE + page(found, {name: f"truth/{name}.svg" for name, lines in found.items() if _drawn(lines)})
 
 
 def draw_truth(folder: Path) -> list[Path]:
@@ -28,7 +29,7 @@ def draw_truth(folder: Path) -> list[Path]:
     made = []
     for name, lines in of_text(FOUND.read_text(encoding="utf-8")).items():
         if drawn := _drawn(lines):
-            figure = Figure(figsize=(10.0, 4.6), layout="constrained")
+            figure = Figure(figsize=(9.0, 4.4), layout="constrained")
             left, right = figure.subplots(1, 2)
             _draw_values(left, drawn)
             _draw_gaps(right, drawn)
@@ -64,12 +65,14 @@ def _draw_gaps(axes: Axes, lines: Sequence[Line]) -> None:
     axes.axvspan(-1.0, 1.0, color="#e6edf5", zorder=0)
     for row, (gap, line) in enumerate(ordered):
         axes.plot(gap, row, marker="o", markersize=3.5, color=_colour(line))
-        if not line.is_met:
-            side = "left" if gap < 0 else "right"
-            axes.annotate(
-                f"{line.case}: {line.asked}", (gap, row), (6 if gap < 0 else -6, 0), textcoords="offset points",
-                ha=side, va="center", fontsize=6, color=MISSED,
-            )  # fmt: skip
+    missed = [(gap, f"{line.case}: {line.asked}") for gap, line in ordered if not line.is_met]
+    # The corners above and below the curve are empty.
+    for words, where, at, side in (
+        ([each for gap, each in missed if gap > 0][::-1], (0.02, 0.98), "top", "left"),
+        ([each for gap, each in missed if gap < 0][::-1], (0.98, 0.02), "bottom", "right"),
+    ):
+        text = "\n".join(words)
+        axes.text(*where, text, transform=axes.transAxes, va=at, ha=side, fontsize=7, color=MISSED)
     axes.set(yticks=[], ylabel="values in order", xlabel="(ours - published) / half of the interval")
 
 

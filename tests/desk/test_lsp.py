@@ -88,7 +88,7 @@ def test_a_dialogue_over_a_model_of_300_lines(tmp_path: Path) -> None:
         for right, typo in (
             ("    type: Observer\n", "    type: Obsever\n"),
             ("stop: 40 s", "stp: 40 s"),
-            ("take: max, unit", "take: max, unti"),
+            ("take: max, unit", "take: max, unitt"),
             ("-> arrival.state", "-> arrival.sate"),
             ("correlation: 5 m", "corelation: 5 m"),
             ("range: ${sensor_range}", "range: ${sensor_rang}"),
