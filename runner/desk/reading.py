@@ -62,13 +62,14 @@ def read(name: str | Path, texts: Texts = NO_TEXTS, types: Iterable[type] = (), 
     is_file = isinstance(name, Path) or is_path(name)
     path = Path(name) if is_file else packaged_models().get(str(name), Path(name))
     types, loading = tuple(types), Loading()
+    given: Any = {**changes, "types": types}
     found, more = list[Problem](), False
     with opened(texts) as known:
         try:
             if is_file:
-                _passes(path, types, loading, changes)
+                _passes(path, loading, given)
             else:
-                loading.passes(name, types=types, **changes)
+                loading.passes(name, given)
                 loading.problems.raise_if_any()
         except ModelError as error:
             found, more = list(error.problems), error.more
@@ -86,7 +87,7 @@ def read(name: str | Path, texts: Texts = NO_TEXTS, types: Iterable[type] = (), 
     )
 
 
-def _passes(path: Path, types: tuple[type, ...], loading: Loading, changes: dict[str, Any]) -> None:
+def _passes(path: Path, loading: Loading, changes: Any) -> None:
     """Raises what is wrong with the file as ``ModelError``."""
     node, problems = read_node(path, Problems()), loading.problems
     keys = node.entries.keys() if isinstance(node, MappingNode) else set[str]()
@@ -97,5 +98,5 @@ def _passes(path: Path, types: tuple[type, ...], loading: Loading, changes: dict
     elif "composites" in keys and keys <= LIBRARY.keys.keys():
         read_library(path, problems)
     else:
-        loading.passes(path, types=types, **changes)
+        loading.passes(path, changes)
     problems.raise_if_any()
