@@ -321,10 +321,13 @@ def rare(
             size = -(-runs // _PARTS)
             parts = [range(start, min(start + size, runs)) for start in range(0, runs, size)]
             evaluator.expect((part[0], (_WHOLE, part)) for part in parts)
-            whole = [evaluator.make(part[0], (_WHOLE, part)) for part in parts]
-            first = [reached for part, _, _ in whole for reached in part]
+            first: list[float] = []
+            tags_of_whole = 0
+            for part in parts:
+                reached, _, took = evaluator.make(part[0], (_WHOLE, part))
+                first += reached
+                tags_of_whole += took
             levels, made, tags = evaluator.make(_LEVELS, (_LEVELS, first))
-            tags_of_whole = sum(tags for _, _, tags in whole)
             return [levels, tags_of_whole / runs, runs + made, tags_of_whole + tags]
 
         levels, tags_of_run, made, tags = cache.outcome(_LEVELS, levels_found)
