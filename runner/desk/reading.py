@@ -72,6 +72,7 @@ def read(
     is_file = isinstance(name, Path) or is_path(name)
     path = Path(name) if is_file else packaged_models().get(str(name), Path(name))
     types, loading = tuple(types), Loading()
+    given: Any = {**changes, "types": types}
     found, more = list[Problem](), False
     parsed = {} if before is None else dict(before.parsed)
 
@@ -81,9 +82,9 @@ def read(
     with opened(texts, recall) as known, without_collection():
         try:
             if is_file:
-                _passes(path, types, loading, changes)
+                _passes(path, loading, given)
             else:
-                loading.passes(name, types=types, **changes)
+                loading.passes(name, given)
                 loading.problems.raise_if_any()
         except ModelError as error:
             found, more = list(error.problems), error.more
@@ -102,7 +103,7 @@ def read(
     )
 
 
-def _passes(path: Path, types: tuple[type, ...], loading: Loading, changes: dict[str, Any]) -> None:
+def _passes(path: Path, loading: Loading, changes: Any) -> None:
     """Raises what is wrong with the file as ``ModelError``."""
     node, problems = read_node(path, Problems()), loading.problems
     keys = node.entries.keys() if isinstance(node, MappingNode) else set[str]()
@@ -113,5 +114,5 @@ def _passes(path: Path, types: tuple[type, ...], loading: Loading, changes: dict
     elif "composites" in keys and keys <= LIBRARY.keys.keys():
         read_library(path, problems)
     else:
-        loading.passes(path, types=types, **changes)
+        loading.passes(path, changes)
     problems.raise_if_any()

@@ -25,7 +25,7 @@ from .calibration import Calibration, Fitted, Matched
 from .evaluator import Evaluator
 from .proposals import SPREAD, Point, spread
 from .space import Interval, read_space
-from .spec import Match, SearchSpec
+from .spec import Match, SearchSpec, results_folder
 
 if TYPE_CHECKING:
     import numpy as np
@@ -42,7 +42,7 @@ _BLIND = 1e-7  # of the largest singular value: below it, the data do not tell a
 def calibrate(
     spec: SearchSpec,
     goal: Match,
-    folder: Path | None,
+    out: Path | None = None,
     *,
     jobs: int | None = None,
     tell: Callable[[int], None] = lambda runs: None,
@@ -53,9 +53,12 @@ def calibrate(
     runs were made.  Raises ``EpicycleError``.
     """
     task = _Task(spec, goal)
+    folder = out or results_folder(task.model.name, "calibration")
     cache = EvaluationCache(task.model, task.about(), [NUMBER], folder)
     with Evaluator(_Worker(task), jobs or available_cores(), _worker_of, spec, goal) as evaluator:
-        return _fitted(_Runs(task, evaluator, cache, tell))
+        found = _fitted(_Runs(task, evaluator, cache, tell))
+    found.folder = folder
+    return found
 
 
 def _fitted(runs: _Runs) -> Calibration:

@@ -23,7 +23,7 @@ from .growing import Growing, place_of, text_of
 from .monitored import AD_HOC, monitors_named, property_of
 from .proposals import Point, is_guided, proposals
 from .space import read_space
-from .spec import MAX_RUNS, Break, SearchSpec
+from .spec import MAX_RUNS, Break, SearchSpec, results_folder
 
 FILE = Path("falsify")  # what the study of a search has for a file, so that paths are relative to the working directory
 MAX_POINTS = 150_000  # numbers in the text of a study, which is read with limits
@@ -32,7 +32,7 @@ MAX_POINTS = 150_000  # numbers in the text of a study, which is read with limit
 def falsify(
     spec: SearchSpec,
     goal: Break,
-    folder: Path,
+    out: Path | None = None,
     *,
     jobs: int | None = None,
     timeout: float | None = None,
@@ -43,8 +43,9 @@ def falsify(
     Runs that are in the folder already are not made again, so that a search that was killed continues.  ``tell`` is
     called with how many there are, and the one of least robustness.  Raises ``EpicycleError``.
     """
-    searching = _Searching(spec, goal, folder)
+    searching = _Searching(spec, goal)
     found, growing = searching.found, searching.growing
+    found.folder = folder = out or results_folder(found.model, "falsification")
     points = searching.next()
     growing.add(points)
     with open_search_runs(growing.whole(), folder, jobs or available_cores(), timeout) as made:
@@ -62,7 +63,7 @@ def falsify(
 class _Searching:
     """What is chosen, batch by batch, and what came of it."""
 
-    def __init__(self, spec: SearchSpec, goal: Break, folder: Path) -> None:
+    def __init__(self, spec: SearchSpec, goal: Break) -> None:
         self._spec, self._goal, self._seed = spec, goal, spec.seed or 0
         if not 0 < goal.runs <= MAX_RUNS:
             raise EpicycleError(f"runs {goal.runs:,}: expected a whole number from 1 to {MAX_RUNS:,}")
@@ -90,7 +91,6 @@ class _Searching:
         self.growing = Growing(study, keys, searched, Search(runs=goal.runs, command=list(spec.command)))
         guided = is_guided() and space.has_ranges
         self.found = Falsification(spec, goal, model.name, monitors, searched, guided)
-        self.found.folder = folder
         self._proposals = (
             searched.proposals(self._seed)
             if isinstance(searched, FaultSpace)

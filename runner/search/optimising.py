@@ -26,7 +26,7 @@ from .growing import Growing, place_of, text_of
 from .optimum import Optimum, Outcome, Tested
 from .proposals import Point, is_guided, proposals
 from .space import read_space
-from .spec import Maximise, Minimise, SearchSpec
+from .spec import Maximise, Minimise, SearchSpec, results_folder
 
 FILE = Path("optimise")  # the file of the study of a search over a model: paths are relative to the working directory
 _SHARED = 0.05  # of the runs may be without a number
@@ -36,7 +36,7 @@ _TOGETHER = 8  # points that are chosen together when the search is guided; more
 def optimise(
     spec: SearchSpec,
     goal: Minimise,
-    folder: Path,
+    out: Path | None = None,
     *,
     jobs: int | None = None,
     timeout: float | None = None,
@@ -47,8 +47,9 @@ def optimise(
     Runs that are in the folder already are not made again, so that a search that was killed continues.  ``tell`` is
     called after each batch.  Raises ``EpicycleError``.
     """
-    work = _Optimising(spec, goal, folder)
+    work = _Optimising(spec, goal)
     found = work.found
+    found.folder = folder = out or results_folder(work.name, "optimisation")
     chosen = proposals(found.space.widths, work.seed, found.guided, _TOGETHER)
     points = next(chosen)[: goal.points]
     work.growing.add(points)
@@ -68,7 +69,7 @@ def optimise(
 
 
 class _Optimising:
-    def __init__(self, spec: SearchSpec, goal: Minimise, folder: Path) -> None:
+    def __init__(self, spec: SearchSpec, goal: Minimise) -> None:
         keys, path = _keys_of(spec)
         study = study_of_text(text_of(keys, []), path, spec.set, spec.types, goal.replications, spec.seed)
         aspects, without_aspects = tuple(spec.aspects), tuple(spec.without_aspects)
@@ -77,7 +78,9 @@ class _Optimising:
         problems = Problems()
         metrics = [metric.name for metric in base.metrics]
         taken = (*metrics, *study.factors)
-        space = read_space(spec.vary, base.load(base.condition(0)), taken, spec.set, problems)
+        model = base.load(base.condition(0))
+        self.name = model.name if path == FILE else study.name
+        space = read_space(spec.vary, model, taken, spec.set, problems)
         problems.raise_if_any()
         if not space.axes:
             raise EpicycleError("there is nothing to vary\n   help: add --vary load=0.5..0.9")
@@ -94,7 +97,6 @@ class _Optimising:
         self.growing = Growing(study, keys, space, Search(runs=runs, command=list(spec.command)))
         guided = is_guided() and space.has_ranges
         self.found = Optimum(goal, space, guided)
-        self.found.folder = folder
 
     @property
     def seed(self) -> int:

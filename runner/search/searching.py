@@ -21,9 +21,12 @@ Show = Callable[[float, float | None, str], None]
 
 
 def found(
-    spec: SearchSpec, goal: Goal, folder: Path, *, jobs: int | None, timeout: float | None, show: Show | None
+    spec: SearchSpec, goal: Goal, out: Path | None, *, jobs: int | None, timeout: float | None, show: Show | None
 ) -> Falsification | Optimum | Calibration:
-    """What a search finds; ``show`` is told how far it has come."""
+    """What a search finds; ``show`` is told how far it has come.
+
+    It is kept in ``out``, by default in the folder of results of the model, or of the study.
+    """
     show = show or _nobody
     if isinstance(goal, Break):
 
@@ -31,17 +34,17 @@ def found(
             known = "" if least is None else f", least robustness {short(least.robustness)}"
             show(float(runs), float(goal.runs), f"{runs:,} runs{known}")
 
-        return falsify(spec, goal, folder, jobs=jobs, timeout=timeout, tell=tell_runs)
+        return falsify(spec, goal, out, jobs=jobs, timeout=timeout, tell=tell_runs)
     if isinstance(goal, Match):
         if timeout is not None:
             raise EpicycleError("--run-timeout is not for --match, which needs every run")
-        return calibrate(spec, goal, folder, jobs=jobs, tell=lambda runs: show(float(runs), None, f"{runs:,} runs"))
+        return calibrate(spec, goal, out, jobs=jobs, tell=lambda runs: show(float(runs), None, f"{runs:,} runs"))
 
     def tell_best(optimum: Optimum) -> None:
         known = "" if optimum.value is None else f", best {with_interval(optimum.value)}"
         show(float(len(optimum.tested)), float(goal.points), f"{len(optimum.tested):,} points{known}")
 
-    return optimise(spec, goal, folder, jobs=jobs, timeout=timeout, tell=tell_best)
+    return optimise(spec, goal, out, jobs=jobs, timeout=timeout, tell=tell_best)
 
 
 def _nobody(done: float, total: float | None, words: str) -> None:

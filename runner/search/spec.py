@@ -7,6 +7,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
+from epicycle.actors import abridged
+
 from ..support.declare.parameters import COUNT, option, repeated, whole
 
 if TYPE_CHECKING:
@@ -105,6 +107,13 @@ class Match:
 
 
 Goal = Break | Minimise | Match
+
+
+def results_folder(name: str, kind: str = "") -> Path:
+    """Where results of a model or study of that name are kept by default."""
+    return Path("results") / abridged(name, 60) / kind
+
+
 GOALS: tuple[type[Break | Minimise | Match], ...] = (Break, Minimise, Maximise, Match)
 
 

@@ -16,6 +16,7 @@ import hashlib
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -36,6 +37,8 @@ SHARE = 0.2  # of the runs that should get from one level to the next: few level
 ENOUGH = 0.1  # of the runs from a level that break the property: it needs no further level
 MOST = 100  # levels
 CONFIDENCE = 0.95
+_WHOLE, _LEVELS = "whole", "levels"  # what is asked for besides repetitions
+_PARTS = 20  # in which whole runs are made
 
 
 @dataclass(repr=False)
@@ -213,16 +216,18 @@ class _Branches:
             )
         return _Branch(simulation.robustness(self.guide) if verdict.holds else -math.inf, None, tags)
 
-    def levels(self) -> tuple[list[float], float]:
-        """Levels of which each is reached by about a fifth of the branches from the one before; the tags of a run."""
+    def levels(self, first: Sequence[float]) -> list[float]:
+        """Levels of which each is reached by about a fifth of the branches from the one before.
+
+        ``first`` is how far whole runs come.
+        """
         levels: list[float] = []
-        origins, tags = None, 0.0
+        origins: list[_Branch] | None = None
         while len(levels) < MOST:
             key = f"levels {len(levels)}"
-            branches = self.from_level(origins, None, key)
-            if origins is None:
-                tags = self.tags / self.runs
-            reached = sorted(branch.reached for branch in branches)
+            reached = sorted(
+                first if origins is None else (branch.reached for branch in self.from_level(origins, None, key))
+            )
             level = reached[math.ceil(SHARE * self.runs) - 1]
             if level == reached[-1]:  # which all of them reach: the next one that some do
                 level = max((each for each in reached if each < level), default=-math.inf)
@@ -230,7 +235,11 @@ class _Branches:
                 break
             levels.append(level)
             origins = [branch for branch in self.from_level(origins, level, key) if branch.reached <= level]
-        return levels, tags
+        return levels
+
+    def whole(self, numbers: Sequence[int]) -> list[float]:
+        """How far some of the runs come that the levels are found by."""
+        return [self._branch(None, None, f"levels 0 {number}").reached for number in numbers]
 
     def spent(self) -> tuple[int, int]:
         """How many runs have been made since this was asked last, and how many tags they took."""
@@ -253,11 +262,15 @@ class _Branches:
     def prepare(self, request: object) -> None:
         """There is nothing to load."""
 
-    def make(self, request: tuple[str, Sequence[float] | None]) -> list[Any]:
-        """A repetition over these levels, or the levels; and the runs and tags that it took."""
-        key, levels = request
-        found = self.levels() if levels is None else (self.shares(levels, key), 0)
-        return [*found, *self.spent()]
+    def make(self, request: tuple[str, Sequence[Any]]) -> list[Any]:
+        """What the request is for, some whole runs, the levels or a repetition; and the runs and tags that it took."""
+        key, given = request
+        made: Sequence[float]
+        if key == _WHOLE:
+            made = self.whole(given)
+        else:
+            made = self.levels(given) if key == _LEVELS else self.shares(given, key)
+        return [made, *self.spent()]
 
 
 def _branches_of(recipe: Recipe, *others: Any) -> _Branches:
@@ -303,17 +316,32 @@ def rare(
     here = _Branches(model, *others)
     with Evaluator(here, jobs_for(model, jobs), _branches_of, Recipe.of(model), *others) as evaluator:
 
-        def outcome(key: str, levels: Sequence[float] | None) -> list[Any]:
-            made: list[Any] = cache.outcome(key, lambda: evaluator.make(key, (key, levels)))
-            return made
+        def levels_found() -> list[Any]:
+            """The levels, and what they took; whole runs, which are half of it, are made in parts."""
+            size = -(-runs // _PARTS)
+            parts = [range(start, min(start + size, runs)) for start in range(0, runs, size)]
+            evaluator.expect((part[0], (_WHOLE, part)) for part in parts)
+            first: list[float] = []
+            tags_of_whole = 0
+            for part in parts:
+                reached, _, took = evaluator.make(part[0], (_WHOLE, part))
+                first += reached
+                tags_of_whole += took
+            levels, made, tags = evaluator.make(_LEVELS, (_LEVELS, first))
+            return [levels, tags_of_whole / runs, runs + made, tags_of_whole + tags]
 
-        levels, tags_of_run, made, tags = outcome("levels", None)
+        levels, tags_of_run, made, tags = cache.outcome(_LEVELS, levels_found)
         keys = [f"repetition {number}" for number in range(repetitions)]
         evaluator.expect((key, (key, levels)) for key in keys if key not in cache)
+
+        def repetition(key: str) -> list[Any]:
+            shares, made, tags = evaluator.make(key, (key, levels))
+            return [shares, 0, made, tags]
+
         for key in keys:
             if tell is not None:
                 tell(made, len(found))
-            shares, _, more, tags_more = outcome(key, levels)
+            shares, _, more, tags_more = cache.outcome(key, partial(repetition, key))
             found.append(shares)
             made, tags = made + more, tags + tags_more
     source = known[monitor]

@@ -21,7 +21,7 @@ from ..model.graph.woven import extent
 from ..study.provenance import versions
 from ..support.printing import columns
 from ..support.shown import finite, in_time, in_words
-from .pen import FigureError, draw
+from .canvas import FigureError, draw
 
 MAX_NAME = 60  # characters of a file name; file systems limit it
 WIDEST = 400  # characters of a text in the table
@@ -67,7 +67,7 @@ def summary_table(model: Model, results: Results) -> Group:
             where = f"by {woven.kind} at {extent([woven])}"
             rows.append((f"{name}: {what}", shown(figure), woven.aspect.reports.get(what, ""), where))
     rows += [
-        ("events", f"{results.events}", "", "sends and acts of aspects in the event log"),
+        ("events", f"{results.events}", "", "sends and events of aspects in the event log"),
         ("firings", f"{results.firings}", "", "of actors"),
         ("wall time", f"{results.wall_time:.3f}", "s", "of initialisation and run"),
         ("digest", results.digest[:16] + "...", "", "SHA-256 of the event log, shortened"),

@@ -20,9 +20,9 @@ from ..study.judge.study_results import StudyResults
 from ..study.session import available_cores
 from ..support.html import Html, tag
 from ..support.printing import complain
+from .canvas import draw as draw_figure
 from .figures import TimeSeries
 from .outcome import check_folder, draw_figures, write_folder
-from .pen import draw as draw_figure
 from .report import write_report
 
 

@@ -13,7 +13,7 @@ from xml.sax.saxutils import escape
 
 from epicycle.actors import EpicycleError, abridged, shortened, visible_lines
 
-from .pen import new_canvas, save
+from .canvas import new_canvas, save
 
 # Okabe and Ito, Color Universal Design, 2008; with markers and dashes, so that lines differ in print, too.
 PALETTE = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000", "#7f7f7f")

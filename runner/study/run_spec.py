@@ -27,7 +27,7 @@ FLAGS: Final = {
     "until": "--until",
 }  # fmt: skip
 
-_UNFIT: Final = (OSError, ValueError, LookupError, TypeError, RecursionError)
+_MALFORMED: Final = (OSError, ValueError, LookupError, TypeError, RecursionError)
 
 
 @dataclass(frozen=True)
@@ -213,7 +213,7 @@ def _of_folder(folder: Path) -> tuple[RunSpec, str]:
         command = shlex.join(map(str, manifest["command"]))
     except FileNotFoundError:
         raise EpicycleError(f"{folder} holds no results of a run: it has no manifest.json") from None
-    except _UNFIT as error:
+    except _MALFORMED as error:
         raise EpicycleError(f"{path} is not the manifest of a run: {error}") from None
     raise EpicycleError(
         f"{path} does not say how to make the run again: '{command}' was made by another version, or from a model that "
@@ -231,7 +231,7 @@ def _manifest(path: Path) -> dict[str, Any]:
 def _is_study(folder: Path) -> bool:
     try:
         return "study" in _manifest(folder / "manifest.json")
-    except _UNFIT:
+    except _MALFORMED:
         return False
 
 

@@ -1,4 +1,4 @@
-"""Trials: runs of a search, which chooses batch by batch what it runs, in the results folder of a study."""
+"""Runs of a search, which chooses batch by batch what it runs, in the results folder of a study."""
 
 from __future__ import annotations
 
@@ -28,23 +28,23 @@ class _SearchTask(Task):
 
 
 class _Worker:
-    """Makes the trials of one plan after the other."""
+    """Makes the runs of one plan after the other."""
 
     def __init__(self) -> None:
         self._batch = 0
         self._runner: Runner | None = None
 
-    def prepare(self, trial: _SearchTask) -> None:
-        """Load the model of the trial's condition, unless it is there."""
-        self._of(trial).prepare(trial)
+    def prepare(self, task: _SearchTask) -> None:
+        """Load the model of the run's condition, unless it is there."""
+        self._of(task).prepare(task)
 
-    def make(self, trial: _SearchTask) -> Row:
+    def make(self, task: _SearchTask) -> Row:
         """The row of a run."""
-        return self._of(trial).make(trial)
+        return self._of(task).make(task)
 
-    def _of(self, trial: _SearchTask) -> Runner:
-        if self._runner is None or trial.batch != self._batch:
-            self._runner, self._batch = Runner(trial.plan), trial.batch
+    def _of(self, task: _SearchTask) -> Runner:
+        if self._runner is None or task.batch != self._batch:
+            self._runner, self._batch = Runner(task.plan), task.batch
         return self._runner
 
 

@@ -30,7 +30,7 @@ def test_a_repeat_without_end() -> None:
         "actors:\n  c: {type: Const, value: 1}\n  p: {type: Repeat, times: 1000000000}\n  r: {type: Recorder}\n"
         "connections: [c.output -> p.input, p.output -> r.input]\n"
     )
-    most = "more than 10,000 tokens and acts of aspects, most of them at p.output, r.input"
+    most = "more than 10,000 tokens and events of aspects, most of them at p.output, r.input"
     assert told == f"too much at (0 s, 1): {most}; {RAISE_IT}"
 
 
@@ -39,7 +39,7 @@ def test_repeats_that_double_at_each_step() -> None:
         "actors:\n  c: {type: Clock, period: 1}\n  p: {type: Repeat, count: 40}\n  r: {type: Recorder}\n"
         "connections: ['c.output -> p[0].input', 'p[..-2].output -> p[1..].input', 'p[-1].output -> r.input']\n"
     )
-    most = "more than 10,000 tokens and acts of aspects, most of them at p[12].output, p[12].input, p[11].input"
+    most = "more than 10,000 tokens and events of aspects, most of them at p[12].output, p[12].input, p[11].input"
     assert told == f"too much at (0 s, 1): {most}; {RAISE_IT}"
 
 

@@ -14,7 +14,7 @@ from PIL import Image
 from epicycle.actors import Actor, CircularMotion, Clock, InputPort, OutputPort
 from epicycle.runner import Model, Results, Simulation
 from epicycle.runner.show import FigureError, Histogram, TimeSeries, Trajectories, draw
-from epicycle.runner.show.pen import style
+from epicycle.runner.show.canvas import style
 from epicycle.runner.show.sheet import FEW, MAX_TIPS, PALETTE, Sheet, tips_of
 
 HOSTILE = '<script>alert(1)</script> & "]]>" \'--> \x1b\u202e'

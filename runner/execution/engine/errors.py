@@ -91,7 +91,7 @@ class Crowd:
         self._by_port[port] = self._by_port.get(port, 0) + number
         if self._total > self.most:
             ports = sorted(self._by_port, key=self._by_port.__getitem__, reverse=True)
-            raise CrowdError(tag, self.most, "tokens and acts of aspects", tuple(ports[:SHOWN]))
+            raise CrowdError(tag, self.most, "tokens and events of aspects", tuple(ports[:SHOWN]))
 
 
 def of_process(error: BaseException, actors: Iterable[Actor], tag: Tag) -> tuple[ActorError, BaseException | None]:

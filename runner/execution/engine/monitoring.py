@@ -15,10 +15,10 @@ from ...model.temporal import (
     LINEAR,
     TINY,
     Condition,
-    Finding,
-    Judge,
     Line,
     Piece,
+    PropertyMonitor,
+    PropertyVerdict,
     Source,
     leaves,
     looks_ahead,
@@ -102,25 +102,38 @@ class _Pulse:
 
 
 class PartMonitoring:
-    """Judges what the ports of a part of a monitor send.
+    """Watches what the ports of a part of a monitor send.
 
     A tag has as many samples as the port that sends most has tokens there: the first of each port, the second, and so
     on; a port that sends fewer stays at its last.
     """
 
     __slots__ = (
-        "_conditions", "_finding", "_is_late", "_judge", "_latest", "_listening", "_microstep", "_missing", "_moment",
-        "_past", "_sent", "_time", "_values", "monitor", "part",
+        "_conditions",
+        "_is_late",
+        "_latest",
+        "_listening",
+        "_microstep",
+        "_missing",
+        "_moment",
+        "_monitor",
+        "_past",
+        "_sent",
+        "_time",
+        "_values",
+        "_verdict",
+        "monitor",
+        "part",
     )  # fmt: skip
 
     def __init__(self, monitor: Monitor, part: Part) -> None:
         self.monitor = monitor
         self.part = part
-        self._judge = Judge(part.tree)
+        self._monitor = PropertyMonitor(part.tree)
         linear = monitor.requirement.between == LINEAR
         self._conditions: list[_Margin | _Pulse] = [
             _Margin(each, readings, source, linear) if isinstance(each, Condition) else _Pulse(source)
-            for each, readings, source in zip(leaves(part.tree), part.readings, self._judge.sources, strict=True)
+            for each, readings, source in zip(leaves(part.tree), part.readings, self._monitor.sources, strict=True)
         ]
         self._listening: dict[str, list[_Margin | _Pulse]] = {port: [] for port in part.ports}
         for condition, readings in zip(self._conditions, part.readings, strict=True):
@@ -131,7 +144,7 @@ class PartMonitoring:
         self._microstep = 0
         self._moment = 0  # of the next sample
         self._sent: dict[str, list[Any]] = {}  # at the present tag
-        self._finding = Finding()
+        self._verdict = PropertyVerdict()
         self._missing = ""  # why it cannot be judged
         self._is_late = looks_ahead(part.tree) or linear  # a break may be found out later than it happens
         self._past: Past[tuple[int, dict[str, Any]]] = Past()
@@ -140,12 +153,12 @@ class PartMonitoring:
     @property
     def is_broken(self) -> bool:
         """Whether it is certain that the run does not have the property."""
-        return self._finding.holds is False
+        return self._verdict.holds is False
 
     @property
     def most(self) -> float:
         """What its robustness is at most, by all that is settled; infinity if nothing is certain yet."""
-        return self.monitor.in_unit(self._judge.most)
+        return self.monitor.in_unit(self._monitor.most)
 
     def add(self, port: str, tag: Moment, token: Any) -> None:
         """Take in what a port sends at a tag."""
@@ -163,7 +176,7 @@ class PartMonitoring:
             self._time = upcoming
 
     def _sample_tag(self, upcoming: int | None) -> None:
-        """Judge the samples of a tag; the last stands until a moment, or the next of the instant (None)."""
+        """Take in the samples of a tag; the last stands until a moment, or the next of the instant (None)."""
         sent, self._sent = self._sent, {}
         count = max(map(len, sent.values()), default=1)
         for number in range(count):
@@ -193,9 +206,9 @@ class PartMonitoring:
 
     def _find(self, over: bool) -> None:
         was_broken = self.is_broken
-        self._finding = self._judge.finding(over)
-        if self.is_broken and not was_broken and self._finding.moment is not None:
-            self._values = self._at(self._finding.moment)
+        self._verdict = self._monitor.verdict(over)
+        if self.is_broken and not was_broken and self._verdict.moment is not None:
+            self._values = self._at(self._verdict.moment)
 
     def _at(self, moment: int) -> dict[str, Any]:
         """What the conditions asked for at a moment, if that is still known."""
@@ -217,7 +230,7 @@ class PartMonitoring:
         for each in self._conditions:
             each.close(moment(end + 1))
         self._find(over=True)
-        found, margin = self._finding, self._finding.robustness
+        found, margin = self._verdict, self._verdict.robustness
         if margin is not None:
             margin = 0.0 if abs(margin) == TINY else self.monitor.in_unit(margin)
         time = None if found.moment is None else to_seconds(time_of(found.moment))

@@ -144,7 +144,7 @@ def make_server(call: LimitedCall, version: str) -> MCPServer:
         change: Annotated[dict[str, Any], Field(description="new values of parameters, by path")] = {},  # noqa: B006
         remove: Annotated[list[str], Field(description="aspects that end")] = [],  # noqa: B006
         let_through: Annotated[
-            list[str], Field(description="ASPECT or ASPECT@PLACE: its next act does not happen")
+            list[str], Field(description="ASPECT or ASPECT@PLACE: its next fault does not happen")
         ] = [],  # noqa: B006
         lose: Annotated[list[str], Field(description="ports whose next token is lost")] = [],  # noqa: B006
         changes: Changes | None = None,

@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypedDict, Unpack, overload
 
-from ...search.spec import Break, Goal, Match, Minimise, SearchSpec
+from ...search.spec import Break, Goal, Match, Minimise, SearchSpec, results_folder
 from ...support.declare.parameters import COUNT, argument, option, repeated
 from .changes import (
     ASPECTS,
@@ -39,20 +39,13 @@ def _out(kind: str) -> Any:
     return option(f"folder for what is found (default: results/MODEL/{kind})", "DIR", Path)
 
 
-def folder_of(name: str, kind: str) -> Path:
-    """Where what is found of a model is kept by default."""
-    from epicycle.actors import abridged
-
-    return Path("results") / abridged(name, 60) / kind
-
-
 def folder_for(models: Sequence[Model], out: str | Path | None, kind: str) -> Path | None:
     """Where runs of models are noted: by default only if they can be told from those of others."""
     if out is not None:
         return Path(out)
     if not models or any(model.origin is None for model in models):
         return None
-    return folder_of(models[0].name, kind)
+    return results_folder(models[0].name, kind)
 
 
 class SearchOptions(TypedDict, total=False):
@@ -133,13 +126,10 @@ def search(
         tuple(map(Path, given.get("types", ()))),
         tuple(command),
     )
-    kind = {Break: "falsification", Match: "calibration"}.get(type(goal), "optimisation")
-    folder = folder_of(Path(model).stem, kind) if out is None else Path(out)
+    folder = None if out is None else Path(out)
     with bar("search") as show:
         seen = show if given.get("progress", True) else None
-        answer = found(spec, goal, folder, jobs=given.get("jobs"), timeout=given.get("run_timeout"), show=seen)
-    answer.folder = folder
-    return answer
+        return found(spec, goal, folder, jobs=given.get("jobs"), timeout=given.get("run_timeout"), show=seen)
 
 
 def explain(

@@ -127,6 +127,7 @@ def plan_of(
     from ...model.language.study import read_study, study_of_text
     from ...model.text.document import plain
     from ...model.text.program import call_site, node_of
+    from ...search.spec import results_folder
     from ...show.report import check_figures
     from ...study.plan.plan import Plan
     from ...study.run.manifest import StoreError
@@ -150,7 +151,7 @@ def plan_of(
         found = read_study(study, set=settings, types=files, replications=replications, seed=seed)
     plan = Plan.made(found)
     check_figures(plan)
-    return plan, Path("results") / plan.study.name if out is None else Path(out)
+    return plan, results_folder(plan.study.name) if out is None else Path(out)
 
 
 def compare(

@@ -118,10 +118,11 @@ def run(options: argparse.Namespace) -> int:
 
 
 def _folder_of(model: Model) -> Path:
+    from ...search.spec import results_folder
     from ...study.run_spec import spec_of
 
     spec = spec_of(model, None, None)
-    return Path(spec.study) / "replays" / spec.run if spec and spec.study else Path("results") / model.name
+    return Path(spec.study) / "replays" / spec.run if spec and spec.study else results_folder(model.name)
 
 
 @command(
@@ -146,6 +147,7 @@ def view(options: argparse.Namespace) -> int:
     """
     from epicycle.actors import EpicycleError
 
+    from ...search.spec import results_folder
     from ...show.view.pages import recorded
 
     if len(options.models) > 2:
@@ -167,7 +169,7 @@ def view(options: argparse.Namespace) -> int:
         tell(f"wrote {path}")
     page = options.out
     if page is None and not exports:
-        page = Path("results") / made.recordings[0].model.name / "view.html"
+        page = results_folder(made.recordings[0].model.name) / "view.html"
         page.parent.mkdir(parents=True, exist_ok=True)
     if page is not None:
         made.save(page)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import TypedDict, Unpack
 
 from epicycle.actors import counted_in_si, plain
 
@@ -37,17 +38,19 @@ from .untried import try_classes
 from .weave_all import weave_all
 
 
-def load_model(
-    name: str | Path,
-    *,
-    set: Iterable[str | Setting] | Mapping[str, object] = (),
-    overrides: str | Path | Iterable[str | Path] = (),
-    aspects: Iterable[str] = (),
-    without_aspects: Iterable[str] = (),
-    disturb: str | Path | Iterable[str | Path] = (),
-    types: Iterable[type] = (),
-    max_actors: int = NORMAL.actors,
-) -> Model:
+class ModelChanges(TypedDict, total=False):
+    """What a model may be changed by while it is loaded."""
+
+    set: Iterable[str | Setting] | Mapping[str, object]
+    overrides: str | Path | Iterable[str | Path]
+    aspects: Iterable[str]
+    without_aspects: Iterable[str]
+    disturb: str | Path | Iterable[str | Path]
+    types: Iterable[type]
+    max_actors: int
+
+
+def load_model(name: str | Path, **changes: Unpack[ModelChanges]) -> Model:
     """Read, change and check a model; raises ``ModelError`` with everything that is wrong.
 
     ``set`` gives parameters their values, as texts like ``"observer[*].sensor.range=5 m"`` or as a mapping
@@ -59,17 +62,10 @@ def load_model(
     classes, which the model may name besides the installed ones. ``max_actors`` is the limit for actors and composites,
     and a fifth of the limit for connections.  ``Model.warnings`` holds what is odd but not wrong.
     """
+    if unknown := changes.keys() - ModelChanges.__annotations__.keys():
+        raise TypeError(f"load_model() got an unexpected keyword argument {min(unknown)!r}")
     loading = Loading()
-    loading.passes(
-        name,
-        set=set,
-        overrides=overrides,
-        aspects=aspects,
-        without_aspects=without_aspects,
-        disturb=disturb,
-        types=types,
-        max_actors=max_actors,
-    )
+    loading.passes(name, changes)
     loading.problems.raise_if_any()
     assert loading.model is not None, "what cannot be made is a problem"
     return loading.model
@@ -87,24 +83,15 @@ class Loading:
     known: PartTypes | None = None
     model: Model | None = None
 
-    def passes(
-        self,
-        name: str | Path,
-        *,
-        set: Iterable[str | Setting] | Mapping[str, object] = (),
-        overrides: str | Path | Iterable[str | Path] = (),
-        aspects: Iterable[str] = (),
-        without_aspects: Iterable[str] = (),
-        disturb: str | Path | Iterable[str | Path] = (),
-        types: Iterable[type] = (),
-        max_actors: int = NORMAL.actors,
-    ) -> None:
-        """Read, change and check a model, with the changes of ``load_model``."""
-        problems, limits, types = self.problems, Limits(max_actors), list(types)
+    def passes(self, name: str | Path, changes: ModelChanges) -> None:
+        """Read, change and check a model."""
+        problems, types = self.problems, list(changes.get("types", ()))
+        limits = Limits(changes.get("max_actors", NORMAL.actors))
+        aspects, without_aspects = list(changes.get("aspects", ())), list(changes.get("without_aspects", ()))
         with problems.looking_for(OUTSIDE):
-            settings = [each for file in _several(overrides) for each in read_overrides(Path(file), problems)]
-            settings += settings_of(set, problems)
-        changes = [*map("without {}".format, without_aspects := list(without_aspects)), *(aspects := list(aspects))]
+            files = _several(changes.get("overrides", ()))
+            settings = [each for file in files for each in read_overrides(Path(file), problems)]
+            settings += settings_of(changes.get("set", ()), problems)
         given = list(settings)
         with without_collection(), noting() as noted:
             # What the files declare.
@@ -112,7 +99,7 @@ class Loading:
             self.text = text
             catalogue = installed().with_types(types)
             with problems.looking_for(OUTSIDE):
-                disturbances = load_disturbances(map(str, _several(disturb)), problems)
+                disturbances = load_disturbances(map(str, _several(changes.get("disturb", ()))), problems)
                 for disturbance in disturbances:
                     declared = joined(declared, disturbance.composites, COMPOSITE_THERE, problems)
             with problems.looking_for(CLASS):
@@ -141,7 +128,8 @@ class Loading:
                     figures_of(self.model, problems)
             self.model.warnings = problems.warnings
             self.model.is_checked = not problems.found
-            self.model.origin = Origin(noted, given, changes, types)
+            said = [*map("without {}".format, without_aspects), *aspects]
+            self.model.origin = Origin(noted, given, said, types)
 
 
 def build(text: ModelText, known: PartTypes, resolver: ParameterResolver, limits: Limits, model: Model) -> None:

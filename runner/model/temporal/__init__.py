@@ -1,9 +1,10 @@
 """Properties over time: their text, and whether signals have them.
 
-``property_of`` reads one.  A ``Judge`` is given the signals of its conditions, and says whether it holds once it can.
+``property_of`` reads one.  A ``PropertyMonitor`` is given the signals of its conditions, and says whether it
+holds once it can.
 """
 
-from .judge import Finding, Judge
+from .monitor import PropertyMonitor, PropertyVerdict
 from .operators import Source
 from .property import Condition, Property, Sends, leaves, looks_ahead
 from .requirement import HOLD, LINEAR, Requirement, RequirementOptions
@@ -12,7 +13,7 @@ from .spread import Spread, spread_of
 from .syntax import WORDS, PropertyError, property_of
 
 __all__ = [
-    "HOLD", "LINEAR", "TINY", "WORDS", "Condition", "Finding", "Judge", "Line", "Piece", "Property", "PropertyError",
-    "Requirement", "RequirementOptions", "Sends", "Source", "Spread", "leaves", "looks_ahead", "moment", "property_of",
-    "spread_of", "time_of",
+    "HOLD", "LINEAR", "TINY", "WORDS", "Condition", "Line", "Piece", "Property", "PropertyError", "PropertyMonitor",
+    "PropertyVerdict", "Requirement", "RequirementOptions", "Sends", "Source", "Spread", "leaves", "looks_ahead",
+    "moment", "property_of", "spread_of", "time_of",
 ]  # fmt: skip

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from epicycle.actors import EpicycleError, did_you_mean
 
-from ..pen import new_canvas, save, style, text_width
+from ..canvas import new_canvas, save, style, text_width
 from .layout import MARGIN, Point, Words
 
 if TYPE_CHECKING:

@@ -11,15 +11,15 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
 
-from ..pen import text_width
+from ..canvas import text_width
 from .layers import Cell, Net, Pin, Run, layer, order
 from .outlines import Box, Link, Outline, Port, label
 from .places import Trunk, place, tracks
 
-NAME, KIND, PORT, PILL = 9.0, 7.5, 7.0, 6.5  # font sizes in points
+NAME, KIND, PORT, BADGE = 9.0, 7.5, 7.0, 6.5  # font sizes in points
 ROW = 14.0  # distance between ports of an actor
 HEADER, TITLE = 28.0, 20.0  # heights of the names of an actor and a composite
-PILL_HEIGHT, PILL_GAP = 12.0, 3.0
+BADGE_HEIGHT, BADGE_GAP = 12.0, 3.0
 HEAD = 9.0  # space for an arrowhead
 PADDING, TRACK = 10.0, 9.0  # beside and between the tracks of a channel
 MARGIN = 12.0
@@ -66,7 +66,7 @@ class Wire:
 
 
 @dataclass(frozen=True)
-class Pill:
+class Badge:
     """A badge on a line: an aspect where it is attached, or a connection's label with its delay (``aspect`` is "")."""
 
     text: str
@@ -78,7 +78,7 @@ class Pill:
 
     @property
     def width(self) -> float:
-        return pill_width(self.text)
+        return badge_width(self.text)
 
 
 @dataclass(frozen=True)
@@ -107,7 +107,7 @@ class Drawing:
     height: float = 0.0
     boxes: list[PlacedBox] = field(default_factory=list)
     wires: list[Wire] = field(default_factory=list)
-    pills: list[Pill] = field(default_factory=list)
+    badges: list[Badge] = field(default_factory=list)
     words: list[Words] = field(default_factory=list)
     cut: int = 0  # wires shown by names at their ends
 
@@ -127,8 +127,8 @@ def draw(outline: Outline, known: dict[str, Scope] | None = None) -> Drawing:
     return drawing
 
 
-def pill_width(words: str) -> float:
-    return text_width(words, PILL) + 8.0
+def badge_width(words: str) -> float:
+    return text_width(words, BADGE) + 8.0
 
 
 class Scope:
@@ -178,7 +178,7 @@ class Scope:
             groups.setdefault((link.source, label(link)), []).append(link)
         nets = {}
         for (source, words), links in groups.items():
-            size = (pill_width(words) + 8.0, PILL_HEIGHT) if words else None
+            size = (badge_width(words) + 8.0, BADGE_HEIGHT) if words else None
             nets[Net(self.pins[source], [self.pins[link.target] for link in links], size)] = links[0]
         return nets
 
@@ -201,7 +201,7 @@ class Scope:
         return [*((aspect, aspect) for aspect in self.ends[pin].aspects), *([] if flag is None else [(flag, "")])]
 
     def _badges_width(self, pin: Pin) -> float:
-        return sum(pill_width(text) + PILL_GAP for text, _ in self._badges(pin))
+        return sum(badge_width(text) + BADGE_GAP for text, _ in self._badges(pin))
 
     def _measure(self, child: Box, cell: Cell) -> None:
         """Set the size of a box and the positions of its ports; an open composite is laid out to do so."""
@@ -221,11 +221,11 @@ class Scope:
             for row, pin in enumerate(pins):
                 pin.offset = HEADER + ROW * row + ROW / 2
         rows = max(len(cell.left), len(cell.right))
-        hidden = max((pill_width(name) for name in child.aspects), default=0.0)
+        hidden = max((badge_width(name) for name in child.aspects), default=0.0)
         names = max(text_width(child.name, NAME, bold=True), text_width(child.kind, KIND))
         names += 16.0 if child.is_closed else 0.0  # beside the symbol of a closed one
         cell.width = max(names + 16.0, sum(widths) + 12.0 + (10.0 if all(widths) else 0.0), hidden + 16.0, 44.0)
-        cell.height = HEADER + ROW * rows + 3.0 + (PILL_HEIGHT + PILL_GAP) * len(child.aspects)
+        cell.height = HEADER + ROW * rows + 3.0 + (BADGE_HEIGHT + BADGE_GAP) * len(child.aspects)
 
     def _columns(self) -> float:
         """Set the positions of the layers and of the tracks between them; returns the total width."""
@@ -286,18 +286,18 @@ class Scope:
                     edge = left if side == "left" else left + cell.width
                     ports.append(PlacedPort(port, side, edge, at, port.path in joined))
                     start = (
-                        edge - HEAD - self._badges_width(pin) + PILL_GAP if side == "left" else edge + 4.0 + PILL_GAP
+                        edge - HEAD - self._badges_width(pin) + BADGE_GAP if side == "left" else edge + 4.0 + BADGE_GAP
                     )
                     for text, aspect in self._badges(pin):
-                        drawing.pills.append(Pill(text, aspect, start, at, place=port.path))
-                        start += pill_width(text) + PILL_GAP
+                        drawing.badges.append(Badge(text, aspect, start, at, place=port.path))
+                        start += badge_width(text) + BADGE_GAP
                     drawing.words.append(_port_name(ports[-1], child.is_open))
             drawing.words += self._names(child, left, upper, cell.width)
-            hidden = upper + cell.height - PILL_GAP - PILL_HEIGHT / 2
+            hidden = upper + cell.height - BADGE_GAP - BADGE_HEIGHT / 2
             for name in reversed(child.aspects):
-                middle = left + (cell.width - pill_width(name)) / 2
-                drawing.pills.append(Pill(name, name, middle, hidden, place=child.path))
-                hidden -= PILL_HEIGHT + PILL_GAP
+                middle = left + (cell.width - badge_width(name)) / 2
+                drawing.badges.append(Badge(name, name, middle, hidden, place=child.path))
+                hidden -= BADGE_HEIGHT + BADGE_GAP
             drawing.boxes.append(PlacedBox(child, left, upper, cell.width, cell.height, level, tuple(ports)))
             if child in self.inner:
                 self.inner[child].put(drawing, left, upper, level + 1)
@@ -309,7 +309,7 @@ class Scope:
                 begin, end = self.spans[cell.layer]
                 start = begin if cell.layer > net.source.cell.layer else end - cell.width
                 at = top + cell.y + cell.height / 2
-                drawing.pills.append(Pill(label(link), "", x + start + 4.0, at, delay=link.delay))
+                drawing.badges.append(Badge(label(link), "", x + start + 4.0, at, delay=link.delay))
 
     def _names(self, box: Box, x: float, y: float, width: float) -> list[Words]:
         """The name and type of a box: on one line above the inside of a composite, otherwise on two."""

@@ -17,8 +17,8 @@ import networkx as nx
 from epicycle.aspects import Processor
 
 from ...model.graph.woven import WovenAspect, extent
-from ..pen import font, new_canvas, save, style, text_width
-from .layout import MARGIN, PILL, PILL_HEIGHT, PORT, Drawing, Line, Pill, PlacedBox, Point, Wire, Words, pill_width
+from ..canvas import font, new_canvas, save, style, text_width
+from .layout import BADGE, BADGE_HEIGHT, MARGIN, PORT, Badge, Drawing, Line, PlacedBox, Point, Wire, Words, badge_width
 from .outlines import duration, shared, short_name
 
 INK, SOFT, FAINT = "#1a1a1a", "#5f6672", "#a9afb8"
@@ -48,7 +48,7 @@ def write_picture(drawing: Drawing, path: Path) -> None:
 
 def aspects_seen(drawing: Drawing) -> dict[str, list[WovenAspect]]:
     """The aspects whose badges are in a drawing, by name, in order of declaration."""
-    seen = {pill.aspect for pill in drawing.pills}
+    seen = {badge.aspect for badge in drawing.badges}
     found: dict[str, list[WovenAspect]] = {}
     for woven in drawing.outline.model.aspects:
         if (name := short_name(woven.name)) in seen:
@@ -66,27 +66,27 @@ class Row(NamedTuple):
     @property
     def indent(self) -> float:
         """Where the explanation starts, beside the sample."""
-        return 6.0 + (pill_width(self.words) if self.words else 14.0)
+        return 6.0 + (badge_width(self.words) if self.words else 14.0)
 
 
-def tied(drawing: Drawing) -> list[list[Pill]]:
+def tied(drawing: Drawing) -> list[list[Badge]]:
     """For each medium and processor that several places share, its badges."""
-    groups: dict[tuple[str, ...], list[Pill]] = {}
+    groups: dict[tuple[str, ...], list[Badge]] = {}
     for woven in drawing.outline.model.aspects:
         if key := shared(woven):
             places = [*woven.ports, *woven.actors]
             groups.setdefault(key, []).extend(
-                pill
-                for pill in drawing.pills
-                if pill.aspect == short_name(woven.name)
-                and any(place == pill.place or place.startswith(f"{pill.place}.") for place in places)
+                badge
+                for badge in drawing.badges
+                if badge.aspect == short_name(woven.name)
+                and any(place == badge.place or place.startswith(f"{badge.place}.") for place in places)
             )
     return [group for group in groups.values() if len(group) > 1]
 
 
-def ties(group: list[Pill]) -> Iterator[Line]:
+def ties(group: list[Badge]) -> Iterator[Line]:
     """Lines that join badges: each to the nearest earlier one, horizontally and then vertically."""
-    middles = sorted((pill.x + pill.width / 2, pill.y) for pill in group)
+    middles = sorted((badge.x + badge.width / 2, badge.y) for badge in group)
     for number, (x, y) in enumerate(middles[1:], start=1):
         other, level = min(middles[:number], key=lambda end: abs(end[0] - x) + abs(end[1] - y))
         yield ((other, level), (x, level), (x, y)) if other != x and level != y else ((other, level), (x, y))
@@ -99,7 +99,7 @@ def legend_of(drawing: Drawing, aspects: dict[str, list[WovenAspect]]) -> list[R
     for name, woven in aspects.items():
         kinds = ", ".join(dict.fromkeys(each.kind for each in woven))
         rows.append(Row("aspect", name, f"aspect {kinds}, at {extent(woven)}{_sharing(woven)}"))
-    delay = next((pill.delay for pill in drawing.pills if pill.delay is not None), None)
+    delay = next((badge.delay for badge in drawing.badges if badge.delay is not None), None)
     if delay is not None:
         rows.append(Row("label", duration(delay), "delay of a connection"))
     if drawing.cut:
@@ -148,8 +148,8 @@ class Painter:
         self.marks()
         for words in drawing.words:
             self.words(words)
-        for pill in drawing.pills:
-            self.pill(pill.text, pill.aspect, pill.x, pill.y)
+        for badge in drawing.badges:
+            self.badge(badge.text, badge.aspect, badge.x, badge.y)
         for number, row in enumerate(legend):
             self.row(row, MARGIN, drawing.height + MARGIN / 2 + LINE * (number + 0.5))
         self.marks()
@@ -231,12 +231,12 @@ class Painter:
             look |= {"linestyle": (0, dashes), "capstyle": "butt"} if dashes else {"capstyle": "round"}
             self.sheet.add_artist(self.shapes.PathPatch(Outline(corners, codes), **look))
 
-    def pill(self, words: str, aspect: str, x: float, y: float) -> None:
+    def badge(self, words: str, aspect: str, x: float, y: float) -> None:
         """A badge: coloured for an aspect, white for a label of the connection."""
-        fill, half, width = self.colours[aspect] if aspect else "white", PILL_HEIGHT / 2, pill_width(words)
-        self.rectangle(x, y - half, width, PILL_HEIGHT, fill, half, linewidth=0.6, zorder=4)
+        fill, half, width = self.colours[aspect] if aspect else "white", BADGE_HEIGHT / 2, badge_width(words)
+        self.rectangle(x, y - half, width, BADGE_HEIGHT, fill, half, linewidth=0.6, zorder=4)
         ink = "white" if fill in DARK else INK
-        self.words(Words(words, x + width / 2, y + 0.35 * PILL, PILL, align="center"), ink)
+        self.words(Words(words, x + width / 2, y + 0.35 * BADGE, BADGE, align="center"), ink)
 
     def words(self, words: Words, colour: str = "") -> None:
         look = {"color": colour or (SOFT if words.is_soft else INK), "ha": words.align, "va": "baseline", "zorder": 5}
@@ -254,7 +254,7 @@ class Painter:
         elif row.sample == "closed":
             self.closed(x + 3.0, middle - 3.5)
         else:
-            self.pill(row.words, row.words if row.sample == "aspect" else "", x, middle)
+            self.badge(row.words, row.words if row.sample == "aspect" else "", x, middle)
         self.words(Words(row.explanation, x + row.indent, middle + 0.35 * PORT, PORT))
 
 

@@ -18,8 +18,8 @@ from ...study.judge.study_results import StudyResults
 from ...study.run.runner import Replay, repeat
 from ...study.run.store import replace_file
 from ...study.session import plan_of_folder
+from ..canvas import FORMATS, FigureError, style
 from ..outcome import MAX_NAME
-from ..pen import FORMATS, FigureError, style
 from .data import Data
 from .declared import check_figures, figures_of_study, own_study_figures, study_figure_types
 from .figure import RunKey, SignalFigure, StudyFigure

@@ -31,7 +31,7 @@ from ...model.catalogue.figure import Figure
 from ...model.text.problems import Problems
 from ...study.inference import half_width
 from ...study.plan.plan import Plan
-from ..pen import FORMATS, draw
+from ..canvas import FORMATS, draw
 from ..samples import selected
 from ..sheet import colours, set_log, width_of
 from ..space import positions

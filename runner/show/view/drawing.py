@@ -47,8 +47,9 @@ def drawn(model: Model) -> dict[str, Any]:
             }
             for wire in drawing.wires
         ],
-        "pills": [
-            [pill.text, pill.aspect, *_rounded(pill.x, pill.y, pill.width), pill.place] for pill in drawing.pills
+        "badges": [
+            [badge.text, badge.aspect, *_rounded(badge.x, badge.y, badge.width), badge.place]
+            for badge in drawing.badges
         ],
     }
 

@@ -41,7 +41,7 @@ def words_of(drawing: Drawing) -> list[tuple[str, Rectangle]]:
     for each in drawing.words:
         left = each.x - {"left": 0.0, "center": 0.5, "right": 1.0}[each.align] * each.width
         found.append((each.text, (left, each.y - 0.75 * each.size, left + each.width, each.y + 0.2 * each.size)))
-    return found + [(each.text, (each.x, each.y - 6.0, each.x + each.width, each.y + 6.0)) for each in drawing.pills]
+    return found + [(each.text, (each.x, each.y - 6.0, each.x + each.width, each.y + 6.0)) for each in drawing.badges]
 
 
 def check(drawing: Drawing) -> None:
@@ -108,7 +108,7 @@ def check(drawing: Drawing) -> None:
     for text, place in texts[: len(drawing.words)]:
         for wire in drawing.wires:
             assert not any(meet(place, stroke, 0.0) for stroke in strokes(wire.lines)), (text, wire)
-    for pill, (_, place) in zip(drawing.pills, texts[len(drawing.words) :], strict=True):
+    for badge, (_, place) in zip(drawing.badges, texts[len(drawing.words) :], strict=True):
         for wire in drawing.wires:
             for stroke in strokes(wire.lines):
-                assert not meet(place, stroke, 0.0) or stroke[1] == stroke[3] == pill.y, (pill, wire)
+                assert not meet(place, stroke, 0.0) or stroke[1] == stroke[3] == badge.y, (badge, wire)

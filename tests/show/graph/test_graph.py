@@ -117,7 +117,7 @@ def test_number_of_connections_is_written_if_boxes_do_not_say_it(tmp_path: Path)
     for wiring, written in wirings.items():
         drawn = outline(small(tmp_path, too(wiring)))
         assert names(drawn) == ["clock: Clock", *ONE, "all: BroadcastChannel", "last: MostRecent"]
-        assert sorted(pill.text for pill in draw(drawn).pills if not pill.aspect) == sorted(["10 ms", written])
+        assert sorted(badge.text for badge in draw(drawn).badges if not badge.aspect) == sorted(["10 ms", written])
 
 
 BUS = """\
@@ -141,7 +141,7 @@ aspects:
 def test_places_that_share_a_medium_are_joined(tmp_path: Path) -> None:
     (tmp_path / "bus.yaml").write_text(BUS, encoding="utf-8")
     drawing = draw(outline(load_model(tmp_path / "bus.yaml"), expand=True))
-    groups = [[(pill.aspect, pill.place) for pill in group] for group in tied(drawing)]
+    groups = [[(badge.aspect, badge.place) for badge in group] for group in tied(drawing)]
     assert groups == [
         [("can", f"node[{n}].input") for n in range(3)],
         [("low", "other[0].input"), ("high", "other[1].input"), ("high", "other[2].input")],
@@ -149,29 +149,29 @@ def test_places_that_share_a_medium_are_joined(tmp_path: Path) -> None:
     ]
     for group in tied(drawing):  # each badge is reached by a line from another one
         lines = list(ties(group))
-        middles = [(pill.x + pill.width / 2, pill.y) for pill in group]
+        middles = [(badge.x + badge.width / 2, badge.y) for badge in group]
         assert len(lines) == len(group) - 1
         graph = nx.Graph((line[0], line[-1]) for line in lines)
         assert nx.is_connected(graph)
         assert {*graph} == {*middles}
     folded = draw(outline(load_model(tmp_path / "bus.yaml", without_aspects=["low", "high", "cpu"])))
     assert tied(folded) == []
-    assert sorted(pill.text for pill in folded.pills) == ["can", "each to all", "in pairs", "loss"]
+    assert sorted(badge.text for badge in folded.badges) == ["can", "each to all", "in pairs", "loss"]
     texts = [row.explanation for row in legend_of(folded, aspects_seen(folded))]
     assert texts[:2] == ["aspect Bus, at 3 ports, which share one medium", "aspect PacketLoss, at 3 ports"]
 
 
 def test_aspects_and_delays_are_written_where_they_are(tmp_path: Path) -> None:
     opened, closed = draw(outline(small(tmp_path))), draw(outline(small(tmp_path), depth=0))
-    assert sorted(pill.text for pill in opened.pills) == ["10 ms", "fault", "loss"]
-    assert sorted(pill.text for pill in closed.pills) == ["10 ms", "fault", "loss"]
+    assert sorted(badge.text for badge in opened.badges) == ["10 ms", "fault", "loss"]
+    assert sorted(badge.text for badge in closed.badges) == ["10 ms", "fault", "loss"]
     boxes = {placed.box.name: placed for placed in closed.boxes}
     cell, last = boxes["cell[0..2]"], boxes["last"]
-    pills = {pill.text: pill for pill in closed.pills}
-    assert cell.x < pills["fault"].x < cell.x + cell.width  # inside of the closed box
+    badges = {badge.text: badge for badge in closed.badges}
+    assert cell.x < badges["fault"].x < cell.x + cell.width  # inside of the closed box
     (entry,) = (port for port in last.ports if port.port.name == "input")
-    assert pills["loss"].y == entry.y
-    assert 0 < entry.x - (pills["loss"].x + pills["loss"].width) < 15
+    assert badges["loss"].y == entry.y
+    assert 0 < entry.x - (badges["loss"].x + badges["loss"].width) < 15
 
 
 MANY = [
@@ -201,12 +201,16 @@ def test_wires_that_could_not_be_followed_are_names(tmp_path: Path, monkeypatch:
     (tmp_path / "long.yaml").write_text(text, encoding="utf-8")
     drawn = outline(load_model(tmp_path / "long.yaml"))
     whole = draw(drawn)
-    assert (whole.cut, [pill.text for pill in whole.pills]) == (0, ["10 ms"])
+    assert (whole.cut, [badge.text for badge in whole.badges]) == (0, ["10 ms"])
     check(whole)
     monkeypatch.setattr(layers, "MOST_PASSES", 2)
     thin = draw(drawn)
     assert thin.cut == 1
-    assert sorted(pill.text for pill in thin.pills) == ["10 ms \u2192 2 inputs", "a1.output \u2192", "a1.output \u2192"]
+    assert sorted(each.text for each in thin.badges) == [
+        "10 ms \u2192 2 inputs",
+        "a1.output \u2192",
+        "a1.output \u2192",
+    ]
     (wire,) = (wire for wire in thin.wires if wire.source == "a1.output" and len(wire.targets) == 2)
     ports = {port.port.path: port for placed in thin.boxes for port in placed.ports}
     assert wire.lines == tuple(

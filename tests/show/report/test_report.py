@@ -18,7 +18,7 @@ from epicycle.runner.interface.cli import main
 from epicycle.runner.model.language.study import read_study
 from epicycle.runner.model.language.study_metric import StudyMetric
 from epicycle.runner.model.text.problems import Problems
-from epicycle.runner.show.pen import style
+from epicycle.runner.show.canvas import style
 from epicycle.runner.show.report import figures_of_study
 from epicycle.runner.show.report.data import Data
 from epicycle.runner.show.report.figure import Layout, roles

@@ -10,7 +10,7 @@ import pytest
 from epicycle.actors import EpicycleError, Fault
 from epicycle.runner import open_study
 from epicycle.runner.interface.cli import main
-from epicycle.runner.show.pen import style
+from epicycle.runner.show.canvas import style
 from epicycle.runner.show.report.data import Data, Names
 from epicycle.runner.show.report.of_table import Distributions, Means
 from epicycle.runner.show.sheet import FEW, Sheet

@@ -155,9 +155,9 @@ def test_clicks_on_aspects_select_what_they_did(wifi: Path, opened: Open) -> Non
     page.do("""
         state.setTime(2.45e9);
         const graph = views.graphs[0]; graph.shut.set("main", false); graph.paint();
-        const pill = graph.drawing.pills.find((each) => each[1] === "wifi_loss" && each[5] === "main.peer_plan");
+        const badge = graph.drawing.badges.find((each) => each[1] === "wifi_loss" && each[5] === "main.peer_plan");
         const {x, y, scale} = graph.camera;
-        graph.pick((pill[2] + 3 - x) * scale, (pill[3] - y) * scale);
+        graph.pick((badge[2] + 3 - x) * scale, (badge[3] - y) * scale);
     """)
     assert re.match(r"dropped by wifi_loss\nat main\.peer_plan, 2\.201 s\n", page.words())
     page.do("""

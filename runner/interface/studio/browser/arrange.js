@@ -280,7 +280,7 @@ class Studio {
   }
 }
 
-const EMPTY = { note: "", width: 300, height: 100, boxes: [], wires: [], pills: [] };
+const EMPTY = { note: "", width: 300, height: 100, boxes: [], wires: [], badges: [] };
 let link, studio;
 
 function begin() {

@@ -92,13 +92,13 @@ class Diagram extends Graph {
 
   pick(px, py) {
     const [x, y] = this.at(px, py);
-    const pill = this.drawing.pills.find(([, aspect, left, middle, width, place]) =>
+    const badge = this.drawing.badges.find(([, aspect, left, middle, width, place]) =>
       aspect && x >= left && x <= left + width && Math.abs(y - middle) < 7 && !this.cover(place));
     const boxes = this.drawing.boxes.filter(({ at: [left, top, width, height], path }) =>
       x >= left && y >= top && x <= left + width && y <= top + height && !this.cover(path));
-    const box = boxes.at(-1), wire = !pill && (!box || (box.composite && !this.isShut(box))) ? this.wireAt(px, py) : null;
+    const box = boxes.at(-1), wire = !badge && (!box || (box.composite && !this.isShut(box))) ? this.wireAt(px, py) : null;
     super.pick(px, py);
-    if (pill) this.chosen = { aspect: pill[1] };
+    if (badge) this.chosen = { aspect: badge[1] };
     else if (wire) {
       const ends = wire.targets.map((path) => [this.ports.get(wire.source), this.ports.get(path)]);
       this.chosen = { wire, ends: ends.filter(([one, other]) => one && other).map((pair) => pair.map((port) => this.pathOf(port))) };

@@ -26,7 +26,7 @@ class Graph extends View {
     }
     /** @type {Map<number, Route | null>} */
     this.routes = new Map();
-    const aspects = [...new Set(this.drawing.pills.map((pill) => pill[1]).filter(Boolean))];
+    const aspects = [...new Set(this.drawing.badges.map((badge) => badge[1]).filter(Boolean))];
     this.colours = new Map(aspects.map((name, i) => [name, PALETTE[(i + 1) % PALETTE.length]]));
     gestures(this.canvas, {
       move: (dx, dy) => {
@@ -104,7 +104,7 @@ class Graph extends View {
     for (const box of seen) this.box(paper, box);
     this.wires(paper);
     for (const box of seen) this.labels(box);
-    this.pills(paper);
+    this.badges(paper);
     this.tokens();
     paper.restore();
   }
@@ -253,7 +253,7 @@ class Graph extends View {
   }
 
   /** @param {Paper} paper */
-  pills(paper) {
+  badges(paper) {
     const { run, state } = this, last = state.tags[this.number], acts = new Map();
     const end = search(run.acts.length, (i) => run.record_tag[run.acts[i]] > last);
     for (let i = end - 1; i >= 0 && i > end - 500; i--) {
@@ -263,9 +263,9 @@ class Graph extends View {
       const before = acts.get(key);
       acts.set(key, { glow: Math.max(glow, before?.glow ?? 0), isLoss: run.isLoss.has(record) || before?.isLoss });
     }
-    for (const [words, aspect, x, y, width, place] of this.drawing.pills) {
+    for (const [words, aspect, x, y, width, place] of this.drawing.badges) {
       const owner = place.replace(/\.[^.]*$/, "");
-      if (!this.isSeen([x, y - 6, width, 12]) || (aspect ? this.cover(place) !== null : this.isPillHidden(x, y))) continue;
+      if (!this.isSeen([x, y - 6, width, 12]) || (aspect ? this.cover(place) !== null : this.isBadgeHidden(x, y))) continue;
       const act = aspect ? acts.get(`${aspect} ${place}`) : null, colour = this.colours.get(aspect);
       paper.beginPath();
       paper.roundRect(x, y - 6, width, 12, 6);
@@ -281,7 +281,7 @@ class Graph extends View {
   }
 
   /** @param {number} x @param {number} y */
-  isPillHidden(x, y) {
+  isBadgeHidden(x, y) {
     for (const box of this.drawing.boxes) {
       const [left, top, width, height] = box.at;
       if (this.isShut(box) && x > left && x < left + width && y > top && y < top + height) return true;
@@ -408,9 +408,9 @@ class Graph extends View {
   /** @param {number} px @param {number} py */
   pick(px, py) {
     const { camera, run, state } = this, x = px / camera.scale + camera.x, y = py / camera.scale + camera.y;
-    const pill = this.drawing.pills.find(([, aspect, left, middle, width, place]) =>
+    const badge = this.drawing.badges.find(([, aspect, left, middle, width, place]) =>
       aspect && x >= left && x <= left + width && Math.abs(y - middle) < 7 && !this.cover(place));
-    if (pill) return this.pickAct(pill[1], pill[5]);
+    if (badge) return this.pickAct(badge[1], badge[5]);
     const boxes = this.drawing.boxes.filter(({ at: [left, top, width, height], path }) =>
       x >= left && y >= top && x <= left + width && y <= top + height && !this.cover(path));
     const box = boxes.at(-1); // the innermost

@@ -5,7 +5,7 @@ const LANE = 46, ACTS = 17, RULER = 18, MODES = 8;
 class Lanes extends Timeline {
   /** @param {State} state */
   constructor(state) {
-    super(state, "Signals and acts of aspects over time");
+    super(state, "Signals and events of aspects over time");
     this.canvas.dataset.view = "lanes";
     this.names = [...new Set(state.runs.flatMap((run) => run.lanes.map((lane) => lane.name)))];
     const asked = state.runs[0].lanes.filter((lane) => lane.asked).map((lane) => lane.name);

@@ -76,7 +76,7 @@ interface ModelDrawing {
   height: number;
   boxes: Box[];
   wires: Wire[];
-  pills: Badge[];
+  badges: Badge[];
 }
 
 interface Monitor {

@@ -1,4 +1,4 @@
-"""Judges: whether a property holds from the beginning of a run, as soon as that is certain."""
+"""Monitors of properties: whether a property holds from the beginning of a run, as soon as that is certain."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from .property import Junction, Not, Property, Quantified, leaves
 from .signal import Line, Piece, at, by_sign, moment
 
 
-class Finding(NamedTuple):
+class PropertyVerdict(NamedTuple):
     """Whether a property holds (None if that cannot be told), by how much, and the moment at which it broke first."""
 
     holds: bool | None = None
@@ -19,7 +19,7 @@ class Finding(NamedTuple):
     moment: int | None = None
 
 
-class Judge:
+class PropertyMonitor:
     """Takes in the conditions of a property, as pieces of ``sources`` in their order."""
 
     __slots__ = ("_root", "sources")
@@ -28,13 +28,13 @@ class Judge:
         self.sources = [Source() for _ in leaves(tree)]
         self._root = _root(tree, iter(self.sources))
 
-    def finding(self, over: bool) -> Finding:
+    def verdict(self, over: bool) -> PropertyVerdict:
         """What is certain by now; with ``over``, nothing comes after this."""
-        return self._root.finding(over)
+        return self._root.verdict(over)
 
     @property
     def most(self) -> float:
-        """What the robustness is at most, by what is certain since the last ``finding``; infinity if nothing is."""
+        """What the robustness is at most, by what is certain since the last ``verdict``; infinity if nothing is."""
         return self._root.most
 
 
@@ -55,10 +55,10 @@ class _Throughout:
 
     @property
     def most(self) -> float:
-        """See ``Judge``; a later moment may still be the one that is awaited."""
+        """See ``PropertyMonitor``; a later moment may still be the one that is awaited."""
         return math.inf if self._any and not self._is_whole else self._extreme
 
-    def finding(self, over: bool) -> Finding:
+    def verdict(self, over: bool) -> PropertyVerdict:
         for piece in self._of.take(over):
             self._known = piece.end
             start = max(piece.start, self._start)
@@ -68,10 +68,10 @@ class _Throughout:
         is_decided = self._moment is not None
         self._is_whole = over if self._end is None else self._known >= self._end
         if not (is_decided or self._is_whole):
-            return Finding()
+            return PropertyVerdict()
         holds = self._any == is_decided
         when = self._moment if not self._any else self._known if self._end is None else self._end
-        return Finding(holds, self._extreme, None if holds else when)
+        return PropertyVerdict(holds, self._extreme, None if holds else when)
 
     def _add(self, start: int, end: int, value: float | Line) -> None:
         both = (self._extreme, at(value, start), at(value, end))
@@ -93,20 +93,20 @@ class _Both:
 
     @property
     def most(self) -> float:
-        """See ``Judge``."""
+        """See ``PropertyMonitor``."""
         both = self._left.most, self._right.most
         return max(both) if self._any else min(both)
 
-    def finding(self, over: bool) -> Finding:
-        both = self._left.finding(over), self._right.finding(over)
+    def verdict(self, over: bool) -> PropertyVerdict:
+        both = self._left.verdict(over), self._right.verdict(over)
         deciding = [each for each in both if each.holds == self._any]
         found = deciding or ([] if None in (both[0].holds, both[1].holds) else both)
         if not found:
-            return Finding()
+            return PropertyVerdict()
         margins = [each.robustness for each in found if each.robustness is not None]
         moments = [each.moment for each in found if each.moment is not None]
         when = None if not moments else max(moments) if self._any else min(moments)
-        return Finding(found[0].holds, max(margins) if self._any else min(margins), when)
+        return PropertyVerdict(found[0].holds, max(margins) if self._any else min(margins), when)
 
 
 class _Once:
@@ -120,19 +120,19 @@ class _Once:
 
     @property
     def most(self) -> float:
-        """See ``Judge``."""
+        """See ``PropertyMonitor``."""
         value = None if self._first is None else self._first.value
         return math.inf if value is None else at(value, 0)
 
-    def finding(self, over: bool) -> Finding:
+    def verdict(self, over: bool) -> PropertyVerdict:
         found = self._of.take(over)
         if found and self._first is None:
             self._first = found[0]
         value = None if self._first is None else self._first.value
         if value is None:
-            return Finding()
+            return PropertyVerdict()
         margin = at(value, 0)
-        return Finding(margin > 0.0, margin, None)
+        return PropertyVerdict(margin > 0.0, margin, None)
 
 
 _Root = _Throughout | _Both | _Once

@@ -1,4 +1,4 @@
-"""What a judge says of random properties and signals, against the definition and against another library."""
+"""What a monitor says of random properties and signals, against the definition and against another library."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from epicycle.runner.model.temporal import Finding, Judge, Piece, Property, Sends, leaves, moment
+from epicycle.runner.model.temporal import Piece, Property, PropertyMonitor, PropertyVerdict, Sends, leaves, moment
 from epicycle.runner.model.temporal.property import Junction, Not, Quantified, Until
 from tests.temporal.definition import random_property, random_signal, random_times, robustness, values_of
 
@@ -18,17 +18,17 @@ def step(start: int, end: int, value: float) -> Piece:
     return Piece(moment(start), moment(end + 1) - 1, value)
 
 
-def judged(tree: Property, signals: list[list[Piece]], draw: random.Random) -> Finding:
+def judged(tree: Property, signals: list[list[Piece]], draw: random.Random) -> PropertyVerdict:
     """What is found when the pieces come in in any order; what is said early must be said in the end."""
-    judge, left, said, most = Judge(tree), [list(pieces) for pieces in signals], set(), math.inf
+    monitor, left, said, most = PropertyMonitor(tree), [list(pieces) for pieces in signals], set(), math.inf
     while any(left):
         number = draw.choice([number for number, pieces in enumerate(left) if pieces])
-        judge.sources[number].pieces.append(left[number].pop(0))
-        said.add(early := judge.finding(False).holds)
-        assert judge.most <= most
-        most = judge.most
+        monitor.sources[number].pieces.append(left[number].pop(0))
+        said.add(early := monitor.verdict(False).holds)
+        assert monitor.most <= most
+        most = monitor.most
         assert (most < 0.0) == (early is False)
-    found = judge.finding(True)
+    found = monitor.verdict(True)
     assert said <= {None, found.holds}
     assert found.robustness is None or found.robustness <= most + 1e-9
     return found
@@ -118,22 +118,22 @@ def test_a_judge_agrees_with_rtamt() -> None:
 def test_when_a_property_broke() -> None:
     always = Quantified(False, Sends("a.b"))
     signal = [step(0, 4, 1.0), step(5, 5, -2.0), step(6, 9, 1.0)]
-    assert judged(always, [signal], random.Random(1)) == Finding(False, -2.0, moment(5))
-    assert judged(Not(always), [signal], random.Random(1)) == Finding(True, 2.0, None)
+    assert judged(always, [signal], random.Random(1)) == PropertyVerdict(False, -2.0, moment(5))
+    assert judged(Not(always), [signal], random.Random(1)) == PropertyVerdict(True, 2.0, None)
     within = Quantified(True, Not(Sends("a.b")), 0, 3)
-    assert judged(within, [signal], random.Random(1)) == Finding(False, -1.0, moment(4) - 1)
+    assert judged(within, [signal], random.Random(1)) == PropertyVerdict(False, -1.0, moment(4) - 1)
     both = Junction(False, always, Quantified(False, Sends("a.c"), 0, 2))
-    assert judged(both, [signal, [step(0, 1, 1.0), step(2, 9, -1.0)]], random.Random(1)) == Finding(
+    assert judged(both, [signal, [step(0, 1, 1.0), step(2, 9, -1.0)]], random.Random(1)) == PropertyVerdict(
         False, -2.0, moment(2)
     )
-    assert judged(within, [signal[:1]], random.Random(1)) == Finding(False, -1.0, moment(4) - 1)
-    assert judged(within, [[step(0, 2, 1.0)]], random.Random(1)) == Finding()  # too short to tell
+    assert judged(within, [signal[:1]], random.Random(1)) == PropertyVerdict(False, -1.0, moment(4) - 1)
+    assert judged(within, [[step(0, 2, 1.0)]], random.Random(1)) == PropertyVerdict()  # too short to tell
 
 
 def test_a_break_is_known_at_once() -> None:
-    judge = Judge(Quantified(False, Junction(True, Sends("a.b"), Quantified(True, Sends("a.c"), 0, 3))))
-    judge.sources[0].pieces += [step(0, 0, -1.0), step(1, 9, 1.0)]
-    judge.sources[1].pieces.append(step(0, 2, -5.0))
-    assert judge.finding(False) == Finding()
-    judge.sources[1].pieces.append(step(3, 3, -4.0))
-    assert judge.finding(False) == Finding(False, -1.0, moment(0))
+    monitor = PropertyMonitor(Quantified(False, Junction(True, Sends("a.b"), Quantified(True, Sends("a.c"), 0, 3))))
+    monitor.sources[0].pieces += [step(0, 0, -1.0), step(1, 9, 1.0)]
+    monitor.sources[1].pieces.append(step(0, 2, -5.0))
+    assert monitor.verdict(False) == PropertyVerdict()
+    monitor.sources[1].pieces.append(step(3, 3, -4.0))
+    assert monitor.verdict(False) == PropertyVerdict(False, -1.0, moment(0))
