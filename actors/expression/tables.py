@@ -40,7 +40,7 @@ def tables_of(given: Sequence[Any]) -> Tables:
 def looked_up(tables: Tables, *arguments: Any) -> float:
     """The value of a checked table; raises ``TypeError`` for what is not a number."""
     numbers = [_number(each) for each in arguments]
-    return along(*numbers, *tables) if len(numbers) == 1 else across(*numbers, *tables)  # type: ignore[call-arg, arg-type]
+    return along(*numbers, *tables) if len(numbers) == 1 else across(*numbers, *tables)  # type: ignore[arg-type]
 
 
 def along(x: float, at: Axis, values: Axis) -> float:
