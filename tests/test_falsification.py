@@ -83,6 +83,7 @@ def test_published_inputs_do_what_is_published(monitor: str) -> None:
     assert told[3], told
 
 
+@pytest.mark.slow
 def test_a_search_of_the_board(tmp_path: Any) -> None:
     case = {
         "search": "transmission", "monitor": "AT2", "vary": {"throttle": "0..100", "brake": "0..350"}, "until": "7 s",

@@ -16,6 +16,7 @@ FINE = 1e-3  # the step at which a descent ends
 LONGEST = 15  # batches of a descent
 FEW = 4  # signals of which all corners are tried
 SMALL = 10  # points of a batch where axes are signals
+SHARED = 3  # of so many points, one may have the least margin if there is to be a slope
 CHANGES = 3  # of a signal, at most, unless it is guided
 
 Point = tuple[float, ...]  # of the unit cube
@@ -67,10 +68,11 @@ def _of_signals(widths: Sequence[int], seed: int, guided: bool) -> Proposals:
     for number in count():
         points = stepped(widths, seed, number)
         found += zip(map(_number, (yield points)), points, strict=True)
-        (least, start), most = min(found, key=lambda each: each[0]), max(each[0] for each in found)
-        found = []
-        if guided and least < most:  # or there is no slope to follow
+        least, start = min(found, key=lambda each: each[0])
+        shared = len([each for each in found if each[0] == least])
+        if guided and least < math.inf and SHARED * shared <= len(found):  # or there is no slope to follow
             yield from _descent(start, seed, number, SMALL, diagonal=True)
+        found = []
 
 
 def stepped(widths: Sequence[int], seed: int, number: int) -> list[Point]:
