@@ -24,16 +24,13 @@ from ...desk import (
     EditError,
     Knowledge,
     Positions,
-    RenameError,
     Session,
-    apply,
     as_data,
     complete,
     controls,
     editing,
     fix,
     hover,
-    rename,
     splices,
 )
 from ...execution.engine import ActorError, LoopError
@@ -95,7 +92,7 @@ class Worker:
             return act(self, asked)
         except StaleError:
             return {"stale": True}
-        except (EpicycleError, RenameError) as error:
+        except EpicycleError as error:
             return {"error": str(error)}
         except (KeyError, TypeError, ValueError, AttributeError, IndexError) as error:
             return {"error": f"this question cannot be read ({type(error).__name__})"}
@@ -196,22 +193,16 @@ class Worker:
         if not isinstance(given, list) or not all(isinstance(each, (str, bool, dict)) for each in given):
             raise EditError("this change cannot be read")
         before = self.text
-        at = Positions(before)
         match what:
             case "connect" | "disconnect":
                 after = getattr(editing, what)(before, *controls.local_ends(self.knowledge, *map(str, given)))
             case "swap":
                 after = editing.swap(before, self.knowledge, "", str(given[0]), str(given[1]))
-            case "rename":
-                place = at.place(at.at_units(int(asked["at"])))
-                edits = rename(self.knowledge, *place, str(given[0]), self.session.texts)
-                if {each.path.resolve() for each in edits} != {self.path}:
-                    raise EditError("this name stands in other files, too: rename it in an editor (epicycle lsp)")
-                after = apply(before, edits)
             case "add_part" | "attach" | "remove" | "set_parameter" | "switch" | "drop_in":
                 after = getattr(editing, what)(before, *given)
             case _:
                 raise EditError("there is no such change")
+        at = Positions(before)
         return {"splices": [self._splice(at, each.start, each.end, each.text) for each in splices(before, after)]}
 
     # -- runs -----------------------------------------------------------------------------------------------------
