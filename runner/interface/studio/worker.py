@@ -362,6 +362,7 @@ def main(arguments: list[str]) -> None:
     _limit()
     keep_for_good()
     worker = Worker(Path(path).resolve(), float(seconds), int(events), files, say)
+    say({})  # it listens
     threading.Thread(target=_listen, args=(sys.stdin, worker), daemon=True).start()
     with seldom_collecting():
         while (asked := worker.next()) is not None:
