@@ -16,6 +16,7 @@ from .knowledge import Knowledge
 from .meaning import Symbol, definition, hover, links, path_of, references, symbols
 from .parts import EditError
 from .places import lines_of
+from .positions import Positions
 from .problem_data import as_data, of_problems, report
 from .reading import Reading, read
 from .session import Session
@@ -26,6 +27,7 @@ __all__ = [
     "Edit",
     "EditError",
     "Knowledge",
+    "Positions",
     "Reading",
     "RenameError",
     "Session",

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from typing import TypeVar, cast
 
 from ..model.text.document import LINE_BREAK, MAX_NODES, Entry, Mapping, Node, Scalar, Sequence, parse
 from ..model.text.problems import Position, Problems
@@ -16,8 +15,6 @@ from ..model.text.problems import Position, Problems
 # Anchors, and what ends a document or begins an odd key, mean something beyond their lines.
 _ODD = re.compile(r"&|^(?:---|\.\.\.|%|[ \t-]*\?(?:\s|\Z))", re.MULTILINE)
 _DASH = re.compile(r" *-[ \t]+\Z")
-
-N = TypeVar("N", bound=Node)
 
 
 @dataclass(frozen=True)
@@ -108,20 +105,23 @@ def _begins_line(at: Position, is_key: bool) -> bool:
 
 def moved_entry(entry: Entry, by: int) -> Entry:
     """An entry that stands so many lines below."""
-    return Entry(moved(entry.key, by), moved(entry.value, by)) if by else entry
+    return Entry(_moved_scalar(entry.key, by), moved(entry.value, by)) if by else entry
 
 
-def moved(node: N, by: int) -> N:
+def moved(node: Node, by: int) -> Node:
     """A node that stands so many lines below."""
     if not by:
         return node
-    at = node.position
-    place = Position(at.file, at.line + by, at.column, at.length, at.source)
-    made: Node
     if isinstance(node, Scalar):
-        made = Scalar(node.value, node.text, node.plain, place)
-    elif isinstance(node, Sequence):
-        made = Sequence(tuple([moved(each, by) for each in node.items]), place)
-    else:
-        made = Mapping({key: moved_entry(each, by) for key, each in node.entries.items()}, place)
-    return cast(N, made)  # of the same class
+        return _moved_scalar(node, by)
+    if isinstance(node, Sequence):
+        return Sequence(tuple([moved(each, by) for each in node.items]), _below(node.position, by))
+    return Mapping({key: moved_entry(each, by) for key, each in node.entries.items()}, _below(node.position, by))
+
+
+def _moved_scalar(node: Scalar, by: int) -> Scalar:
+    return Scalar(node.value, node.text, node.plain, _below(node.position, by))
+
+
+def _below(at: Position, by: int) -> Position:
+    return Position(at.file, at.line + by, at.column, at.length, at.source)

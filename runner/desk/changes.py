@@ -17,6 +17,7 @@ from ..model.text.problems import Position, Problem
 from ..model.text.reading import NAME, NAMES_HAVE
 from .knowledge import Knowledge
 from .names import MODEL, Name
+from .positions import Positions
 from .reading import NO_TEXTS, Reading, Texts, read
 
 _PLAIN = re.compile(r"[A-Za-z0-9_.+*/^%° -]+\Z")
@@ -39,11 +40,11 @@ class RenameError(EpicycleError):
 
 def apply(text: str, edits: Iterable[Edit]) -> str:
     """A text with changes, of which no two overlap."""
-    lines = re.split("(\r\n|[\n\r\x85\u2028\u2029])", text)
+    at = Positions(text)
     for edit in sorted(edits, key=lambda each: (each.line, each.start), reverse=True):
-        place = 2 * edit.line
-        lines[place] = lines[place][: edit.start] + edit.text + lines[place][edit.end :]
-    return "".join(lines)
+        start, end = at.offset(edit.line, edit.start), at.offset(edit.line, edit.end)
+        text = text[:start] + edit.text + text[end:]
+    return text
 
 
 # -- fixes ------------------------------------------------------------------------------------------------------------

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import yaml
 
-from ..model.text.document import Mapping, Node, Scalar, Sequence, parse
+from ..model.text.document import LINE_BREAK, Mapping, Node, Scalar, Sequence, parse
 from ..model.text.problems import Problems
 
 MARK = "epicycle_mark_here"
@@ -44,7 +44,7 @@ class Place:
 
 def lines_of(text: str) -> list[str]:
     """The lines of a text, as positions count them."""
-    return re.split("\r\n|[\n\r\x85\u2028\u2029]", text)
+    return LINE_BREAK.split(text)
 
 
 def place_at(text: str, line: int, column: int) -> Place | None:

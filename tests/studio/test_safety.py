@@ -35,7 +35,7 @@ ENDLESS = MODEL.replace("stop: 10 s, ", "")
 def studio_at(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Served, Path]]:
     path = tmp_path_factory.mktemp("studio") / "safe.yaml"
     path.write_text(MODEL)
-    with served(path, "--seconds", "3", "--events", "20000") as found:
+    with served(path, "--seconds", "30", "--events", "20000") as found:
         yield found, path
 
 
@@ -314,9 +314,9 @@ def test_a_step_that_never_ends_is_ended(tmp_path: Path) -> None:
     path = tmp_path / "stuck.yaml"
     text = MODEL.replace("{type: Scale, factor: 2}", "{type: Stuck}").split("run:")[0] + "run: {stop: 10 s}\n"
     path.write_text(text)
-    with served(path, "--types", str(types), "--seconds", "0.5") as studio, asking(studio) as page:
+    with served(path, "--types", str(types), "--seconds", "2") as studio, asking(studio) as page:
         assert page.ask(ask="read", text=text)["valid"] is True
-        assert page.ask(ask="run", text=text) == {"error": "the run took longer than 10.5 s, and was ended"}
+        assert page.ask(ask="run", text=text) == {"error": "the run took longer than 12 s, and was ended"}
         assert page.ask(ask="run", text=MODEL)["stopped"] == "stop time"
 
 

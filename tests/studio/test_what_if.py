@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 import epicycle
-from tests.studio.studio_parts import Served, Writer, asking, served
+from tests.studio.studio_parts import PATIENCE, Served, Writer, asking, served
 
 MODELS = Path(__file__).parents[2] / "models"
 
@@ -67,7 +67,7 @@ def test_a_lost_plan_is_let_through_by_two_clicks(studio: Callable[..., Writer],
     click(writer, "sequence", f"view.hits.find(([,, what]) => what.record >= 0 && {port} === 'main.peer_plan')")
     assert "wifi_loss: dropped at main.peer_plan" in tab.locator(".whatif .through").get_attribute("title")
     tab.locator(".whatif .through").click()
-    tab.locator(".futures").wait_for()
+    tab.locator(".futures").wait_for(timeout=PATIENCE * 1000)
     told = tab.locator(".futures .story").all_inner_texts()
     assert told[:2] == [
         "From 3.401 s on, wifi_loss lets token 105 at main.peer_plan through.",
@@ -106,7 +106,7 @@ def test_another_one_is_lost_and_a_parameter_and_an_aspect_change(
 
     def futures() -> tuple[str, list[str]]:
         """What the page says of both futures, and the values of their first metric; closes them."""
-        tab.locator(".futures .story").first.wait_for()
+        tab.locator(".futures .story").first.wait_for(timeout=PATIENCE * 1000)
         found = tab.locator(".futures .story").first.inner_text()
         cells = tab.locator(".futures .compared tr").nth(1).locator("td").all_inner_texts()
         tab.locator(".futures button.close").click()
@@ -168,7 +168,7 @@ def test_what_cannot_change_is_said(line: Served) -> None:
     with asking(line) as page:
         for message, asked in wrong.items():
             assert page.ask(ask="what_if", text=LINE, **asked) == {"error": message}
-        assert page.ask(ask="what_if", text="model: x\n", at=[0, 0])["error"] == "the model is not valid"
+        assert page.ask(ask="what_if", text="model: [\n", at=[0, 0])["error"] == "the model is not valid"
         same = page.ask(ask="what_if", text=LINE, at=[0, 0])
         assert same == {"sentence": "From 0 s on, nothing is changed. Both futures have the same log.", "view": None}
         endless = LINE.replace("1 s}", "1 us}").replace("stop: 20 s, ", "")

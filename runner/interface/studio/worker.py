@@ -10,7 +10,6 @@ import gc
 import json
 import os
 import queue
-import re
 import sys
 import threading
 import time
@@ -24,15 +23,14 @@ from epicycle.actors import EpicycleError, Tag
 from ...desk import (
     EditError,
     Knowledge,
-    RenameError,
+    Positions,
     Session,
-    apply,
+    as_data,
     complete,
     controls,
     editing,
     fix,
     hover,
-    rename,
     splices,
 )
 from ...execution.engine import ActorError, LoopError
@@ -40,7 +38,7 @@ from ...model.build.figures import figures_of
 from ...model.build.model import Model
 from ...model.text.document import MAX_BYTES
 from ...model.text.files import opened
-from ...model.text.problems import Position, Problems
+from ...model.text.problems import Problem, Problems
 from ...search.what_if import Changes, what_if
 from ...show.view import Recording, data_of, drawn
 from ...study.run_spec import RunSpec, named
@@ -52,40 +50,12 @@ MEMORY = 4 << 30  # bytes that a worker may take
 MOST = 100_000  # firings that a run shows
 BEAT = 0.2  # s between two messages of a run
 REST = 0.1  # s without a question
-_BREAKS = re.compile("\r\n|[\n\r\x85\u2028\u2029]")
 
 Message = dict[str, Any]
 
 
 class StaleError(Exception):
     """A newer question waits."""
-
-
-class Offsets:
-    """Places of a text: our lines and columns, characters, and UTF-16 as browsers count."""
-
-    def __init__(self, text: str) -> None:
-        self.text = text
-        self._starts = [0, *(found.end() for found in _BREAKS.finditer(text))]
-        self._is_simple = text.isascii() or max(text) <= "\uffff"
-
-    def there(self, offset: int) -> int:
-        return offset if self._is_simple else len(self.text[:offset].encode("utf-16-le", "surrogatepass")) // 2
-
-    def here(self, units: int) -> int:
-        if self._is_simple:
-            return min(max(units, 0), len(self.text))
-        return len(self.text.encode("utf-16-le", "surrogatepass")[: 2 * units].decode("utf-16-le", "ignore"))
-
-    def of(self, line: int, column: int) -> int:
-        """The browser's offset for a line and column from 0."""
-        return self.there(min(self._starts[min(line, len(self._starts) - 1)] + column, len(self.text)))
-
-    def place(self, units: int) -> tuple[int, int]:
-        """Line and column, from 0."""
-        offset = self.here(units)
-        line = sum(1 for _ in _BREAKS.finditer(self.text, 0, offset))
-        return line, offset - self._starts[line]
 
 
 class Worker:
@@ -122,7 +92,7 @@ class Worker:
             return act(self, asked)
         except StaleError:
             return {"stale": True}
-        except (EpicycleError, RenameError) as error:
+        except EpicycleError as error:
             return {"error": str(error)}
         except (KeyError, TypeError, ValueError, AttributeError, IndexError) as error:
             return {"error": f"this question cannot be read ({type(error).__name__})"}
@@ -142,7 +112,7 @@ class Worker:
     def read(self, asked: Message) -> Message:
         """Problems at once, then the graph of what is valid so far, and what can be set."""
         knowledge = self.knowledge
-        reading, at = knowledge.reading, Offsets(self.text)
+        reading, at = knowledge.reading, Positions(self.text)
         self.say({"problems": [self._problem(each, at) for each in reading.problems], "valid": reading.is_valid})
         reading = controls.so_far(reading, self.session.texts)
         model, known = reading.loading.model, knowledge if reading is knowledge.reading else Knowledge(reading)
@@ -156,46 +126,51 @@ class Worker:
             "aspects": list(controls.aspects(known)),
         }
 
-    def _problem(self, problem: Any, at: Offsets) -> Message:
-        position: Position | None = problem.position
-        found = {
-            "code": problem.kind.code,
-            "severity": problem.severity,
-            "message": problem.message,
-            "help": list(problem.help),
-            "from": 0,
-            "to": 0,
-        }
-        if position is None or position.file != self.knowledge.file:
-            return found | {"where": "" if position is None else str(position)}
-        line, column = position.line - 1, position.column - 1
-        found |= {"from": at.of(line, column), "to": at.of(line, column + position.length), "line": position.line}
-        if (edit := fix(self.knowledge, problem)) is not None and edit.path.resolve() == self.path:
-            new = {"from": at.of(edit.line, edit.start), "to": at.of(edit.line, edit.end), "text": edit.text}
-            found["fix"] = new
+    def _problem(self, problem: Problem, at: Positions) -> Message:
+        """A problem with its place in this text, and how it can be removed by a change of it."""
+        edit, position = fix(self.knowledge, problem), problem.position
+        found = as_data(problem) | {"where": str(position or "")}
+        if position is not None and position.file == self.knowledge.file:
+            start = at.offset(position.line - 1, position.column - 1)
+            end = min(start + position.length, len(at.text))
+            found |= {"from": at.units(start), "to": at.units(end), "where": f"line {position.line}"}
+        if edit is not None and edit.path.resolve() == self.path:
+            found["fix"] = self._splice(at, at.offset(edit.line, edit.start), at.offset(edit.line, edit.end), edit.text)
         return found
 
+    def _splice(self, at: Positions, start: int, end: int, text: str) -> Message:
+        """A text in place of a stretch of characters."""
+        return {"from": at.units(start), "to": at.units(end), "text": text}
+
     def complete(self, asked: Message) -> Message:
-        at = Offsets(self.text)
-        line, column = at.place(int(asked["at"]))
+        at = Positions(self.text)
+        line, column = at.place(at.at_units(int(asked["at"])))
         found = complete(self.path, line, column, self.session.texts, self.session.types)
         return {
             "options": [
-                {"text": e.text, "kind": e.kind, "what": e.what, "doc": e.doc, "from": at.of(line, column - e.replaces)}
-                for e in found[:500]
+                {
+                    "text": each.text,
+                    "kind": each.kind,
+                    "what": each.what,
+                    "doc": each.doc,
+                    "from": at.units(at.offset(line, column - each.replaces)),
+                }
+                for each in found[:500]
             ]
         }
 
     def hover(self, asked: Message) -> Message:
-        return {"words": hover(self.knowledge, *Offsets(self.text).place(int(asked["at"])))}
+        at = Positions(self.text)
+        return {"words": hover(self.knowledge, *at.place(at.at_units(int(asked["at"]))))}
 
     def colours(self, asked: Message) -> Message:
         """The names in the text, with what they are."""
-        at, found = Offsets(self.text), []
+        at, found = Positions(self.text), []
         for use in self.knowledge.names.uses:
             if use.position.file == self.knowledge.file:
-                start = at.of(use.position.line - 1, use.position.column - 1)
-                found.append([start, start + use.position.length, sorted(each.kind for each in use.names)[0]])
+                start = at.offset(use.position.line - 1, use.position.column - 1)
+                kind = sorted(each.kind for each in use.names)[0]
+                found.append([at.units(start), at.units(start + use.position.length), kind])
         return {"colours": found}
 
     def types(self, asked: Message) -> Message:
@@ -223,23 +198,12 @@ class Worker:
                 after = getattr(editing, what)(before, *controls.local_ends(self.knowledge, *map(str, given)))
             case "swap":
                 after = editing.swap(before, self.knowledge, "", str(given[0]), str(given[1]))
-            case "rename":
-                at = Offsets(before).place(int(asked["at"]))
-                edits = rename(self.knowledge, *at, str(given[0]), self.session.texts)
-                if {each.path.resolve() for each in edits} != {self.path}:
-                    raise EditError("this name stands in other files, too: rename it in an editor (epicycle lsp)")
-                after = apply(before, edits)
             case "add_part" | "attach" | "remove" | "set_parameter" | "switch" | "drop_in":
                 after = getattr(editing, what)(before, *given)
             case _:
                 raise EditError("there is no such change")
-        at_ = Offsets(before)
-        return {
-            "splices": [
-                {"from": at_.there(each.start), "to": at_.there(each.end), "text": each.text}
-                for each in splices(before, after)
-            ]
-        }
+        at = Positions(before)
+        return {"splices": [self._splice(at, each.start, each.end, each.text) for each in splices(before, after)]}
 
     # -- runs -----------------------------------------------------------------------------------------------------
 
@@ -398,6 +362,7 @@ def main(arguments: list[str]) -> None:
     _limit()
     keep_for_good()
     worker = Worker(Path(path).resolve(), float(seconds), int(events), files, say)
+    say({})  # it listens
     threading.Thread(target=_listen, args=(sys.stdin, worker), daemon=True).start()
     with seldom_collecting():
         while (asked := worker.next()) is not None:

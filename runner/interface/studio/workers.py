@@ -12,6 +12,7 @@ from typing import Any
 
 Message = dict[str, Any]
 LONGEST = 64 << 20  # bytes of an answer
+START = 60.0  # s that a process may take until it listens
 
 
 class Workers:
@@ -41,6 +42,7 @@ class Workers:
             if self._latest[kind] != number:
                 return {"stale": True}
             try:
+                await asyncio.wait_for(self._start(), START)
                 return await asyncio.wait_for(self._answer(number, question, tell), self.patience)
             except TimeoutError:
                 self.stop()
@@ -62,17 +64,25 @@ class Workers:
             tell(said)
         raise EOFError
 
+    async def _start(self) -> None:
+        """Start the process, unless it runs; the time that it takes until it listens is not that of a question."""
+        if self._process is not None and self._process.returncode is None:
+            return
+        self._process = await asyncio.create_subprocess_exec(
+            sys.executable,
+            "-m",
+            "epicycle.runner.interface.studio.worker",
+            *self.arguments,
+            stdin=asyncio.subprocess.PIPE,
+            stdout=asyncio.subprocess.PIPE,
+            limit=LONGEST,
+        )
+        assert self._process.stdout is not None
+        if not await self._process.stdout.readline():
+            raise EOFError
+
     async def _send(self, question: Message) -> None:
-        if self._process is None or self._process.returncode is not None:
-            self._process = await asyncio.create_subprocess_exec(
-                sys.executable,
-                "-m",
-                "epicycle.runner.interface.studio.worker",
-                *self.arguments,
-                stdin=asyncio.subprocess.PIPE,
-                stdout=asyncio.subprocess.PIPE,
-                limit=LONGEST,
-            )
+        assert self._process is not None
         assert self._process.stdin is not None
         with suppress(ConnectionError):
             self._process.stdin.write(json.dumps(question).encode() + b"\n")

@@ -207,7 +207,7 @@ class Scope:
         """Set the size of a box and the positions of its ports; an open composite is laid out to do so."""
         if child.is_open:
             inputs, outputs = [self.ends[pin] for pin in cell.left], [self.ends[pin] for pin in cell.right]
-            key = repr((child, inputs, outputs))  # everything that it depends on
+            key = repr((child, inputs, outputs))  # everything it depends on
             scope = self.inner[child] = self.known.get(key) or Scope(child, inputs, outputs, self.known)
             scope.key = key
             cell.width, cell.height = scope.width, scope.height

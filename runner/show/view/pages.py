@@ -84,7 +84,7 @@ def recorded(
         problems = Problems()
         figures = figures_of(model, problems)
         problems.raise_if_any()
-        if stop is None and model.endless:
+        if stop is None and model.endless and watch is None:
             complain(
                 f"{model.endless}\n   help: end it with Ctrl-C, which keeps what was recorded, or give a stop time"
             )

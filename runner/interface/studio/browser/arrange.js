@@ -130,17 +130,16 @@ class Studio {
   }
 
   showProblems(problems) {
-    this.editor.setProblems(problems.filter((each) => each.where === undefined));
+    this.editor.setProblems(problems.filter((each) => "from" in each));
     const errors = problems.filter((each) => each.severity === "error").length, others = problems.length - errors;
     const counted = (count, word) => `${count} ${word}${count === 1 ? "" : "s"}`;
     this.summary.textContent = problems.length ? [errors && counted(errors, "problem"), others && counted(others, "warning")].filter(Boolean).join(", ") : "no problems";
     this.summary.dataset.kind = errors ? "error" : others ? "warning" : "fine";
     this.problems.replaceChildren(...problems.map((problem) => {
-      const at = problem.where ?? (problem.line ? `line ${problem.line}` : "");
-      const made = element("li", { className: problem.severity }, element("button", { type: "button", className: "link", text: at || "the text" }),
+      const made = element("li", { className: problem.severity }, element("button", { type: "button", className: "link", text: problem.where || "the text" }),
         element("code", { text: problem.code }), element("span", { text: problem.message }),
         ...problem.help.map((each) => element("em", { text: each })));
-      made.querySelector("button").addEventListener("click", () => this.editor.show(problem.from, problem.to));
+      made.querySelector("button").addEventListener("click", () => this.editor.show(problem.from ?? 0, problem.to ?? 0));
       if (problem.fix) made.append(button(`write ${problem.fix.text.trim()}`, () => this.editor.splice([problem.fix]), "small"));
       return made;
     }));

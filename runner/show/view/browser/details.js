@@ -57,7 +57,7 @@ class Details {
         parts.push(button(`show it in ${runs[i].name}`, () => this.state.goTo({ run: i, firing: runs[i].firstChange, record: NOTHING }), "changed"));
     }
     if (data.comparison.length) {
-      const head = ["metric", ...runs.map((run) => run.name), "difference"];
+      const head = ["metric", ...runs.map((run) => run.name), "change"];
       parts.push(table([head, ...data.comparison], "compared"));
     }
     return parts;
