@@ -41,6 +41,6 @@ import_ = Command(  # "import" is a keyword in Python
         option("-o", "--out", metavar="MODEL.yaml", type=Path, help="write to this file (default: print the model)"),
         TYPES,
     ),
-    ("build",),
+    ("model.build",),
     _run,
 )

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 import epicycle
-from epicycle.runner import bars
+from epicycle.runner.support import bars
 
 NOTEBOOK = Path(__file__).parents[1] / "docs" / "tutorial" / "14_notebook.ipynb"
 
