@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 import re
 from collections.abc import Iterable
 from pathlib import Path
@@ -196,6 +197,11 @@ def _value(kind: Any) -> Any:
     return getattr(kind, "value", kind)
 
 
+def _is_no_refusal(record: logging.LogRecord) -> bool:
+    """Whether a record is of more than a name that cannot be changed, which the editor is told in the answer."""
+    return not (record.exc_info and isinstance(record.exc_info[1], JsonRpcInvalidParams))
+
+
 def _overlap(one: lsp.Range, other: lsp.Range) -> bool:
     return one.start <= other.end and other.start <= one.end
 
@@ -206,6 +212,7 @@ def _overlap(one: lsp.Range, other: lsp.Range) -> bool:
 def make_server(version: str, types: tuple[type, ...] = ()) -> Server:
     """A server with everything that the desk offers."""
     server = Server(version, types)
+    logging.getLogger("pygls.protocol.json_rpc").addFilter(_is_no_refusal)
 
     @server.feature(lsp.TEXT_DOCUMENT_DID_OPEN)
     def opened(params: lsp.DidOpenTextDocumentParams) -> None:

@@ -44,7 +44,8 @@ def _run(arguments: Sequence[str], *, is_program: bool) -> int:
     try:
         with seldom_collecting():
             code: int = options.run(options)
-        sys.stdout.flush()  # here, where a failure can be reported
+        if not sys.stdout.closed:  # as a language server leaves it
+            sys.stdout.flush()  # here, where a failure can be reported
         return code
     except EpicycleError as error:
         if options.debug:

@@ -94,4 +94,8 @@ async def editor() -> AsyncIterator[Editor]:
         await asyncio.wait_for(client.shutdown_async(None), PATIENCE)
         client.exit(None)
         await asyncio.wait_for(client.stop(), PATIENCE)
+        assert client._server is not None
+        assert client._server.stderr is not None
+        complaints = await client._server.stderr.read()
+    assert complaints == b"", complaints.decode()
     assert found.log == []
