@@ -7,8 +7,6 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
-from epicycle.actors import abridged
-
 from ..support.declare.parameters import COUNT, option, repeated, whole
 
 if TYPE_CHECKING:
@@ -111,6 +109,8 @@ Goal = Break | Minimise | Match
 
 def results_folder(name: str, kind: str = "") -> Path:
     """Where results of a model or study of that name are kept by default."""
+    from epicycle.actors import abridged  # here, because the command line reads what a search is given
+
     return Path("results") / abridged(name, 60) / kind
 
 

@@ -67,7 +67,7 @@ def summary_table(model: Model, results: Results) -> Group:
             where = f"by {woven.kind} at {extent([woven])}"
             rows.append((f"{name}: {what}", shown(figure), woven.aspect.reports.get(what, ""), where))
     rows += [
-        ("events", f"{results.events}", "", "sends and events of aspects in the event log"),
+        ("events", f"{results.events}", "", "sends and events of aspects in the log"),
         ("firings", f"{results.firings}", "", "of actors"),
         ("wall time", f"{results.wall_time:.3f}", "s", "of initialisation and run"),
         ("digest", results.digest[:16] + "...", "", "SHA-256 of the event log, shortened"),

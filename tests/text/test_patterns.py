@@ -7,7 +7,7 @@ import time
 from hypothesis import given
 from hypothesis import strategies as st
 
-from epicycle.runner.model.text.patterns import matches
+from epicycle.runner.model.text.patterns import matches, select
 
 
 def fits(pattern: list[str], path: list[str]) -> bool:
@@ -33,3 +33,7 @@ def test_no_pattern_takes_for_ever() -> None:
     assert not matches(".".join(["**"] * 25 + ["x"]), deep)
     assert not matches(".".join(["**", "a"] * 12 + ["x"]), deep)
     assert time.process_time() - started < 1
+
+
+def test_the_path_of_the_model_itself_is_empty() -> None:
+    assert select("a.*.c", ["", "a.b[0].c", "a.b[0]", "d"]) == ["a.b[0].c"]

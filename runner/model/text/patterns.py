@@ -261,6 +261,6 @@ class PathIndex:
                 found.setdefault(path[:end], []).append(path)
                 if path[end - 1] == "]":
                     found.setdefault(path[: path.rindex("[", 0, end)], []).append(path)
-            if path[-1] == "]":
+            if path.endswith("]"):  # the model itself has an empty path
                 found.setdefault(path[: path.rindex("[")], []).append(path)
         return found
