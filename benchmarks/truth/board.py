@@ -39,6 +39,7 @@ from .falsifying import replays, searches
 HERE = Path(__file__).parent
 ROOT = HERE.parent.parent
 SOURCES = ("stochastic", "simpy", "queues", "superdense", "falsification", "tracking")
+BESIDE = ("searches",)  # which take hours, and are made when they are named
 FOUND = HERE.parent / "TRUTH.json"
 RESULTS = Path("results/truth")
 LEAST, MOST = 90.0, 99.0  # % of 95 % intervals that should hold the published value
@@ -162,7 +163,7 @@ def _of_replay(name: str, case: Mapping[str, Any], jobs: int | None) -> Iterator
 
 
 def _of_search(name: str, case: Mapping[str, Any], jobs: int | None) -> Iterator[Line]:
-    file = HERE / name / f"{case['search']}.yaml"
+    file = HERE / "falsification" / f"{case['search']}.yaml"
     for *told, command in searches(file, case, ROOT / RESULTS / name, jobs):
         yield Line(case["search"], *told, f"epicycle search {file.relative_to(ROOT)}{command}", is_interval=False)
 
