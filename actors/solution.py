@@ -140,7 +140,8 @@ class Solution:
         if stepper is None:
             return self._stepper.step()
         while True:
-            before = copy.copy(stepper) if stepper.next_step > WINDOW else None
+            # By its length, a step of one window may seem longer than that: times are rounded.
+            before = copy.copy(stepper) if min(stepper.next_step, stepper.limits.max_step) > WINDOW else None
             if not stepper.step():
                 return False
             self._taken += 1

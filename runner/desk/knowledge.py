@@ -155,7 +155,7 @@ class Knowledge:
         graph, scope = self.graph, next(iter(self.scopes(owner)), None)
         if graph is None or scope is None:
             return
-        holders = [path for path in graph.components if path and path.startswith(scope) and path + "." != scope]
+        holders = [path for path in graph.components if path.startswith(scope) and path + "." != scope]
         if start:
             try:
                 chosen = select(scope + start[:-1], holders)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ from epicycle.actors import trajectory
 from epicycle.actors.core import EpicycleError
 from epicycle.actors.expression import ExpressionError, Formula, evaluate
 from epicycle.actors.integration import STEPPERS
+from epicycle.runner import load_model
 from epicycle.runner.execution.engine import ActorError, Simulation
 from epicycle.runner.model.text.problems import ModelError
 from tests.actors.feeding import feed, load, model_of, tokens
@@ -529,3 +531,25 @@ def evaluated(formula: Formula, values: Any) -> Any:
     except ExpressionError as error:
         given = ", ".join(f"{name} = {values[name]!r}" for name in formula.names if name in values)
         raise EpicycleError(f"{formula.source!r}: {error}{f', with {given}' if given else ''}") from None
+
+
+def test_a_step_of_one_window_is_not_tried_for_ever(tmp_path: Path) -> None:
+    """Its ends, which are rounded, are further apart than its length."""
+    path = tmp_path / "tank.yaml"
+    path.write_text(
+        """\
+model: tank
+actors:
+  clock: {type: Clock, period: 1 s, values: [1.0]}
+  tank:
+    type: ODE
+    initial: {level: 1.0}
+    derivatives: {level: "flow * interpolate(level, [0, 1, 2], [1, 0.8, 0.2]) - 0.3 * sqrt(max(level, 0))"}
+    crossings: {full: level - 1.4}
+  look: {type: Clock, period: 0.5 s}
+connections: [clock.output -> tank.flow, look.output -> tank.trigger]
+run: {stop: 20 s, record: tank.level}
+""",
+        encoding="utf-8",
+    )
+    assert Simulation(load_model(path)).run()["tank.level"].tokens[-1] == pytest.approx(1.684408, abs=1e-6)

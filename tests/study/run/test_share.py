@@ -122,6 +122,7 @@ def test_four_parts_in_one_folder_of_which_one_is_killed(
     assert (out / "table.parquet").read_bytes() == (tmp_path / "calm" / "table.parquet").read_bytes()
 
 
+@pytest.mark.slow
 def test_four_parts_in_folders_of_their_own(done: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     write(tmp_path)
     for number in (3, 1, 4, 2):
