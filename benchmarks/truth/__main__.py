@@ -20,7 +20,8 @@ PAGE = HERE.parent / "TRUTH.md"
 def main() -> None:
     """Run the sources that the command line names, or all."""
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    options.add_argument("sources", nargs="*", metavar="SOURCE", choices=[*SOURCES, *BESIDE, []], help=", ".join((*SOURCES, *BESIDE)))
+    known = (*SOURCES, *BESIDE)
+    options.add_argument("sources", nargs="*", metavar="SOURCE", choices=[*known, []], help=", ".join(known))
     options.add_argument("--jobs", type=int, help="processes at a time (default: one per core)")
     options.add_argument("--check", action="store_true", help="compare with the page instead of writing it")
     given = options.parse_args()

@@ -198,7 +198,7 @@ def _value(kind: Any) -> Any:
 
 
 def _is_no_refusal(record: logging.LogRecord) -> bool:
-    """Whether a record is of more than a name that cannot be changed, which the editor is told in the answer."""
+    """Whether a record is of more than a name that cannot be changed: the answer itself says that to the editor."""
     return not (record.exc_info and isinstance(record.exc_info[1], JsonRpcInvalidParams))
 
 
