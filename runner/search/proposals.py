@@ -76,7 +76,7 @@ def _of_signals(widths: Sequence[int], seed: int, guided: bool) -> Proposals:
 
 
 def stepped(widths: Sequence[int], seed: int, number: int) -> list[Point]:
-    """Points whose signals change at most as often as there are points before: a small batch.
+    """A small batch of points whose signals change at most ``CHANGES`` times.
 
     Of every two points, one has its values at the ends of the ranges.
     """

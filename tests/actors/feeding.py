@@ -82,3 +82,7 @@ def tokens(sent: dict[str, list[tuple[float, Any]]], port: str = "output") -> li
 def seconds(*values: Any) -> list[tuple[float, Any]]:
     """One token a second, the first at 1 s."""
     return [(float(time), value) for time, value in enumerate(values, 1)]
+
+
+def ticks(period: float, until: float) -> list[tuple[float, int]]:
+    return [(round(k * period, 9), k) for k in range(round(until / period) + 1)]
