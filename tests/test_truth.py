@@ -192,6 +192,7 @@ def test_what_was_found_is_the_committed_page() -> None:
     assert board.page(found) == (board.HERE.parent / "TRUTH.md").read_text(encoding="utf-8")
 
 
+@pytest.mark.slow
 def test_the_page_of_the_site_has_a_picture_of_each_source_with_numbers(tmp_path: Path) -> None:
     made = draw_truth(tmp_path)
     assert [path.name for path in made] == ["stochastic.svg", "queues.svg", "tracking.svg"]

@@ -148,6 +148,7 @@ def test_four_parts_in_folders_of_their_own(done: Path, tmp_path: Path, capsys: 
     )
 
 
+@pytest.mark.slow
 def test_a_part_continues_and_reports_only_its_own(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     write(tmp_path, STUDY + "set: {fails: [3]}\n")
     assert study(tmp_path, "--part", "1/4", "--jobs", 1) == 1
