@@ -21,6 +21,10 @@ _FLAG: Final = re.compile(
     r"(?=\s|$)",
     re.DOTALL,
 )
+# After a complete expression or name; alone, or after an operator, it is a name itself, other than 'else'.
+_LATE_FLAG: Final = re.compile(
+    rf"(?:(?<![\w.])(?!(?:and|or|not|if|else|in)\b)[\w.)\]}}]+|(?=\s+else))\s+(?P<flag>{_FLAGS})\s*$"
+)
 _CLAUSE: Final = re.compile(r"(?<![\w.])(on|after|when|do)(?![\w.])")
 _DIVISION: Final = re.compile(r"[\s\d.eE+-]*[*/]")
 _ASSIGNMENT: Final = re.compile(r"\s*(?P<name>[A-Za-z_]\w*)\s*=(?!=)(?P<formula>.*)", re.DOTALL)
@@ -263,6 +267,10 @@ def _clauses(text: str) -> tuple[dict[str, object], dict[str, Span]]:
             span = start + clause.start(), len(clause[0])
             raise ParameterError(f"{text!r}: {clause[0]!r} is given twice", span=span)
         places[clause[0]] = _stripped(value, start + clause.end())
+        if (late := _LATE_FLAG.search(masked, clause.end(), end)) is not None:
+            flag, span = late["flag"], (start + late.start("flag"), len(late["flag"]))
+            first = clauses[0][0]
+            raise ParameterError(f"{text!r}: {flag!r} comes first: write 'a -> b {flag} {first} ...'", span=span)
         value = value.strip()
         said[clause[0]] = [each.strip() for each in value.split(",")] if clause[0] == "on" else value
     return said, places

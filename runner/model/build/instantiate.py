@@ -63,6 +63,8 @@ class PartTypes:
         if asked in others:
             other = "aspect" if is_actor else "actor"
             return (f"{asked} is an {other}: it belongs under '{other}s'",)
+        if asked.lower() == "composite":
+            return ("a composite is declared under 'composites:', and its name is the type",)
         composites = sorted(self.composites) if is_actor else []
         if len(composites) + len(types) <= MAX_SHOWN:
             valid = ", ".join(sorted([*composites, *types]))
