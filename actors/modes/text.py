@@ -268,9 +268,9 @@ def _clauses(text: str) -> tuple[dict[str, object], dict[str, Span]]:
             raise ParameterError(f"{text!r}: {clause[0]!r} is given twice", span=span)
         places[clause[0]] = _stripped(value, start + clause.end())
         if (late := _LATE_FLAG.search(masked, clause.end(), end)) is not None:
-            flag, span = late["flag"], (start + late.start("flag"), len(late["flag"]))
+            word, span = late["flag"], (start + late.start("flag"), len(late["flag"]))
             first = clauses[0][0]
-            raise ParameterError(f"{text!r}: {flag!r} comes first: write 'a -> b {flag} {first} ...'", span=span)
+            raise ParameterError(f"{text!r}: {word!r} comes first: write 'a -> b {word} {first} ...'", span=span)
         value = value.strip()
         said[clause[0]] = [each.strip() for each in value.split(",")] if clause[0] == "on" else value
     return said, places
