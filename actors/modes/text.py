@@ -23,7 +23,9 @@ _FLAG: Final = re.compile(
 )
 # After a complete expression or name; alone, or after an operator, it is a name itself, other than 'else'.
 _LATE_FLAG: Final = re.compile(
-    rf"(?:(?<![\w.])(?!(?:and|or|not|if|else|in)\b)[\w.)\]}}]+|(?=\s+else))\s+(?P<flag>{_FLAGS})\s*$"
+    r"(?:(?<![\w.])(?!(?:and|or|not|if|else|in)\b)[\w.)\]}]+|(?=\s+else))"
+    rf"\s+(?P<flag>(?:{_FLAGS}|(?:priority|probability|rate)\s+\S.*?)\s*$)",
+    re.DOTALL,
 )
 _CLAUSE: Final = re.compile(r"(?<![\w.])(on|after|when|do)(?![\w.])")
 _DIVISION: Final = re.compile(r"[\s\d.eE+-]*[*/]")
@@ -268,9 +270,10 @@ def _clauses(text: str) -> tuple[dict[str, object], dict[str, Span]]:
             raise ParameterError(f"{text!r}: {clause[0]!r} is given twice", span=span)
         places[clause[0]] = _stripped(value, start + clause.end())
         if (late := _LATE_FLAG.search(masked, clause.end(), end)) is not None:
-            word, span = late["flag"], (start + late.start("flag"), len(late["flag"]))
-            first = clauses[0][0]
-            raise ParameterError(f"{text!r}: {word!r} comes first: write 'a -> b {word} {first} ...'", span=span)
+            misplaced = rest[late.start("flag") : end].strip()
+            form = f"'a -> b {misplaced} {clauses[0][0]} ...'"
+            span = start + late.start("flag"), len(misplaced)
+            raise ParameterError(f"{text!r}: {misplaced.split()[0]!r} comes first: write {form}", span=span)
         value = value.strip()
         said[clause[0]] = [each.strip() for each in value.split(",")] if clause[0] == "on" else value
     return said, places
