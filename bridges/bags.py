@@ -17,8 +17,9 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar
 
-import mcap.reader
+import numpy as np
 from rosbags import rosbag2
+from rosbags.interfaces import MessageDefinitionFormat, Nodetype
 from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
 
 from epicycle.actors import (
@@ -36,6 +37,8 @@ from epicycle.runner import Model
 from epicycle.runner.recorded import Message, RecordingError, Writing
 
 KINDS: Mapping[str, Any] = {"number": float, "truth value": bool, "text": str, "any value": Any}
+_TEXTS = ("string", "wstring")
+_OCTETS = {"byte": "uint8", "octet": "uint8", "char": "uint8"}
 LONGEST = 1_000_000_000 * 10**9  # ns, of a run
 
 
@@ -57,35 +60,70 @@ def port_of(topic: str) -> str:
 
 
 class BagFile:
-    """What is in a recording: ``topics`` with the types of their messages.  This one is a folder."""
+    """What is in a recording, a folder or a file: ``topics`` with the types of their messages."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self._store: Any = None
-        with self.checked(), self.opened() as reader:
-            self.topics: dict[str, str] = self._topics(reader)
+        with self._opened() as reader:
+            self.topics: dict[str, str] = {each.topic: each.msgtype for each in reader.connections}
+            for each in reader.connections:
+                if (encoding := each.ext.serialization_format) != "cdr":
+                    raise self.error(f"messages of {each.topic} are in {encoding or 'no encoding'}, not in cdr")
 
     def raw(self, topics: Iterable[str] = ()) -> Iterator[tuple[int, str, bytes]]:
         """Time (ns), topic and bytes of each message, of all topics if none is named; raises ``RecordingError``."""
-        latest = None
-        with self.checked(), self.opened() as reader:
-            for time, topic, data in self._each(reader, tuple(topics)):
-                if latest is not None and time < latest:
-                    raise self.error(f"a message of {topic} at {time} ns comes after one at {latest} ns")
-                latest = time
-                yield time, topic, data
+        last: list[tuple[str, int]] = []
+        topics = tuple(topics)
+        with self._opened(last) as reader:
+            chosen = [each for each in reader.connections if not topics or each.topic in topics]
+            for connection, time, data in reader.messages(chosen):
+                if last and time < last[0][1]:
+                    raise self.error(f"a message of {connection.topic} at {time} ns comes after one at {last[0][1]} ns")
+                last[:] = [(connection.topic, time)]
+                yield time, connection.topic, data
 
     def messages(self, topics: Iterable[str] = ()) -> Iterator[tuple[int, str, Fields]]:
         """Time (ns), topic and fields of each message; raises ``RecordingError``."""
-        store = self.store
         for time, topic, data in self.raw(topics):
-            kind = self.topics[topic]
-            try:
-                message = store.deserialize_cdr(data, kind)
-            except Exception as error:  # of many kinds, for bytes that are no such message
-                said = brief(str(error) or type(error).__name__)
-                raise self.error(f"a message of {topic} at {time} ns is not a {kind}: {said}") from None
-            yield time, topic, fields_of(message)
+            yield time, topic, self.read(topic, data, f" at {time} ns")
+
+    def read(self, topic: str, content: bytes, when: str = "") -> Any:
+        """The fields of a message; raises ``RecordingError``."""
+        kind = self.topics[topic]
+        try:
+            return fields_of(self.store.deserialize_cdr(content, kind))
+        except EpicycleError:
+            raise
+        except Exception as error:  # of many kinds, for bytes that are no such message
+            said = brief(str(error) or type(error).__name__)
+            raise self.error(f"a message of {topic}{when} is not a {kind}: {said}") from None
+
+    def written(self, topic: str, token: Any) -> bytes:
+        """The message with these fields; raises ``RecordingError`` if they do not fit its type."""
+        kind = self.topics[topic]
+        try:
+            return bytes(self.store.serialize_cdr(self._message(kind, token), kind))
+        except EpicycleError:
+            raise
+        except Exception as error:  # of many kinds, for values of all kinds
+            said = brief(str(error) or type(error).__name__)
+            raise RecordingError(f"{brief(token)} cannot be a {kind} of {topic} in {self.path}: {said}") from None
+
+    def _message(self, kind: str, fields: Mapping[str, Any]) -> Any:
+        """The message of a type; numbers beyond the range of theirs become its ends."""
+        told = self.store.fielddefs[kind][1]
+        return self.store.types[kind](**{name: self._value(is_of, fields[name]) for name, is_of in told})
+
+    def _value(self, is_of: tuple[Any, Any], value: Any) -> Any:
+        node, of = is_of
+        if node == Nodetype.NAME:
+            return self._message(of, value)
+        if node == Nodetype.BASE:
+            return value if of[0] in _TEXTS else _in_range(of[0], value).item()
+        inner, name = of[0], of[0][1][0]
+        if inner[0] == Nodetype.BASE and name not in _TEXTS:
+            return _in_range(name, value)
+        return [self._value(inner, each) for each in value]
 
     @cached_property
     def start(self) -> int:
@@ -93,90 +131,61 @@ class BagFile:
         first = next(self.raw(), None)
         return 0 if first is None else first[0]
 
-    @property
+    @cached_property
     def store(self) -> Any:
         """What knows the types of the messages, which takes a while to make."""
-        if self._store is None:
-            self._store = get_typestore(Stores.LATEST)
-            with self.checked(), self.opened() as reader:
-                own = get_typestore(Stores.EMPTY)
-                found: dict[str, Any] = {}
-                for kind, language, text in self._definitions(reader):
-                    if language in ("ros2msg", "msg"):
-                        found |= get_types_from_msg(text, kind)
-                    elif text:
-                        found |= get_types_from_idl(re.sub(r"^(=+\nIDL: .*|=+)$", "", text, flags=re.M))
-                named = repr([(kind, fields, [each[:2] for each in told]) for kind, (told, fields) in found.items()])
-                if re.search("['\"]", re.sub(r"'[A-Za-z_][A-Za-z0-9_/]*'", "", named)):
-                    raise self.error("a type of messages, or a field, has a name that is none")  # and would become code
-                if found:
-                    own.register(found)
-                    self._store = own
-        return self._store
+        found: dict[str, Any] = {}
+        with self._opened() as reader:
+            for each in reader.connections:
+                kind, text = each.msgtype, each.msgdef.data
+                if each.msgdef.format == MessageDefinitionFormat.MSG:
+                    found |= get_types_from_msg(text, kind)
+                elif text:
+                    found |= get_types_from_idl(re.sub(r"^(=+\nIDL: .*|=+)$", "", text, flags=re.M))
+            named = repr([(kind, fields, [each[:2] for each in told]) for kind, (told, fields) in found.items()])
+            if re.search("['\"]", re.sub(r"'[A-Za-z_][A-Za-z0-9_/]*'", "", named)):
+                raise self.error("a type of messages, or a field, has a name that is none")  # and would become code
+            store = get_typestore(Stores.EMPTY if found else Stores.LATEST)
+            store.register(found)
+        return store
 
     @contextmanager
-    def opened(self) -> Iterator[Any]:
-        """The reader of the file."""
-        with rosbag2.Reader(self.path) as reader:
-            yield reader
+    def _opened(self, last: Iterable[tuple[str, int]] = ()) -> Iterator[Any]:
+        """The reader of the file, of which errors name the ``last`` message that was read.
 
-    def _topics(self, reader: Any) -> dict[str, str]:
-        return {each.topic: each.msgtype for each in reader.connections}
-
-    def _definitions(self, reader: Any) -> Iterator[tuple[str, str, str]]:
-        """Each type of messages, the language of its definition, and this."""
-        for each in reader.connections:
-            if each.msgdef.data:
-                yield each.msgtype, each.msgdef.format.name.lower(), each.msgdef.data
-
-    def _each(self, reader: Any, topics: tuple[str, ...]) -> Iterator[tuple[int, str, bytes]]:
-        chosen = [each for each in reader.connections if not topics or each.topic in topics]
-        for connection, time, data in reader.messages(chosen):
-            yield time, connection.topic, data
-
-    @contextmanager
-    def checked(self) -> Iterator[None]:
-        """The libraries raise errors of many kinds for files that are damaged."""
+        The libraries raise errors of many kinds for files that are damaged.
+        """
         try:
-            yield
+            with rosbag2.Reader(self.path) as reader:
+                yield reader
         except (EpicycleError, GeneratorExit):
             raise
         except Exception as error:
-            said = " ".join(str(error).split())[:200]
-            raise self.error(said or type(error).__name__) from None
+            said = " ".join(str(error).split())[:200].rstrip(".") or type(error).__name__
+            said = f"it holds {said}, which is not of ROS 2" if isinstance(error, KeyError) else said
+            after = "".join(f", after a message of {topic} at {time} ns" for topic, time in last)
+            raise self.error(f"{said}{after}") from None
 
     def error(self, reason: str) -> RecordingError:
         """What is wrong with the file."""
         return RecordingError(f"{self.path} is not a recording of ROS 2: {reason}")
 
 
-class _McapFile(BagFile):
-    """A single MCAP file."""
-
-    @contextmanager
-    def opened(self) -> Iterator[Any]:
-        with self.path.open("rb") as file:
-            yield mcap.reader.make_reader(file)
-
-    def _topics(self, reader: Any) -> dict[str, str]:
-        summary = reader.get_summary()
-        if summary is None or not summary.channels:
-            raise self.error("it has no summary of its channels; repair it with 'mcap recover'")
-        for each in summary.channels.values():
-            if each.message_encoding != "cdr":
-                raise self.error(
-                    f"messages of {each.topic} are in {each.message_encoding or 'no encoding'}, not in cdr"
-                )
-        return {each.topic: summary.schemas[each.schema_id].name for each in summary.channels.values()}
-
-    def _definitions(self, reader: Any) -> Iterator[tuple[str, str, str]]:
-        for each in reader.get_summary().schemas.values():
-            yield each.name, each.encoding, each.data.decode()
-
-    def _each(self, reader: Any, topics: tuple[str, ...]) -> Iterator[tuple[int, str, bytes]]:
-        is_sorted = bool(reader.get_summary().chunk_indexes)
-        for _, channel, message in reader.iter_messages(topics or None, log_time_order=is_sorted):
-            yield message.log_time, channel.topic, message.data
+def _in_range(name: str, value: Any) -> Any:
+    """An array of a type of numbers of ROS, those beyond its range at its ends; raises ``ValueError`` for NaN."""
+    dtype, found = np.dtype(_OCTETS.get(name, name)), np.asarray(value)
+    if dtype.kind in "iu" and found.dtype != dtype:
+        ends = np.iinfo(dtype)
+        low, high = ends.min, ends.max
+        if found.dtype.kind == "f":
+            if not np.isfinite(found).all():
+                raise ValueError(f"{brief(value)} is no {name}")
+            found, high = np.rint(found), float(high) if dtype.itemsize < 8 else np.nextafter(float(high), 0.0)
+        else:
+            own = np.iinfo(found.dtype)
+            low, high = max(low, own.min), min(high, own.max)
+        found = np.clip(found, low, high)
+    return found.astype(dtype)
 
 
 def bag(path: str | Path) -> BagFile:
@@ -184,13 +193,11 @@ def bag(path: str | Path) -> BagFile:
     path = Path(path)
     if path.name == "metadata.yaml":
         path = path.parent
-    if path.is_dir():
-        return BagFile(path)
-    if path.suffix.lower() != ".mcap":
+    if not path.is_dir() and path.suffix.lower() != ".mcap":
         raise RecordingError(f"{path} is not a recording of ROS 2: a folder with metadata.yaml, or a file *.mcap")
-    if not path.is_file():
+    if not path.exists():
         raise RecordingError(f"{path} cannot be read: there is no such file")
-    return _McapFile(path)
+    return BagFile(path)
 
 
 _names: dict[type, tuple[str, ...]] = {}
@@ -386,7 +393,7 @@ def lockstep(
 
 
 class BagFolder:
-    """A recording that is a folder, for ``epicycle recording apply``: its messages pass as bytes that nobody reads."""
+    """A recording that is a folder, for ``epicycle recording apply``."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -399,6 +406,10 @@ class BagFolder:
         for time, topic, data in self._file.raw():
             yield Message(time, self._numbers[topic], bytes(data))
 
+    def codec(self) -> BagFile:
+        """What reads the messages."""
+        return self._file
+
     @contextmanager
     def replacing(self, path: Path) -> Iterator[Writing]:
         """A new folder, with the same kind of files."""
@@ -407,7 +418,7 @@ class BagFolder:
         aside = path.with_name(f".{path.name}")
         shutil.rmtree(aside, ignore_errors=True)
         try:
-            with self._file.checked(), self._file.opened() as reader:
+            with self._file._opened() as reader:
                 stored = rosbag2.StoragePlugin.MCAP if any(self.path.glob("*.mcap")) else rosbag2.StoragePlugin.SQLITE3
                 with rosbag2.Writer(aside, version=9, storage_plugin=stored) as writer:
                     yield _Writing(writer, reader, self._numbers)
@@ -441,11 +452,9 @@ class _Writing:
                     offered_qos_profiles=each.ext.offered_qos_profiles,
                 )
 
-    def write(self, time: int, message: Message, changed: str | None) -> None:
+    def write(self, time: int, message: Message, changed: str | bytes | None) -> None:
         """Add a message."""
-        if changed is not None or not isinstance(message.content, bytes):
-            raise RecordingError("messages of ROS 2 can only be lost, delayed or duplicated")
-        self._writer.write(self._connections[message.channel], time, message.content)
+        self._writer.write(self._connections[message.channel], time, message.content if changed is None else changed)
 
     def finish(self) -> None:
         """Nothing: the file is closed by who has opened it."""

@@ -56,8 +56,8 @@ class FMU(Actor):
     Clocks are ports: a token at a triggered input clock ticks it, an output clock sends true when it ticks.  An input
     clock with an interval ticks by itself, at its own times, and is an output, too, which says so.
 
-    The output ``fmu`` sends, once, the digest of the file, which so is part of that of the run.  An FMU is a program: it
-    runs only if its file was named (``--types``), or ``trust`` was called.  What an FMU computes is outside of the
+    The output ``fmu`` sends, once, the digest of the file, which so is part of that of the run.  An FMU is a program:
+    it runs only if its file was named (``--types``), or ``trust`` was called.  What an FMU computes is outside of the
     promise of bits: another machine may give others.
     """
 
@@ -98,16 +98,16 @@ class FMU(Actor):
                 raise ParameterError(f"file: {self.file.name}: {name} and another variable would both be port {port!r}")
             kind, said = KINDS[each.type], f"{each.description or name}{f', in {each.unit}' if each.unit else ''}"
             shape = self._shapes.get(name)
-            type: Any = Any if kind is bytes else kind
+            tokens: Any = Any if kind is bytes else kind
             if shape is not None:
-                type = list if kind in (bytes, str) else shaped(np.ndarray, shape)
+                tokens = list if kind in (bytes, str) else shaped(np.ndarray, shape)
             if each.causality == "output" or each.intervalVariability in TIMED:
                 self._output_of[port] = name
-                found[port] = OutputPort(type, doc=said, depends_on=() if each.causality == "input" else None)
+                found[port] = OutputPort(tokens, doc=said, depends_on=() if each.causality == "input" else None)
             else:
                 self._input_of[port] = name
-                type = Any if each.type == CLOCK else type if shape is None else type | list
-                found[port] = InputPort(type, required=False, doc=said)
+                tokens = Any if each.type == CLOCK else tokens if shape is None else tokens | list
+                found[port] = InputPort(tokens, required=False, doc=said)
         for port, name in self._output_of.items():
             known = depends.get(name)
             if known is not None:
