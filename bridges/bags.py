@@ -36,7 +36,8 @@ from epicycle.actors import (
 from epicycle.runner import Model
 from epicycle.runner.recorded import Message, RecordingError, Writing
 
-KINDS: Mapping[str, Any] = {"number": float, "truth value": bool, "text": str, "any value": Any}
+from .names import KINDS, port_of, reason_of
+
 _TEXTS = ("string", "wstring")
 _OCTETS = {"byte": "uint8", "octet": "uint8", "char": "uint8"}
 LONGEST = 1_000_000_000 * 10**9  # ns, of a run
@@ -51,12 +52,6 @@ class Fields(dict[str, Any]):
         except KeyError:
             near = did_you_mean(name, self)
             raise AttributeError(f"the message has no field {name!r}{near}; fields: {', '.join(self)}") from None
-
-
-def port_of(topic: str) -> str:
-    """The name of a topic as a port: ``/robot/front/scan`` is ``robot_front_scan``."""
-    name = re.sub(r"\W+", "_", topic, flags=re.ASCII).strip("_") or "topic"
-    return f"_{name}" if name[0].isdigit() else name
 
 
 class BagFile:
@@ -95,8 +90,7 @@ class BagFile:
         except EpicycleError:
             raise
         except Exception as error:  # of many kinds, for bytes that are no such message
-            said = brief(str(error) or type(error).__name__)
-            raise self.error(f"a message of {topic}{when} is not a {kind}: {said}") from None
+            raise self.error(f"a message of {topic}{when} is not a {kind}: {reason_of(error)}") from None
 
     def written(self, topic: str, token: Any) -> bytes:
         """The message with these fields; raises ``RecordingError`` if they do not fit its type."""
@@ -106,8 +100,9 @@ class BagFile:
         except EpicycleError:
             raise
         except Exception as error:  # of many kinds, for values of all kinds
-            said = brief(str(error) or type(error).__name__)
-            raise RecordingError(f"{brief(token)} cannot be a {kind} of {topic} in {self.path}: {said}") from None
+            raise RecordingError(
+                f"{brief(token)} cannot be a {kind} of {topic} in {self.path}: {reason_of(error)}"
+            ) from None
 
     def _message(self, kind: str, fields: Mapping[str, Any]) -> Any:
         """The message of a type; numbers beyond the range of theirs become its ends."""
@@ -161,10 +156,9 @@ class BagFile:
         except (EpicycleError, GeneratorExit):
             raise
         except Exception as error:
-            said = " ".join(str(error).split())[:200].rstrip(".") or type(error).__name__
-            said = f"it holds {said}, which is not of ROS 2" if isinstance(error, KeyError) else said
+            reason = f"it holds {error}, which is not of ROS 2" if isinstance(error, KeyError) else reason_of(error)
             after = "".join(f", after a message of {topic} at {time} ns" for topic, time in last)
-            raise self.error(f"{said}{after}") from None
+            raise self.error(f"{reason}{after}") from None
 
     def error(self, reason: str) -> RecordingError:
         """What is wrong with the file."""
@@ -176,15 +170,14 @@ def _in_range(name: str, value: Any) -> Any:
     dtype, found = np.dtype(_OCTETS.get(name, name)), np.asarray(value)
     if dtype.kind in "iu" and found.dtype != dtype:
         ends = np.iinfo(dtype)
-        low, high = ends.min, ends.max
         if found.dtype.kind == "f":
             if not np.isfinite(found).all():
                 raise ValueError(f"{brief(value)} is no {name}")
-            found, high = np.rint(found), float(high) if dtype.itemsize < 8 else np.nextafter(float(high), 0.0)
+            highest = float(ends.max) if dtype.itemsize < 8 else np.nextafter(float(ends.max), 0.0)
+            found = np.clip(np.rint(found), ends.min, highest)
         else:
             own = np.iinfo(found.dtype)
-            low, high = max(low, own.min), min(high, own.max)
-        found = np.clip(found, low, high)
+            found = np.clip(found, max(ends.min, own.min), min(ends.max, own.max))
     return found.astype(dtype)
 
 
@@ -250,6 +243,13 @@ class Bag(Actor):
 
     is_source: ClassVar[bool] = True
     copies_share: ClassVar[tuple[str, ...]] = ("_bag",)
+
+    @staticmethod
+    def told(path: Path) -> str:
+        """What ``epicycle describe`` says of a recording: its topics."""
+        topics = bag(path).topics
+        width = max(map(len, topics), default=0)
+        return "\n".join(f"{topic.ljust(width)}  {kind}" for topic, kind in topics.items())
 
     def own_ports(self) -> dict[str, InputPort[Any] | OutputPort[Any]]:
         self._bag = bag(self.file)
@@ -418,18 +418,15 @@ class BagFolder:
         aside = path.with_name(f".{path.name}")
         shutil.rmtree(aside, ignore_errors=True)
         try:
+            aside.mkdir()
+            made = aside / path.name  # after which the files in it are named
             with self._file._opened() as reader:
                 stored = rosbag2.StoragePlugin.MCAP if any(self.path.glob("*.mcap")) else rosbag2.StoragePlugin.SQLITE3
-                with rosbag2.Writer(aside, version=9, storage_plugin=stored) as writer:
+                with rosbag2.Writer(made, version=9, storage_plugin=stored) as writer:
                     yield _Writing(writer, reader, self._numbers)
-            for each in aside.iterdir():  # the files in it are named after the folder
-                if each.name.startswith(aside.name):
-                    each.rename(each.with_name(each.name.removeprefix(".")))
-            about = aside / "metadata.yaml"
-            about.write_text(about.read_text(encoding="utf-8").replace(aside.name, path.name), encoding="utf-8")
             if path.exists():
                 shutil.rmtree(path)
-            aside.rename(path)
+            made.rename(path)
         except OSError as error:
             raise RecordingError(f"{path} cannot be written: {error.strerror or error}") from None
         finally:

@@ -7,8 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from epicycle.runner import Model
-
-from .extras import needed
+from epicycle.runner.support.extras import needed
 
 if TYPE_CHECKING:
     from gymnasium import spaces
@@ -37,7 +36,7 @@ def gym(
     with a unit; default: the model's), ``changes`` are those of ``epicycle.load``.  A run that stops by itself is
     terminated, one whose time is up is truncated.  Raises ``ModelError``, ``AgentError``.
     """
-    learning = needed("learning", "gym")
+    learning = needed("epicycle.bridges.learning", "gym")
     agent = learning.Agent(observe, act, reward, actions, observations, when, every)
     made: GymEnv = learning.GymEnv(model, agent, until=until, **changes)
     return made
@@ -56,7 +55,7 @@ def zoo(
     It is an ``AECEnv``, in which each agent decides at its own times; with ``parallel`` a ``ParallelEnv``, for agents
     that all decide ``every`` so many seconds, at once.
     """
-    learning = needed("learning", "zoo")
+    learning = needed("epicycle.bridges.learning", "zoo")
     env = learning.ZooEnv(model, agents, until=until, **changes)
     if not parallel:
         return env

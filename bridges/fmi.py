@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import math
-import re
 from fractions import Fraction
 from pathlib import Path
 from typing import Any, ClassVar
 
+import fmpy
 import numpy as np
 
 from epicycle.actors import (
     Actor,
+    EpicycleError,
     InputPort,
     MappingParameter,
     OutputPort,
@@ -26,17 +27,13 @@ from epicycle.actors import (
     to_seconds,
 )
 from epicycle.runner.model.catalogue import given_programs, types_of_file
+from epicycle.runner.support.apart import Apart
 
-from .slaves import CLOCK, KINDS, TIMED, Apart, Event, FMUError, Slave, described, digest_of, runnable
+from .names import port_of, reason_of
+from .slaves import CLOCK, KINDS, TIMED, Event, FMUError, Slave, described, digest_of, runnable
 
 _SETTABLE = ("parameter", "structuralParameter", "input")
 _A = {"output": "an output", "independent": "the time", "calculatedParameter": "a calculated parameter"}
-
-
-def port_of(variable: str) -> str:
-    """The name of a variable as a port: ``der(x[1])`` is ``der_x_1``."""
-    name = re.sub(r"\W+", "_", variable, flags=re.ASCII).strip("_") or "variable"
-    return f"_{name}" if name[0].isdigit() else name
 
 
 def trust(path: str | Path) -> Path:
@@ -72,6 +69,27 @@ class FMU(Actor):
     apart = Parameter(bool, False, doc="whether it runs in a process of its own")
     limit = Parameter(float, 60.0, unit="s", above=0, doc="longest time for a call of one that is apart")
 
+    @staticmethod
+    def told(path: Path) -> str:
+        """What ``epicycle describe`` says of an FMU: version, platforms, and its variables."""
+        about = described(path)
+        kinds = {"co-simulation": about.coSimulation, "model exchange": about.modelExchange}
+        lines = [
+            f"{about.modelName}: FMI {about.fmiVersion} for {' and '.join(kind for kind in kinds if kinds[kind])}",
+            *([about.description] if about.description else []),
+            f"platforms: {', '.join(sorted(fmpy.supported_platforms(str(path))))}; sha256:{digest_of(path)}",
+        ]
+        rows = [("variable", "causality", "type", "unit", "start", "port")]
+        for each in about.modelVariables:
+            port = port_of(each.name) if each.causality in ("input", "output") else ""
+            kind = f"{each.type}{list(each.shape) if each.shape else ''}"
+            rows.append((each.name, each.causality or "local", kind, each.unit or "", str(each.start or ""), port))
+        widths = [max(len(row[place]) for row in rows) for place in range(len(rows[0]))]
+        lines += [
+            "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows
+        ]
+        return "\n".join(lines)
+
     def own_ports(self) -> dict[str, InputPort[Any] | OutputPort[Any]]:
         about = self._about = described(self.file)
         runnable(self.file, about)
@@ -97,16 +115,16 @@ class FMU(Actor):
             if port in found:
                 raise ParameterError(f"file: {self.file.name}: {name} and another variable would both be port {port!r}")
             kind, said = KINDS[each.type], f"{each.description or name}{f', in {each.unit}' if each.unit else ''}"
-            shape = self._shapes.get(name)
+            shape = self._shapes.get(name, ())
             tokens: Any = Any if kind is bytes else kind
-            if shape is not None:
+            if shape:
                 tokens = list if kind in (bytes, str) else shaped(np.ndarray, shape)
             if each.causality == "output" or each.intervalVariability in TIMED:
                 self._output_of[port] = name
                 found[port] = OutputPort(tokens, doc=said, depends_on=() if each.causality == "input" else None)
             else:
                 self._input_of[port] = name
-                tokens = Any if each.type == CLOCK else tokens if shape is None else tokens | list
+                tokens = Any if each.type == CLOCK else tokens | list if shape else tokens
                 found[port] = InputPort(tokens, required=False, doc=said)
         for port, name in self._output_of.items():
             known = depends.get(name)
@@ -167,7 +185,8 @@ class FMU(Actor):
                 f"   help: if you trust it, add --types {self.file}; in Python, types=[...] or trust(...)"
             )
         variables, co = self._variables, self._about.coSimulation
-        self._slave = Apart(str(self.file), self.limit) if self.apart else Slave(str(self.file))
+        file = str(self.file)
+        self._slave = Apart(file, self.limit, Slave, file) if self.apart else Slave(file)
         self._can_go_back = bool(co.canGetAndSetFMUstate)
         self._varies = bool(co.canHandleVariableCommunicationStepSize)
         outputs = {name: math.prod(self._shapes.get(name, ())) for name in self._output_of.values()}
@@ -199,10 +218,10 @@ class FMU(Actor):
         """Call a function of the FMU; what it fails with names the file."""
         try:
             return getattr(self._slave, name)(*given)
-        except FMUError:
+        except EpicycleError:
             raise
         except Exception as error:  # of FMPy, and of ctypes
-            raise FMUError(f"{self.file}: {' '.join(str(error).split())}") from None
+            raise FMUError(f"{self.file}: {reason_of(error)}") from None
 
     def fire(self) -> None:
         now = self.context.time
@@ -212,8 +231,8 @@ class FMU(Actor):
             if self._variables[name].type == CLOCK:
                 self._ticked.append(name)
             else:
-                values = self._sampled if self._variables[name].clocks else self._waiting
-                values[name] = self._elements(name, self.inputs[port].value, f"{self.path}.{port}")
+                kept = self._sampled if self._variables[name].clocks else self._waiting
+                kept[name] = self._elements(name, self.inputs[port].value, f"{self.path}.{port}")
         if self._is_first:
             self.fmu.send(f"sha256:{digest_of(self.file)}")
             self._is_first = False
@@ -249,7 +268,7 @@ class FMU(Actor):
         kind, shape = self._variables[name].type, self._shapes[name]
         if KINDS[kind] in (bytes, str):
             return np.array(elements, dtype=object).reshape(shape).tolist()
-        array = np.array(elements, dtype=np.uint64 if kind == "UInt64" else KINDS[kind]).reshape(shape)
+        array: Any = np.array(elements, dtype=np.uint64 if kind == "UInt64" else KINDS[kind]).reshape(shape)
         array.setflags(write=False)
         return array
 
@@ -317,25 +336,3 @@ def _is_of(kind: str, value: Any) -> bool:
         return isinstance(value, KINDS[kind])
     values = 1 << int(kind.partition("Int")[2] or 32)
     return type(value) is int and value in range(*((0, values) if kind[0] == "U" else (-values // 2, values // 2)))
-
-
-def told(path: str | Path) -> str:
-    """What an FMU is: version, platforms, and its variables with causality, type, unit and start."""
-    import fmpy
-
-    path = Path(path)
-    about = described(path)
-    kinds = {"co-simulation": about.coSimulation, "model exchange": about.modelExchange}
-    lines = [
-        f"{about.modelName}: FMI {about.fmiVersion} for {' and '.join(name for name, each in kinds.items() if each)}",
-        *([about.description] if about.description else []),
-        f"platforms: {', '.join(sorted(fmpy.supported_platforms(str(path))))}; sha256:{digest_of(path)}",
-    ]
-    rows = [("variable", "causality", "type", "unit", "start", "port")]
-    for each in about.modelVariables:
-        port = port_of(each.name) if each.causality in ("input", "output") else ""
-        kind = f"{each.type}{list(each.shape) if each.shape else ''}"
-        rows.append((each.name, each.causality or "local", kind, each.unit or "", str(each.start or ""), port))
-    widths = [max(len(row[place]) for row in rows) for place in range(len(rows[0]))]
-    lines += ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]
-    return "\n".join(lines)

@@ -13,6 +13,7 @@ from simpy.events import NORMAL, URGENT, Event, EventPriority
 from epicycle import actors
 from epicycle.actors import (
     EpicycleError,
+    FunctionParameter,
     InputPort,
     MappingParameter,
     OutputPort,
@@ -28,6 +29,8 @@ from epicycle.actors import (
 from epicycle.runner import ActorError, Model, Simulation
 from epicycle.runner.model.catalogue import given_functions
 
+from .names import KINDS
+
 ENV = "env"
 RESOURCES: Mapping[str, type] = {
     each.__name__: each
@@ -41,28 +44,17 @@ RESOURCES: Mapping[str, type] = {
         simpy.FilterStore,
     )
 }
-KINDS: Mapping[str, Any] = {"number": float, "truth value": bool, "text": str, "any value": Any}
 Behaviour = Callable[..., Any]
 
 
-class FunctionParameter(Parameter[Behaviour]):
+class _FunctionParameter(FunctionParameter):
     """A function of SimPy processes: given in Python, or by its name in a file that the user has named."""
 
-    def __init__(self, known: Mapping[str, Behaviour], *, doc: str = "") -> None:
-        super().__init__(str, doc=doc)  # type: ignore[arg-type]
-        self.known = known
-
-    def describe_type(self) -> str:
-        return "function"
-
-    def convert(self, value: object) -> Behaviour:
-        if callable(value):
-            return value
-        if not isinstance(value, str):
-            raise ParameterError(f"{value!r} is not the name of a function")
-        known = {**given_functions(), **self.known}
-        if value in known:
-            return known[value]
+    def _named(self, value: str) -> Behaviour:
+        named = given_functions()
+        if value in named:
+            return named[value]
+        known = {**named, **self.given}
         raise ParameterError(
             f"{value!r} is not a function that is known{did_you_mean(value, known)}; known: "
             f"{', '.join(sorted(known)) or 'none'}; name its file with --types FILE.py, or in Python "
@@ -95,7 +87,7 @@ class Process(actors.Process):
     A model file can name functions only of files that the user has named (``--types bank.py``: ``bank.customer``).
     """
 
-    function = FunctionParameter({}, doc="the function, such as bank.customer")
+    function = _FunctionParameter({}, doc="the function, such as bank.customer")
     arguments = MappingParameter(any_parameter(), {}, doc="its arguments by name, besides env and ports")
     input_ports: Any = texts_parameter(None, doc="parameters that are inputs; default: those of its decorator")
     output_ports: Any = texts_parameter(None, doc="parameters that are outputs; default: those of its decorator")
@@ -107,12 +99,11 @@ class Process(actors.Process):
     @classmethod
     def knowing(cls, *functions: Behaviour) -> type[Process]:
         """This actor class, for models that may also name these functions, as ``module.name`` or ``name``."""
-        before = declared_parameters(cls)["function"]
-        assert isinstance(before, FunctionParameter)
-        known = dict(before.known)
+        before: _FunctionParameter = declared_parameters(cls)["function"]  # type: ignore[assignment]
+        given = dict(before.given)
         for each in functions:
-            known[each.__name__] = known[f"{each.__module__}.{each.__qualname__}"] = each
-        parameter = FunctionParameter(known, doc=before.doc)
+            given[each.__name__] = given[f"{each.__module__}.{each.__qualname__}"] = each
+        parameter = _FunctionParameter(given, doc=before.doc)
         return type(cls.__name__, (cls,), {"function": parameter, "__doc__": cls.__doc__, "__module__": cls.__module__})
 
     def _named(self) -> tuple[tuple[str, ...], tuple[str, ...]]:

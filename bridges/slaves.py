@@ -1,19 +1,13 @@
-"""FMUs for co-simulation, in this process or in one of their own: what ``fmi`` needs of versions 2 and 3."""
+"""FMUs for co-simulation: what ``fmi`` needs of versions 2 and 3."""
 
 from __future__ import annotations
 
 import hashlib
-import os
-import secrets
 import shutil
-import signal
-import subprocess
-import sys
 from collections.abc import Mapping
 from contextlib import suppress
 from ctypes import c_double, c_int, c_uint32
 from fractions import Fraction
-from multiprocessing.connection import Client, Listener
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
 from zipfile import ZipFile
@@ -26,11 +20,12 @@ from fmpy.fmi3 import FMU3Slave
 
 from epicycle.actors import EpicycleError
 
+from .names import reason_of
+
 CLOCK = "Clock"
 TIMED = ("constant", "fixed", "calculated", "tunable", "changing", "countdown")  # clocks that the importer lets tick
 DISCARD = 2  # the status of a step that has not been completed
 CHANGED = 2  # the qualifier of an interval that the importer has not heard of
-BEGIN_LIMIT = 30.0  # s until a process has started
 KINDS: Mapping[str, type] = {
     **dict.fromkeys(("Real", "Float32", "Float64"), float),
     **dict.fromkeys(("Integer", "Int8", "Int16", "Int32", "Int64", "UInt8", "UInt16", "UInt32", "UInt64"), int),
@@ -71,8 +66,7 @@ def described(path: Path) -> Any:
                 each.intervalDecimal = _seconds(clocks[each.name], "interval")
                 each.shiftDecimal = _seconds(clocks[each.name], "shift")
     except Exception as error:  # of many kinds: no archive, no description, wrong XML
-        said = " ".join(str(error).split())[:200]
-        raise FMUError(f"{path} is not an FMU: {said or type(error).__name__}") from None
+        raise FMUError(f"{path} is not an FMU: {reason_of(error)}") from None
     return about
 
 
@@ -126,7 +120,7 @@ class Slave:
         try:
             self._fmu = FMU3Slave(**given) if self.is_new else FMU2Slave(**given)
         except Exception as error:  # of the system, for a library that it cannot load
-            raise FMUError(f"{path} cannot be loaded: {' '.join(str(error).split())[:300]}") from None
+            raise FMUError(f"{path} cannot be loaded: {reason_of(error)}") from None
 
     def start(self, values: Mapping[str, list[Any]], time: float) -> None:
         """Initialise it with values of parameters and inputs."""
@@ -192,7 +186,10 @@ class Slave:
         self.put({name: value for name, value in values.items() if not self.variables[name].clocks})
         if ticks:
             self._fmu.setClock([self.variables[name].valueReference for name in ticks], [True] * len(ticks))
-        came, told, intervals, following = [], {}, {}, None
+        came: list[str] = []
+        told: dict[str, list[Any]] = {}
+        intervals: dict[str, float] = {}
+        following: float | None = None
         for _ in range(1000):
             self.put(self._of(ticks, values))
             new = [name for name in self._outward if self._fmu.getClock([self.variables[name].valueReference])[0]]
@@ -240,80 +237,6 @@ class Slave:
             with suppress(Exception):
                 act()
         shutil.rmtree(self._folder, ignore_errors=True)
-
-
-class Apart:
-    """An FMU in a process of its own: the same methods, each within a limit of time (s)."""
-
-    def __init__(self, path: str, limit: float) -> None:
-        self._path, self._limit = path, limit
-        key = secrets.token_bytes(16)
-        with Listener(authkey=key) as listener:
-            address = str(listener.address)
-            words = [sys.executable, "-c", "from epicycle.bridges.slaves import serve; serve()", address, path]
-            environment = {**os.environ, "EPICYCLE_FMU_KEY": key.hex(), "PYTHONPATH": os.pathsep.join(sys.path)}
-            self._process = subprocess.Popen(words, env=environment)
-            self._connection = listener.accept()
-        self._answer("loading", BEGIN_LIMIT)
-
-    def __getattr__(self, name: str) -> Any:
-        if name.startswith("_"):
-            raise AttributeError(name)
-
-        def call(*given: Any) -> Any:
-            self._connection.send((name, given))
-            return self._answer(name, self._limit)
-
-        return call
-
-    def _answer(self, doing: str, limit: float) -> Any:
-        try:
-            if not self._connection.poll(limit):
-                self._end()
-                raise FMUError(f"{self._path}: {doing} takes longer than {limit:g} s; its process was ended")
-            is_right, answer = self._connection.recv()
-        except (EOFError, OSError):
-            code = self._process.wait()
-            ended = signal.Signals(-code).name if code < 0 else f"exit code {code}"
-            raise FMUError(f"{self._path}: its process ended in {doing}, with {ended}") from None
-        if not is_right:
-            raise FMUError(answer)
-        return answer
-
-    def close(self) -> None:
-        """End it."""
-        with suppress(Exception):
-            self._connection.send(("close", ()))
-            self._connection.poll(1.0)
-        self._end()
-
-    def _end(self) -> None:
-        self._process.kill()
-        self._process.wait()
-        self._connection.close()
-
-
-def serve() -> None:
-    """What the process does: the methods of a ``Slave``, as it is asked for them."""
-    address, path = sys.argv[-2:]
-    with Client(address, authkey=bytes.fromhex(os.environ.pop("EPICYCLE_FMU_KEY"))) as connection:
-        try:
-            slave = Slave(path)
-            connection.send((True, None))
-        except Exception as error:
-            connection.send((False, str(error)))
-            return
-        name = ""
-        while name != "close":
-            try:
-                name, given = connection.recv()
-            except EOFError:
-                slave.close()
-                return
-            try:
-                connection.send((True, getattr(slave, name)(*given)))
-            except Exception as error:
-                connection.send((False, f"{path}: {' '.join(str(error).split())}"))
 
 
 def digest_of(path: Path) -> str:

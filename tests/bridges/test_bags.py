@@ -261,7 +261,7 @@ def test_what_an_aspect_makes_must_fit_the_type(tmp_path: Path, capsys: pytest.C
     numbers = dict(file.messages(["/robot/numbers"]).__next__()[2])
     for value, reason in (
         ({"layout": {"dim": [], "data_offset": float("nan")}}, "nan is no uint32"),
-        ({"data": ["a"]}, "could not convert string to float: \u2019a\u2019"),
+        ({"layout": 3}, "'int' object is not subscriptable"),
     ):
         with pytest.raises(RecordingError) as refused:
             file.written("/robot/numbers", numbers | value)

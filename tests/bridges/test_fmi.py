@@ -173,9 +173,8 @@ def test_arrays_fit_other_actors(ticking: Path) -> None:
     fmu = other.add(FMU("fmu", file=trust(ticking), values={"n": 4}))
     plant = other.add(StateSpace("plant", a=[[0.0]], b=[[1.0]], c=[[1.0], [2.0], [3.0]]))
     other.connect(other.add(Clock("clock", period=0.5)).output, plant.trigger)
-    other.connect(plant.output, fmu.inputs["u"])
     with pytest.raises(ModelError) as caught:
-        other.check()
+        other.connect(plant.output, fmu.inputs["u"])
     assert "plant.output sends array[3], but fmu.u takes array[4] | list" in str(caught.value)
 
 
