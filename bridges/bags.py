@@ -34,9 +34,9 @@ from epicycle.actors import (
     texts_parameter,
 )
 from epicycle.runner import Model
-from epicycle.runner.recorded import Message, RecordingError, Writing
+from epicycle.runner.recorded import Message, RecordingError, Writing, topics_like
 
-from .names import KINDS, port_of, reason_of
+from .names import KINDS, ports_of, reason_of
 
 _TEXTS = ("string", "wstring")
 _OCTETS = {"byte": "uint8", "octet": "uint8", "char": "uint8"}
@@ -197,9 +197,11 @@ _names: dict[type, tuple[str, ...]] = {}
 
 
 def fields_of(message: Any) -> Any:
-    """A message as a token."""
+    """A message as a token, or what an aspect has made of one, with attributes again."""
     if isinstance(message, list):
         return [fields_of(each) for each in message]
+    if isinstance(message, Mapping):
+        return Fields({name: fields_of(each) for name, each in message.items()})
     kind = type(message)
     if kind not in _names:
         found = [each.name for each in dataclasses.fields(kind)] if dataclasses.is_dataclass(kind) else []
@@ -253,19 +255,19 @@ class Bag(Actor):
 
     def own_ports(self) -> dict[str, InputPort[Any] | OutputPort[Any]]:
         self._bag = bag(self.file)
-        self._topics = tuple(self._bag.topics if self.topics is None else self.topics)
-        for topic in self._topics:
+        topics = tuple(self._bag.topics if self.topics is None else self.topics)
+        for topic in topics:
             if topic not in self._bag.topics:
                 near, known = did_you_mean(topic, self._bag.topics), ", ".join(self._bag.topics)
                 raise ParameterError(f"topics: {self.file.name} has no topic {topic!r}{near}; topics: {known}")
-        self._ports = {topic: port_of(topic) for topic in self._topics}
-        return {port: OutputPort(doc=f"messages of {topic}") for topic, port in self._ports.items()}
+        self.ports = ports_of(topics)
+        return {port: OutputPort(doc=f"messages of {topic}") for topic, port in self.ports.items()}
 
     _next: tuple[int, str, Fields] | None = None
 
     def initialize(self) -> None:
         self._start = self._bag.start
-        self._position = _Position(self._bag, self._topics)
+        self._position = _Position(self._bag, tuple(self.ports))
         self._prepare()
 
     def restart(self) -> None:
@@ -287,7 +289,7 @@ class Bag(Actor):
     def fire(self) -> None:
         assert self._next is not None
         _, topic, message = self._next
-        self.outputs[self._ports[topic]].send(message)
+        self.outputs[self.ports[topic]].send(message)
         self._prepare()
 
 
@@ -305,7 +307,7 @@ class _Node(Actor):
     def fire(self) -> None:
         for name, port in self.inputs.items():
             for token in port.tokens:
-                said = self._hear(self.topics[name], _as_fields(token))
+                said = self._hear(self.topics[name], fields_of(token))
                 if said is not None:
                     self._send(name, said)
 
@@ -330,13 +332,6 @@ class _Node(Actor):
             port.send(value)
 
 
-def _as_fields(token: Any) -> Any:
-    """What an aspect has made of a message, with attributes again."""
-    if isinstance(token, Mapping):
-        return Fields({name: _as_fields(each) for name, each in token.items()})
-    return token
-
-
 def lockstep(
     recording: str | Path,
     program: Any,
@@ -358,13 +353,10 @@ def lockstep(
 
     >>> model = lockstep("walk.mcap", Filter, outputs={"error": "number"}, disturb="lost.yaml", at="/gps")
     """
-    from fnmatch import fnmatchcase
-
     file = bag(recording)
     model = Model(file.path.stem)
-    chosen = None if topics is None else list(topics)
-    source = model.add(Bag("bag", file=file.path.resolve(), topics=chosen))
-    names = {port_of(topic): topic for topic in (file.topics if chosen is None else chosen)}
+    source = model.add(Bag("bag", file=file.path.resolve(), topics=None if topics is None else list(topics)))
+    names = {port: topic for topic, port in source.ports.items()}
     kinds = dict(outputs) if isinstance(outputs, Mapping) else dict.fromkeys(outputs, "any value")
     for name, each in kinds.items():
         if name in names:
@@ -379,12 +371,8 @@ def lockstep(
         model.connect(source.outputs[name], node.inputs[name])
     places = None
     if at is not None:
-        patterns = [at] if isinstance(at, str) else list(at)
-        for pattern in patterns:
-            if not any(fnmatchcase(topic, pattern) for topic in names.values()):
-                near, known = did_you_mean(pattern, names.values()), ", ".join(names.values())
-                raise RecordingError(f"{pattern!r} matches no topic{near}; topics: {known}")
-        heard = [name for name, topic in names.items() if any(fnmatchcase(topic, pattern) for pattern in patterns)]
+        chosen = topics_like([at] if isinstance(at, str) else at, names.values())
+        heard = [name for name, topic in names.items() if topic in chosen]
         places = [path for name in heard for path in (f"node.{name}", f"bag.{name}")]
     for each in [disturb] if isinstance(disturb, (str, Path)) else disturb:
         model.disturb(each, at=places, set=set)

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
-from pathlib import Path
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
-from epicycle.runner import Model
 from epicycle.runner.support.extras import needed
+
+from .names import Source
 
 if TYPE_CHECKING:
     from gymnasium import spaces
 
     from .learning import Agent, GymEnv
-
-Source = str | Path | Callable[[], Model]
 
 
 def gym(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from contextlib import suppress
 from fractions import Fraction
 from pathlib import Path
 from typing import Any, ClassVar
@@ -11,6 +12,7 @@ import fmpy
 import numpy as np
 
 from epicycle.actors import (
+    NEVER,
     Actor,
     EpicycleError,
     InputPort,
@@ -29,11 +31,10 @@ from epicycle.actors import (
 from epicycle.runner.model.catalogue import given_programs, types_of_file
 from epicycle.runner.support.apart import Apart
 
-from .names import port_of, reason_of
+from .names import ports_of, reason_of
 from .slaves import CLOCK, KINDS, TIMED, Event, FMUError, Slave, described, digest_of, runnable
 
 _SETTABLE = ("parameter", "structuralParameter", "input")
-_A = {"output": "an output", "independent": "the time", "calculatedParameter": "a calculated parameter"}
 
 
 def trust(path: str | Path) -> Path:
@@ -74,21 +75,15 @@ class FMU(Actor):
         """What ``epicycle describe`` says of an FMU: version, platforms, and its variables."""
         about = described(path)
         kinds = {"co-simulation": about.coSimulation, "model exchange": about.modelExchange}
-        lines = [
-            f"{about.modelName}: FMI {about.fmiVersion} for {' and '.join(kind for kind in kinds if kinds[kind])}",
-            *([about.description] if about.description else []),
-            f"platforms: {', '.join(sorted(fmpy.supported_platforms(str(path))))}; sha256:{digest_of(path)}",
-        ]
-        rows = [("variable", "causality", "type", "unit", "start", "port")]
+        lines = [f"{about.modelName}: FMI {about.fmiVersion} for {' and '.join(kind for kind in kinds if kinds[kind])}"]
+        lines += [about.description] if about.description else []
+        lines += [f"platforms: {', '.join(sorted(fmpy.supported_platforms(str(path))))}; sha256:{digest_of(path)}"]
+        rows, ports = [("variable", "causality", "type", "unit", "start", "port")], _ports(about)
         for each in about.modelVariables:
-            port = port_of(each.name) if each.causality in ("input", "output") else ""
             kind = f"{each.type}{list(each.shape) if each.shape else ''}"
-            rows.append((each.name, each.causality or "local", kind, each.unit or "", str(each.start or ""), port))
-        widths = [max(len(row[place]) for row in rows) for place in range(len(rows[0]))]
-        lines += [
-            "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows
-        ]
-        return "\n".join(lines)
+            rows.append((each.name, each.causality, kind, each.unit or "", each.start or "", ports.get(each.name, "")))
+        widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+        return "\n".join([*lines, *("  ".join(map(str.ljust, row, widths)).rstrip() for row in rows)])
 
     def own_ports(self) -> dict[str, InputPort[Any] | OutputPort[Any]]:
         about = self._about = described(self.file)
@@ -100,9 +95,8 @@ class FMU(Actor):
         self._output_of: dict[str, str] = {}
         depends = {each.variable.name: each.dependencies for each in about.outputs}
         found: dict[str, InputPort[Any] | OutputPort[Any]] = {}
-        for name, each in self._variables.items():
-            if each.causality not in ("input", "output"):
-                continue
+        for name, port in _ports(about).items():
+            each = self._variables[name]
             if each.type not in KINDS:
                 raise ParameterError(
                     f"file: {self.file.name}: {name} is of type {each.type}, which is none of FMI 2 or 3"
@@ -111,9 +105,6 @@ class FMU(Actor):
                 raise ParameterError(
                     f"file: {self.file.name}: {name} is a clock, and there is no event mode to tick in"
                 )
-            port = port_of(name)
-            if port in found:
-                raise ParameterError(f"file: {self.file.name}: {name} and another variable would both be port {port!r}")
             kind, said = KINDS[each.type], f"{each.description or name}{f', in {each.unit}' if each.unit else ''}"
             shape = self._shapes.get(name, ())
             tokens: Any = Any if kind is bytes else kind
@@ -145,10 +136,8 @@ class FMU(Actor):
         for name, value in self.values.items():
             if name not in self._variables:
                 raise ParameterError(f"values: {self.file.name} has no {name!r}{did_you_mean(name, self._variables)}")
-            causality = self._variables[name].causality
-            if causality not in _SETTABLE:
-                kind = _A.get(causality, "a local variable")
-                raise ParameterError(f"values: {name} is {kind} of {self.file.name}, not a parameter or an input")
+            if (causality := self._variables[name].causality) not in _SETTABLE:
+                raise ParameterError(f"values: {name} of {self.file.name} is of causality {causality}, and has its own")
             self._given(name, value)
         own = self._about.defaultExperiment
         own = None if own is None else own.stepSize
@@ -203,7 +192,7 @@ class FMU(Actor):
         self._waiting: dict[str, list[Any]] = {}  # values for inputs
         self._sampled: dict[str, list[Any]] = {}  # for those with clocks
         self._ticked: list[str] = []  # by tokens
-        self._event, self._ends, self._following = self._has_events, False, math.inf
+        self._event, self._ends, self._following = self._has_events, False, NEVER
         self._call("start", {name: self._given(name, value) for name, value in self.values.items()}, self._time)
         self._saved_at = self._time
         self._is_first = True
@@ -218,10 +207,11 @@ class FMU(Actor):
         """Call a function of the FMU; what it fails with names the file."""
         try:
             return getattr(self._slave, name)(*given)
-        except EpicycleError:
-            raise
-        except Exception as error:  # of FMPy, and of ctypes
-            raise FMUError(f"{self.file}: {reason_of(error)}") from None
+        except Exception as error:  # of FMPy, of ctypes, or of its process
+            reason = str(error) if isinstance(error, EpicycleError) else f"{self.file}: {reason_of(error)}"
+            with suppress(Exception):  # whose process may have ended
+                reason += f": {self._slave.said()}".removesuffix(": ")
+            raise FMUError(reason) from None
 
     def fire(self) -> None:
         now = self.context.time
@@ -240,11 +230,11 @@ class FMU(Actor):
             return
         ticks = [*dict.fromkeys(self._ticked), *(name for name, time in self._due.items() if self._at(time) <= now)]
         values: dict[str, list[Any]] = {}
-        if self._event or ticks or now >= self._to(self._following) or (self._has_events and self._waiting):
+        if self._has_events and (self._event or self._waiting or ticks or now >= self._following):
             event: Event = self._call("event", {**self._waiting, **self._sampled}, ticks, self._clocked)
             self._plan(ticks, event.intervals)
             values, ticks = event.values, [*ticks, *event.ticks]
-            self._following = math.inf if event.following is None else event.following
+            self._following = NEVER if event.following is None else to_nanoseconds(event.following)
             self._ends = self._ends or event.ends
         elif self._waiting:
             self._call("put", self._waiting)
@@ -288,12 +278,9 @@ class FMU(Actor):
     def _at(self, time: Fraction) -> int:
         return self._origin + round(time * 10**9)
 
-    def _to(self, time: float) -> float:
-        return math.inf if math.isinf(time) else to_nanoseconds(time)
-
     def _reached(self, now: int) -> bool:
         """Bring the FMU to the present, if that is possible now; whether it is there."""
-        there = self._to(self._time)
+        there = to_nanoseconds(self._time)
         if there == now:
             return True
         if there > now:  # it has run ahead, and a token has come
@@ -303,7 +290,7 @@ class FMU(Actor):
             self._time, self._event, self._ends = self._saved_at, False, False
         elif not self._varies and now < self._next:
             return False
-        while self._to(self._time) < now and not self._ends:
+        while to_nanoseconds(self._time) < now and not self._ends:
             self._advance(to_seconds(now))
         return True
 
@@ -316,7 +303,7 @@ class FMU(Actor):
 
     def _go_ahead(self) -> None:
         """Run to the next event, or to the next communication; or wait for that."""
-        target = int(min(self._next, self._to(self._following), *map(self._at, self._due.values())))
+        target = min(self._next, self._following, *map(self._at, self._due.values()))
         if self._has_events and target > self.context.time:
             if self._can_go_back and self._input_of:
                 self._call("save")
@@ -325,6 +312,12 @@ class FMU(Actor):
             target = to_nanoseconds(self._time)
         self._wake.cancel()
         self._wake = self.context.wake(self, max(target, self.context.time))
+
+
+def _ports(about: Any) -> dict[str, str]:
+    """The ports of inputs and outputs."""
+    names = (each.name for each in about.modelVariables if each.causality in ("input", "output"))
+    return ports_of(names, "fmu")
 
 
 def _is_of(kind: str, value: Any) -> bool:

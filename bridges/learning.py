@@ -26,7 +26,7 @@ from epicycle.actors import Actor, EpicycleError, InputPort, OutputPort, Paramet
 from epicycle.runner import Model, Results, Simulation, load_model
 from epicycle.runner.execution.results import STOP_TIME
 
-from .environments import Source
+from .names import Source
 
 Observation = NDArray[np.float64]
 CHANGES = ("set", "overrides", "disturb", "aspects", "without_aspects", "types", "max_actors")

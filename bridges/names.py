@@ -3,17 +3,27 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
 from typing import Any
 
+from epicycle.runner import Model
+
+Source = str | Path | Callable[[], Model]  # a packaged model, a file, or what makes one
 # What an output sends, as a model says it.
 KINDS: Mapping[str, Any] = {"number": float, "truth value": bool, "text": str, "any value": Any}
 
 
-def port_of(name: str) -> str:
-    """Any name as that of a port: ``/robot/front/scan`` is ``robot_front_scan``, ``der(x[1])`` is ``der_x_1``."""
-    found = re.sub(r"\W+", "_", name, flags=re.ASCII).strip("_") or "nameless"
-    return f"_{found}" if found[0].isdigit() else found
+def ports_of(names: Iterable[str], *taken: str) -> dict[str, str]:
+    """Names as those of ports: ``/robot/front/scan`` is ``robot_front_scan``, ``der(x[1])`` is ``der_x_1``."""
+    found: dict[str, str] = {}
+    for name in names:
+        port = re.sub(r"\W+", "_", name, flags=re.ASCII).strip("_") or "nameless"
+        port = f"_{port}" if port[0].isdigit() else port
+        while port in taken or port in found.values():
+            port += "_"
+        found[name] = port
+    return found
 
 
 def reason_of(error: Exception) -> str:

@@ -8,6 +8,7 @@ from collections.abc import Callable, Generator, Iterable, Mapping
 from typing import Any, cast
 
 import simpy
+from simpy import Container, FilterStore, PreemptiveResource, PriorityResource, PriorityStore, Resource, Store
 from simpy.events import NORMAL, URGENT, Event, EventPriority
 
 from epicycle import actors
@@ -34,15 +35,7 @@ from .names import KINDS
 ENV = "env"
 RESOURCES: Mapping[str, type] = {
     each.__name__: each
-    for each in (
-        simpy.Resource,
-        simpy.PriorityResource,
-        simpy.PreemptiveResource,
-        simpy.Container,
-        simpy.Store,
-        simpy.PriorityStore,
-        simpy.FilterStore,
-    )
+    for each in (Resource, PriorityResource, PreemptiveResource, Container, Store, PriorityStore, FilterStore)
 }
 Behaviour = Callable[..., Any]
 
@@ -223,7 +216,7 @@ class Inlet:
     @property
     def items(self) -> list[Any]:
         """Tokens that have arrived and nobody has got."""
-        return list(self._actor._queued[self._port.name])
+        return self._actor.unread(self._port)
 
     def get(self) -> Event:
         """An event whose value is the next token."""

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import hashlib
+import math
 import shutil
 from collections.abc import Mapping
 from contextlib import suppress
-from ctypes import c_double, c_int, c_uint32
+from ctypes import byref, c_double, c_int, c_uint32
 from fractions import Fraction
 from pathlib import Path
 from typing import Any, NamedTuple, TypeVar
@@ -14,9 +15,10 @@ from zipfile import ZipFile
 
 import fmpy
 from defusedxml.ElementTree import fromstring
+from fmpy import fmi2
 from fmpy.fmi1 import FMICallException
-from fmpy.fmi2 import FMU2Slave, fmi2LastSuccessfulTime, fmi2Terminated
 from fmpy.fmi3 import FMU3Slave
+from fmpy.logging import addLoggerProxy
 
 from epicycle.actors import EpicycleError
 
@@ -25,6 +27,7 @@ from .names import reason_of
 CLOCK = "Clock"
 TIMED = ("constant", "fixed", "calculated", "tunable", "changing", "countdown")  # clocks that the importer lets tick
 DISCARD = 2  # the status of a step that has not been completed
+BEYOND = 4e9  # s, longer than any run
 CHANGED = 2  # the qualifier of an interval that the importer has not heard of
 KINDS: Mapping[str, type] = {
     **dict.fromkeys(("Real", "Float32", "Float64"), float),
@@ -111,6 +114,7 @@ class Slave:
         self._is_stepping = False  # and not handling events, with which it begins
         self._folder = fmpy.extract(str(self.path))
         self._saved: Any = None
+        self._said = ""
         given = {
             "guid": self.about.guid,
             "unzipDirectory": self._folder,
@@ -118,7 +122,7 @@ class Slave:
             "instanceName": self.about.modelName or "fmu",
         }
         try:
-            self._fmu = FMU3Slave(**given) if self.is_new else FMU2Slave(**given)
+            self._fmu = FMU3Slave(**given) if self.is_new else fmi2.FMU2Slave(**given)
         except Exception as error:  # of the system, for a library that it cannot load
             raise FMUError(f"{path} cannot be loaded: {reason_of(error)}") from None
 
@@ -127,7 +131,8 @@ class Slave:
         sizes = {name for name in values if self.variables[name].causality == "structuralParameter"}
         others = {name: value for name, value in values.items() if name not in sizes}
         if self.is_new:
-            self._fmu.instantiate(eventModeUsed=self.has_events, earlyReturnAllowed=self.has_events)
+            events = self.has_events
+            self._fmu.instantiate(eventModeUsed=events, earlyReturnAllowed=events, logMessage=self._hear)
             if sizes:
                 self._fmu.enterConfigurationMode()
                 self.put({name: values[name] for name in sizes})
@@ -135,11 +140,24 @@ class Slave:
             self.put(others)
             self._fmu.enterInitializationMode(startTime=time)
         else:
-            self._fmu.instantiate()
+            callbacks = fmi2.fmi2CallbackFunctions.from_buffer_copy(fmi2.defaultCallbacks)
+            callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(self._hear)
+            addLoggerProxy(byref(callbacks))
+            self._fmu.instantiate(callbacks=callbacks)
             self._fmu.setupExperiment(startTime=time)
             self.put(others)
             self._fmu.enterInitializationMode()
         self._fmu.exitInitializationMode()
+
+    def _hear(self, *given: Any) -> None:
+        """Keep what the FMU says of an error; all else that it would write to the terminal is nobody's business."""
+        *_, status, _, message = given
+        if status > DISCARD:
+            self._said = message.decode("utf-8", "replace")
+
+    def said(self) -> str:
+        """What the FMU has said of its latest error."""
+        return self._said
 
     def _function(self, name: str) -> str:
         kind: str = self.variables[name].type
@@ -170,8 +188,8 @@ class Slave:
                 if error.status != DISCARD:
                     raise
                 # It has come only so far, perhaps because it ends the simulation.
-                last = float(self._fmu.getRealStatus(fmi2LastSuccessfulTime))
-                return last, False, bool(self._fmu.getBooleanStatus(fmi2Terminated))
+                last = float(self._fmu.getRealStatus(fmi2.fmi2LastSuccessfulTime))
+                return last, False, bool(self._fmu.getBooleanStatus(fmi2.fmi2Terminated))
             return until, False, False
         event, ends, early, last = self._fmu.doStep(time, until - time, self._saved is None)
         return (last if early else until), bool(event), bool(ends)
@@ -198,7 +216,7 @@ class Slave:
             came += new
             again, ends, _, _, defined, when = self._fmu.updateDiscreteStates()
             intervals |= self._intervals()
-            following, ticks = (float(when) if defined else None), []
+            following, ticks = (float(when) if defined and when < BEYOND else None), []
             if ends or not again:
                 break
         else:
@@ -214,6 +232,8 @@ class Slave:
             interval, qualifier = (c_double * 1)(), (c_int * 1)()
             self._fmu.getIntervalDecimal((c_uint32 * 1)(self.variables[name].valueReference), interval, qualifier)
             if qualifier[0] == CHANGED:
+                if not 0 <= interval[0] < math.inf:
+                    raise FMUError(f"{self.path}: the interval of the clock {name} is {interval[0]:g} s")
                 found[name] = float(interval[0])
         return found
 

@@ -358,14 +358,15 @@ class _McapWriting:
         self._writer.finish()  # type: ignore[no-untyped-call]
 
 
-def check_topics(patterns: Iterable[str], topics: Iterable[str]) -> None:
-    """Raise ``RecordingError`` for a pattern that matches no topic."""
+def topics_like(patterns: Iterable[str], topics: Iterable[str]) -> list[str]:
+    """The topics that a pattern matches; raises ``RecordingError`` for a pattern that matches none."""
     from fnmatch import fnmatchcase
 
-    topics = list(topics)
+    patterns, topics = list(patterns), list(topics)
     for pattern in patterns:
         if not any(fnmatchcase(topic, pattern) for topic in topics):
             listed = ", ".join(topics[:20]) + (", ..." if len(topics) > 20 else "")
             raise RecordingError(
                 f"{pattern!r} matches no topic{did_you_mean(pattern, topics)}; topics: {listed or 'none'}"
             )
+    return [topic for topic in topics if any(fnmatchcase(topic, pattern) for pattern in patterns)]

@@ -6,7 +6,6 @@ import json
 import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +17,7 @@ from ..model.build.disturbance import disturb_ports
 from ..model.build.model import Model
 from ..model.language.settings import Setting
 from ..support.shown import finite
-from .files import Codec, Message, Recording, RecordingError, check_topics, opened
+from .files import Codec, Message, Recording, RecordingError, opened, topics_like
 
 SENDER = "recording"
 _LONGEST = 1_000_000_000 * 10**9  # ns
@@ -246,10 +245,8 @@ def _places(names: _Channels, channels: Mapping[int, str], patterns: list[str]) 
     """The inputs and outputs of the topics that patterns match; None without patterns."""
     if not patterns:
         return None
-    check_topics(patterns, channels.values())
-    chosen = [
-        names[number] for number, topic in channels.items() if any(fnmatchcase(topic, pattern) for pattern in patterns)
-    ]
+    found = topics_like(patterns, channels.values())
+    chosen = [names[number] for number, topic in channels.items() if topic in found]
     return {
         "input": [f"{each.actor}.{each.port}" for each in chosen],
         "output": [f"{SENDER}.{each.output}" for each in chosen],

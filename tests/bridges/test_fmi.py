@@ -215,7 +215,7 @@ def test_describe(stair: Path, capsys: pytest.CaptureFixture[str]) -> None:
     ("values", "message"),
     [
         ({"perid": 2}, "fmu: values: events.fmu has no 'perid', did you mean 'period'?"),
-        ({"level": 2}, "fmu: values: level is an output of events.fmu, not a parameter or an input"),
+        ({"level": 2}, "fmu: values: level of events.fmu is of causality output, and has its own"),
         ({"period": True}, "fmu: values: period of events.fmu is of type Float64, not true"),
         ({"mistake": 1.5}, "fmu: values: mistake of events.fmu is of type Int32, not 1.5"),
         ({"mistake": 2**31}, "fmu: values: mistake of events.fmu is of type Int32, not 2147483648"),
