@@ -5,6 +5,7 @@ from __future__ import annotations
 import inspect
 import random  # noqa: TID251  # the class alone: what is drawn comes from a stream
 from collections.abc import Callable, Generator, Iterable, Mapping
+from pathlib import Path
 from typing import Any, cast
 
 import simpy
@@ -184,8 +185,9 @@ def _checked(behaviour: Generator[Any, Any, None], name: str) -> Generator[Event
         except StopIteration:
             return
         if not isinstance(event, Event):
+            line, file = behaviour.gi_frame.f_lineno, Path(behaviour.gi_code.co_filename).name
             behaviour.close()
-            raise EpicycleError(f"{name} yields {brief(event)}, which is not an event")
+            raise EpicycleError(f"{name} yields {brief(event)} at {file}:{line}, which is not an event")
         try:
             act, given = behaviour.send, (yield event)
         except BaseException as error:  # an interrupt, the failure of the event, or the end of the run

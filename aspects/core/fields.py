@@ -74,7 +74,8 @@ def field_of(token: Any, name: str, advice: str = "") -> Any:
     else:
         raise FieldError(f"a token of type {type(token).__name__} has no fields{advice and f'; {advice}'}")
     if name not in names:
-        raise FieldError(f"{type(token).__name__} has no field {name!r}; its fields: {', '.join(map(str, names))}")
+        known = ", ".join(each for each in map(str, names) if each.isprintable())  # others are not for people
+        raise FieldError(f"{type(token).__name__} has no field {name!r}; its fields: {known}")
     return token[name] if isinstance(token, dict) else getattr(token, name)
 
 

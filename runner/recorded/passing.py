@@ -127,7 +127,7 @@ def pass_recording(
     ``at`` are patterns of topics, in place of those of the disturbances.  Raises ``EpicycleError``.
     """
     if source.suffix.lower() != target.suffix.lower():
-        raise RecordingError(f"{target} must be of the same kind as {source}: {source.suffix}")
+        raise RecordingError(f"{target} must be of the same kind as {source}: {source.suffix or 'a folder'}")
     patterns, names = list(at), list(map(str, disturbances))
     with opened(source) as recording:
 
