@@ -312,24 +312,17 @@ class _Node(Actor):
                     self._send(name, said)
 
     def _send(self, name: str, said: Any) -> None:
-        if not isinstance(said, Mapping) or (len(self.outputs) == 1 and not said.keys() <= self.outputs.keys()):
-            if len(self.outputs) != 1:
-                raise EpicycleError(
-                    f"on_message({self.topics[name]!r}, ...) returns {brief(said)}, not a mapping of outputs to "
-                    f"values; outputs: {', '.join(self.outputs) or 'none'}"
-                )
-            said = {next(iter(self.outputs)): said}
+        returns, known = f"on_message({self.topics[name]!r}, ...) returns", ", ".join(self.outputs) or "none"
+        if len(self.outputs) == 1 and not (isinstance(said, Mapping) and said.keys() <= self.outputs.keys()):
+            said = dict.fromkeys(self.outputs, said)
+        if not isinstance(said, Mapping):
+            raise EpicycleError(f"{returns} {brief(said)}, not a mapping of outputs to values; outputs: {known}")
         for key, value in said.items():
             if key not in self.outputs:
                 near = did_you_mean(key, self.outputs)
-                raise EpicycleError(
-                    f"on_message({self.topics[name]!r}, ...) returns a value for {key!r}, which is no output{near}; "
-                    f"outputs: {', '.join(self.outputs) or 'none'}"
-                )
+                raise EpicycleError(f"{returns} a value for {key!r}, which is no output{near}; outputs: {known}")
             port = self.outputs[key]
-            if port.type is float:
-                value = float(value)
-            port.send(value)
+            port.send(float(value) if port.type is float else value)
 
 
 def lockstep(

@@ -6,6 +6,7 @@ import inspect
 import random  # noqa: TID251  # the class alone: what is drawn comes from a stream
 from collections.abc import Callable, Generator, Iterable, Mapping
 from pathlib import Path
+from types import GeneratorType
 from typing import Any, cast
 
 import simpy
@@ -167,7 +168,7 @@ class Process(actors.Process):
             given["random"] = Random(self.random)
         result = self.function(**{ENV: self.environment}, **given)
         if inspect.isgenerator(result):
-            yield from _checked(cast("Generator[Any, Any, None]", result), _name(self.function))
+            yield from _checked(cast("GeneratorType[Any, Any, Any]", result), _name(self.function))
         elif isinstance(result, Event):
             yield result
 
@@ -176,7 +177,7 @@ def _name(function: Behaviour) -> str:
     return getattr(function, "__name__", repr(function))
 
 
-def _checked(behaviour: Generator[Any, Any, None], name: str) -> Generator[Event, Any, None]:
+def _checked(behaviour: GeneratorType[Any, Any, Any], name: str) -> Generator[Event, Any, None]:
     """A generator, as it is as long as it yields events."""
     act, given = behaviour.send, None
     while True:
@@ -185,9 +186,10 @@ def _checked(behaviour: Generator[Any, Any, None], name: str) -> Generator[Event
         except StopIteration:
             return
         if not isinstance(event, Event):
-            line, file = behaviour.gi_frame.f_lineno, Path(behaviour.gi_code.co_filename).name
+            frame, file = behaviour.gi_frame, Path(behaviour.gi_code.co_filename).name
+            where = f"{file}:{frame.f_lineno}" if frame is not None else file
             behaviour.close()
-            raise EpicycleError(f"{name} yields {brief(event)} at {file}:{line}, which is not an event")
+            raise EpicycleError(f"{name} yields {brief(event)} at {where}, which is not an event")
         try:
             act, given = behaviour.send, (yield event)
         except BaseException as error:  # an interrupt, the failure of the event, or the end of the run
