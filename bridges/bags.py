@@ -186,7 +186,7 @@ def bag(path: str | Path) -> BagFile:
     path = Path(path)
     if path.name == "metadata.yaml":
         path = path.parent
-    if not path.is_dir() and path.suffix.lower() != ".mcap":
+    if not path.is_dir() and path.suffix.lower() not in ("", ".mcap"):
         raise RecordingError(f"{path} is not a recording of ROS 2: a folder with metadata.yaml, or a file *.mcap")
     if not path.exists():
         raise RecordingError(f"{path} cannot be read: there is no such file")
