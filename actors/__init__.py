@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from .constructors import *  # the same classes, each with a constructor that names its parameters
     from .control import FilterDesign
     from .distributions import Distribution
+    from .functions import FunctionParameter
     from .modes import Mode, on_entry, on_exit, transition
     from .replay import ReplayError
     from .robotics import (
@@ -39,7 +40,8 @@ __all__ = [
     "DeadZone", "Default", "Derivative", "Detections", "Difference", "DiscreteFilter", "Display", "DistanceMonitor",
     "Distribution", "DoubleIntegrator", "Dynamics", "Emitter", "Environment", "EpicycleError", "Equals", "Estimate",
     "Estimator", "Events", "Exponential", "Expression", "ExtendedEstimator", "Extreme", "Fault", "FaultError", "Filter",
-    "FilterDesign", "FilterError", "FilterPyEstimator", "FirstOfInstant", "FirstOrder", "Flooding", "Function", "Gamma",
+    "FilterDesign", "FilterError", "FilterPyEstimator", "FirstOfInstant", "FirstOrder", "Flooding", "Function",
+    "FunctionParameter", "Gamma",
     "GoalMonitor", "Histogram", "HoldingExpression", "Host", "Hysteresis", "InertialSensor", "Inform", "Inhibit",
     "InputPort", "IntegratedOUEstimator", "Integrator", "IsPresent", "JPDATracker", "Latest", "LatestOfAll", "Limiter",
     "Link", "LogNormal", "LogicGate", "LookupTable", "Machine", "MappingParameter", "Match", "MathFunction",
@@ -90,7 +92,7 @@ _MODULES = {
     ".flow": (
         "BooleanSwitch", "Merge", "MostRecent", "Repeat", "Router", "Sampler", "Select", "Switch", "Synchronizer",
     ),
-    ".functions": ("Expression", "Function", "LookupTable"),
+    ".functions": ("Expression", "Function", "FunctionParameter", "LookupTable"),
     ".links": ("ArqReceiver", "ArqSender", "Link", "NetworkSwitch"),
     ".logic": ("Comparator", "Equals", "LogicGate"),
     ".modes": ("ModalActor", "Mode", "StateMachine", "on_entry", "on_exit", "transition"),

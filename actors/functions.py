@@ -112,8 +112,10 @@ class FunctionParameter(Parameter[Callable[..., Any]]):
             return value
         if not isinstance(value, str):
             raise ParameterError(f"{value!r} is not the name of a function")
-        if value in self.given:
-            return self.given[value]
+        return self.given[value] if value in self.given else self._named(value)
+
+    def _named(self, value: str) -> Callable[..., Any]:
+        """A function that is not given, by its name."""
         offered = entry_points(group=FUNCTION_GROUP)
         for point in offered:
             if value in (point.name, point.value):

@@ -17,8 +17,9 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, ClassVar
 
-import mcap.reader
+import numpy as np
 from rosbags import rosbag2
+from rosbags.interfaces import MessageDefinitionFormat, Nodetype
 from rosbags.typesys import Stores, get_types_from_idl, get_types_from_msg, get_typestore
 
 from epicycle.actors import (
@@ -33,9 +34,12 @@ from epicycle.actors import (
     texts_parameter,
 )
 from epicycle.runner import Model
-from epicycle.runner.recorded import Message, RecordingError, Writing
+from epicycle.runner.recorded import Message, RecordingError, Writing, topics_like
 
-KINDS: Mapping[str, Any] = {"number": float, "truth value": bool, "text": str, "any value": Any}
+from .names import KINDS, ports_of, reason_of
+
+_TEXTS = ("string", "wstring")
+_OCTETS = {"byte": "uint8", "octet": "uint8", "char": "uint8"}
 LONGEST = 1_000_000_000 * 10**9  # ns, of a run
 
 
@@ -50,42 +54,71 @@ class Fields(dict[str, Any]):
             raise AttributeError(f"the message has no field {name!r}{near}; fields: {', '.join(self)}") from None
 
 
-def port_of(topic: str) -> str:
-    """The name of a topic as a port: ``/robot/front/scan`` is ``robot_front_scan``."""
-    name = re.sub(r"\W+", "_", topic, flags=re.ASCII).strip("_") or "topic"
-    return f"_{name}" if name[0].isdigit() else name
-
-
 class BagFile:
-    """What is in a recording: ``topics`` with the types of their messages.  This one is a folder."""
+    """What is in a recording, a folder or a file: ``topics`` with the types of their messages."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self._store: Any = None
-        with self.checked(), self.opened() as reader:
-            self.topics: dict[str, str] = self._topics(reader)
+        with self._opened() as reader:
+            self.topics: dict[str, str] = {each.topic: each.msgtype for each in reader.connections}
+            for each in reader.connections:
+                if (encoding := each.ext.serialization_format) != "cdr":
+                    raise self.error(f"messages of {each.topic} are in {encoding or 'no encoding'}, not in cdr")
 
     def raw(self, topics: Iterable[str] = ()) -> Iterator[tuple[int, str, bytes]]:
         """Time (ns), topic and bytes of each message, of all topics if none is named; raises ``RecordingError``."""
-        latest = None
-        with self.checked(), self.opened() as reader:
-            for time, topic, data in self._each(reader, tuple(topics)):
-                if latest is not None and time < latest:
-                    raise self.error(f"a message of {topic} at {time} ns comes after one at {latest} ns")
-                latest = time
-                yield time, topic, data
+        last: list[tuple[str, int]] = []
+        topics = tuple(topics)
+        with self._opened(last) as reader:
+            chosen = [each for each in reader.connections if not topics or each.topic in topics]
+            for connection, time, data in reader.messages(chosen):
+                if last and time < last[0][1]:
+                    raise self.error(f"a message of {connection.topic} at {time} ns comes after one at {last[0][1]} ns")
+                last[:] = [(connection.topic, time)]
+                yield time, connection.topic, data
 
     def messages(self, topics: Iterable[str] = ()) -> Iterator[tuple[int, str, Fields]]:
         """Time (ns), topic and fields of each message; raises ``RecordingError``."""
-        store = self.store
         for time, topic, data in self.raw(topics):
-            kind = self.topics[topic]
-            try:
-                message = store.deserialize_cdr(data, kind)
-            except Exception as error:  # of many kinds, for bytes that are no such message
-                said = brief(str(error) or type(error).__name__)
-                raise self.error(f"a message of {topic} at {time} ns is not a {kind}: {said}") from None
-            yield time, topic, fields_of(message)
+            yield time, topic, self.read(topic, data, f" at {time} ns")
+
+    def read(self, topic: str, content: bytes, when: str = "") -> Any:
+        """The fields of a message; raises ``RecordingError``."""
+        kind = self.topics[topic]
+        try:
+            return fields_of(self.store.deserialize_cdr(content, kind))
+        except EpicycleError:
+            raise
+        except Exception as error:  # of many kinds, for bytes that are no such message
+            raise self.error(f"a message of {topic}{when} is not a {kind}: {reason_of(error)}") from None
+
+    def written(self, topic: str, token: Any) -> bytes:
+        """The message with these fields; raises ``RecordingError`` if they do not fit its type."""
+        kind = self.topics[topic]
+        try:
+            return bytes(self.store.serialize_cdr(self._message(kind, token), kind))
+        except EpicycleError:
+            raise
+        except Exception as error:  # of many kinds, for values of all kinds
+            raise RecordingError(
+                f"{brief(token)} cannot be a {kind} of {topic} in {self.path}: {reason_of(error)}"
+            ) from None
+
+    def _message(self, kind: str, fields: Mapping[str, Any]) -> Any:
+        """The message of a type; numbers beyond the range of theirs become its ends."""
+        told = self.store.fielddefs[kind][1]
+        return self.store.types[kind](**{name: self._value(is_of, fields[name]) for name, is_of in told})
+
+    def _value(self, is_of: tuple[Any, Any], value: Any) -> Any:
+        node, of = is_of
+        if node == Nodetype.NAME:
+            return self._message(of, value)
+        if node == Nodetype.BASE:
+            return value if of[0] in _TEXTS else _in_range(of[0], value).item()
+        inner, name = of[0], of[0][1][0]
+        if inner[0] == Nodetype.BASE and name not in _TEXTS:
+            return _in_range(name, value)
+        return [self._value(inner, each) for each in value]
 
     @cached_property
     def start(self) -> int:
@@ -93,90 +126,59 @@ class BagFile:
         first = next(self.raw(), None)
         return 0 if first is None else first[0]
 
-    @property
+    @cached_property
     def store(self) -> Any:
         """What knows the types of the messages, which takes a while to make."""
-        if self._store is None:
-            self._store = get_typestore(Stores.LATEST)
-            with self.checked(), self.opened() as reader:
-                own = get_typestore(Stores.EMPTY)
-                found: dict[str, Any] = {}
-                for kind, language, text in self._definitions(reader):
-                    if language in ("ros2msg", "msg"):
-                        found |= get_types_from_msg(text, kind)
-                    elif text:
-                        found |= get_types_from_idl(re.sub(r"^(=+\nIDL: .*|=+)$", "", text, flags=re.M))
-                named = repr([(kind, fields, [each[:2] for each in told]) for kind, (told, fields) in found.items()])
-                if re.search("['\"]", re.sub(r"'[A-Za-z_][A-Za-z0-9_/]*'", "", named)):
-                    raise self.error("a type of messages, or a field, has a name that is none")  # and would become code
-                if found:
-                    own.register(found)
-                    self._store = own
-        return self._store
+        found: dict[str, Any] = {}
+        with self._opened() as reader:
+            for each in reader.connections:
+                kind, text = each.msgtype, each.msgdef.data
+                if each.msgdef.format == MessageDefinitionFormat.MSG:
+                    found |= get_types_from_msg(text, kind)
+                elif text:
+                    found |= get_types_from_idl(re.sub(r"^(=+\nIDL: .*|=+)$", "", text, flags=re.M))
+            named = repr([(kind, fields, [each[:2] for each in told]) for kind, (told, fields) in found.items()])
+            if re.search("['\"]", re.sub(r"'[A-Za-z_][A-Za-z0-9_/]*'", "", named)):
+                raise self.error("a type of messages, or a field, has a name that is none")  # and would become code
+            store = get_typestore(Stores.EMPTY if found else Stores.LATEST)
+            store.register(found)
+        return store
 
     @contextmanager
-    def opened(self) -> Iterator[Any]:
-        """The reader of the file."""
-        with rosbag2.Reader(self.path) as reader:
-            yield reader
+    def _opened(self, last: Iterable[tuple[str, int]] = ()) -> Iterator[Any]:
+        """The reader of the file, of which errors name the ``last`` message that was read.
 
-    def _topics(self, reader: Any) -> dict[str, str]:
-        return {each.topic: each.msgtype for each in reader.connections}
-
-    def _definitions(self, reader: Any) -> Iterator[tuple[str, str, str]]:
-        """Each type of messages, the language of its definition, and this."""
-        for each in reader.connections:
-            if each.msgdef.data:
-                yield each.msgtype, each.msgdef.format.name.lower(), each.msgdef.data
-
-    def _each(self, reader: Any, topics: tuple[str, ...]) -> Iterator[tuple[int, str, bytes]]:
-        chosen = [each for each in reader.connections if not topics or each.topic in topics]
-        for connection, time, data in reader.messages(chosen):
-            yield time, connection.topic, data
-
-    @contextmanager
-    def checked(self) -> Iterator[None]:
-        """The libraries raise errors of many kinds for files that are damaged."""
+        The libraries raise errors of many kinds for files that are damaged.
+        """
         try:
-            yield
+            with rosbag2.Reader(self.path) as reader:
+                yield reader
         except (EpicycleError, GeneratorExit):
             raise
         except Exception as error:
-            said = " ".join(str(error).split())[:200]
-            raise self.error(said or type(error).__name__) from None
+            reason = f"it holds {error}, which is not of ROS 2" if isinstance(error, KeyError) else reason_of(error)
+            after = "".join(f", after a message of {topic} at {time} ns" for topic, time in last)
+            raise self.error(f"{reason}{after}") from None
 
     def error(self, reason: str) -> RecordingError:
         """What is wrong with the file."""
         return RecordingError(f"{self.path} is not a recording of ROS 2: {reason}")
 
 
-class _McapFile(BagFile):
-    """A single MCAP file."""
-
-    @contextmanager
-    def opened(self) -> Iterator[Any]:
-        with self.path.open("rb") as file:
-            yield mcap.reader.make_reader(file)
-
-    def _topics(self, reader: Any) -> dict[str, str]:
-        summary = reader.get_summary()
-        if summary is None or not summary.channels:
-            raise self.error("it has no summary of its channels; repair it with 'mcap recover'")
-        for each in summary.channels.values():
-            if each.message_encoding != "cdr":
-                raise self.error(
-                    f"messages of {each.topic} are in {each.message_encoding or 'no encoding'}, not in cdr"
-                )
-        return {each.topic: summary.schemas[each.schema_id].name for each in summary.channels.values()}
-
-    def _definitions(self, reader: Any) -> Iterator[tuple[str, str, str]]:
-        for each in reader.get_summary().schemas.values():
-            yield each.name, each.encoding, each.data.decode()
-
-    def _each(self, reader: Any, topics: tuple[str, ...]) -> Iterator[tuple[int, str, bytes]]:
-        is_sorted = bool(reader.get_summary().chunk_indexes)
-        for _, channel, message in reader.iter_messages(topics or None, log_time_order=is_sorted):
-            yield message.log_time, channel.topic, message.data
+def _in_range(name: str, value: Any) -> Any:
+    """An array of a type of numbers of ROS, those beyond its range at its ends; raises ``ValueError`` for NaN."""
+    dtype, found = np.dtype(_OCTETS.get(name, name)), np.asarray(value)
+    if dtype.kind in "iu" and found.dtype != dtype:
+        ends = np.iinfo(dtype)
+        if found.dtype.kind == "f":
+            if not np.isfinite(found).all():
+                raise ValueError(f"{brief(value)} is no {name}")
+            highest = float(ends.max) if dtype.itemsize < 8 else np.nextafter(float(ends.max), 0.0)
+            found = np.clip(np.rint(found), ends.min, highest)
+        else:
+            own = np.iinfo(found.dtype)
+            found = np.clip(found, max(ends.min, own.min), min(ends.max, own.max))
+    return found.astype(dtype)
 
 
 def bag(path: str | Path) -> BagFile:
@@ -184,22 +186,22 @@ def bag(path: str | Path) -> BagFile:
     path = Path(path)
     if path.name == "metadata.yaml":
         path = path.parent
-    if path.is_dir():
-        return BagFile(path)
-    if path.suffix.lower() != ".mcap":
+    if not path.is_dir() and path.suffix.lower() not in ("", ".mcap"):
         raise RecordingError(f"{path} is not a recording of ROS 2: a folder with metadata.yaml, or a file *.mcap")
-    if not path.is_file():
+    if not path.exists():
         raise RecordingError(f"{path} cannot be read: there is no such file")
-    return _McapFile(path)
+    return BagFile(path)
 
 
 _names: dict[type, tuple[str, ...]] = {}
 
 
 def fields_of(message: Any) -> Any:
-    """A message as a token."""
+    """A message as a token, or what an aspect has made of one, with attributes again."""
     if isinstance(message, list):
         return [fields_of(each) for each in message]
+    if isinstance(message, Mapping):
+        return Fields({name: fields_of(each) for name, each in message.items()})
     kind = type(message)
     if kind not in _names:
         found = [each.name for each in dataclasses.fields(kind)] if dataclasses.is_dataclass(kind) else []
@@ -244,21 +246,28 @@ class Bag(Actor):
     is_source: ClassVar[bool] = True
     copies_share: ClassVar[tuple[str, ...]] = ("_bag",)
 
+    @staticmethod
+    def told(path: Path) -> str:
+        """What ``epicycle describe`` says of a recording: its topics."""
+        topics = bag(path).topics
+        width = max(map(len, topics), default=0)
+        return "\n".join(f"{topic.ljust(width)}  {kind}" for topic, kind in topics.items())
+
     def own_ports(self) -> dict[str, InputPort[Any] | OutputPort[Any]]:
         self._bag = bag(self.file)
-        self._topics = tuple(self._bag.topics if self.topics is None else self.topics)
-        for topic in self._topics:
+        topics = tuple(self._bag.topics if self.topics is None else self.topics)
+        for topic in topics:
             if topic not in self._bag.topics:
                 near, known = did_you_mean(topic, self._bag.topics), ", ".join(self._bag.topics)
                 raise ParameterError(f"topics: {self.file.name} has no topic {topic!r}{near}; topics: {known}")
-        self._ports = {topic: port_of(topic) for topic in self._topics}
-        return {port: OutputPort(doc=f"messages of {topic}") for topic, port in self._ports.items()}
+        self.ports = ports_of(topics)
+        return {port: OutputPort(doc=f"messages of {topic}") for topic, port in self.ports.items()}
 
     _next: tuple[int, str, Fields] | None = None
 
     def initialize(self) -> None:
         self._start = self._bag.start
-        self._position = _Position(self._bag, self._topics)
+        self._position = _Position(self._bag, tuple(self.ports))
         self._prepare()
 
     def restart(self) -> None:
@@ -280,7 +289,7 @@ class Bag(Actor):
     def fire(self) -> None:
         assert self._next is not None
         _, topic, message = self._next
-        self.outputs[self._ports[topic]].send(message)
+        self.outputs[self.ports[topic]].send(message)
         self._prepare()
 
 
@@ -298,36 +307,22 @@ class _Node(Actor):
     def fire(self) -> None:
         for name, port in self.inputs.items():
             for token in port.tokens:
-                said = self._hear(self.topics[name], _as_fields(token))
+                said = self._hear(self.topics[name], fields_of(token))
                 if said is not None:
                     self._send(name, said)
 
     def _send(self, name: str, said: Any) -> None:
-        if not isinstance(said, Mapping) or (len(self.outputs) == 1 and not said.keys() <= self.outputs.keys()):
-            if len(self.outputs) != 1:
-                raise EpicycleError(
-                    f"on_message({self.topics[name]!r}, ...) returns {brief(said)}, not a mapping of outputs to "
-                    f"values; outputs: {', '.join(self.outputs) or 'none'}"
-                )
-            said = {next(iter(self.outputs)): said}
+        returns, known = f"on_message({self.topics[name]!r}, ...) returns", ", ".join(self.outputs) or "none"
+        if len(self.outputs) == 1 and not (isinstance(said, Mapping) and said.keys() <= self.outputs.keys()):
+            said = dict.fromkeys(self.outputs, said)
+        if not isinstance(said, Mapping):
+            raise EpicycleError(f"{returns} {brief(said)}, not a mapping of outputs to values; outputs: {known}")
         for key, value in said.items():
             if key not in self.outputs:
                 near = did_you_mean(key, self.outputs)
-                raise EpicycleError(
-                    f"on_message({self.topics[name]!r}, ...) returns a value for {key!r}, which is no output{near}; "
-                    f"outputs: {', '.join(self.outputs) or 'none'}"
-                )
+                raise EpicycleError(f"{returns} a value for {key!r}, which is no output{near}; outputs: {known}")
             port = self.outputs[key]
-            if port.type is float:
-                value = float(value)
-            port.send(value)
-
-
-def _as_fields(token: Any) -> Any:
-    """What an aspect has made of a message, with attributes again."""
-    if isinstance(token, Mapping):
-        return Fields({name: _as_fields(each) for name, each in token.items()})
-    return token
+            port.send(float(value) if port.type is float else value)
 
 
 def lockstep(
@@ -351,13 +346,10 @@ def lockstep(
 
     >>> model = lockstep("walk.mcap", Filter, outputs={"error": "number"}, disturb="lost.yaml", at="/gps")
     """
-    from fnmatch import fnmatchcase
-
     file = bag(recording)
     model = Model(file.path.stem)
-    chosen = None if topics is None else list(topics)
-    source = model.add(Bag("bag", file=file.path.resolve(), topics=chosen))
-    names = {port_of(topic): topic for topic in (file.topics if chosen is None else chosen)}
+    source = model.add(Bag("bag", file=file.path.resolve(), topics=None if topics is None else list(topics)))
+    names = {port: topic for topic, port in source.ports.items()}
     kinds = dict(outputs) if isinstance(outputs, Mapping) else dict.fromkeys(outputs, "any value")
     for name, each in kinds.items():
         if name in names:
@@ -372,12 +364,8 @@ def lockstep(
         model.connect(source.outputs[name], node.inputs[name])
     places = None
     if at is not None:
-        patterns = [at] if isinstance(at, str) else list(at)
-        for pattern in patterns:
-            if not any(fnmatchcase(topic, pattern) for topic in names.values()):
-                near, known = did_you_mean(pattern, names.values()), ", ".join(names.values())
-                raise RecordingError(f"{pattern!r} matches no topic{near}; topics: {known}")
-        heard = [name for name, topic in names.items() if any(fnmatchcase(topic, pattern) for pattern in patterns)]
+        chosen = topics_like([at] if isinstance(at, str) else at, names.values())
+        heard = [name for name, topic in names.items() if topic in chosen]
         places = [path for name in heard for path in (f"node.{name}", f"bag.{name}")]
     for each in [disturb] if isinstance(disturb, (str, Path)) else disturb:
         model.disturb(each, at=places, set=set)
@@ -386,7 +374,7 @@ def lockstep(
 
 
 class BagFolder:
-    """A recording that is a folder, for ``epicycle recording apply``: its messages pass as bytes that nobody reads."""
+    """A recording that is a folder, for ``epicycle recording apply``."""
 
     def __init__(self, path: Path) -> None:
         self.path = path
@@ -399,6 +387,10 @@ class BagFolder:
         for time, topic, data in self._file.raw():
             yield Message(time, self._numbers[topic], bytes(data))
 
+    def codec(self) -> BagFile:
+        """What reads the messages."""
+        return self._file
+
     @contextmanager
     def replacing(self, path: Path) -> Iterator[Writing]:
         """A new folder, with the same kind of files."""
@@ -407,18 +399,15 @@ class BagFolder:
         aside = path.with_name(f".{path.name}")
         shutil.rmtree(aside, ignore_errors=True)
         try:
-            with self._file.checked(), self._file.opened() as reader:
+            aside.mkdir()
+            made = aside / path.name  # after which the files in it are named
+            with self._file._opened() as reader:
                 stored = rosbag2.StoragePlugin.MCAP if any(self.path.glob("*.mcap")) else rosbag2.StoragePlugin.SQLITE3
-                with rosbag2.Writer(aside, version=9, storage_plugin=stored) as writer:
+                with rosbag2.Writer(made, version=9, storage_plugin=stored) as writer:
                     yield _Writing(writer, reader, self._numbers)
-            for each in aside.iterdir():  # the files in it are named after the folder
-                if each.name.startswith(aside.name):
-                    each.rename(each.with_name(each.name.removeprefix(".")))
-            about = aside / "metadata.yaml"
-            about.write_text(about.read_text(encoding="utf-8").replace(aside.name, path.name), encoding="utf-8")
             if path.exists():
                 shutil.rmtree(path)
-            aside.rename(path)
+            made.rename(path)
         except OSError as error:
             raise RecordingError(f"{path} cannot be written: {error.strerror or error}") from None
         finally:
@@ -441,11 +430,9 @@ class _Writing:
                     offered_qos_profiles=each.ext.offered_qos_profiles,
                 )
 
-    def write(self, time: int, message: Message, changed: str | None) -> None:
+    def write(self, time: int, message: Message, changed: str | bytes | None) -> None:
         """Add a message."""
-        if changed is not None or not isinstance(message.content, bytes):
-            raise RecordingError("messages of ROS 2 can only be lost, delayed or duplicated")
-        self._writer.write(self._connections[message.channel], time, message.content)
+        self._writer.write(self._connections[message.channel], time, message.content if changed is None else changed)
 
     def finish(self) -> None:
         """Nothing: the file is closed by who has opened it."""

@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
-from pathlib import Path
+from collections.abc import Iterable, Mapping
 from typing import TYPE_CHECKING, Any
 
-from epicycle.runner import Model
+from epicycle.runner.support.extras import needed
 
-from .extras import needed
+from .names import Source
 
 if TYPE_CHECKING:
     from gymnasium import spaces
 
     from .learning import Agent, GymEnv
-
-Source = str | Path | Callable[[], Model]
 
 
 def gym(
@@ -37,7 +34,7 @@ def gym(
     with a unit; default: the model's), ``changes`` are those of ``epicycle.load``.  A run that stops by itself is
     terminated, one whose time is up is truncated.  Raises ``ModelError``, ``AgentError``.
     """
-    learning = needed("learning", "gym")
+    learning = needed("epicycle.bridges.learning", "gym")
     agent = learning.Agent(observe, act, reward, actions, observations, when, every)
     made: GymEnv = learning.GymEnv(model, agent, until=until, **changes)
     return made
@@ -56,7 +53,7 @@ def zoo(
     It is an ``AECEnv``, in which each agent decides at its own times; with ``parallel`` a ``ParallelEnv``, for agents
     that all decide ``every`` so many seconds, at once.
     """
-    learning = needed("learning", "zoo")
+    learning = needed("epicycle.bridges.learning", "zoo")
     env = learning.ZooEnv(model, agents, until=until, **changes)
     if not parallel:
         return env

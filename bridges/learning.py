@@ -13,7 +13,6 @@ import operator
 from collections import OrderedDict
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any, ClassVar, cast
 
 import gymnasium
@@ -27,8 +26,9 @@ from epicycle.actors import Actor, EpicycleError, InputPort, OutputPort, Paramet
 from epicycle.runner import Model, Results, Simulation, load_model
 from epicycle.runner.execution.results import STOP_TIME
 
+from .names import Source
+
 Observation = NDArray[np.float64]
-Source = str | Path | Callable[[], Model]
 CHANGES = ("set", "overrides", "disturb", "aspects", "without_aspects", "types", "max_actors")
 KEPT = 32  # models with other options, which are made once
 

@@ -5,14 +5,18 @@ from __future__ import annotations
 import inspect
 import random  # noqa: TID251  # the class alone: what is drawn comes from a stream
 from collections.abc import Callable, Generator, Iterable, Mapping
+from pathlib import Path
+from types import GeneratorType
 from typing import Any, cast
 
 import simpy
+from simpy import Container, FilterStore, PreemptiveResource, PriorityResource, PriorityStore, Resource, Store
 from simpy.events import NORMAL, URGENT, Event, EventPriority
 
 from epicycle import actors
 from epicycle.actors import (
     EpicycleError,
+    FunctionParameter,
     InputPort,
     MappingParameter,
     OutputPort,
@@ -28,41 +32,24 @@ from epicycle.actors import (
 from epicycle.runner import ActorError, Model, Simulation
 from epicycle.runner.model.catalogue import given_functions
 
+from .names import KINDS
+
 ENV = "env"
 RESOURCES: Mapping[str, type] = {
     each.__name__: each
-    for each in (
-        simpy.Resource,
-        simpy.PriorityResource,
-        simpy.PreemptiveResource,
-        simpy.Container,
-        simpy.Store,
-        simpy.PriorityStore,
-        simpy.FilterStore,
-    )
+    for each in (Resource, PriorityResource, PreemptiveResource, Container, Store, PriorityStore, FilterStore)
 }
-KINDS: Mapping[str, Any] = {"number": float, "truth value": bool, "text": str, "any value": Any}
 Behaviour = Callable[..., Any]
 
 
-class FunctionParameter(Parameter[Behaviour]):
+class _FunctionParameter(FunctionParameter):
     """A function of SimPy processes: given in Python, or by its name in a file that the user has named."""
 
-    def __init__(self, known: Mapping[str, Behaviour], *, doc: str = "") -> None:
-        super().__init__(str, doc=doc)  # type: ignore[arg-type]
-        self.known = known
-
-    def describe_type(self) -> str:
-        return "function"
-
-    def convert(self, value: object) -> Behaviour:
-        if callable(value):
-            return value
-        if not isinstance(value, str):
-            raise ParameterError(f"{value!r} is not the name of a function")
-        known = {**given_functions(), **self.known}
-        if value in known:
-            return known[value]
+    def _named(self, value: str) -> Behaviour:
+        named = given_functions()
+        if value in named:
+            return named[value]
+        known = {**named, **self.given}
         raise ParameterError(
             f"{value!r} is not a function that is known{did_you_mean(value, known)}; known: "
             f"{', '.join(sorted(known)) or 'none'}; name its file with --types FILE.py, or in Python "
@@ -95,7 +82,7 @@ class Process(actors.Process):
     A model file can name functions only of files that the user has named (``--types bank.py``: ``bank.customer``).
     """
 
-    function = FunctionParameter({}, doc="the function, such as bank.customer")
+    function = _FunctionParameter({}, doc="the function, such as bank.customer")
     arguments = MappingParameter(any_parameter(), {}, doc="its arguments by name, besides env and ports")
     input_ports: Any = texts_parameter(None, doc="parameters that are inputs; default: those of its decorator")
     output_ports: Any = texts_parameter(None, doc="parameters that are outputs; default: those of its decorator")
@@ -107,12 +94,11 @@ class Process(actors.Process):
     @classmethod
     def knowing(cls, *functions: Behaviour) -> type[Process]:
         """This actor class, for models that may also name these functions, as ``module.name`` or ``name``."""
-        before = declared_parameters(cls)["function"]
-        assert isinstance(before, FunctionParameter)
-        known = dict(before.known)
+        before: _FunctionParameter = declared_parameters(cls)["function"]  # type: ignore[assignment]
+        given = dict(before.given)
         for each in functions:
-            known[each.__name__] = known[f"{each.__module__}.{each.__qualname__}"] = each
-        parameter = FunctionParameter(known, doc=before.doc)
+            given[each.__name__] = given[f"{each.__module__}.{each.__qualname__}"] = each
+        parameter = _FunctionParameter(given, doc=before.doc)
         return type(cls.__name__, (cls,), {"function": parameter, "__doc__": cls.__doc__, "__module__": cls.__module__})
 
     def _named(self) -> tuple[tuple[str, ...], tuple[str, ...]]:
@@ -182,7 +168,7 @@ class Process(actors.Process):
             given["random"] = Random(self.random)
         result = self.function(**{ENV: self.environment}, **given)
         if inspect.isgenerator(result):
-            yield from _checked(cast("Generator[Any, Any, None]", result), _name(self.function))
+            yield from _checked(cast("GeneratorType[Any, Any, Any]", result), _name(self.function))
         elif isinstance(result, Event):
             yield result
 
@@ -191,7 +177,7 @@ def _name(function: Behaviour) -> str:
     return getattr(function, "__name__", repr(function))
 
 
-def _checked(behaviour: Generator[Any, Any, None], name: str) -> Generator[Event, Any, None]:
+def _checked(behaviour: GeneratorType[Any, Any, Any], name: str) -> Generator[Event, Any, None]:
     """A generator, as it is as long as it yields events."""
     act, given = behaviour.send, None
     while True:
@@ -200,8 +186,10 @@ def _checked(behaviour: Generator[Any, Any, None], name: str) -> Generator[Event
         except StopIteration:
             return
         if not isinstance(event, Event):
+            frame, file = behaviour.gi_frame, Path(behaviour.gi_code.co_filename).name
+            where = f"{file}:{frame.f_lineno}" if frame is not None else file
             behaviour.close()
-            raise EpicycleError(f"{name} yields {brief(event)}, which is not an event")
+            raise EpicycleError(f"{name} yields {brief(event)} at {where}, which is not an event")
         try:
             act, given = behaviour.send, (yield event)
         except BaseException as error:  # an interrupt, the failure of the event, or the end of the run
@@ -232,7 +220,7 @@ class Inlet:
     @property
     def items(self) -> list[Any]:
         """Tokens that have arrived and nobody has got."""
-        return list(self._actor._queued[self._port.name])
+        return self._actor.unread(self._port)
 
     def get(self) -> Event:
         """An event whose value is the next token."""

@@ -1,55 +1,89 @@
-"""FMUs for co-simulation, in this process or in one of their own: what ``fmi`` needs of versions 2 and 3."""
+"""FMUs for co-simulation: what ``fmi`` needs of versions 2 and 3."""
 
 from __future__ import annotations
 
 import hashlib
-import os
-import secrets
+import math
 import shutil
-import signal
-import subprocess
-import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from contextlib import suppress
-from multiprocessing.connection import Client, Listener
+from ctypes import byref, c_double, c_int, c_uint32
+from fractions import Fraction
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple, TypeVar
+from zipfile import ZipFile
 
 import fmpy
+from defusedxml.ElementTree import fromstring
+from fmpy import fmi2
 from fmpy.fmi1 import FMICallException
-from fmpy.fmi2 import FMU2Slave, fmi2LastSuccessfulTime, fmi2Terminated
 from fmpy.fmi3 import FMU3Slave
+from fmpy.logging import addLoggerProxy
 
 from epicycle.actors import EpicycleError
 
+from .names import reason_of
+
 CLOCK = "Clock"
+TIMED = ("constant", "fixed", "calculated", "tunable", "changing", "countdown")  # clocks that the importer lets tick
 DISCARD = 2  # the status of a step that has not been completed
-BEGIN_LIMIT = 30.0  # s until a process has started
-# What FMPy calls the functions for each type of variables, in version 2 and 3.
-TYPES: Mapping[str, tuple[str, type]] = {
-    **dict.fromkeys(("Real",), ("Real", float)),
-    **dict.fromkeys(("Integer",), ("Integer", int)),
-    **dict.fromkeys(("Float32", "Float64"), ("", float)),
-    **dict.fromkeys(("Int8", "Int16", "Int32", "Int64", "UInt8", "UInt16", "UInt32", "UInt64"), ("", int)),
-    "Enumeration": ("Int64", int),
-    "Boolean": ("Boolean", bool),
-    "String": ("String", str),
-    "Binary": ("Binary", bytes),
-    CLOCK: (CLOCK, bool),
+BEYOND = 4e9  # s, longer than any run
+CHANGED = 2  # the qualifier of an interval that the importer has not heard of
+KINDS: Mapping[str, type] = {
+    **dict.fromkeys(("Real", "Float32", "Float64"), float),
+    **dict.fromkeys(("Integer", "Int8", "Int16", "Int32", "Int64", "UInt8", "UInt16", "UInt32", "UInt64"), int),
+    "Enumeration": int,
+    "Boolean": bool,
+    "String": str,
+    "Binary": bytes,
+    CLOCK: bool,
 }
+
+
+T = TypeVar("T")
 
 
 class FMUError(EpicycleError):
     """An FMU that cannot be used, or that has failed; the message names the file."""
 
 
+class Event(NamedTuple):
+    """What an event has brought."""
+
+    ticks: list[str]  # output clocks
+    values: dict[str, list[Any]]  # of outputs whose clocks tick
+    intervals: dict[str, float]  # s until clocks tick, where the FMU decides
+    following: float | None  # time of the next event (s)
+    ends: bool  # whether the FMU ends the simulation
+
+
 def described(path: Path) -> Any:
-    """The description of an FMU, as FMPy reads it; raises ``FMUError``."""
+    """The description of an FMU, as FMPy reads it, with the intervals of clocks; raises ``FMUError``."""
     try:
-        return fmpy.read_model_description(str(path), validate=False)
+        about = fmpy.read_model_description(str(path), validate=False)
+        with ZipFile(path) as archive:
+            clocks = {each.get("name"): each for each in fromstring(archive.read("modelDescription.xml")).iter(CLOCK)}
+        for each in about.modelVariables:
+            each.clocks = [clock.name for clock in each.clocks or ()]
+            if each.type == CLOCK:
+                each.intervalDecimal = _seconds(clocks[each.name], "interval")
+                each.shiftDecimal = _seconds(clocks[each.name], "shift")
     except Exception as error:  # of many kinds: no archive, no description, wrong XML
-        said = " ".join(str(error).split())[:200]
-        raise FMUError(f"{path} is not an FMU: {said or type(error).__name__}") from None
+        raise FMUError(f"{path} is not an FMU: {reason_of(error)}") from None
+    return about
+
+
+def _seconds(clock: Any, name: str) -> Fraction | None:
+    """The interval or the shift of a clock, a decimal number or counted in its resolution."""
+    if (counter := clock.get(f"{name}Counter")) is not None:
+        return Fraction(int(counter), int(clock.get("resolution")))
+    return None if (decimal := clock.get(f"{name}Decimal")) is None else Fraction(decimal)
+
+
+def is_asked(clock: Any) -> bool:
+    """Whether the FMU decides during a run when a clock ticks."""
+    kind = clock.intervalVariability
+    return kind in ("tunable", "changing", "countdown") or (kind in TIMED and clock.intervalDecimal is None)
 
 
 def runnable(path: Path, about: Any) -> None:
@@ -74,8 +108,13 @@ class Slave:
         self.variables = {each.name: each for each in self.about.modelVariables}
         self.is_new = self.about.fmiVersion != "2.0"
         self.has_events = bool(self.is_new and self.about.coSimulation.hasEventMode)
+        clocks = {name: each for name, each in self.variables.items() if each.type == CLOCK}
+        self._outward = [name for name, each in clocks.items() if each.causality == "output"]
+        self._asked = [name for name, each in clocks.items() if each.causality == "input" and is_asked(each)]
+        self._is_stepping = False  # and not handling events, with which it begins
         self._folder = fmpy.extract(str(self.path))
         self._saved: Any = None
+        self._said = ""
         given = {
             "guid": self.about.guid,
             "unzipDirectory": self._folder,
@@ -83,43 +122,61 @@ class Slave:
             "instanceName": self.about.modelName or "fmu",
         }
         try:
-            self._fmu = FMU3Slave(**given) if self.is_new else FMU2Slave(**given)
+            self._fmu = FMU3Slave(**given) if self.is_new else fmi2.FMU2Slave(**given)
         except Exception as error:  # of the system, for a library that it cannot load
-            raise FMUError(f"{path} cannot be loaded: {' '.join(str(error).split())[:300]}") from None
+            raise FMUError(f"{path} cannot be loaded: {reason_of(error)}") from None
 
-    def start(self, values: Mapping[str, Any], time: float) -> None:
+    def start(self, values: Mapping[str, list[Any]], time: float) -> None:
         """Initialise it with values of parameters and inputs."""
+        sizes = {name for name in values if self.variables[name].causality == "structuralParameter"}
+        others = {name: value for name, value in values.items() if name not in sizes}
         if self.is_new:
-            self._fmu.instantiate(eventModeUsed=self.has_events, earlyReturnAllowed=self.has_events)
-            self.put(values)
+            events = self.has_events
+            self._fmu.instantiate(eventModeUsed=events, earlyReturnAllowed=events, logMessage=self._hear)
+            if sizes:
+                self._fmu.enterConfigurationMode()
+                self.put({name: values[name] for name in sizes})
+                self._fmu.exitConfigurationMode()
+            self.put(others)
             self._fmu.enterInitializationMode(startTime=time)
         else:
-            self._fmu.instantiate()
+            callbacks = fmi2.fmi2CallbackFunctions.from_buffer_copy(fmi2.defaultCallbacks)
+            callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(self._hear)
+            addLoggerProxy(byref(callbacks))
+            self._fmu.instantiate(callbacks=callbacks)
             self._fmu.setupExperiment(startTime=time)
-            self.put(values)
+            self.put(others)
             self._fmu.enterInitializationMode()
         self._fmu.exitInitializationMode()
 
+    def _hear(self, *given: Any) -> None:
+        """Keep what the FMU says of an error; all else that it would write to the terminal is nobody's business."""
+        *_, status, _, message = given
+        if status > DISCARD:
+            self._said = message.decode("utf-8", "replace")
+
+    def said(self) -> str:
+        """What the FMU has said of its latest error."""
+        return self._said
+
     def _function(self, name: str) -> str:
-        kind = self.variables[name].type
-        return TYPES[kind][0] if self.is_new is False or TYPES[kind][0] else kind
+        kind: str = self.variables[name].type
+        return kind if kind != "Enumeration" else "Int64" if self.is_new else "Integer"
 
-    def put(self, values: Mapping[str, Any]) -> None:
-        """Set variables."""
-        for name, value in values.items():
-            kind = self._function(name)
-            kind = "Integer" if kind == "Int64" and not self.is_new else kind
-            getattr(self._fmu, f"set{kind}")([self.variables[name].valueReference], [value])
+    def put(self, values: Mapping[str, list[Any]]) -> None:
+        """Set variables; the values are those of all elements."""
+        for name, elements in values.items():
+            getattr(self._fmu, f"set{self._function(name)}")([self.variables[name].valueReference], elements)
 
-    def get(self, names: Iterable[str]) -> dict[str, Any]:
-        """The values of variables."""
+    def get(self, sizes: Mapping[str, int]) -> dict[str, list[Any]]:
+        """The values of variables with so many elements."""
         found = {}
-        for name in names:
-            kind = self._function(name)
-            kind = "Integer" if kind == "Int64" and not self.is_new else kind
-            (value,) = getattr(self._fmu, f"get{kind}")([self.variables[name].valueReference])
-            value = value.decode("utf-8", "replace") if isinstance(value, bytes) and kind == "String" else value
-            found[name] = TYPES[self.variables[name].type][1](value)
+        for name, size in sizes.items():
+            kind, function = KINDS[self.variables[name].type], f"get{self._function(name)}"
+            elements = getattr(self._fmu, function)([self.variables[name].valueReference], *[size] * self.is_new)
+            if kind is str:
+                elements = [each if isinstance(each, str) else each.decode("utf-8", "replace") for each in elements]
+            found[name] = [kind(each) for each in elements]
         return found
 
     def step(self, time: float, until: float) -> tuple[float, bool, bool]:
@@ -131,31 +188,58 @@ class Slave:
                 if error.status != DISCARD:
                     raise
                 # It has come only so far, perhaps because it ends the simulation.
-                last = float(self._fmu.getRealStatus(fmi2LastSuccessfulTime))
-                return last, False, bool(self._fmu.getBooleanStatus(fmi2Terminated))
+                last = float(self._fmu.getRealStatus(fmi2.fmi2LastSuccessfulTime))
+                return last, False, bool(self._fmu.getBooleanStatus(fmi2.fmi2Terminated))
             return until, False, False
-        event, ends, early, last = self._fmu.doStep(time, until - time)
+        event, ends, early, last = self._fmu.doStep(time, until - time, self._saved is None)
         return (last if early else until), bool(event), bool(ends)
 
-    def event(self, values: Mapping[str, Any], clocks: Iterable[str]) -> tuple[list[str], float | None, bool]:
-        """Handle an event, at which inputs change; the clocks that tick, the next time event, and whether it ends."""
-        self._fmu.enterEventMode()
-        self.put(values)
-        return self.settle(clocks)
+    def event(self, values: Mapping[str, list[Any]], ticks: list[str], sizes: Mapping[str, int]) -> Event:
+        """Handle an event: inputs change, those with clocks if one of these ticks.
 
-    def settle(self, clocks: Iterable[str]) -> tuple[list[str], float | None, bool]:
-        """Let discrete states settle, in event mode, and leave it."""
-        ticking = [name for name in clocks if self.get([name])[name]]
+        ``ticks`` are the input clocks that tick, ``sizes`` those of the outputs that have clocks.
+        """
+        if self._is_stepping:
+            self._fmu.enterEventMode()
+        self.put({name: value for name, value in values.items() if not self.variables[name].clocks})
+        if ticks:
+            self._fmu.setClock([self.variables[name].valueReference for name in ticks], [True] * len(ticks))
+        came: list[str] = []
+        told: dict[str, list[Any]] = {}
+        intervals: dict[str, float] = {}
         following: float | None = None
         for _ in range(1000):
+            self.put(self._of(ticks, values))
+            new = [name for name in self._outward if self._fmu.getClock([self.variables[name].valueReference])[0]]
+            self.put(self._of(new, values))
+            told |= self.get(self._of([*ticks, *new], sizes))
+            came += new
             again, ends, _, _, defined, when = self._fmu.updateDiscreteStates()
-            following = float(when) if defined else None
+            intervals |= self._intervals()
+            following, ticks = (float(when) if defined and when < BEYOND else None), []
             if ends or not again:
                 break
         else:
             raise FMUError("its discrete states do not settle")
         self._fmu.enterStepMode()
-        return ticking, following, bool(ends)
+        self._is_stepping = True
+        return Event(came, told, intervals, following, bool(ends))
+
+    def _intervals(self) -> dict[str, float]:
+        """The intervals of clocks that the FMU has changed."""
+        found = {}
+        for name in self._asked:
+            interval, qualifier = (c_double * 1)(), (c_int * 1)()
+            self._fmu.getIntervalDecimal((c_uint32 * 1)(self.variables[name].valueReference), interval, qualifier)
+            if qualifier[0] == CHANGED:
+                if not 0 <= interval[0] < math.inf:
+                    raise FMUError(f"{self.path}: the interval of the clock {name} is {interval[0]:g} s")
+                found[name] = float(interval[0])
+        return found
+
+    def _of(self, clocks: list[str], each: Mapping[str, T]) -> dict[str, T]:
+        """Those variables that have one of these clocks."""
+        return {name: value for name, value in each.items() if not set(clocks).isdisjoint(self.variables[name].clocks)}
 
     def save(self) -> None:
         """Keep the present state."""
@@ -173,80 +257,6 @@ class Slave:
             with suppress(Exception):
                 act()
         shutil.rmtree(self._folder, ignore_errors=True)
-
-
-class Apart:
-    """An FMU in a process of its own: the same methods, each within a limit of time (s)."""
-
-    def __init__(self, path: str, limit: float) -> None:
-        self._path, self._limit = path, limit
-        key = secrets.token_bytes(16)
-        with Listener(authkey=key) as listener:
-            address = str(listener.address)
-            words = [sys.executable, "-c", "from epicycle.bridges.slaves import serve; serve()", address, path]
-            environment = {**os.environ, "EPICYCLE_FMU_KEY": key.hex(), "PYTHONPATH": os.pathsep.join(sys.path)}
-            self._process = subprocess.Popen(words, env=environment)
-            self._connection = listener.accept()
-        self._answer("loading", BEGIN_LIMIT)
-
-    def __getattr__(self, name: str) -> Any:
-        if name.startswith("_"):
-            raise AttributeError(name)
-
-        def call(*given: Any) -> Any:
-            self._connection.send((name, given))
-            return self._answer(name, self._limit)
-
-        return call
-
-    def _answer(self, doing: str, limit: float) -> Any:
-        try:
-            if not self._connection.poll(limit):
-                self._end()
-                raise FMUError(f"{self._path}: {doing} takes longer than {limit:g} s; its process was ended")
-            is_right, answer = self._connection.recv()
-        except (EOFError, OSError):
-            code = self._process.wait()
-            ended = signal.Signals(-code).name if code < 0 else f"exit code {code}"
-            raise FMUError(f"{self._path}: its process ended in {doing}, with {ended}") from None
-        if not is_right:
-            raise FMUError(answer)
-        return answer
-
-    def close(self) -> None:
-        """End it."""
-        with suppress(Exception):
-            self._connection.send(("close", ()))
-            self._connection.poll(1.0)
-        self._end()
-
-    def _end(self) -> None:
-        self._process.kill()
-        self._process.wait()
-        self._connection.close()
-
-
-def serve() -> None:
-    """What the process does: the methods of a ``Slave``, as it is asked for them."""
-    address, path = sys.argv[-2:]
-    with Client(address, authkey=bytes.fromhex(os.environ.pop("EPICYCLE_FMU_KEY"))) as connection:
-        try:
-            slave = Slave(path)
-            connection.send((True, None))
-        except Exception as error:
-            connection.send((False, str(error)))
-            return
-        name = ""
-        while name != "close":
-            try:
-                name, given = connection.recv()
-            except EOFError:
-                slave.close()
-                return
-            try:
-                connection.send((True, getattr(slave, name)(*given)))
-            except Exception as error:
-                connection.send((False, f"{path}: {' '.join(str(error).split())}"))
 
 
 def digest_of(path: Path) -> str:

@@ -85,6 +85,10 @@ class Process(Actor):
             self._reads.append((port.name, ref(event)))
         return event
 
+    def unread(self, port: InputPort[Any]) -> list[Any]:
+        """The tokens that have arrived at a port and that nobody has read."""
+        return list(self._queued[port.name])
+
     def fire(self) -> None:
         for name, port in self.inputs.items():
             if port.present:

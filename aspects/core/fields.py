@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 from collections.abc import Callable
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -12,8 +13,9 @@ from numpy.typing import NDArray
 from epicycle.actors import EpicycleError
 
 # The field with the time that a token describes.  No sensor measures it, so aspects that alter all numbers do not
-# change it.
+# change it, nor the stamp in the header of a message.
 STAMP = "time"
+_STAMPS = (STAMP, "stamp")
 
 Change = Callable[[NDArray[np.float64]], NDArray[np.float64]]
 
@@ -23,18 +25,30 @@ class FieldError(EpicycleError):
 
 
 def altered(token: Any, fields: tuple[str, ...], change: Change) -> Any:
-    """The token with ``change`` applied to its numbers: all except the time in its field ``time``, or the named fields.
+    """The token with ``change`` applied to its numbers: all except times, or those of the named fields.
 
     A token may be a number, an array, a list or tuple of these, a dataclass or a dict.  Texts and truth values stay as
-    they are, and an integer stays an integer (rounded to even).  Raises ``FieldError``.
+    they are, and an integer stays an integer (rounded to even).  A field of a field is named with a dot:
+    ``pose.position``.  Raises ``FieldError``.
     """
     if not fields:
         return _changed(token, change)
-    for name in fields:
+    inner = _grouped(fields)
+    for name in inner:
         field_of(token, name, "leave out 'fields' to alter all its numbers")
     if isinstance(token, dict):
-        return {name: _changed(value, change) if name in fields else value for name, value in token.items()}
-    return dataclasses.replace(token, **{name: _changed(getattr(token, name), change) for name in fields})
+        return {name: altered(value, inner[name], change) if name in inner else value for name, value in token.items()}
+    return dataclasses.replace(token, **{name: altered(getattr(token, name), inner[name], change) for name in inner})
+
+
+@lru_cache
+def _grouped(fields: tuple[str, ...]) -> dict[str, tuple[str, ...]]:
+    """The fields of fields, by the names of these; () is a whole one."""
+    found: dict[str, tuple[str, ...]] = {}
+    for name, _, rest in (each.partition(".") for each in fields):
+        whole = not rest or found.get(name) == ()
+        found[name] = () if whole else (*found.get(name, ()), rest)
+    return found
 
 
 def stamped_as(token: Any, other: Any) -> Any:
@@ -60,7 +74,8 @@ def field_of(token: Any, name: str, advice: str = "") -> Any:
     else:
         raise FieldError(f"a token of type {type(token).__name__} has no fields{advice and f'; {advice}'}")
     if name not in names:
-        raise FieldError(f"{type(token).__name__} has no field {name!r}; its fields: {', '.join(map(str, names))}")
+        known = ", ".join(each for each in map(str, names) if each.isprintable())  # others are not for people
+        raise FieldError(f"{type(token).__name__} has no field {name!r}; its fields: {known}")
     return token[name] if isinstance(token, dict) else getattr(token, name)
 
 
@@ -98,7 +113,7 @@ def _changed(value: Any, change: Change) -> Any:
     if isinstance(value, (list, tuple)):
         return type(value)([_changed(item, change) for item in value])
     if isinstance(value, dict):
-        return {key: item if key == STAMP else _changed(item, change) for key, item in value.items()}
+        return {key: item if key in _STAMPS else _changed(item, change) for key, item in value.items()}
     if dataclasses.is_dataclass(value) and not isinstance(value, type):
         names = [each.name for each in dataclasses.fields(value) if each.name != STAMP]
         return dataclasses.replace(value, **{name: _changed(getattr(value, name), change) for name in names})

@@ -6,20 +6,18 @@ import json
 import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
-from epicycle.actors import Actor, InputPort, OutputPort, texts_parameter
+from epicycle.actors import Actor, EpicycleError, InputPort, OutputPort, texts_parameter
 from epicycle.aspects import FieldError
 
 from ..execution.engine import ActorError, Simulation
-from ..execution.results import Results
 from ..model.build.disturbance import disturb_ports
 from ..model.build.model import Model
 from ..model.language.settings import Setting
 from ..support.shown import finite
-from .files import Message, Recording, RecordingError, check_topics, opened
+from .files import Codec, Message, Recording, RecordingError, opened, topics_like
 
 SENDER = "recording"
 _LONGEST = 1_000_000_000 * 10**9  # ns
@@ -39,24 +37,28 @@ class Passed:
 
 
 class Opaque:
-    """Content that nobody reads: an aspect that would alter it fails."""
+    """A message whose content nobody has read: an aspect that would alter it fails."""
 
-    def __init__(self, data: bytes) -> None:
-        self.data = data
+    __slots__ = ("message",)
+
+    def __init__(self, message: Message) -> None:
+        self.message = message
 
     def __repr__(self) -> str:
-        return f"<{len(self.data)} bytes>"
+        return f"<{len(self.message.content)} bytes>"
 
 
 class _Sender(Actor):
     """Sends the messages of a recording at their times, each channel by its own output."""
 
-    copies_share = ("_recording", "_came")
+    copies_share = ("_recording", "_came", "_token")
 
     ports = texts_parameter(doc="names of the outputs, in the order of the channels")
 
-    def __init__(self, path: str, recording: Recording, came: dict[str, int], ports: list[str]) -> None:
-        self._recording = recording
+    def __init__(
+        self, path: str, recording: Recording, came: dict[str, int], token: Callable[[Message], Any], ports: list[str]
+    ) -> None:
+        self._recording, self._token = recording, token
         self._came = came  # by topic
         super().__init__(path, ports=ports)
 
@@ -86,7 +88,7 @@ class _Sender(Actor):
     def fire(self) -> None:
         assert self._next is not None
         self._came[self._recording.channels[self._next.channel]] += 1
-        self.outputs[self._outputs[self._next.channel]].send(_token(self._next))
+        self.outputs[self._outputs[self._next.channel]].send(self._token(self._next))
         self._prepare()
 
 
@@ -125,38 +127,64 @@ def pass_recording(
     ``at`` are patterns of topics, in place of those of the disturbances.  Raises ``EpicycleError``.
     """
     if source.suffix.lower() != target.suffix.lower():
-        raise RecordingError(f"{target} must be of the same kind as {source}: {source.suffix}")
+        raise RecordingError(f"{target} must be of the same kind as {source}: {source.suffix or 'a folder'}")
+    patterns, names = list(at), list(map(str, disturbances))
     with opened(source) as recording:
-        names = _names(recording.channels)
-        with recording.replacing(target) as writing:
-            start = next((message.time for message in recording.messages()), 0)
-            came: dict[str, int] = dict.fromkeys(recording.channels.values(), 0)
-            delivered = dict(came)
 
-            def deliver(time: int, token: Any) -> None:
-                message, changed = _message(token)
-                delivered[recording.channels[message.channel]] += 1
-                writing.write(start + time, message, changed)
+        def weave(model: Model, channels: _Channels) -> list[str]:
+            places = _places(channels, recording.channels, patterns)
+            left_out, model.exactly = disturb_ports(model, names, places, set, types)
+            return left_out
 
-            model = _model(source.stem, recording, names, came, deliver)
-            places = _places(names, recording.channels, list(at))
-            left_out, model.exactly = disturb_ports(model, map(str, disturbances), places, set, types)
-            results = _run(model, seed)
-            writing.finish()
-    return Passed(came, delivered, results.aspects, left_out, seed)
+        try:
+            return _pass(recording, target, weave, seed, None)  # of bytes that nobody reads, which is faster
+        except ActorError as error:
+            if isinstance(error.__cause__, RecordingError):
+                raise error.__cause__ from None
+            codec = _codec(recording, error)
+        try:
+            return _pass(recording, target, weave, seed, codec)
+        except ActorError as error:
+            raise (error.__cause__ if isinstance(error.__cause__, RecordingError) else error) from None
 
 
-def _run(model: Model, seed: int) -> Results:
+def _codec(recording: Recording, error: ActorError) -> Codec:
+    """What reads the messages that an aspect wants to know; raises ``EpicycleError``."""
     try:
-        return Simulation(model, seed=seed).run()
-    except ActorError as error:
-        if isinstance(error.__cause__, RecordingError):
-            raise error.__cause__ from None
-        if isinstance(error.__cause__, FieldError):
-            raise RecordingError(
-                f"{error}\n   help: only JSON messages can be altered; choose their topics with at"
-            ) from None
-        raise
+        codec = recording.codec()
+    except EpicycleError as lacking:
+        raise RecordingError(f"{error}\n   help: {lacking}") from None
+    if codec is not None:
+        return codec
+    if isinstance(error.__cause__, FieldError):
+        raise RecordingError(
+            f"{error}\n   help: only messages in JSON, and those of ROS 2, can be altered; choose their topics with at"
+        ) from None
+    raise error
+
+
+def _pass(
+    recording: Recording, target: Path, weave: Callable[[Model, _Channels], list[str]], seed: int, codec: Codec | None
+) -> Passed:
+    """Let the messages pass, those that aspects reach with their fields if there is a codec."""
+    channels, tokens = _names(recording.channels), _Tokens(recording.channels, codec)
+    with recording.replacing(target) as writing:
+        start = next((message.time for message in recording.messages()), 0)
+        came: dict[str, int] = dict.fromkeys(recording.channels.values(), 0)
+        delivered = dict(came)
+
+        def deliver(time: int, token: Any) -> None:
+            message, changed = tokens.message(token)
+            delivered[recording.channels[message.channel]] += 1
+            writing.write(start + time, message, changed)
+
+        model = _model(recording, channels, came, tokens.of, deliver)
+        left_out = weave(model, channels)
+        reached = {path for woven in model.aspects for path in woven.ports}
+        tokens.are_read = {number for number, each in channels.items() if not reached.isdisjoint(each.paths)}
+        results = Simulation(model, seed=seed).run()
+        writing.finish()
+    return Passed(came, delivered, results.aspects, left_out, seed)
 
 
 # -- the model --------------------------------------------------------------------------------------------------------
@@ -170,10 +198,17 @@ class _Names:
     actor: str
     port: str
 
+    @property
+    def paths(self) -> tuple[str, str]:
+        return f"{SENDER}.{self.output}", f"{self.actor}.{self.port}"
 
-def _names(channels: Mapping[int, str]) -> dict[int, _Names]:
+
+_Channels = dict[int, _Names]
+
+
+def _names(channels: Mapping[int, str]) -> _Channels:
     """``/robot/front/scan`` is the input ``robot_front.scan`` and the output ``recording.robot_front_scan``."""
-    found: dict[int, _Names] = {}
+    found: _Channels = {}
     taken: set[str] = set()
     for number, topic in channels.items():
         parts = [re.sub(r"\W", "_", part, flags=re.ASCII) for part in re.split(r"[/.]", topic) if part] or ["_"]
@@ -188,14 +223,14 @@ def _names(channels: Mapping[int, str]) -> dict[int, _Names]:
 
 
 def _model(
-    name: str,
     recording: Recording,
-    names: Mapping[int, _Names],
+    names: _Channels,
     came: dict[str, int],
+    token: Callable[[Message], Any],
     deliver: Callable[[int, Any], None],
 ) -> Model:
-    model = Model(name)
-    model.add(_Sender(SENDER, recording, came, [each.output for each in names.values()]))
+    model = Model(recording.path.stem)
+    model.add(_Sender(SENDER, recording, came, token, [each.output for each in names.values()]))
     ports: dict[str, list[str]] = {}
     for each in names.values():
         ports.setdefault(each.actor, []).append(each.port)
@@ -206,16 +241,12 @@ def _model(
     return model
 
 
-def _places(
-    names: Mapping[int, _Names], channels: Mapping[int, str], patterns: list[str]
-) -> dict[str, list[str]] | None:
+def _places(names: _Channels, channels: Mapping[int, str], patterns: list[str]) -> dict[str, list[str]] | None:
     """The inputs and outputs of the topics that patterns match; None without patterns."""
     if not patterns:
         return None
-    check_topics(patterns, channels.values())
-    chosen = [
-        names[number] for number, topic in channels.items() if any(fnmatchcase(topic, pattern) for pattern in patterns)
-    ]
+    found = topics_like(patterns, channels.values())
+    chosen = [names[number] for number, topic in channels.items() if topic in found]
     return {
         "input": [f"{each.actor}.{each.port}" for each in chosen],
         "output": [f"{SENDER}.{each.output}" for each in chosen],
@@ -225,32 +256,45 @@ def _places(
 # -- tokens -----------------------------------------------------------------------------------------------------------
 
 
-def _token(message: Message) -> dict[str, Any]:
-    """The fields of a message, and what is needed to write it again."""
-    if isinstance(message.content, bytes):
-        fields: dict[str, Any] = {_VALUE: Opaque(message.content)}
-        has_fields, text = False, None
-    else:
-        text = message.content
-        value = _value(text)
+class _Tokens:
+    """What messages are as tokens; those of channels that ``are_read`` by a codec have fields."""
+
+    def __init__(self, topics: Mapping[int, str], codec: Codec | None) -> None:
+        self._topics, self._codec = topics, codec
+        self.are_read: set[int] = set()
+
+    def of(self, message: Message) -> Any:
+        """The fields of a message, and what is needed to write it again."""
+        time, channel, content, beside = message
+        if isinstance(content, str):
+            text, value = content, _value(content)
+        elif self._codec is not None and channel in self.are_read:
+            text, value = content.decode("latin-1"), self._codec.read(self._topics[channel], content)
+        else:
+            return Opaque(message)
         has_fields = isinstance(value, dict) and _MESSAGE not in value
-        fields = value if has_fields else {_VALUE: value}
-    return {**fields, _MESSAGE: json.dumps([message.time, message.channel, message.beside, has_fields, text])}
+        note = json.dumps([time, channel, beside, has_fields, isinstance(content, str), text])
+        return {**(value if has_fields else {_VALUE: value}), _MESSAGE: note}
 
-
-def _message(token: Any) -> tuple[Message, str | None]:
-    """The message that a token was, and its new content; None if that is as it was."""
-    if not isinstance(token, dict) or _MESSAGE not in token:
-        raise RecordingError("an aspect has replaced a message by something else")
-    time, channel, beside, has_fields, text = json.loads(token[_MESSAGE])
-    fields = {name: each for name, each in token.items() if name != _MESSAGE}
-    if text is None:
-        return Message(time, channel, fields[_VALUE].data, beside), None
-    said = json.dumps(fields if has_fields else fields[_VALUE])
-    changed = None
-    if said != json.dumps(_value(text)):
-        changed = json.dumps(finite(json.loads(said)), ensure_ascii=False, separators=(",", ":"))
-    return Message(time, channel, text, beside), changed
+    def message(self, token: Any) -> tuple[Message, str | bytes | None]:
+        """The message that a token was, and its new content; None if that is as it was."""
+        if isinstance(token, Opaque):
+            return token.message, None
+        if not isinstance(token, dict) or _MESSAGE not in token:
+            raise RecordingError("an aspect has replaced a message by something else")
+        time, channel, beside, has_fields, is_text, text = json.loads(token[_MESSAGE])
+        fields = {name: each for name, each in token.items() if name != _MESSAGE}
+        value = fields if has_fields else fields[_VALUE]
+        if not is_text:
+            assert self._codec is not None
+            content, topic = text.encode("latin-1"), self._topics[channel]
+            new = self._codec.written(topic, value)
+            is_same = new == self._codec.written(topic, self._codec.read(topic, content))
+            return Message(time, channel, content, beside), None if is_same else new
+        said, changed = json.dumps(value), None
+        if said != json.dumps(_value(text)):
+            changed = json.dumps(finite(json.loads(said)), ensure_ascii=False, separators=(",", ":"))
+        return Message(time, channel, text, beside), changed
 
 
 def _value(text: str) -> Any:

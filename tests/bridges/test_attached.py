@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Generator
+from heapq import heappop, heappush
 from typing import Any
 
 import pytest
@@ -172,3 +174,40 @@ def test_an_error_of_the_program_is_its_own() -> None:
         env.run(until=3)
     env.run(until=done)
     assert done.value.digest == Simulation(ticking(stop=1.0)).run().digest
+
+
+def test_two_runs_share_an_environment() -> None:
+    alone = [Simulation(ticking(stop=5.0), seed=seed).run().digest for seed in (1, 2)]
+    env = simpy.Environment()
+    first, second = (Simulation(ticking(stop=5.0), seed=seed).attach(env) for seed in (1, 2))
+    env.run(until=first & second)
+    assert [first.value.digest, second.value.digest] == alone
+    assert env.now == 5.0
+
+
+def test_what_an_environment_shows_to_everybody_suffices() -> None:
+    """An environment that keeps its events elsewhere, as another version of SimPy might."""
+
+    class Other(simpy.Environment):
+        def __init__(self) -> None:
+            super().__init__()
+            self.hidden, self._queue = self._queue, None  # type: ignore[assignment]
+
+        def schedule(self, event: Any, priority: Any = 1, delay: float = 0) -> None:
+            heappush(self.hidden, (self.now + delay, priority, next(self._eid), event))
+
+        def peek(self) -> float:
+            return self.hidden[0][0] if self.hidden else math.inf
+
+        def step(self) -> None:
+            if not self.hidden:
+                raise simpy.core.EmptySchedule
+            self._now, _, _, event = heappop(self.hidden)
+            callbacks, event.callbacks = event.callbacks, None
+            for callback in callbacks:
+                callback(event)
+
+    env = Other()
+    env.process(iter_timeouts(env, 0.25))
+    results = env.run(until=Simulation(ticking(stop=5.0)).attach(env))
+    assert results.digest == Simulation(ticking(stop=5.0)).run().digest

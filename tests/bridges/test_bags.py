@@ -10,6 +10,7 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 pytest.importorskip("rosbags")
@@ -173,8 +174,8 @@ def test_stamps_that_are_not_in_order_are_reported(tmp_path: Path) -> None:
     with pytest.raises(ActorError) as caught:
         epicycle.run(lockstep(path, lambda topic, message: message.data, outputs=["y"]))
     assert str(caught.value).splitlines()[0] == (
-        f"bag failed in fire() at (0 s, 1): {path} is not a recording of ROS 2: a message of /x at 3 ns comes after "
-        "one at 5 ns"
+        f"bag failed in fire() at (0 s, 1): {path} is not a recording of ROS 2: Unindexed MCAP messages are not in "
+        "timestamp order. Use an indexed file, after a message of /x at 5 ns"
     )
     with pytest.raises(epicycle.EpicycleError) as refused:
         lockstep(path, lambda topic, message: message.data, outputs=["x"])
@@ -209,6 +210,81 @@ def test_a_folder_passes_a_disturbance(kind: str, tmp_path: Path) -> None:
     if kind == "mcap":
         with (out / "out.mcap").open("rb") as file:
             assert sum(1 for _ in reading.make_reader(file).iter_messages()) == len(after)
+
+
+@pytest.mark.parametrize("kind", ["mcap", "sqlite3", "file"])
+def test_aspects_alter_fields_of_a_recording(kind: str, tmp_path: Path) -> None:
+    made(tmp_path / "walk", "mcap" if kind == "file" else kind)
+    ending = "walk.mcap" if kind == "file" else ""
+    source, out = tmp_path / "walk" / ending, tmp_path / f"out{Path(ending).suffix}"
+    bias = tmp_path / "bias.yaml"
+    bias.write_text("disturbance: bias\naspects: {bias: {type: Bias, by: 0.5, fields: twist.linear.x, at: nowhere}}\n")
+    epicycle.disturb(source, bias, out, at="/robot/twist", seed=1)
+    before, after = list(bag(source).messages()), list(bag(out).messages())
+    assert [each[:2] for each in after] == [each[:2] for each in before]
+    for (_, topic, old), (_, _, new) in zip(before, after, strict=True):
+        if topic == "/robot/twist":
+            assert (old.twist.linear.x, new.twist.linear.x) == (1.0, 1.5)
+            assert new.header == old.header
+            new.twist.linear["x"] = 1.0
+        assert repr(new) == repr(old)
+    untouched = [[data for _, topic, data in bag(path).raw() if topic != "/robot/twist"] for path in (source, out)]
+    assert untouched[0] == untouched[1]
+
+
+def test_all_numbers_but_stamps_are_altered(tmp_path: Path) -> None:
+    source, bias = made(tmp_path / "walk"), tmp_path / "bias.yaml"
+    bias.write_text("disturbance: bias\naspects: {bias: {type: Bias, by: 0.5, at: nowhere}}\n")
+    epicycle.disturb(source, bias, tmp_path / "out", at="/robot/*", seed=1)
+    found = {
+        topic: (message, old)
+        for (_, topic, message), (*_, old) in zip(bag(tmp_path / "out").messages(), bag(source).messages(), strict=True)
+    }
+    place, old = found["/robot/gps"]
+    assert (place.header, place.point) == (old.header, {"x": old.point.x + 0.5, "y": 0.5, "z": 0.5})
+    numbers, _ = found["/robot/numbers"]
+    assert numbers.data.tolist() == [1.5, 2.5]
+    assert numbers.layout.data_offset == 0  # 0.5, to even
+
+
+def test_what_an_aspect_makes_must_fit_the_type(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    source, missing = made(tmp_path / "walk"), tmp_path / "missing.yaml"
+    missing.write_text("disturbance: d\naspects: {it: {type: Bias, by: 1, fields: twist.lineal.x, at: nowhere}}\n")
+    with pytest.raises(ActorError) as caught:
+        epicycle.disturb(source, missing, tmp_path / "out", at="/robot/twist")
+    assert str(caught.value).splitlines()[0] == (
+        "aspect it failed in pass_token() at recording.robot_twist at (0 s, 1): Fields has no field 'lineal'; its "
+        "fields: linear, angular"
+    )
+    assert not (tmp_path / "out").exists()
+    file = bag(source)
+    numbers = dict(file.messages(["/robot/numbers"]).__next__()[2])
+    for value, reason in (
+        ({"layout": {"dim": [], "data_offset": float("nan")}}, "nan is no uint32"),
+        ({"layout": 3}, "'int' object is not subscriptable"),
+    ):
+        with pytest.raises(RecordingError) as refused:
+            file.written("/robot/numbers", numbers | value)
+        assert str(refused.value).endswith(
+            f"cannot be a std_msgs/msg/Float64MultiArray of /robot/numbers in {source}: {reason}"
+        )
+
+
+@pytest.mark.parametrize(
+    ("name", "values", "wanted"),
+    [
+        ("uint8", [255.4, -3.0, 7.5], [255, 0, 8]),
+        ("int8", [300, -300, 5], [127, -128, 5]),
+        ("int64", [1e30, -1e30, 0.0], [2**63 - 1024, -(2**63), 0]),
+        ("uint64", 2**64 - 1, 2**64 - 1),
+        ("uint64", [-1, 5], [0, 5]),
+        ("byte", 7, 7),
+        ("bool", True, True),
+        ("float32", 0.1, float(np.float32(0.1))),
+    ],
+)
+def test_numbers_beyond_a_range_become_its_ends(name: str, values: Any, wanted: Any) -> None:
+    assert bags._in_range(name, values).tolist() == wanted
 
 
 @pytest.mark.slow

@@ -8,18 +8,19 @@ import zipfile
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 pytest.importorskip("fmpy")
 
-from epicycle.actors import Clock, EpicycleError, ParameterError
+from epicycle.actors import Clock, EpicycleError, ParameterError, StateSpace
 from epicycle.bridges import FMU, fmi, trust
-from epicycle.runner import ActorError, Model, Results, Simulation
+from epicycle.runner import ActorError, Model, ModelError, Results, Simulation
 from epicycle.runner.interface.cli import main
 from epicycle.runner.model.catalogue import types
 from epicycle.runner.model.catalogue.code import code_of
 from epicycle.runner.model.catalogue.types import TypesError
-from tests.bridges.made_fmus import decay, events
+from tests.bridges.made_fmus import clocks, decay, events
 
 
 @pytest.fixture(scope="module")
@@ -30,6 +31,11 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def stair(folder: Path) -> Path:
     return events(folder)
+
+
+@pytest.fixture(scope="module")
+def ticking(folder: Path) -> Path:
+    return clocks(folder)
 
 
 def ran(
@@ -118,6 +124,60 @@ def test_feedthrough_is_exact_and_within_the_tag(stair: Path) -> None:
     ]
 
 
+@pytest.mark.parametrize("apart", [False, True])
+def test_clocks_tick_at_their_times_with_their_values(ticking: Path, apart: bool) -> None:
+    given = {"push": (1.0, [True] * 3), "amount": (0.9, [4.0]), "u": (0.2, [[1.0, 2.0, 3.0]])}
+    results = ran(ticking, given, stop=4.0, apart=apart)
+    # A token ticks a clock; inputs and outputs with this clock are of its ticks alone.
+    assert changes(results, "fmu.total") == [(1.0, 4.0), (2.0, 8.0), (3.0, 12.0)]
+    assert len(results["fmu.total"]) == 3
+    # Each starts a countdown of 0.4 s, and too large a total ticks the output clock in the same event.
+    assert list(results["fmu.delay"].times) == [1.4, 2.4, 3.4]
+    assert changes(results, "fmu.late") == [(1.4, 1), (2.4, 2), (3.4, 3)]
+    assert list(results["fmu.full"].times) == [3.0]
+    assert changes(results, "fmu.overflows") == [(0.0, 0), (3.0, 1)]
+    # Clocks with an interval tick by themselves: 0.25 s from 0.1 s on; 1/3 s, without drift.
+    assert list(results["fmu.sample"].times) == [round(0.1 + 0.25 * number, 9) for number in range(16)]
+    assert changes(results, "fmu.sampled") == [(0.1, 0.0), (0.35, 1.0)]
+    assert list(results["fmu.thirds"].times) == [round(number / 3, 9) for number in range(13)]
+
+
+def test_arrays_are_arrays(ticking: Path) -> None:
+    results = ran(ticking, {"u": (0.2, [[1.0, 2.0, 3.0]])}, stop=0.3, values={"factor": 2, "u": [1, 1, 1]})
+    found = [
+        (float(time), each.tolist()) for time, each in zip(results["fmu.y"].times, results["fmu.y"].values, strict=True)
+    ]
+    one = [[2.0, 2.0, 2.0], [-2.0, -2.0, -2.0]]
+    assert found == [(0.0, one), (0.1, one), (0.2, [[2.0, 4.0, 6.0], [-2.0, -4.0, -6.0]])]
+    assert results["fmu.words"].values[0] == ["one", "two"]
+    longer = ran(ticking, {"u": (0.2, [np.array([1.0, 2.0, 3.0, 4.0])])}, stop=0.2, values={"n": 4})
+    assert longer["fmu.y"].values[-1].tolist() == [[1.0, 2.0, 3.0, 4.0], [-1.0, -2.0, -3.0, -4.0]]
+    with pytest.raises(ActorError) as caught:
+        ran(ticking, {"u": (0.2, [[1.0, 2.0]])})
+    assert str(caught.value).splitlines()[0] == (
+        "fmu failed in fire() at (0.2 s, 1): fmu.u: u of clocks.fmu is of type Float64[3], not [1.0, 2.0]"
+    )
+
+
+def test_arrays_fit_other_actors(ticking: Path) -> None:
+    model = Model("test", stop=1.0)
+    fmu = model.add(FMU("fmu", file=trust(ticking), step=0.5))
+    plant = model.add(StateSpace("plant", a=[[0.0]], b=[[1.0]], c=[[1.0], [2.0], [3.0]]))
+    clock = model.add(Clock("clock", period=0.5, values=[1.0]))
+    model.connect(clock.output, plant.input)
+    model.connect(clock.output, plant.trigger)
+    model.connect(plant.output, fmu.inputs["u"])
+    model.record(fmu.outputs["y"])
+    assert Simulation(model).run()["fmu.y"].values[-1][0].tolist() == [1.0, 2.0, 3.0]
+    other = Model("other", stop=1.0)
+    fmu = other.add(FMU("fmu", file=trust(ticking), values={"n": 4}))
+    plant = other.add(StateSpace("plant", a=[[0.0]], b=[[1.0]], c=[[1.0], [2.0], [3.0]]))
+    other.connect(other.add(Clock("clock", period=0.5)).output, plant.trigger)
+    with pytest.raises(ModelError) as caught:
+        other.connect(plant.output, fmu.inputs["u"])
+    assert "plant.output sends array[3], but fmu.u takes array[4] | list" in str(caught.value)
+
+
 def test_an_fmu_of_version_2(folder: Path) -> None:
     file = decay(folder)
     results = ran(file, stop=1.0, step=0.1)
@@ -155,9 +215,10 @@ def test_describe(stair: Path, capsys: pytest.CaptureFixture[str]) -> None:
     ("values", "message"),
     [
         ({"perid": 2}, "fmu: values: events.fmu has no 'perid', did you mean 'period'?"),
-        ({"level": 2}, "fmu: values: level is an output of events.fmu, not a parameter or an input"),
+        ({"level": 2}, "fmu: values: level of events.fmu is of causality output, and has its own"),
         ({"period": True}, "fmu: values: period of events.fmu is of type Float64, not true"),
         ({"mistake": 1.5}, "fmu: values: mistake of events.fmu is of type Int32, not 1.5"),
+        ({"mistake": 2**31}, "fmu: values: mistake of events.fmu is of type Int32, not 2147483648"),
     ],
 )
 def test_wrong_values_are_reported(stair: Path, values: dict[str, Any], message: str) -> None:
@@ -195,7 +256,7 @@ def test_a_token_that_is_no_number_is_reported(stair: Path) -> None:
     with pytest.raises(ActorError) as caught:
         ran(stair, {"in": (0.5, [float("nan")])})
     line = str(caught.value).splitlines()[0]
-    assert line == "fmu failed in fire() at (0.5 s, 1): fmu.in got nan, which is not a finite number"
+    assert line == "fmu failed in fire() at (0.5 s, 1): fmu.in: in of events.fmu is of type Float64, not nan"
 
 
 REFERENCE = os.environ.get("EPICYCLE_REFERENCE_FMUS")  # a folder with 2.0/*.fmu and 3.0/*.fmu of the Reference-FMUs
@@ -225,3 +286,8 @@ def test_the_reference_fmus(version: str) -> None:
     name = "Float64_continuous"
     through = ran(folder / "Feedthrough.fmu", {f"{name}_input": (0.25, [0.1, 1 / 3])}, stop=1.0)
     assert [each for each in changes(through, f"fmu.{name}_output") if each[0]] == [(0.25, 0.1), (0.5, 1 / 3)]
+    if version == "3.0":
+        still = {"A": np.zeros((3, 3)), "B": np.eye(3), "C": np.eye(3), "D": np.zeros((3, 3))}
+        system = ran(folder / "StateSpace.fmu", stop=2.0, step=1.0, values={**still, "u": [1.0, 0.5, 0.0]})
+        ramps = [[0.0, 0.0, 0.0], [1.0, 0.5, 0.0], [2.0, 1.0, 0.0]]
+        assert [each.tolist() for each in system["fmu.y"].values] == [pytest.approx(each, abs=1e-9) for each in ramps]

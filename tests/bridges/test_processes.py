@@ -238,8 +238,9 @@ def test_a_generator_that_yields_rubbish_is_named(bank: Path) -> None:
     model.add(Process("teller", function="bank.broken"))
     with pytest.raises(ActorError) as caught:
         Simulation(model).run()
+    line = bank.read_text().splitlines().index("    yield 3") + 1
     assert str(caught.value).splitlines()[0] == (
-        "teller failed in run() at (0 s, 1): broken yields 3, which is not an event"
+        f"teller failed in run() at (0 s, 1): broken yields 3 at bank.py:{line}, which is not an event"
     )
 
 

@@ -369,8 +369,8 @@ def test_what_cannot_be_altered_is_told(capsys: pytest.CaptureFixture[str]) -> N
     assert main(["recording", "apply", "in.mcap", "--with", "d.yaml", "-o", "o.mcap", "--at", "/robot/scan"]) == 2
     assert capsys.readouterr().err == (
         "error: aspect it failed in pass_token() at recording.robot_scan at (0 s, 2): a token of type Opaque holds no "
-        "numbers to alter\n   declared at d.yaml:3:3\n   help: only JSON messages can be altered; choose their topics "
-        "with at\n"
+        "numbers to alter\n   declared at d.yaml:3:3\n   help: in.mcap is not a recording of ROS 2: it holds "
+        "'jsonschema', which is not of ROS 2\n"
     )
     assert not Path("o.mcap").exists()
 

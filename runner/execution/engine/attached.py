@@ -98,20 +98,20 @@ class Attached:
         if self._is_over() or time != self._planned:
             return
         self._planned = NEVER
-        if self._more(time):  # at the same nanosecond, which may be a later float
+        if self._outside.now < self._outside.peek() and self._is_soon(time):  # a later float at the same nanosecond
             self._plan(time, self._outside.peek())
             return
-        director, reason = self._director, ""
+        # Nothing comes before this now, but what its own tags bring.
+        director, reason, is_awaited = self._director, "", False
         stop = None if self._stop == NEVER else self._stop
-        while not reason and self._director.next_time <= time:
+        while not reason and not is_awaited and director.next_time <= time:
             reason = self._run.advance(stop, most=1)
             while not reason and director.present is not None:
                 reason = self._run.advance(stop, most=1)
-            if self._more(time):  # what the tag has brought comes first
-                break
-        if not reason and director._stop_after is not None and self._director.next_time > time:
+            is_awaited = self._is_soon(time)
+        if not reason and director._stop_after is not None and director.next_time > time:
             reason = director._reason
-        if not reason and time >= self._stop and self._director.next_time > time and not self._more(time):
+        if not reason and time >= self._stop and director.next_time > time and not is_awaited:
             reason, self._run._stop = STOP_TIME, stop
         if reason:
             self._run.stopped = reason
@@ -123,10 +123,9 @@ class Attached:
     def _is_over(self) -> bool:
         return self._run.is_over
 
-    def _more(self, time: int) -> bool:
-        """Whether something is to happen at a time before a tick."""
-        queue = self._outside._queue
-        return bool(queue) and queue[0][1] < _LAST and _nanoseconds(queue[0][0]) <= time
+    def _is_soon(self, time: int) -> bool:
+        """Whether the next event of the environment is at a time (ns)."""
+        return _nanoseconds(self._outside.peek()) <= time
 
     def finish(self) -> Results:
         """End the run where it is; its processes end, too."""

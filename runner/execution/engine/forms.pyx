@@ -48,24 +48,27 @@ cdef class Drawing:
         return self.first
 
 
+cdef Drawing drawing(int law, stream, double first, double second=0.0):
+    """What draws from a law."""
+    cdef Drawing made = Drawing()
+    made.law, made.stream, made.first, made.second = law, stream, first, second
+    return made
+
+
 cdef Drawing drawing_of(distribution, stream):
     """What draws from a distribution; None if that is left to Python."""
-    cdef Drawing made = Drawing()
     kind = type(distribution)
     if kind is Constant:
-        made.law, made.first = CONSTANT, distribution.value
-    elif kind is Exponential:
-        made.law, made.first = EXPONENTIAL, distribution.mean
-    elif kind is Gamma:
-        made.law, made.first, made.second = GAMMA, distribution.shape, distribution.mean / distribution.shape
-    elif kind is Normal:
-        made.law, made.first, made.second = NORMAL, distribution.mean, distribution.standard_deviation
-    elif kind is Uniform:
-        made.law, made.first, made.second = UNIFORM, distribution.low, distribution.high
-    else:
-        return None
-    made.stream = stream
-    return made
+        return drawing(CONSTANT, stream, distribution.value)
+    if kind is Exponential:
+        return drawing(EXPONENTIAL, stream, distribution.mean)
+    if kind is Gamma:
+        return drawing(GAMMA, stream, distribution.shape, distribution.mean / distribution.shape)
+    if kind is Normal:
+        return drawing(NORMAL, stream, distribution.mean, distribution.standard_deviation)
+    if kind is Uniform:
+        return drawing(UNIFORM, stream, distribution.low, distribution.high)
+    return None
 
 
 cdef class Native(Form):
@@ -204,7 +207,7 @@ cdef class PoissonForm(Ticking):
     cdef public Drawing drawing
 
     cdef bint take(self) except -1:
-        self.drawing = drawing_of(Exponential(mean=self.actor.mean_interval), self.actor.random)
+        self.drawing = drawing(EXPONENTIAL, self.actor.random, self.actor.mean_interval)
         return not self.actor.trigger.width and Ticking.take(self)
 
     cpdef fire(self):
@@ -243,7 +246,7 @@ cdef class ServerForm(Native):
         elif actor.distribution is None and actor.inputs["service_time"].width:
             self.time = actor.inputs["service_time"]
         elif actor.distribution is None:
-            self.drawing = drawing_of(Constant(value=actor.service_time), None)
+            self.drawing = drawing(CONSTANT, None, actor.service_time)
         return self.output is not None and self.size is not None and self.rejected is not None
 
     cpdef fire(self):

@@ -158,10 +158,12 @@ class Run:
         most: int | None = None,
         progress: Callable[[float], None] | None = None,
         pace: Pace | None = None,
+        is_short: bool = False,
     ) -> str:
         """Run until ``stop`` (ns), for at most ``most`` steps; returns why there is no more to do until then, if so.
 
-        An exception ends the run; one of an actor is raised as ``ActorError``.
+        An exception ends the run; one of an actor is raised as ``ActorError``.  Ctrl-C comes between two steps, but for
+        ``is_short``, because to arrange for that takes as long as some steps.
         """
         self._stop = stop
         started = time.perf_counter()
@@ -169,7 +171,7 @@ class Run:
             with seldom_collecting():
                 if not self.is_begun:
                     self._begin()
-                with nullcontext() if most == 1 else between_steps(self.director.interrupt):
+                with nullcontext() if is_short or most == 1 else between_steps(self.director.interrupt):
                     self.stopped = handle_events(self.director, stop, [*self.actors.values()], progress, pace, most)
         except BaseException as error:
             self.end()
@@ -204,7 +206,7 @@ class Run:
 
         self.director.watch = watch
         try:
-            self.advance(stop)
+            self.advance(stop, is_short=True)
         finally:
             self.director.watch = before
         holds = holds or (self.stopped == NO_EVENTS and condition())

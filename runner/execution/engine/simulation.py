@@ -166,7 +166,8 @@ class Simulation(Tabled):
     def advance_until(self, condition: Callable[[], bool]) -> bool:
         """Run until a condition holds, or to the stop time; returns whether it holds.
 
-        The condition is asked whenever the time is about to advance: everything at the present time is done.
+        The condition is asked whenever the time is about to advance: everything at the present time is done.  This is
+        for many short parts of a run: Ctrl-C may end one in the middle of a firing.
         """
         self._refuse_over()
         return self._run.advance_until(self.model.output.stop_time, condition)

@@ -248,16 +248,16 @@ class Wiring:
     def _over(self, edge: Edge, onward: Receiver, channel: tuple[Edge, ...]) -> Receiver:
         """One connection: its delay, and the aspects and the boundary port at its far end."""
         far = edge.destination
-        boundary_port, lane = self.directors.boundary_ports.get(far), self.graph.channel_of(channel, edge)
-        is_output = self.graph.direction(far) == "output"
-        source = far if is_output else edge.source
-        # Aspects at a port of a composite are outside of it.
-        if boundary_port is not None and not is_output:
-            onward = self._woven(far, source, boundary_port.lane(lane, onward))
-        elif boundary_port is not None:
-            onward = boundary_port.lane(lane, self._woven(far, source, onward))
-        else:
+        boundary_port = self.directors.boundary_ports.get(far)
+        source = far if self.graph.direction(far) == "output" else edge.source
+        if boundary_port is None:
             onward = self._woven(far, source, onward)
+        else:  # aspects at a port of a composite are outside of it
+            lane = self.graph.channel_of(channel, edge)
+            if source == far:
+                onward = boundary_port.lane(lane, self._woven(far, source, onward))
+            else:
+                onward = self._woven(far, source, boundary_port.lane(lane, onward))
         for woven in reversed(self._woven_on.get((edge.source, far), [])):
             onward = self._through(woven, far, source, onward, connection_place(edge.source, far))
         if edge.delay is None:

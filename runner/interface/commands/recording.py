@@ -27,7 +27,8 @@ def _fit(options: argparse.Namespace) -> int:
 
 
 def _apply(options: argparse.Namespace) -> int:
-    check_path("--out", options.out)
+    if not Path(options.recording).is_dir():  # what replaces a folder checks that by itself
+        check_path("--out", options.out)
     found = calls.disturb(**arguments(calls.disturb, options))
     if options.json:
         tell_json(found.facts())

@@ -18,9 +18,9 @@ EXTRAS = {  # by which extra each is installed
 
 
 def needed(module: str, who: str) -> Any:
-    """A module of this folder; raises ``EpicycleError`` if a package that it needs is missing."""
+    """A module; raises ``EpicycleError`` if a package that it needs is missing."""
     try:
-        return import_module(f".{module}", __package__)
+        return import_module(module)
     except ModuleNotFoundError as error:
         package = (error.name or "").partition(".")[0]
         if package not in EXTRAS:

@@ -1,0 +1,17 @@
+from .bags import Bag as Bag
+from .bags import BagFolder as BagFolder
+from .bags import bag as bag
+from .bags import lockstep as lockstep
+from .environments import gym as gym
+from .environments import zoo as zoo
+from .fmi import FMU as FMU
+from .fmi import trust as trust
+from .learning import Agent as Agent
+from .learning import AgentError as AgentError
+from .learning import GymEnv as GymEnv
+from .learning import ZooEnv as ZooEnv
+from .learning import deploy as deploy
+from .processes import Environment as Environment
+from .processes import Process as Process
+from .processes import process as process
+from .systems import linear as linear
