@@ -17,7 +17,9 @@ from ..model.graph.model_graph import ModelGraph
 from ..model.language.ports import ParameterText
 from ..model.temporal import Requirement
 from ..model.text.patterns import PatternError, in_general, select
+from ..model.text.problems import Position
 from .names import MODEL, Names
+from .positions import positions
 from .reading import Reading
 
 Keys = tuple[str | int, ...]
@@ -40,12 +42,18 @@ class Knowledge:
         self.reading = reading
         self.names = Names(reading)
         known = reading.files.items()
-        wanted = (reading.path if file is None else file).resolve()
-        self.file = next((name for name, (path, _) in known if path.resolve() == wanted), reading.name)
+        self.path = (reading.path if file is None else file).resolve()
+        self.file = next((name for name, (path, _) in known if path.resolve() == self.path), reading.name)
 
     @property
     def text(self) -> str:
         return self.reading.files[self.file][1] if self.file in self.reading.files else ""
+
+    def stretch(self, at: Position) -> tuple[Path, int, int]:
+        """A position as a file and a stretch of characters."""
+        path, text = self.reading.files.get(at.file, (Path(at.file), ""))
+        start = positions(text).offset(at.line - 1, at.column - 1)
+        return path, start, min(start + at.length, len(text))
 
     @cached_property
     def catalogue(self) -> Catalogue:

@@ -182,9 +182,3 @@ def symbols(node: Node | None) -> list[Symbol]:
             inside += (Symbol(each.text, SECTIONS[key], each.position) for each in ports)
         found.append(Symbol(key, "section", replace(entry.key.position), tuple(inside)))
     return found
-
-
-def path_of(knowledge: Knowledge, position: Position) -> Path:
-    """The file of a position."""
-    known = knowledge.reading.files.get(position.file)
-    return Path(position.file) if known is None else known[0]

@@ -8,7 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from epicycle.runner.desk import EditError, Knowledge, difference, editing, read, splices
+from epicycle.runner.desk import EditError, Knowledge, difference, editing, read
+from epicycle.runner.desk.changes import apply, edits_between
 from epicycle.runner.desk.parts import data_of
 from epicycle.runner.model.catalogue.packaged import packaged_models
 
@@ -243,16 +244,12 @@ def test_an_edit_changes_what_is_meant_and_nothing_else(name: str, tmp_path: Pat
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_splices_make_one_text_of_the_other(name: str) -> None:
+def test_edits_make_one_text_of_the_other(name: str) -> None:
     before, act, *_ = CASES[name]
-    text = after = act(before)
-    for each in reversed(splices(before, after)):
-        text = before[: each.start] + each.text + before[each.end :] if after == text else text
-    made, at = "", 0
-    for each in splices(before, after):
-        made += before[at : each.start] + each.text
-        at = each.end
-    assert made + before[at:] == after
+    after = act(before)
+    found = edits_between(Path("m.yaml"), before, after)
+    assert apply(before, found) == after
+    assert all(each.text != before[each.start : each.end] for each in found)
 
 
 def test_what_a_swapped_aspect_does_not_know_goes(tmp_path: Path) -> None:

@@ -148,11 +148,14 @@ def test_a_file_of_others_is_left_alone(tmp_path: Path) -> None:
 def test_places_are_counted_in_units_of_the_client(encoding: str) -> None:
     text = "a: é\r\nb: 😀 \u2028c: d\ne"
     positions, size = Positions(text, encoding), {"utf-8": 4, "utf-16": 2, "utf-32": 1}[encoding]
-    assert positions.to_client(1, 4) == (1, 3 + size)
-    assert positions.to_client(2, 0) == (1, 5 + size - 1 + {"utf-8": 3}.get(encoding, 1))
+    assert positions.to_client(positions.offset(1, 4)) == (1, 3 + size)
+    assert positions.to_client(positions.offset(2, 0)) == (1, 5 + size - 1 + {"utf-8": 3}.get(encoding, 1))
     for line, column in ((0, 0), (0, 4), (1, 3), (1, 4), (2, 0), (2, 3), (3, 1)):
-        assert positions.from_client(*positions.to_client(line, column)) == (line, column)
-    assert Positions("\ufeffa: b", encoding).from_client(0, {"utf-8": 3}.get(encoding, 1)) == (0, 0)
+        offset = positions.offset(line, column)
+        assert positions.from_client(*positions.to_client(offset)) == offset
+        assert positions.place(offset) == (line, column)
+    marked = Positions("\ufeffa: b", encoding)
+    assert marked.place(marked.from_client(0, {"utf-8": 3}.get(encoding, 1))) == (0, 0)
 
 
 # -- random edits -----------------------------------------------------------------------------------------------------

@@ -147,15 +147,30 @@ def test_it_listens_on_this_machine_only(studio_at: tuple[Served, Path]) -> None
 
 # -- what is answered -------------------------------------------------------------------------------------------------
 
+COMPLETION, HOVER, RENAME = "textDocument/completion", "textDocument/hover", "textDocument/rename"
+OTHER = {"textDocument": {"uri": "file:///etc/passwd"}}
+
+
+def place(line: int) -> dict[str, int]:
+    return {"line": line, "character": 5}
+
+
 ODD: dict[str, Any] = {
     "no question": {"id": 1},
     "another question": {"id": 1, "ask": "shell", "text": "", "command": "id"},
     "a method of a worker": {"id": 1, "ask": "answer", "text": ""},
     "no text": {"id": 1, "ask": "read"},
     "a text that is none": {"id": 1, "ask": "read", "text": [1]},
-    "a place that is none": {"id": 1, "ask": "complete", "text": MODEL, "at": "x"},
-    "a place far away": {"id": 1, "ask": "hover", "text": MODEL, "at": 10**30},
-    "a place before": {"id": 1, "ask": "complete", "text": MODEL, "at": -5},
+    "a place that is none": {"id": 1, "ask": COMPLETION, "text": MODEL, "params": {"position": "x"}},
+    "no parameters": {"id": 1, "ask": COMPLETION, "text": MODEL},
+    "parameters that are none": {"id": 1, "ask": COMPLETION, "text": MODEL, "params": [1]},
+    "a place far away": {"id": 1, "ask": HOVER, "text": MODEL, "params": {"position": place(10**30)}},
+    "a place behind": {"id": 1, "ask": HOVER, "text": MODEL, "params": {"position": place(10**9)}},
+    "a place before": {"id": 1, "ask": COMPLETION, "text": MODEL, "params": {"position": place(-5)}},
+    "a name that is none": {"id": 1, "ask": RENAME, "text": MODEL, "params": {"position": place(3), "newName": "<b>"}},
+    "a text of somebody else": {"id": 1, "ask": HOVER, "text": MODEL, "params": {"position": place(3), **OTHER}},
+    "a request for more": {"id": 1, "ask": "workspace/executeCommand", "text": MODEL, "params": {"command": "id"}},
+    "a question that is a list": {"id": 1, "ask": ["read"], "text": MODEL},
     "no change": {"id": 1, "ask": "edit", "text": MODEL, "what": "data_of", "given": []},
     "a change of nothing": {"id": 1, "ask": "edit", "text": MODEL, "what": "connect", "given": []},
     "a change with too much": {"id": 1, "ask": "edit", "text": MODEL, "what": "switch", "given": ["a"] * 9},
@@ -172,7 +187,8 @@ def test_an_odd_question_is_answered_in_words(name: str, studio_at: tuple[Served
     studio, path = studio_at
     with asking(studio) as page:
         found = page.ask(**{key: each for key, each in ODD[name].items() if key != "id"})
-        assert found.keys() & {"error", "options", "words", "saved", "problems"}
+        assert found.keys() & {"error", "result", "saved", "problems"}
+        assert "root:" not in str(found)
         assert "Traceback" not in str(found)
         assert page.ask(ask="read", text=MODEL)["valid"] is True
     assert path.read_text() == MODEL
@@ -399,7 +415,9 @@ def test_names_and_docs_are_text_on_the_page(studio: Callable[..., Writer], tmp_
     kept = [line for line in INJECTING.splitlines() if not line.startswith((f'  "{TAG}"', "  gain", "model"))]
     valid = "\n".join(["model: x", *kept]).replace(f', "{TAG}": {{of: sink.output, take: count}}', "")
     tab.evaluate(
-        "(text) => epicycle.studio.editor.splice([{ from: 0, to: epicycle.studio.editor.text.length, text }])", valid
+        "(newText) => epicycle.studio.editor.write([{ range: { start: { line: 0, character: 0 },"
+        " end: { line: 1e6, character: 0 } }, newText }])",
+        valid,
     )
     writer.until_run()
     for view in ("signals", "sequence", "details"):

@@ -125,22 +125,22 @@ class Studio {
     this.showChosen();
     if (isValid) this.runSoon = setTimeout(() => this.running.start(text), RUN_PAUSE);
     else this.running.stale(this.running.now ? "not run: there are problems; these are the figures of the text before" : "runs when there are no problems");
-    const { colours: coloured } = await link.ask({ ask: "colours", text });
+    const { result: coloured } = await link.ask({ ask: "textDocument/semanticTokens/full", text, params: {} });
     if (version === this.version && coloured) this.editor.setColours(coloured);
   }
 
   showProblems(problems) {
-    this.editor.setProblems(problems.filter((each) => "from" in each));
-    const errors = problems.filter((each) => each.severity === "error").length, others = problems.length - errors;
-    const counted = (count, word) => `${count} ${word}${count === 1 ? "" : "s"}`;
+    this.editor.setProblems(problems);
+    const errors = problems.filter((each) => each.severity === 1).length, others = problems.length - errors;
+    const counted = (/** @type {number} */ count, /** @type {string} */ word) => `${count} ${word}${count === 1 ? "" : "s"}`;
     this.summary.textContent = problems.length ? [errors && counted(errors, "problem"), others && counted(others, "warning")].filter(Boolean).join(", ") : "no problems";
     this.summary.dataset.kind = errors ? "error" : others ? "warning" : "fine";
-    this.problems.replaceChildren(...problems.map((problem) => {
-      const made = element("li", { className: problem.severity }, element("button", { type: "button", className: "link", text: problem.where || "the text" }),
-        element("code", { text: problem.code }), element("span", { text: problem.message }),
-        ...problem.help.map((each) => element("em", { text: each })));
-      made.querySelector("button").addEventListener("click", () => this.editor.show(problem.from ?? 0, problem.to ?? 0));
-      if (problem.fix) made.append(button(`write ${problem.fix.text.trim()}`, () => this.editor.splice([problem.fix]), "small"));
+    this.problems.replaceChildren(...problems.map(({ range, severity, code, message, relatedInformation, fix }) => {
+      const [said, ...help] = message.split("\nhelp: ");
+      const go = button(relatedInformation ? "another file" : `line ${range.start.line + 1}`, () => this.editor.show(range), "link");
+      const made = element("li", { className: severity === 1 ? "error" : "warning" }, go,
+        element("code", { text: code }), element("span", { text: said }), ...help.map((each) => element("em", { text: each })));
+      if (fix) made.append(button(fixText(fix), () => this.editor.write([fix]), "small"));
       return made;
     }));
   }
@@ -249,8 +249,8 @@ class Studio {
         const { version } = this, found = await link.ask({ ask: "edit", text: this.editor.text, what, given: pending.given });
         if (version !== this.version) continue;
         this.say(found.error ?? "");
-        if (found.splices) this.editor.splice(found.splices);
-        return Boolean(found.splices);
+        if (found.edits) this.editor.write(found.edits);
+        return Boolean(found.edits);
       }
       return false;
     });
