@@ -121,6 +121,8 @@ WRONG = (
     ("stop: 10 s", "stp: 10 s"),
     ("of: left.state", "of: left.stte"),
     ("{type: PacketLoss,", "{type: PacketLos,"),
+    ("doc: ticks that came through", "doc: ticks, or some of them, that came through"),
+    ("doc: ticks that came through", "doc: seen (once, twice, 3)"),
 )
 
 

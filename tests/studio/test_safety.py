@@ -319,21 +319,42 @@ def test_a_worker_that_dies_in_a_run_is_told_of(tmp_path: Path) -> None:
         assert page.ask(ask="run", text=MODEL)["stopped"] == "stop time"
 
 
-@pytest.mark.slow
-def test_a_step_that_never_ends_is_ended(tmp_path: Path) -> None:
-    types = tmp_path / "stuck.py"
+def stuck(folder: Path) -> tuple[Path, Path, str]:
+    """A file of types, of which one never ends its firing, a model's file, and the text that uses it."""
+    types, path = folder / "stuck.py", folder / "stuck.yaml"
     types.write_text(
         "from epicycle.actors import Actor, InputPort\n\n\n"
         "class Stuck(Actor):\n    input = InputPort(object)\n\n"
         "    def fire(self) -> None:\n        while True:\n            pass\n"
     )
-    path = tmp_path / "stuck.yaml"
     text = MODEL.replace("{type: Scale, factor: 2}", "{type: Stuck}").split("run:")[0] + "run: {stop: 10 s}\n"
     path.write_text(text)
+    return types, path, text
+
+
+@pytest.mark.slow
+def test_a_step_that_never_ends_is_ended(tmp_path: Path) -> None:
+    types, path, text = stuck(tmp_path)
     with served(path, "--types", str(types), "--seconds", "2") as studio, asking(studio) as page:
         assert page.ask(ask="read", text=text)["valid"] is True
         assert page.ask(ask="run", text=text) == {"error": "the run took longer than 12 s, and was ended"}
         assert page.ask(ask="run", text=MODEL)["stopped"] == "stop time"
+
+
+@pytest.mark.slow
+def test_a_step_that_never_ends_ends_with_the_studio(tmp_path: Path) -> None:
+    types, path, text = stuck(tmp_path)
+    with served(path, "--types", str(types)) as studio, asking(studio) as page:
+        page.ask(ask="run", text=MODEL)  # the worker is there
+        page.socket.send(json.dumps({"id": 100, "ask": "run", "text": text}))
+        time.sleep(1)
+        workers = _children(studio.process.pid)
+        assert len(workers) == 1
+    for _ in range(100):
+        if not any(Path(f"/proc/{each}").exists() for each in workers):
+            break
+        time.sleep(0.1)
+    assert not any(Path(f"/proc/{each}").exists() for each in workers)
 
 
 # -- the file ---------------------------------------------------------------------------------------------------------

@@ -64,9 +64,9 @@ class Worker:
         self.answers = Answers(self.session)
         self.ended = ""  # why the latest run was ended
         self.say = say
-        self.waiting: queue.Queue[Message | None] = queue.Queue()
+        self.waiting: queue.Queue[Message] = queue.Queue()
 
-    def next(self) -> Message | None:
+    def next(self) -> Message:
         """The next question; what the ones before have left is cleared away when nobody waits."""
         with suppress(queue.Empty):
             return self.waiting.get(timeout=REST)
@@ -299,10 +299,10 @@ def _limit() -> None:
 
 
 def _listen(stream: TextIO, worker: Worker) -> None:
-    """Take questions while one is answered, so that a run can notice that it is stale."""
+    """Take questions while one is answered, so that a run can notice that it is stale; end with the studio."""
     for line in stream:
         worker.waiting.put(json.loads(line))
-    worker.waiting.put(None)
+    os._exit(0)
 
 
 def main(arguments: list[str]) -> None:
@@ -325,7 +325,8 @@ def main(arguments: list[str]) -> None:
     say({})  # it listens
     threading.Thread(target=_listen, args=(sys.stdin, worker), daemon=True).start()
     with seldom_collecting():
-        while (asked := worker.next()) is not None:
+        while True:
+            asked = worker.next()
             if asked["ask"] == "stop":  # only a run in progress heeds it
                 continue
             current = asked
