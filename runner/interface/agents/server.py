@@ -15,7 +15,6 @@ from mcp.server.mcpserver.exceptions import ResourceError
 from mcp.server.mcpserver.exceptions import ToolError as Refusal
 
 from ...model.catalogue.packaged import packaged_models
-from ..commands import COMMANDS
 from .limited import LimitedCall, ToolError
 
 INSTRUCTIONS = """Epicycle simulates networks of actors. A model is YAML: read epicycle://language first, then write a
@@ -56,12 +55,8 @@ TOOLS = {
 class Offered:
     """A tool as the command's own parser knows it."""
 
-    def __init__(self, name: str, tool: Tool) -> None:
-        self.name, self.tool = name, tool
-        self.command = next(each for each in COMMANDS if each.name == tool.command)
-        parser = argparse.ArgumentParser(add_help=False)
-        for each in self.command.options:
-            each(parser)
+    def __init__(self, name: str, tool: Tool, parser: argparse.ArgumentParser) -> None:
+        self.name, self.tool, self.said = name, tool, parser.description
         wanted = tool.options.split()
         named = [(_name(each), each) for each in parser._actions]
         self.known = {name: each for name, each in named if name in wanted or not each.option_strings}
@@ -70,8 +65,7 @@ class Offered:
         properties = {name: _schema(each) for name, each in self.known.items()}
         required = [name for name, each in self.known.items() if each.required and name not in self.tool.unless_given]
         schema = {"type": "object", "properties": properties, "required": required, "additionalProperties": False}
-        words = self.command.description or self.command.summary
-        return mcp.Tool(name=self.name, description=words, input_schema=schema)
+        return mcp.Tool(name=self.name, description=self.said, input_schema=schema)
 
     def words(self, call: LimitedCall, given: Mapping[str, Any]) -> tuple[list[str], list[str]]:
         """The models, or other names, and the options; raises ``ToolError``."""
@@ -117,10 +111,10 @@ def _texts(name: str, value: Any) -> Iterator[str]:
 class Assisting(MCPServer):
     """The server whose tools run commands in one folder."""
 
-    def __init__(self, call: LimitedCall, version: str) -> None:
+    def __init__(self, call: LimitedCall, version: str, parsers: Mapping[str, argparse.ArgumentParser]) -> None:
         super().__init__("epicycle", instructions=INSTRUCTIONS, version=version, log_level="ERROR")
         self.call = call
-        self.offered = {name: Offered(name, tool) for name, tool in TOOLS.items()}
+        self.offered = {name: Offered(name, tool, parsers[tool.command]) for name, tool in TOOLS.items()}
 
     async def list_tools(self) -> list[mcp.Tool]:
         return [each.described() for each in self.offered.values()]
@@ -142,9 +136,9 @@ class Assisting(MCPServer):
         return mcp.TextContent(type="text", text=self.call.json(tool.command, names, *options, good=tool.good))
 
 
-def make_server(call: LimitedCall, version: str) -> MCPServer:
-    """The server, with what it offers to read."""
-    server = Assisting(call, version)
+def make_server(call: LimitedCall, version: str, parsers: Mapping[str, argparse.ArgumentParser]) -> MCPServer:
+    """The server, with what it offers to read; ``parsers`` are those of the commands."""
+    server = Assisting(call, version, parsers)
 
     @server.resource("epicycle://language", mime_type="text/markdown")
     def language() -> str:

@@ -67,8 +67,9 @@ class Studio {
         pane("text", textBox),
         pane("graph", this.graphBox, this.hint, this.addRow(), this.chosen),
         pane("over", this.views.box),
-        pane("side", heading("run"), this.running.box, heading("parameters"), this.parameters.box,
-          heading("aspects", button("disturbance …", () => file.click(), "small"), file), this.aspects.box, this.attach.box),
+        pane("side", heading("run"), this.running.box,
+          heading("aspects", button("disturbance …", () => file.click(), "small"), file), this.aspects.box, this.attach.box,
+          heading("parameters"), this.parameters.box),
         pane("below", this.summary, this.problems)), ...lists);
     this.page.dataset.tab = "graph";
     this.editor = new TextEditor(textBox, hello.text, this.page.dataset.nonce, {
