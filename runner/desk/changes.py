@@ -10,7 +10,7 @@ from itertools import accumulate
 from pathlib import Path
 from typing import Any
 
-from epicycle.actors import EpicycleError, Parameter
+from epicycle.actors import EpicycleError, Parameter, UnitError
 
 from ..model.language.ports import ParameterText
 from ..model.text.document import Mapping as MappingNode
@@ -129,12 +129,21 @@ def sample(parameter: Parameter[Any] | ParameterText | None) -> str | None:
         return "true"
     if kind not in (int, float, int | float):
         return None
-    low, high = parameter.min, parameter.max
-    if isinstance(low, str) or isinstance(high, str):
-        return None
+    low, high = limits(parameter)
     value = 1 if (low is None or low <= 1) and (high is None or high >= 1) else low if low is not None else high
     unit = parameter.unit if parameter.unit not in ("", "1") else ""
     return f"{value:g} {unit}".rstrip() if isinstance(value, (int, float)) else None
+
+
+def limits(parameter: Parameter[Any] | ParameterText) -> tuple[float | None, float | None]:
+    """The least and the greatest value of a parameter in its unit; None where it has none."""
+    if isinstance(parameter, Parameter):
+        return parameter.min, parameter.max
+    try:
+        low, _, high = parameter.bounds()
+    except UnitError:
+        return None, None
+    return low, high
 
 
 # -- names ------------------------------------------------------------------------------------------------------------

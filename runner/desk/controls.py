@@ -11,7 +11,7 @@ from ..model.catalogue.reference import as_written, doc_of, first_sentence, show
 from ..model.language.ports import ParameterText
 from ..model.text.document import Node, Scalar, plain
 from . import parts
-from .changes import sample
+from .changes import limits, sample
 from .knowledge import Knowledge
 from .names import MODEL
 from .parts import EditError
@@ -90,7 +90,7 @@ def _field(
     found = {"name": name, "said": written, "value": "" if value is None else shown(as_written(value)), "kind": "text"}
     if parameter is None:
         return found
-    low, high = (_finite(each) for each in (parameter.min, parameter.max))
+    low, high = (_finite(each) for each in limits(parameter))
     of_type = parameter.type if isinstance(parameter, Parameter) else type(value)
     return found | {
         "kind": "choice" if parameter.choices else "switch" if of_type is bool else "text",

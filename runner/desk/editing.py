@@ -225,6 +225,7 @@ def _canonical(data: Any) -> str:
 
 def _without(text: str, keys: Keys) -> str:
     """The text without an entry or item."""
+    parts.data_of(text)  # says so if it cannot be read
     return _checked(
         text, parts.delete(text, keys), keys[:-1], lambda items: items.pop(keys[-1]), f"no {parts.path(keys)}"
     )

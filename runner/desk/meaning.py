@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -17,10 +18,11 @@ from ..model.text.reading import Text
 from ..support.shown import short
 from .knowledge import Keys, Knowledge, owner_of
 from .names import MODEL, SECTIONS, Name, Use
-from .places import place_at
+from .places import Place, place_at
 from .schema import allowed, language
 
 # The keys of a file that name others, and of which kind those are that may be packaged; a study names a model, too.
+_PORT = re.compile(r"(?<![\w.])(?P<actor>[A-Za-z_]\w*)(?:\[[^\]]*\])?\.(?P<port>\w*)\Z")
 _FILES = {"include": "", "extends": "model"}
 
 
@@ -78,7 +80,8 @@ def hover(knowledge: Knowledge, line: int, column: int) -> str:
     parts = [_of_name(knowledge, name) for name in sorted(use.names, key=str)] if use is not None else []
     place = place_at(knowledge.text, line, column)
     if place is not None and not any(each.kind in ("actor", "port") for each in (use.names if use else ())):
-        parts += _of_place(knowledge, (*place.keys, place.whole) if place.is_key else place.keys, place.around[0])
+        parts += _of_port(knowledge, place)
+        parts += _of_place(knowledge, place)
     return "\n\n".join(dict.fromkeys(each for each in parts if each))
 
 
@@ -137,11 +140,26 @@ def _of_parameter(knowledge: Knowledge, name: Name) -> str:
     return "\n\n".join(each for each in (text, ", ".join([*unit, *limits]), found.doc) if each)
 
 
-def _of_place(knowledge: Knowledge, keys: Keys, root: Node) -> Iterator[str]:
-    """What the language says of the value under some keys, and which value it has."""
-    known = language(knowledge.reading.types)
-    found = (each["description"] for each in allowed(known, root, keys) if "description" in each)
-    yield next(found, "")
+def _of_port(knowledge: Knowledge, place: Place) -> Iterator[str]:
+    """A port that an actor has by its type."""
+    start = _PORT.search(place.before)
+    rest = re.match(r"\w*", place.whole[len(place.before) :])
+    if start is None or rest is None:
+        return
+    for direction in ("input", "output"):
+        for each in knowledge.ports_of(owner_of(place.keys)[0], start["actor"], direction):
+            if each.name == start["port"] + rest[0]:
+                yield f"**{each.name}**: {direction} of {start['actor']}, {each.what}: {each.doc}".removesuffix(": ")
+
+
+def _of_place(knowledge: Knowledge, place: Place) -> Iterator[str]:
+    """What the language says of the value at a place, or of a key there, and which value it has."""
+    keys: Keys = (*place.keys, place.whole) if place.is_key else place.keys
+    schemas = allowed(language(knowledge.reading.types), place.around[0], keys)
+    yield next((each["description"] for each in schemas if "description" in each), "")
+    for each in schemas:
+        chosen = zip(each.get("enum", ()), each.get("enumDescriptions", ()), strict=False)
+        yield from (f"`{value}`: {words}" for value, words in chosen if value == place.whole)
     owner, inner = owner_of(keys)
     if len(inner) < 3 or inner[0] not in ("actors", "aspects"):
         return

@@ -233,6 +233,9 @@ def test_hover(tmp_path: Path) -> None:
     assert said("he", "ard:").startswith("**heard**: metric: count of left.state")
     assert said("los", "sy:").endswith("\n\nat `clock.trigger`, `left.trigger`, `right.trigger`")
     assert "Time at which a run ends" in said("run: {st", "op")
+    assert said("-> left.trig", "ger").startswith("**trigger**: input of left, any: sends the state now")
+    assert said("clock.out", "put -> left").startswith("**output**: output of clock, any: the values in turn")
+    assert said("take: co", "unt").endswith("`count`: how many there are (tokens)")
     assert hover(knowledge, 400, 0) == ""
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from epicycle.runner.desk import EditError, Knowledge, difference, editing, read
+from epicycle.runner.desk import EditError, Knowledge, controls, difference, editing, read
 from epicycle.runner.desk.changes import apply, edits_between
 from epicycle.runner.desk.parts import data_of
 from epicycle.runner.model.catalogue.packaged import packaged_models
@@ -431,3 +431,32 @@ def test_an_alias_is_left_to_its_author() -> None:
     assert str(caught.value) == (
         "this can be changed once the text can be read: there is no anchor &p before this alias"
     )
+
+
+def test_bounds_are_numbers_in_the_unit_of_the_parameter(tmp_path: Path) -> None:
+    text = "model: m\nparameters: {pace: {value: 1 min, min: 500 ms, max: 0.1 h}}\n"
+    text += 'actors: {clock: {type: Clock, period: "${pace}"}}\nrun: {stop: 1 h}\n'
+    path = tmp_path / "m.yaml"
+    (field,) = controls.parameters(Knowledge(read(path, {path.resolve(): text})))
+    assert (field["low"], field["high"], field["number"], field["unit"]) == (0.5, 360.0, 60.0, "s")
+
+
+@pytest.mark.parametrize(
+    "act",
+    [
+        lambda text: editing.remove(text, "", "actors", "a"),
+        lambda text: editing.remove(text, "", "aspects", "a"),
+        lambda text: editing.switch(text, "", "a", False),
+        lambda text: editing.switch(text, "", "a", True),
+        lambda text: editing.add_part(text, "", "actors", "b", "Clock", {}),
+        lambda text: editing.attach(text, "", "b", "PacketLoss", "a.b"),
+        lambda text: editing.connect(text, "", "a.b", "c.d"),
+        lambda text: editing.disconnect(text, "", "a.b", "c.d"),
+        lambda text: editing.set_parameter(text, "", "actors", "a", "period", "1 s"),
+        lambda text: editing.drop_in("model: m\n", text),
+    ],
+)
+@pytest.mark.parametrize("text", ["model: m\nactors: {a: {type: Clock\n", "a: 1\na: 2\n", "\x00", "a: *b\n", "[" * 500])
+def test_a_text_that_cannot_be_read_is_not_changed(act: Callable[[str], str], text: str) -> None:
+    with pytest.raises(EditError):
+        act(text)

@@ -158,7 +158,7 @@ class Studio {
       const [said, ...help] = message.split("\nhelp: ");
       const go = button(relatedInformation ? "another file" : `line ${range.start.line + 1}`, () => this.editor.show(range), "link");
       const made = element("li", { className: severity === 1 ? "error" : "warning" }, go,
-        element("code", { text: code }), element("span", { text: said }), ...help.map((each) => element("em", { text: each })));
+        element("code", { text: code }), element("span", { text: said }), ...help.filter((each) => !fix || each !== fixText(fix)).map((each) => element("em", { text: each })));
       if (fix) made.append(button(fixText(fix), () => this.editor.write([fix]), "small"));
       return made;
     }));
