@@ -9,6 +9,7 @@ from pathlib import Path
 
 from epicycle.actors import declared_ports, type_name
 
+from ..model.catalogue.packaged import packaged_models
 from ..model.catalogue.reference import as_written, shown
 from ..model.language.files import named_file
 from ..model.text.document import Mapping, Node, Scalar, Sequence
@@ -50,13 +51,16 @@ def links(knowledge: Knowledge) -> Iterator[tuple[Position, Path]]:
     """Where the file names another one, which it includes, extends or runs, and that file's path."""
     root, folder = knowledge.reading.nodes.get(knowledge.file), Path(knowledge.file).parent
     entries = root.entries if isinstance(root, Mapping) else {}
+    known = packaged_models().values()  # of all others, a model takes only what is in its folder
     for key, kind in {**_FILES, **({"model": "model"} if "study" in entries else {})}.items():
         node = entries[key].value if key in entries else None
         for each in node.items if isinstance(node, Sequence) else (node,):
             if isinstance(each, Scalar):
                 said = Text(each.text, each.position)
                 path = named_file(said, folder, kind, Problems()) if kind else folder / each.text
-                if path is not None and path.is_file():
+                if path is None or not path.is_file():
+                    continue
+                if key == "model" or path in known or folder.resolve() in path.resolve().parents:
                     yield each.position, path
 
 

@@ -271,6 +271,9 @@ def test_links_lead_to_the_files_that_are_named(tmp_path: Path) -> None:
     ]
     assert found("two.yaml", "study: two\nmodel: mm1\nvary: {load: [0.5]}\n") == [("model: mm1", 8, 3, "mm1.yaml")]
     assert found("broken.yaml", "model: [\nextends: mm1\n") == []
+    (tmp_path.parent / "outside.yaml").write_text("model: outside\n")
+    assert found("far.yaml", "model: far\nextends: ../outside.yaml\ninclude: ../outside.yaml\n") == []
+    assert found("odd.yaml", 'model: odd\ninclude: ["\\0", "", "."]\n') == []
 
 
 def test_symbols() -> None:

@@ -115,6 +115,15 @@ def _handshake(studio: Served, address: str, headers: dict[str, str]) -> int:
         return int(raw.recv(4096).split()[1])
 
 
+def test_a_request_without_a_path_finds_nothing(studio_at: tuple[Served, Path]) -> None:
+    studio, _ = studio_at
+    host = studio.origin.removeprefix("http://")
+    for line in ("GET * HTTP/1.1", "OPTIONS * HTTP/1.1", "GET //x/ HTTP/1.1", "GET http://evil.example/ HTTP/1.1"):
+        with socket.create_connection(("127.0.0.1", int(host.rpartition(":")[2])), timeout=PATIENCE) as raw:
+            raw.sendall(f"{line}\r\nHost: {host}\r\n\r\n".encode())
+            assert raw.recv(4096).split()[1] == b"404"
+
+
 def test_a_socket_without_an_origin_is_refused(studio_at: tuple[Served, Path]) -> None:
     with pytest.raises(InvalidStatus) as refused:
         connect(studio_at[0].socket)

@@ -115,7 +115,7 @@ class Studio:
         headers: dict[str, list[str]] = {}
         for name, value in scope["headers"]:
             headers.setdefault(name.decode("latin-1"), []).append(value.decode("latin-1"))
-        token = scope["path"].split("/")[1].encode()
+        token = scope["path"].removeprefix("/").partition("/")[0].encode("utf-8", "surrogateescape")
         hosts, origins = headers.get("host", []), headers.get("origin", [])
         if not hmac.compare_digest(token, self.token.encode()) or len(hosts) != 1 or hosts[0] not in self.hosts:
             return False
