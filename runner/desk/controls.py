@@ -59,7 +59,8 @@ def fields(knowledge: Knowledge, owner: str, section: str, name: str) -> list[di
     names = knowledge.names
     entry = names.declared(owner, section.removesuffix("s")).get(name)
     entries = getattr(entry.value, "entries", {}) if entry is not None else {}
-    made = _made(knowledge, owner, section, name)
+    made = knowledge.made(owner, section, name)
+    made = made.aspect if section == "aspects" and made is not None else made
     found: dict[str, dict[str, Any]] = {}
     for kind in names.types_of(owner, name):
         cls = None if kind in names.classes else knowledge.type_called(kind, section)
@@ -69,17 +70,6 @@ def fields(knowledge: Knowledge, owner: str, section: str, name: str) -> list[di
             value = parameter.value_in(made) if isinstance(parameter, Parameter) and made is not None else None
             found[each] = _field(each, parameter, said, value)
     return list(found.values())
-
-
-def _made(knowledge: Knowledge, owner: str, section: str, name: str) -> Any:
-    """The first actor or aspect that a text makes of a part."""
-    model = knowledge.reading.loading.model
-    for scope in knowledge.scopes(owner)[:1] if model is not None else ():
-        assert model is not None
-        if section == "aspects":
-            return next((each.aspect for each in model.aspects if each.name == f"{scope}{name}"), None)
-        return model.graph.actors.get(f"{scope}{name}") or model.graph.actors.get(f"{scope}{name}[0]")
-    return None
 
 
 def _field(

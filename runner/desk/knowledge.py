@@ -126,8 +126,9 @@ class Knowledge:
                 for name, port in declared_ports(cls).items():
                     if port.direction == direction:
                         yield Known(name, type_name(port.type), port.doc)
-                if has_own_ports(cls):
-                    yield from self._ports_of_instance(owner, actor, direction, declared_ports(cls))
+                if has_own_ports(cls) and (made := self.made(owner, "actors", actor)) is not None:
+                    ports = (made.inputs if direction == "input" else made.outputs).items()
+                    yield from (Known(n, type_name(p.type), p.doc) for n, p in ports if n not in declared_ports(cls))
 
     def own_ports(self, owner: str, direction: str) -> Iterator[Known]:
         """The ports of a class."""
@@ -138,17 +139,6 @@ class Knowledge:
             texts = {key: getattr(each.value, "text", "") for key, each in inner.items()}
             yield Known(name, texts.get("type", said), texts.get("doc", ""))
 
-    def _ports_of_instance(self, owner: str, actor: str, direction: str, but: Mapping[str, Any]) -> Iterator[Known]:
-        graph = self.graph
-        for scope in self.scopes(owner) if graph is not None else ():
-            assert graph is not None
-            for path in (f"{scope}{actor}", f"{scope}{actor}[0]"):
-                if path in graph.actors:
-                    made = graph.actors[path]
-                    ports = made.inputs if direction == "input" else made.outputs
-                    yield from (Known(n, type_name(p.type), p.doc) for n, p in ports.items() if n not in but)
-                    return
-
     # -- paths ----------------------------------------------------------------------------------------------------
 
     def scopes(self, owner: str) -> list[str]:
@@ -157,6 +147,16 @@ class Knowledge:
             return [""]
         found = self.graph.components.items() if self.graph is not None else ()
         return [f"{path}." for path, each in found if each.kind == owner]
+
+    def made(self, owner: str, section: str, name: str) -> Any:
+        """The first actor, or woven aspect, that is made of a part of a class; None if there is none yet."""
+        model = self.reading.loading.model
+        for scope in self.scopes(owner)[:1] if model is not None else ():
+            assert model is not None
+            if section == "aspects":
+                return next((each for each in model.aspects if each.name == f"{scope}{name}"), None)
+            return model.graph.actors.get(f"{scope}{name}") or model.graph.actors.get(f"{scope}{name}[0]")
+        return None
 
     def next_names(self, owner: str, start: str, directions: frozenset[str]) -> Iterator[Known]:
         """What may follow a pattern, which is empty or ends with a dot: components and ports, and what they match."""

@@ -96,7 +96,9 @@ def _of_name(knowledge: Knowledge, name: Name) -> str:
         types = names.types_of(name.owner, name.name)
         said = [f"**{name.name}**: {name.kind}{inside}, {' or '.join(f'`{each}`' for each in types)}"]
         said += [knowledge.of_type(each, f"{name.kind}s") for each in types]
-        return "\n\n".join([*said, *_places(knowledge, name)])
+        if name.kind == "aspect" and (made := knowledge.made(name.owner, "aspects", name.name)) is not None:
+            said.append("at " + ", ".join(dict.fromkeys(f"`{in_general(place)}`" for place in made.places)))
+        return "\n\n".join(said)
     if name.kind == "port":
         direction = "input" if name.name in names.ports(name.owner, "input") else "output"
         found = next((each for each in knowledge.own_ports(name.owner, direction) if each.name == name.name), None)
@@ -111,16 +113,6 @@ def _of_name(knowledge: Knowledge, name: Name) -> str:
     metrics = model.output.metrics if model is not None else []
     takes = next((f": {each.takes}" for each in metrics if each.name == name.name and name.kind == "metric"), "")
     return f"**{name.name}**: {name.kind}{takes}"
-
-
-def _places(knowledge: Knowledge, name: Name) -> Iterator[str]:
-    """Where an aspect attaches."""
-    model = knowledge.reading.loading.model
-    if name.kind == "aspect" and model is not None:
-        for scope in knowledge.scopes(name.owner)[:1]:
-            for each in model.aspects:
-                if each.name == f"{scope}{name.name}":
-                    yield "at " + ", ".join(dict.fromkeys(f"`{in_general(place)}`" for place in each.places))
 
 
 def _of_parameter(knowledge: Knowledge, name: Name) -> str:
@@ -174,15 +166,11 @@ def _of_place(knowledge: Knowledge, place: Place) -> Iterator[str]:
             if (cls := knowledge.type_called(kind, section)) is not None and section == "actors":
                 for port in declared_ports(cls).values():
                     yield f"- {port.direction} `{port.name}` ({type_name(port.type)}): {port.doc}".rstrip(": ")
-    elif section == "actors" and knowledge.graph is not None:
-        for scope in knowledge.scopes(owner)[:1]:
-            actors = knowledge.graph.actors
-            made = actors.get(f"{scope}{part}") or actors.get(f"{scope}{part}[0]")
-            if made is not None and isinstance(key, str) and hasattr(made, key):
-                unit = knowledge.unit_of(owner, inner)
-                yield f"value of `{made.path}`: `{shown(as_written(getattr(made, key)))}`" + (
-                    f" {unit}" if unit else ""
-                )
+    elif section == "actors" and isinstance(key, str):
+        made = knowledge.made(owner, section, part)
+        if made is not None and hasattr(made, key):
+            unit = knowledge.unit_of(owner, inner)
+            yield f"value of `{made.path}`: `{shown(as_written(getattr(made, key)))}` {unit}".rstrip()
 
 
 # -- the outline ------------------------------------------------------------------------------------------------------
