@@ -10,6 +10,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+from epicycle.runner.interface.studio.server import OWN
 from epicycle.runner.show.view.page import PARTS
 
 ROOT = Path(__file__).parents[1]
@@ -17,9 +18,12 @@ VERSION = "5.9.3"  # of TypeScript
 PATIENCE = 300.0  # s for a download
 OPTIONS = "--noEmit --allowJs --checkJs --strict --strictNullChecks false --target es2023 --lib es2023,dom,dom.iterable"
 _VIEW, _REPORT = ROOT / "runner" / "show" / "view" / "browser", ROOT / "runner" / "show" / "report"
+_STUDIO = ROOT / "runner" / "interface" / "studio" / "browser"
+_SHARED = [_VIEW / "types.d.ts", *(_VIEW / f"{part}.js" for part in PARTS)]
 # Each is one program, whose files see each other's names.
 PROGRAMS = {
-    "the page of a run": [_VIEW / name for name in ("types.d.ts", *(f"{part}.js" for part in (*PARTS, "main")))],
+    "the page of a run": [*_SHARED, _VIEW / "main.js"],
+    "the page of the studio": [*_SHARED, _STUDIO / "types.d.ts", *(_STUDIO / f"{part}.js" for part in OWN)],
     "the page of a report": [_REPORT / "page.js"],
 }
 

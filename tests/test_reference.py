@@ -27,12 +27,12 @@ FILES = (
 
 def texts() -> dict[str, str]:
     """What the files should hold: Epicycle's own types, whatever else is installed."""
-    from epicycle.runner.desk import page
     from epicycle.runner.model.catalogue.figure import own_figures
     from epicycle.runner.model.catalogue.types import built_in
     from epicycle.runner.model.language.schema import json_schema, schema_text
     from epicycle.runner.show import markdown
     from epicycle.runner.show.report import own_study_figures
+    from tests.desk.kinds_page import page
 
     own, figures, of_studies = built_in(), own_figures(), own_study_figures()
     schema = schema_text(json_schema(own, figures, of_studies))

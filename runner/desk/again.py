@@ -36,6 +36,13 @@ class _Change:
         return None if problems.found else node
 
 
+def alike(one: str | list[str], other: str | list[str]) -> tuple[int, int]:
+    """How many items are the same at the beginning and, of the rest, at the end."""
+    most = min(len(one), len(other))
+    first = next((at for at in range(most) if one[at] != other[at]), most)
+    return first, next((at for at in range(most - first) if one[-1 - at] != other[-1 - at]), most - first)
+
+
 def read_again(text: str, name: str, before: str, root: Node) -> Node | None:
     """What a text holds, by what it held before a change; None if it must be read as a whole."""
     if text == before:
@@ -44,9 +51,7 @@ def read_again(text: str, name: str, before: str, root: Node) -> Node | None:
     if len(text) >= MAX_NODES or _ODD.search(text) or _ODD.search(before):
         return None
     old, new = LINE_BREAK.split(before), LINE_BREAK.split(text)
-    most = min(len(old), len(new))
-    first = next((at for at in range(most) if old[at] != new[at]), most)
-    behind = next((at for at in range(most - first) if old[-1 - at] != new[-1 - at]), most - first)
+    first, behind = alike(old, new)
     starts = [0, *(found.end() for found in LINE_BREAK.finditer(text)), len(text)]
     change = _Change(text, name, starts, first, len(old) - behind, len(new) - behind)
     return _changed(root, change, len(old), 0)
@@ -54,7 +59,7 @@ def read_again(text: str, name: str, before: str, root: Node) -> Node | None:
 
 def _changed(node: Node, change: _Change, end: int, depth: int) -> Node | None:
     """A mapping or list, whose lines ended before ``end``, after a change within it."""
-    if isinstance(node, Scalar) or node.position.source[node.position.column - 1 :][:1] in ("{", "["):
+    if isinstance(node, Scalar) or _has_brackets(node):
         return None
     if isinstance(node, Mapping):
         keys, values = list(node.entries), [each.value for each in node.entries.values()]
@@ -79,7 +84,7 @@ def _changed(node: Node, change: _Change, end: int, depth: int) -> Node | None:
         if not all(_begins_line(each, isinstance(node, Mapping)) for each in edges):
             return None
         read = change.read(lines[one], stop, depth)
-        if type(read) is not type(node) or read.position.column != node.position.column:
+        if type(read) is not type(node) or read.position.column != node.position.column or _has_brackets(read):
             return None
         made = read
     by = change.new - change.old
@@ -92,6 +97,10 @@ def _changed(node: Node, change: _Change, end: int, depth: int) -> Node | None:
     if isinstance(node, Sequence) and isinstance(made, Sequence):
         return Sequence((*values[:one], *made.items, *(moved(each, by) for each in values[other:])), at)
     return None
+
+
+def _has_brackets(node: Node) -> bool:
+    return node.position.source[node.position.column - 1 :][:1] in ("{", "[")
 
 
 def _begins_line(at: Position, is_key: bool) -> bool:

@@ -5,19 +5,21 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from difflib import SequenceMatcher
+from itertools import accumulate
 from pathlib import Path
 from typing import Any
 
-from epicycle.actors import EpicycleError, Parameter
+from epicycle.actors import EpicycleError, Parameter, UnitError
 
 from ..model.language.ports import ParameterText
 from ..model.text.document import Mapping as MappingNode
 from ..model.text.document import Node
 from ..model.text.problems import Position, Problem
 from ..model.text.reading import NAME, NAMES_HAVE
+from .again import alike
 from .knowledge import Knowledge
 from .names import MODEL, Name
-from .positions import Positions
 from .reading import NO_TEXTS, Reading, Texts, read
 
 _PLAIN = re.compile(r"[A-Za-z0-9_.+*/^%° -]+\Z")
@@ -25,10 +27,9 @@ _PLAIN = re.compile(r"[A-Za-z0-9_.+*/^%° -]+\Z")
 
 @dataclass(frozen=True)
 class Edit:
-    """A text in place of a stretch of one line of a file; line and columns count from 0."""
+    """A text in place of a stretch of a file, which counts characters from its beginning."""
 
     path: Path
-    line: int
     start: int
     end: int
     text: str
@@ -40,11 +41,23 @@ class RenameError(EpicycleError):
 
 def apply(text: str, edits: Iterable[Edit]) -> str:
     """A text with changes, of which no two overlap."""
-    at = Positions(text)
-    for edit in sorted(edits, key=lambda each: (each.line, each.start), reverse=True):
-        start, end = at.offset(edit.line, edit.start), at.offset(edit.line, edit.end)
-        text = text[:start] + edit.text + text[end:]
+    for edit in sorted(edits, key=lambda each: each.start, reverse=True):
+        text = text[: edit.start] + edit.text + text[edit.end :]
     return text
+
+
+def edits_between(path: Path, before: str, after: str) -> list[Edit]:
+    """What makes one text of another: the lines that differ, and of these the characters."""
+    one, other = before.splitlines(keepends=True), after.splitlines(keepends=True)
+    starts = [0, *accumulate(map(len, one))]
+    found = []
+    for what, a, b, c, d in SequenceMatcher(None, one, other, autojunk=False).get_opcodes() if before != after else ():
+        old, new = "".join(one[a:b]), "".join(other[c:d])
+        if what == "equal":
+            continue
+        same, behind = alike(old, new)
+        found.append(Edit(path, starts[a] + same, starts[b] - behind, new[same : len(new) - behind]))
+    return found
 
 
 # -- fixes ------------------------------------------------------------------------------------------------------------
@@ -55,25 +68,24 @@ def fix(knowledge: Knowledge, problem: Problem) -> Edit | None:
     found = problem.fix
     if found is None or (at := found.position).file not in knowledge.reading.files:
         return None
-    path = knowledge.reading.files[at.file][0]
     if found.key:
-        return _missing(knowledge, at, found.key, path)
+        return _missing(knowledge, at, found.key)
     text = at.source[at.column - 1 : at.column - 1 + at.length]
     quote = text[:1] if text[:1] in "'\"" and text[-1:] == text[:1] else ""
     new = found.text if not quote or _PLAIN.match(found.text) is None else f"{quote}{found.text}{quote}"
-    return Edit(path, at.line - 1, at.column - 1, at.column - 1 + at.length, new)
+    return Edit(*knowledge.stretch(at), new)
 
 
 def fix_all(knowledge: Knowledge) -> list[Edit]:
     """The changes that all problems ask for, the first one at each place."""
-    found: dict[tuple[Path, int, int], Edit] = {}
+    found: dict[tuple[Path, int], Edit] = {}
     for problem in knowledge.reading.problems:
         if (edit := fix(knowledge, problem)) is not None:
-            found.setdefault((edit.path, edit.line, edit.start), edit)
+            found.setdefault((edit.path, edit.start), edit)
     return list(found.values())
 
 
-def _missing(knowledge: Knowledge, at: Position, key: str, path: Path) -> Edit | None:
+def _missing(knowledge: Knowledge, at: Position, key: str) -> Edit | None:
     """A value for a parameter that has none, after the type of the part."""
     found = _part_at(knowledge.reading.nodes.get(at.file), at)
     if found is None:
@@ -83,11 +95,11 @@ def _missing(knowledge: Knowledge, at: Position, key: str, path: Path) -> Edit |
     if value is None or "type" not in part.entries:
         return None
     said = part.entries["type"]
-    behind, start = said.value.position, part.position
-    line, end = behind.line - 1, behind.column - 1 + behind.length
+    start = part.position
+    path, _, end = knowledge.stretch(said.value.position)
     is_flow = start.source[start.column - 1 : start.column] == "{"
     indent = " " * (said.key.position.column - 1)
-    return Edit(path, line, end, end, f", {key}: {value}" if is_flow else f"\n{indent}{key}: {value}")
+    return Edit(path, end, end, f", {key}: {value}" if is_flow else f"\n{indent}{key}: {value}")
 
 
 def _part_at(root: Node | None, at: Position) -> tuple[tuple[str, ...], MappingNode] | None:
@@ -117,12 +129,21 @@ def sample(parameter: Parameter[Any] | ParameterText | None) -> str | None:
         return "true"
     if kind not in (int, float, int | float):
         return None
-    low, high = parameter.min, parameter.max
-    if isinstance(low, str) or isinstance(high, str):
-        return None
+    low, high = limits(parameter)
     value = 1 if (low is None or low <= 1) and (high is None or high >= 1) else low if low is not None else high
     unit = parameter.unit if parameter.unit not in ("", "1") else ""
     return f"{value:g} {unit}".rstrip() if isinstance(value, (int, float)) else None
+
+
+def limits(parameter: Parameter[Any] | ParameterText) -> tuple[float | None, float | None]:
+    """The least and the greatest value of a parameter in its unit; None where it has none."""
+    if isinstance(parameter, Parameter):
+        return parameter.min, parameter.max
+    try:
+        low, _, high = parameter.bounds()
+    except UnitError:
+        return None, None
+    return low, high
 
 
 # -- names ------------------------------------------------------------------------------------------------------------
@@ -151,8 +172,7 @@ def rename(knowledge: Knowledge, line: int, column: int, new: str, texts: Texts 
         at = each.position
         if len(each.names) > 1:
             raise RenameError(f"{at}: the name stands for several things: {_owners(each.names)}; change it by hand")
-        path = reading.files[at.file][0] if at.file in reading.files else Path(at.file)
-        edits.append(Edit(path, at.line - 1, at.column - 1, at.column - 1 + at.length, new))
+        edits.append(Edit(*knowledge.stretch(at), new))
     edits = list(dict.fromkeys(edits))
     _check(reading, edits, name, texts)
     return edits
@@ -164,11 +184,8 @@ def _owners(names: Iterable[Name]) -> str:
 
 def _check(reading: Reading, edits: list[Edit], name: Name, texts: Texts) -> None:
     """Raise ``RenameError`` if the model would be another one."""
-    changed: dict[Path, str] = dict(texts)
-    for path, text in dict(reading.files.values()).items():
-        if mine := [each for each in edits if each.path == path]:
-            changed[path.resolve()] = apply(text, mine)
-    after = read(reading.path, changed, reading.types)
+    changed = {path.resolve(): text for path, text in texts_after(reading, edits).items()}
+    after = read(reading.path, {**texts, **changed}, reading.types, before=reading)
     if _shape(after) != _shape(reading):
         new = [each for each in after.problems if each.severity == "error"]
         why = str(new[0]) if new and reading.is_valid else "the model would be another one"

@@ -16,7 +16,7 @@ from ..model.text.document import Mapping
 from .knowledge import Keys, Knowledge, Known, owner_of
 from .names import MODEL
 from .places import Place, lines_of, place_at
-from .reading import NO_TEXTS, Texts, read
+from .reading import NO_TEXTS, Reading, Texts, read
 from .schema import allowed, applying, language
 
 _WORD = re.compile(r"[\w*]*(?:\[[^\]]*\]?)?\Z")
@@ -43,16 +43,21 @@ class Suggestion:
 
 
 def complete(
-    path: Path, line: int, column: int, texts: Texts = NO_TEXTS, types: tuple[type, ...] = ()
+    path: Path,
+    line: int,
+    column: int,
+    texts: Texts = NO_TEXTS,
+    types: tuple[type, ...] = (),
+    before: Reading | None = None,
 ) -> list[Suggestion]:
-    """What may be written in a file at a line and column, which count from 0."""
+    """What may be written in a file, which was read ``before``, at a line and column, which count from 0."""
     text = texts.get(path.resolve())
     if text is None:
         text = path.read_text(encoding="utf-8", errors="replace")
     place = place_at(text, line, column)
     if place is None:
         return []
-    knowledge = Knowledge(read(path, {**texts, path.resolve(): place.text}, types))
+    knowledge = Knowledge(read(path, {**texts, path.resolve(): place.text}, types, before=before))
     follows = lines_of(text)[line][column:]
     found = list(_keys(place, knowledge, follows) if place.is_key else _values(place, knowledge))
     if not place.is_key and lines_of(text)[line][:column].strip() == place.before:  # perhaps a first key

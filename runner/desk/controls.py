@@ -11,7 +11,7 @@ from ..model.catalogue.reference import as_written, doc_of, first_sentence, show
 from ..model.language.ports import ParameterText
 from ..model.text.document import Node, Scalar, plain
 from . import parts
-from .changes import sample
+from .changes import limits, sample
 from .knowledge import Knowledge
 from .names import MODEL
 from .parts import EditError
@@ -59,7 +59,8 @@ def fields(knowledge: Knowledge, owner: str, section: str, name: str) -> list[di
     names = knowledge.names
     entry = names.declared(owner, section.removesuffix("s")).get(name)
     entries = getattr(entry.value, "entries", {}) if entry is not None else {}
-    made = _made(knowledge, owner, section, name)
+    made = knowledge.made(owner, section, name)
+    made = made.aspect if section == "aspects" and made is not None else made
     found: dict[str, dict[str, Any]] = {}
     for kind in names.types_of(owner, name):
         cls = None if kind in names.classes else knowledge.type_called(kind, section)
@@ -71,17 +72,6 @@ def fields(knowledge: Knowledge, owner: str, section: str, name: str) -> list[di
     return list(found.values())
 
 
-def _made(knowledge: Knowledge, owner: str, section: str, name: str) -> Any:
-    """The first actor or aspect that a text makes of a part."""
-    model = knowledge.reading.loading.model
-    for scope in knowledge.scopes(owner)[:1] if model is not None else ():
-        assert model is not None
-        if section == "aspects":
-            return next((each.aspect for each in model.aspects if each.name == f"{scope}{name}"), None)
-        return model.graph.actors.get(f"{scope}{name}") or model.graph.actors.get(f"{scope}{name}[0]")
-    return None
-
-
 def _field(
     name: str, parameter: Parameter[Any] | ParameterText | None, said: Node | None, value: Any
 ) -> dict[str, Any]:
@@ -90,7 +80,7 @@ def _field(
     found = {"name": name, "said": written, "value": "" if value is None else shown(as_written(value)), "kind": "text"}
     if parameter is None:
         return found
-    low, high = (_finite(each) for each in (parameter.min, parameter.max))
+    low, high = (_finite(each) for each in limits(parameter))
     of_type = parameter.type if isinstance(parameter, Parameter) else type(value)
     return found | {
         "kind": "choice" if parameter.choices else "switch" if of_type is bool else "text",

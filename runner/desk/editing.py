@@ -9,8 +9,6 @@ from __future__ import annotations
 import copy
 import re
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
-from difflib import SequenceMatcher
 from typing import Any
 
 from epicycle.actors import declared_parameters
@@ -29,33 +27,6 @@ from .parts import EditError, Keys
 _ENDS = re.compile(PORT_SCHEMA["pattern"])
 _TYPE = re.compile(r"[A-Za-z_]\w*(?:[.:][A-Za-z_]\w*)*\Z")
 _ORDER = tuple(dict.fromkeys((*("model", "doc", "extends", "include", "composites"), *MODEL.keys, *COMPOSITE.keys)))
-
-
-@dataclass(frozen=True)
-class Splice:
-    """A text in place of a stretch of another, by characters from its beginning."""
-
-    start: int
-    end: int
-    text: str
-
-
-def splices(before: str, after: str) -> list[Splice]:
-    """The lines that differ between two texts, and of these the characters."""
-    one, other = before.splitlines(keepends=True), after.splitlines(keepends=True)
-    starts = [0]
-    for line in one:
-        starts.append(starts[-1] + len(line))
-    found = []
-    for what, a, b, c, d in SequenceMatcher(None, one, other, autojunk=False).get_opcodes() if before != after else ():
-        old, new = "".join(one[a:b]), "".join(other[c:d])
-        if what == "equal":
-            continue
-        least = min(len(old), len(new))
-        same = next((at for at in range(least) if old[at] != new[at]), least)
-        behind = next((at for at in range(least - same) if old[-1 - at] != new[-1 - at]), least - same)
-        found.append(Splice(starts[a] + same, starts[b] - behind, new[same : len(new) - behind]))
-    return found
 
 
 # -- what can be done -------------------------------------------------------------------------------------------------
@@ -254,6 +225,7 @@ def _canonical(data: Any) -> str:
 
 def _without(text: str, keys: Keys) -> str:
     """The text without an entry or item."""
+    parts.data_of(text)  # says so if it cannot be read
     return _checked(
         text, parts.delete(text, keys), keys[:-1], lambda items: items.pop(keys[-1]), f"no {parts.path(keys)}"
     )

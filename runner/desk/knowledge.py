@@ -17,7 +17,9 @@ from ..model.graph.model_graph import ModelGraph
 from ..model.language.ports import ParameterText
 from ..model.temporal import Requirement
 from ..model.text.patterns import PatternError, in_general, select
+from ..model.text.problems import Position
 from .names import MODEL, Names
+from .positions import positions
 from .reading import Reading
 
 Keys = tuple[str | int, ...]
@@ -40,12 +42,18 @@ class Knowledge:
         self.reading = reading
         self.names = Names(reading)
         known = reading.files.items()
-        wanted = (reading.path if file is None else file).resolve()
-        self.file = next((name for name, (path, _) in known if path.resolve() == wanted), reading.name)
+        self.path = (reading.path if file is None else file).resolve()
+        self.file = next((name for name, (path, _) in known if path.resolve() == self.path), reading.name)
 
     @property
     def text(self) -> str:
         return self.reading.files[self.file][1] if self.file in self.reading.files else ""
+
+    def stretch(self, at: Position) -> tuple[Path, int, int]:
+        """A position as a file and a stretch of characters."""
+        path, text = self.reading.files.get(at.file, (Path(at.file), ""))
+        start = positions(text).offset(at.line - 1, at.column - 1)
+        return path, start, min(start + at.length, len(text))
 
     @cached_property
     def catalogue(self) -> Catalogue:
@@ -118,8 +126,9 @@ class Knowledge:
                 for name, port in declared_ports(cls).items():
                     if port.direction == direction:
                         yield Known(name, type_name(port.type), port.doc)
-                if has_own_ports(cls):
-                    yield from self._ports_of_instance(owner, actor, direction, declared_ports(cls))
+                if has_own_ports(cls) and (made := self.made(owner, "actors", actor)) is not None:
+                    ports = (made.inputs if direction == "input" else made.outputs).items()
+                    yield from (Known(n, type_name(p.type), p.doc) for n, p in ports if n not in declared_ports(cls))
 
     def own_ports(self, owner: str, direction: str) -> Iterator[Known]:
         """The ports of a class."""
@@ -130,17 +139,6 @@ class Knowledge:
             texts = {key: getattr(each.value, "text", "") for key, each in inner.items()}
             yield Known(name, texts.get("type", said), texts.get("doc", ""))
 
-    def _ports_of_instance(self, owner: str, actor: str, direction: str, but: Mapping[str, Any]) -> Iterator[Known]:
-        graph = self.graph
-        for scope in self.scopes(owner) if graph is not None else ():
-            assert graph is not None
-            for path in (f"{scope}{actor}", f"{scope}{actor}[0]"):
-                if path in graph.actors:
-                    made = graph.actors[path]
-                    ports = made.inputs if direction == "input" else made.outputs
-                    yield from (Known(n, type_name(p.type), p.doc) for n, p in ports.items() if n not in but)
-                    return
-
     # -- paths ----------------------------------------------------------------------------------------------------
 
     def scopes(self, owner: str) -> list[str]:
@@ -149,6 +147,16 @@ class Knowledge:
             return [""]
         found = self.graph.components.items() if self.graph is not None else ()
         return [f"{path}." for path, each in found if each.kind == owner]
+
+    def made(self, owner: str, section: str, name: str) -> Any:
+        """The first actor, or woven aspect, that is made of a part of a class; None if there is none yet."""
+        model = self.reading.loading.model
+        for scope in self.scopes(owner)[:1] if model is not None else ():
+            assert model is not None
+            if section == "aspects":
+                return next((each for each in model.aspects if each.name == f"{scope}{name}"), None)
+            return model.graph.actors.get(f"{scope}{name}") or model.graph.actors.get(f"{scope}{name}[0]")
+        return None
 
     def next_names(self, owner: str, start: str, directions: frozenset[str]) -> Iterator[Known]:
         """What may follow a pattern, which is empty or ends with a dot: components and ports, and what they match."""

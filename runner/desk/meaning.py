@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 from epicycle.actors import declared_ports, type_name
 
+from ..model.catalogue.packaged import packaged_models
 from ..model.catalogue.reference import as_written, shown
 from ..model.language.files import named_file
 from ..model.text.document import Mapping, Node, Scalar, Sequence
@@ -17,10 +19,11 @@ from ..model.text.reading import Text
 from ..support.shown import short
 from .knowledge import Keys, Knowledge, owner_of
 from .names import MODEL, SECTIONS, Name, Use
-from .places import place_at
+from .places import Place, place_at
 from .schema import allowed, language
 
 # The keys of a file that name others, and of which kind those are that may be packaged; a study names a model, too.
+_PORT = re.compile(r"(?<![\w.])(?P<actor>[A-Za-z_]\w*)(?:\[[^\]]*\])?\.(?P<port>\w*)\Z")
 _FILES = {"include": "", "extends": "model"}
 
 
@@ -48,13 +51,16 @@ def links(knowledge: Knowledge) -> Iterator[tuple[Position, Path]]:
     """Where the file names another one, which it includes, extends or runs, and that file's path."""
     root, folder = knowledge.reading.nodes.get(knowledge.file), Path(knowledge.file).parent
     entries = root.entries if isinstance(root, Mapping) else {}
+    known = packaged_models().values()  # of all others, a model takes only what is in its folder
     for key, kind in {**_FILES, **({"model": "model"} if "study" in entries else {})}.items():
         node = entries[key].value if key in entries else None
         for each in node.items if isinstance(node, Sequence) else (node,):
             if isinstance(each, Scalar):
                 said = Text(each.text, each.position)
                 path = named_file(said, folder, kind, Problems()) if kind else folder / each.text
-                if path is not None and path.is_file():
+                if path is None or not path.is_file():
+                    continue
+                if key == "model" or path in known or folder.resolve() in path.resolve().parents:
                     yield each.position, path
 
 
@@ -78,7 +84,8 @@ def hover(knowledge: Knowledge, line: int, column: int) -> str:
     parts = [_of_name(knowledge, name) for name in sorted(use.names, key=str)] if use is not None else []
     place = place_at(knowledge.text, line, column)
     if place is not None and not any(each.kind in ("actor", "port") for each in (use.names if use else ())):
-        parts += _of_place(knowledge, (*place.keys, place.whole) if place.is_key else place.keys, place.around[0])
+        parts += _of_port(knowledge, place)
+        parts += _of_place(knowledge, place)
     return "\n\n".join(dict.fromkeys(each for each in parts if each))
 
 
@@ -89,7 +96,9 @@ def _of_name(knowledge: Knowledge, name: Name) -> str:
         types = names.types_of(name.owner, name.name)
         said = [f"**{name.name}**: {name.kind}{inside}, {' or '.join(f'`{each}`' for each in types)}"]
         said += [knowledge.of_type(each, f"{name.kind}s") for each in types]
-        return "\n\n".join([*said, *_places(knowledge, name)])
+        if name.kind == "aspect" and (made := knowledge.made(name.owner, "aspects", name.name)) is not None:
+            said.append("at " + ", ".join(dict.fromkeys(f"`{in_general(place)}`" for place in made.places)))
+        return "\n\n".join(said)
     if name.kind == "port":
         direction = "input" if name.name in names.ports(name.owner, "input") else "output"
         found = next((each for each in knowledge.own_ports(name.owner, direction) if each.name == name.name), None)
@@ -104,16 +113,6 @@ def _of_name(knowledge: Knowledge, name: Name) -> str:
     metrics = model.output.metrics if model is not None else []
     takes = next((f": {each.takes}" for each in metrics if each.name == name.name and name.kind == "metric"), "")
     return f"**{name.name}**: {name.kind}{takes}"
-
-
-def _places(knowledge: Knowledge, name: Name) -> Iterator[str]:
-    """Where an aspect attaches."""
-    model = knowledge.reading.loading.model
-    if name.kind == "aspect" and model is not None:
-        for scope in knowledge.scopes(name.owner)[:1]:
-            for each in model.aspects:
-                if each.name == f"{scope}{name.name}":
-                    yield "at " + ", ".join(dict.fromkeys(f"`{in_general(place)}`" for place in each.places))
 
 
 def _of_parameter(knowledge: Knowledge, name: Name) -> str:
@@ -137,11 +136,26 @@ def _of_parameter(knowledge: Knowledge, name: Name) -> str:
     return "\n\n".join(each for each in (text, ", ".join([*unit, *limits]), found.doc) if each)
 
 
-def _of_place(knowledge: Knowledge, keys: Keys, root: Node) -> Iterator[str]:
-    """What the language says of the value under some keys, and which value it has."""
-    known = language(knowledge.reading.types)
-    found = (each["description"] for each in allowed(known, root, keys) if "description" in each)
-    yield next(found, "")
+def _of_port(knowledge: Knowledge, place: Place) -> Iterator[str]:
+    """A port that an actor has by its type."""
+    start = _PORT.search(place.before)
+    rest = re.match(r"\w*", place.whole[len(place.before) :])
+    if start is None or rest is None:
+        return
+    for direction in ("input", "output"):
+        for each in knowledge.ports_of(owner_of(place.keys)[0], start["actor"], direction):
+            if each.name == start["port"] + rest[0]:
+                yield f"**{each.name}**: {direction} of {start['actor']}, {each.what}: {each.doc}".removesuffix(": ")
+
+
+def _of_place(knowledge: Knowledge, place: Place) -> Iterator[str]:
+    """What the language says of the value at a place, or of a key there, and which value it has."""
+    keys: Keys = (*place.keys, place.whole) if place.is_key else place.keys
+    schemas = allowed(language(knowledge.reading.types), place.around[0], keys)
+    yield next((each["description"] for each in schemas if "description" in each), "")
+    for each in schemas:
+        chosen = zip(each.get("enum", ()), each.get("enumDescriptions", ()), strict=False)
+        yield from (f"`{value}`: {words}" for value, words in chosen if value == place.whole)
     owner, inner = owner_of(keys)
     if len(inner) < 3 or inner[0] not in ("actors", "aspects"):
         return
@@ -152,15 +166,11 @@ def _of_place(knowledge: Knowledge, keys: Keys, root: Node) -> Iterator[str]:
             if (cls := knowledge.type_called(kind, section)) is not None and section == "actors":
                 for port in declared_ports(cls).values():
                     yield f"- {port.direction} `{port.name}` ({type_name(port.type)}): {port.doc}".rstrip(": ")
-    elif section == "actors" and knowledge.graph is not None:
-        for scope in knowledge.scopes(owner)[:1]:
-            actors = knowledge.graph.actors
-            made = actors.get(f"{scope}{part}") or actors.get(f"{scope}{part}[0]")
-            if made is not None and isinstance(key, str) and hasattr(made, key):
-                unit = knowledge.unit_of(owner, inner)
-                yield f"value of `{made.path}`: `{shown(as_written(getattr(made, key)))}`" + (
-                    f" {unit}" if unit else ""
-                )
+    elif section == "actors" and isinstance(key, str):
+        made = knowledge.made(owner, section, part)
+        if made is not None and hasattr(made, key):
+            unit = knowledge.unit_of(owner, inner)
+            yield f"value of `{made.path}`: `{shown(as_written(getattr(made, key)))}` {unit}".rstrip()
 
 
 # -- the outline ------------------------------------------------------------------------------------------------------
@@ -182,9 +192,3 @@ def symbols(node: Node | None) -> list[Symbol]:
             inside += (Symbol(each.text, SECTIONS[key], each.position) for each in ports)
         found.append(Symbol(key, "section", replace(entry.key.position), tuple(inside)))
     return found
-
-
-def path_of(knowledge: Knowledge, position: Position) -> Path:
-    """The file of a position."""
-    known = knowledge.reading.files.get(position.file)
-    return Path(position.file) if known is None else known[0]

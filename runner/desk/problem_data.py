@@ -6,20 +6,30 @@ from collections.abc import Iterable
 from typing import Any
 
 from ..model.text.problems import Problem
-from .changes import Edit, fix
+from .changes import fix
 from .knowledge import Knowledge
+from .positions import positions
 from .reading import Reading
 
 
 def report(reading: Reading) -> dict[str, Any]:
     """Whether a file is valid, and everything that is wrong with it."""
     knowledge = Knowledge(reading)
-    problems = [as_data(each, fix(knowledge, each)) for each in reading.problems]
+    problems = [as_data(each) | _fix(knowledge, each) for each in reading.problems]
     return {"valid": reading.is_valid, "problems": problems, "more": reading.more}
 
 
-def as_data(problem: Problem, edit: Edit | None = None) -> dict[str, Any]:
-    """A problem: its code, message, place and help, and the change that removes it; lines and columns count from 1."""
+def _fix(knowledge: Knowledge, problem: Problem) -> dict[str, Any]:
+    """The change that removes a problem."""
+    if (edit := fix(knowledge, problem)) is None:
+        return {}
+    line, column = positions(dict(knowledge.reading.files.values())[edit.path]).place(edit.start)
+    place = {"file": str(edit.path), "line": line + 1, "column": column + 1, "length": edit.end - edit.start}
+    return {"fix": {**place, "text": edit.text}}
+
+
+def as_data(problem: Problem) -> dict[str, Any]:
+    """A problem: its code, message, place and help; lines and columns count from 1."""
     found: dict[str, Any] = {
         "code": problem.kind.code,
         "kind": problem.kind.title,
@@ -30,14 +40,6 @@ def as_data(problem: Problem, edit: Edit | None = None) -> dict[str, Any]:
     if (at := problem.position) is not None:
         found |= {"file": at.file, "line": at.line, "column": at.column, "length": at.length}
     found["help"] = list(problem.help)
-    if edit is not None:
-        found["fix"] = {
-            "file": str(edit.path),
-            "line": edit.line + 1,
-            "column": edit.start + 1,
-            "length": edit.end - edit.start,
-            "text": edit.text,
-        }
     return found
 
 

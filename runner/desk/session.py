@@ -15,14 +15,14 @@ class Session:
         self.types = types
         self.texts: dict[Path, str] = {}
         self._known: dict[Path, Knowledge] = {}
-        self._before: dict[Path, Reading] = {}
+        self.readings: dict[Path, Reading] = {}  # the latest ones, perhaps of texts that have changed since
 
     def change(self, path: Path, text: str | None) -> list[Path]:
         """Open a text, change it, or close it (None); the open files to which that makes a difference."""
         path = path.resolve()
         if text is None:
             self.texts.pop(path, None)
-            self._before.pop(path, None)
+            self.readings.pop(path, None)
         else:
             self.texts[path] = text
         stale = [each for each, known in self._known.items() if path in _files(known)]
@@ -34,7 +34,8 @@ class Session:
         """What is known of an open file, or of one on disk."""
         path = path.resolve()
         if path not in self._known:
-            reading = self._before[path] = read(path, self.texts, self.types, before=self._before.get(path))
+            before = self.readings.get(path)
+            reading = self.readings[path] = read(path, self.texts, self.types, before=before)
             self._known[path] = Knowledge(reading)
         return self._known[path]
 

@@ -110,10 +110,10 @@ def test_each_tool_answers(folder: Path) -> None:
         assert [(each["message"], each["file"], each["fix"]["text"]) for each in wrong[:1]] == [
             ("clock: there is no actor type 'Clok', did you mean 'Clock'?", "model.yaml", "Clock")
         ]
-        assert [each["monitor"] for each in (await one.told("describe", name="line.yaml"))["monitors"]] == ["small"]
-        assert (await one.told("describe", name="PacketLoss"))["kind"] == "aspect"
+        assert [each["monitor"] for each in (await one.told("describe", model="line.yaml"))["monitors"]] == ["small"]
+        assert (await one.told("describe", model="PacketLoss"))["kind"] == "aspect"
         assert "mm1" in (await one.told("list", what="models"))["models"]
-        run = await one.told("run", model="line.yaml", changes={"set": {"clock.period": "2 s"}}, until="10 s")
+        run = await one.told("run", model="line.yaml", set=["clock.period=2 s"], until="10 s")
         assert run["metrics"] == {"sent": 6, "small": 1.0, "small_robustness": 0.0}
         short = await one.told("run", model="line.yaml", max_tags=3)
         assert (short["stopped"], short["metrics"]["sent"]) == ("the program", 3)
@@ -125,7 +125,7 @@ def test_each_tool_answers(folder: Path) -> None:
         assert (await one.told("diff", before="line.yaml", after=MODEL.replace("0.5", "0.6")))["changes"][0][
             "after"
         ] == 0.6
-        other = await one.told("what_if", model="line.yaml", at="5 s", change={"count.step": 3}, lose=["heard.input"])
+        other = await one.told("what_if", model="line.yaml", at="5 s", change=["count.step=3"], lose=["heard.input"])
         assert other["first_firing"]["actor"] == "count"
         picture = (await one.raw("draw", model="line.yaml")).content[0]
         assert (picture.type, picture.mime_type) == ("image", "image/png")
@@ -146,6 +146,10 @@ def test_resources_are_the_language_the_reference_and_examples(folder: Path) -> 
         language = await read("epicycle://language")
         assert language.startswith("# The language of Epicycle")
         assert len(language.splitlines()) <= 200
+        assert (await one.refused("run")) == "run needs model"
+        assert (await one.refused("run", model="mm1", out="x")) == (
+            "run takes no 'out': it takes model, seed, until, max_tags, set, disturb, aspect, without"
+        )
         assert json.loads(await read("epicycle://reference/Clock"))["name"] == "Clock"
         assert "mm1" in (await read("epicycle://examples")).splitlines()
         assert "model: mm1" in await read("epicycle://examples/mm1")
@@ -179,42 +183,47 @@ def test_hostile_arguments_end_with_a_message(folder: Path, tmp_path: Path) -> N
             "\0.yaml",
         ):
             assert await one.refused("run", model=name) == f"there is no file {name!r} in the folder of this server"
-        assert await one.refused("run", model="mm1", changes={"disturb": ["../secret.yaml"]}) == (
+        assert await one.refused("run", model="mm1", disturb=["../secret.yaml"]) == (
             "there is no file '../secret.yaml' in the folder of this server"
         )
         for said in (
             await one.refused("run", model="far.yaml"),
-            await one.refused("run", model=MODEL, changes={"aspects": [f"slow=ExecutionTime,times={secret},at=count"]}),
+            await one.refused("run", model=MODEL, aspect=[f"slow=ExecutionTime,times={secret},at=count"]),
             await one.refused("run", model=MODEL.replace("Recorder", "Mine")),
-            await one.refused("run", model=MODEL, changes={"set": {"types": "mine.py"}}),
+            await one.refused("run", model=MODEL, set=["types=mine.py"]),
             await one.refused("run", model="--types=mine.py"),
-            await one.refused("run", model=MODEL, changes={"types": ["mine.py"]}),
-            await one.refused("run", model=MODEL, changes={"set": {"x\n--types": "mine.py"}}),
+            await one.refused("run", model=MODEL, types=["mine.py"]),
+            await one.refused("run", model=MODEL, set=["x\n--types=mine.py"]),
             await one.refused("run", model=MODEL, until="--types=mine.py"),
             await one.refused("run", model=3),
+            await one.refused("run", model=MODEL, out="elsewhere"),
+            await one.refused("run", model=MODEL, overrides=[str(secret)]),
+            await one.refused("run", model=MODEL, set=[{"clock.period": 2}]),
+            await one.refused("run", model=[MODEL, MODEL]),
+            await one.refused("shell", command="id"),
             await one.refused("run", model=MODEL, seed=-1),
             await one.refused("run", model=MODEL, seed="x"),
             await one.refused("run", model=MODEL, until={"a": 1}),
             await one.refused("run", model="a" * 300_000),
             await one.refused("run", model="model: a\n" + "x" * 300_000),
             await one.refused("run", model="\n"),
-            await one.refused("run", model=MODEL, changes={"set": {f"p{n}": 1.0 for n in range(50_000)}}),
-            await one.refused("run", model=MODEL, changes={"set": {"clock.period": {"a": ["\0"]}}}),
+            await one.refused("run", model=MODEL, set=[f"p{n}=1.0" for n in range(50_000)]),
+            await one.refused("run", model=MODEL, set=["clock.period=\0"]),
             await one.refused("run", model="&a [*a]\n"),
             await one.refused("compare", model="mm1", replications=10**9),
-            await one.refused("search", model="mm1", property="always ((("),
+            await one.refused("search", model="mm1", **{"break": "always ((("}),
             await one.refused("explain", model="mm1", monitor="nothing"),
             await one.refused("what_if", model="line.yaml", at="never"),
             await one.refused("what_if", model="line.yaml", at=1, lose=["no.port"]),
             await one.refused("draw", model="mm1", depth=10**9),
-            await one.refused("describe", name="NoSuchType"),
+            await one.refused("describe", model="NoSuchType"),
             await one.refused("list", what="files"),
             await one.refused("run"),
         ):
             assert said
             assert "12345" not in said
         assert "ended after 4 s" in await one.refused(
-            "run", model=MODEL, until=9e8, max_tags=2_000_000, changes={"set": {"clock.period": "1 ns"}}
+            "run", model=MODEL, until=9e8, max_tags=2_000_000, set=["clock.period=1 ns"]
         )
         many = MODEL.replace("{type: Recorder}", "{type: Recorder, count: 19000}").replace(
             "heard.input", '"heard[*].input"'
@@ -237,7 +246,7 @@ def test_hostile_arguments_end_with_a_message(folder: Path, tmp_path: Path) -> N
 )
 def test_what_no_process_can_be_given(folder: Path, words: list[str], message: str) -> None:
     with pytest.raises(ToolError) as raised:
-        LimitedCall(folder).facts("run", words[:1], *words[1:])
+        LimitedCall(folder).json("run", words[:1], *words[1:])
     assert str(raised.value) == message
 
 
@@ -246,7 +255,7 @@ def test_types_are_those_that_the_command_line_names(folder: Path, tmp_path: Pat
     (tmp_path / "mine.py").write_text(TYPES, encoding="utf-8")
 
     async def talk(one: Assistant) -> None:
-        assert (await one.told("describe", name="Mine"))["name"] == "Mine"
+        assert (await one.told("describe", model="Mine"))["name"] == "Mine"
 
     dialogue(folder, talk, "--types", str(tmp_path / "mine.py"))
 

@@ -9,29 +9,17 @@ from pathlib import Path
 
 import pytest
 
-from epicycle.runner.desk import (
-    Edit,
-    Knowledge,
-    RenameError,
-    apply,
-    complete,
-    definition,
-    fix_all,
-    hover,
-    links,
-    read,
-    references,
-    rename,
-    symbols,
-    texts_after,
-)
-from epicycle.runner.desk.kinds_page import example
+from epicycle.runner.desk import Knowledge, read
+from epicycle.runner.desk.changes import RenameError, apply, edits_between, fix_all, rename, texts_after
+from epicycle.runner.desk.completion import complete
+from epicycle.runner.desk.meaning import definition, hover, links, references, symbols
 from epicycle.runner.interface.cli import main
 from epicycle.runner.model.build.load import load_model
 from epicycle.runner.model.text.kinds import KINDS, Kind
 from epicycle.runner.model.text.problems import ModelError
 from tests.bad_models.test_bad_models import FOLDER
 from tests.desk.desk_parts import MODELS, NAME, folder_with_model, place
+from tests.desk.kinds_page import example
 
 SMALL = """model: two_bodies
 parameters:
@@ -133,6 +121,8 @@ WRONG = (
     ("stop: 10 s", "stp: 10 s"),
     ("of: left.state", "of: left.stte"),
     ("{type: PacketLoss,", "{type: PacketLos,"),
+    ("doc: ticks that came through", "doc: ticks, or some of them, that came through"),
+    ("doc: ticks that came through", "doc: seen (once, twice, 3)"),
 )
 
 
@@ -243,6 +233,9 @@ def test_hover(tmp_path: Path) -> None:
     assert said("he", "ard:").startswith("**heard**: metric: count of left.state")
     assert said("los", "sy:").endswith("\n\nat `clock.trigger`, `left.trigger`, `right.trigger`")
     assert "Time at which a run ends" in said("run: {st", "op")
+    assert said("-> left.trig", "ger").startswith("**trigger**: input of left, any: sends the state now")
+    assert said("clock.out", "put -> left").startswith("**output**: output of clock, any: the values in turn")
+    assert said("take: co", "unt").endswith("`count`: how many there are (tokens)")
     assert hover(knowledge, 400, 0) == ""
 
 
@@ -278,6 +271,9 @@ def test_links_lead_to_the_files_that_are_named(tmp_path: Path) -> None:
     ]
     assert found("two.yaml", "study: two\nmodel: mm1\nvary: {load: [0.5]}\n") == [("model: mm1", 8, 3, "mm1.yaml")]
     assert found("broken.yaml", "model: [\nextends: mm1\n") == []
+    (tmp_path.parent / "outside.yaml").write_text("model: outside\n")
+    assert found("far.yaml", "model: far\nextends: ../outside.yaml\ninclude: ../outside.yaml\n") == []
+    assert found("odd.yaml", 'model: odd\ninclude: ["\\0", "", "."]\n') == []
 
 
 def test_symbols() -> None:
@@ -357,8 +353,26 @@ run: {stop: 2 s}
     )
 
 
-def test_edits_keep_ends_of_lines() -> None:
-    assert apply("a: 1\r\nb: 2\n", [Edit(Path(), 0, 3, 4, "x"), Edit(Path(), 1, 0, 1, "c")]) == "a: x\r\nc: 2\n"
+def test_edits_keep_ends_of_lines(tmp_path: Path) -> None:
+    text = "model: m\r\nactors:\n  clock: {typ: Clock, period: 1 s}\r\n"
+    assert mended(tmp_path / "m.yaml", text) == text.replace("typ:", "type:")
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "count"),
+    [
+        ("", "a\n", 1),
+        ("a\nb\nc\n", "a\nx\nc\n", 1),
+        ("a\nb\nc\n", "c\n", 1),
+        ("aba", "ababa", 1),
+        ("x: 1\ny: 1\n", "x: 2\ny: 2\n", 1),
+    ],
+)
+def test_edits_make_one_text_of_another(before: str, after: str, count: int) -> None:
+    found = edits_between(Path("m.yaml"), before, after)
+    assert apply(before, found) == after
+    assert len(found) == count
+    assert edits_between(Path("m.yaml"), after, after) == []
 
 
 def test_a_run_imports_no_desk(tmp_path: Path) -> None:

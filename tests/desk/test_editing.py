@@ -8,7 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from epicycle.runner.desk import EditError, Knowledge, difference, editing, read, splices
+from epicycle.runner.desk import EditError, Knowledge, controls, difference, editing, read
+from epicycle.runner.desk.changes import apply, edits_between
 from epicycle.runner.desk.parts import data_of
 from epicycle.runner.model.catalogue.packaged import packaged_models
 
@@ -243,16 +244,12 @@ def test_an_edit_changes_what_is_meant_and_nothing_else(name: str, tmp_path: Pat
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_splices_make_one_text_of_the_other(name: str) -> None:
+def test_edits_make_one_text_of_the_other(name: str) -> None:
     before, act, *_ = CASES[name]
-    text = after = act(before)
-    for each in reversed(splices(before, after)):
-        text = before[: each.start] + each.text + before[each.end :] if after == text else text
-    made, at = "", 0
-    for each in splices(before, after):
-        made += before[at : each.start] + each.text
-        at = each.end
-    assert made + before[at:] == after
+    after = act(before)
+    found = edits_between(Path("m.yaml"), before, after)
+    assert apply(before, found) == after
+    assert all(each.text != before[each.start : each.end] for each in found)
 
 
 def test_what_a_swapped_aspect_does_not_know_goes(tmp_path: Path) -> None:
@@ -434,3 +431,32 @@ def test_an_alias_is_left_to_its_author() -> None:
     assert str(caught.value) == (
         "this can be changed once the text can be read: there is no anchor &p before this alias"
     )
+
+
+def test_bounds_are_numbers_in_the_unit_of_the_parameter(tmp_path: Path) -> None:
+    text = "model: m\nparameters: {pace: {value: 1 min, min: 500 ms, max: 0.1 h}}\n"
+    text += 'actors: {clock: {type: Clock, period: "${pace}"}}\nrun: {stop: 1 h}\n'
+    path = tmp_path / "m.yaml"
+    (field,) = controls.parameters(Knowledge(read(path, {path.resolve(): text})))
+    assert (field["low"], field["high"], field["number"], field["unit"]) == (0.5, 360.0, 60.0, "s")
+
+
+@pytest.mark.parametrize(
+    "act",
+    [
+        lambda text: editing.remove(text, "", "actors", "a"),
+        lambda text: editing.remove(text, "", "aspects", "a"),
+        lambda text: editing.switch(text, "", "a", False),
+        lambda text: editing.switch(text, "", "a", True),
+        lambda text: editing.add_part(text, "", "actors", "b", "Clock", {}),
+        lambda text: editing.attach(text, "", "b", "PacketLoss", "a.b"),
+        lambda text: editing.connect(text, "", "a.b", "c.d"),
+        lambda text: editing.disconnect(text, "", "a.b", "c.d"),
+        lambda text: editing.set_parameter(text, "", "actors", "a", "period", "1 s"),
+        lambda text: editing.drop_in("model: m\n", text),
+    ],
+)
+@pytest.mark.parametrize("text", ["model: m\nactors: {a: {type: Clock\n", "a: 1\na: 2\n", "\x00", "a: *b\n", "[" * 500])
+def test_a_text_that_cannot_be_read_is_not_changed(act: Callable[[str], str], text: str) -> None:
+    with pytest.raises(EditError):
+        act(text)

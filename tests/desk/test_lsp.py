@@ -106,6 +106,15 @@ def test_a_dialogue_over_a_model_of_300_lines(tmp_path: Path) -> None:
             assert wrong != before
         assert wrong == renamed
 
+        # The colours of names: the first one is a parameter.
+        colours: Any = await client.text_document_semantic_tokens_full_async(
+            lsp.SemanticTokensParams(lsp.TextDocumentIdentifier(path.resolve().as_uri()))
+        )
+        lines = renamed.splitlines()
+        row, column, length, kind, _ = colours.data[:5]
+        assert (lines[row][column : column + length] + ":", kind) == (lines[row].split()[0], 0)
+        assert len(colours.data) // 5 > 100
+
         # The outline.
         symbols: Any = await client.text_document_document_symbol_async(
             lsp.DocumentSymbolParams(lsp.TextDocumentIdentifier(path.resolve().as_uri()))
@@ -148,11 +157,14 @@ def test_a_file_of_others_is_left_alone(tmp_path: Path) -> None:
 def test_places_are_counted_in_units_of_the_client(encoding: str) -> None:
     text = "a: é\r\nb: 😀 \u2028c: d\ne"
     positions, size = Positions(text, encoding), {"utf-8": 4, "utf-16": 2, "utf-32": 1}[encoding]
-    assert positions.to_client(1, 4) == (1, 3 + size)
-    assert positions.to_client(2, 0) == (1, 5 + size - 1 + {"utf-8": 3}.get(encoding, 1))
+    assert positions.to_client(positions.offset(1, 4)) == (1, 3 + size)
+    assert positions.to_client(positions.offset(2, 0)) == (1, 5 + size - 1 + {"utf-8": 3}.get(encoding, 1))
     for line, column in ((0, 0), (0, 4), (1, 3), (1, 4), (2, 0), (2, 3), (3, 1)):
-        assert positions.from_client(*positions.to_client(line, column)) == (line, column)
-    assert Positions("\ufeffa: b", encoding).from_client(0, {"utf-8": 3}.get(encoding, 1)) == (0, 0)
+        offset = positions.offset(line, column)
+        assert positions.from_client(*positions.to_client(offset)) == offset
+        assert positions.place(offset) == (line, column)
+    marked = Positions("\ufeffa: b", encoding)
+    assert marked.place(marked.from_client(0, {"utf-8": 3}.get(encoding, 1))) == (0, 0)
 
 
 # -- random edits -----------------------------------------------------------------------------------------------------
@@ -217,12 +229,13 @@ def edit_at_random(folder: Path, number: int, seed: int) -> None:
                 text = (MODELS / path.name).read_text(encoding="utf-8")
                 await vim.write(path, text)
             text = mutant(text, draw) or "model: m"
-            found = await vim.write(path, text)
+            path.write_text(text, encoding="utf-8")
+            # The server reads the text while this process validates the file.
+            found, valid = await asyncio.gather(vim.write(path, text), asyncio.to_thread(validated, path))
+            path.write_text((MODELS / path.name).read_text(encoding="utf-8"), encoding="utf-8")
             errors = [each for each in found if each.severity == lsp.DiagnosticSeverity.Error] or found
             told = [(each.code, each.message, each.range.start.line, each.range.start.character) for each in errors]
-            path.write_text(text, encoding="utf-8")
-            assert told == [expected(each, path, text) for each in validated(path)], text
-            path.write_text((MODELS / path.name).read_text(encoding="utf-8"), encoding="utf-8")
+            assert told == [expected(each, path, text) for each in valid], f"edit {count}: {text}"
             if count % 3:
                 continue
             lines = text.split("\n")
@@ -240,6 +253,8 @@ async def ask(vim: Editor, at: dict[str, Any], path: Path, text: str) -> None:
     await client.text_document_definition_async(lsp.DefinitionParams(**at))
     await client.text_document_references_async(lsp.ReferenceParams(**at, context=lsp.ReferenceContext(True)))
     await client.text_document_document_symbol_async(lsp.DocumentSymbolParams(at["text_document"]))
+    await client.text_document_document_link_async(lsp.DocumentLinkParams(at["text_document"]))
+    await client.text_document_semantic_tokens_full_async(lsp.SemanticTokensParams(at["text_document"]))
     await client.text_document_prepare_rename_async(lsp.PrepareRenameParams(**at))
     await vim.actions(path, text)
     with suppress(JsonRpcInvalidParams):

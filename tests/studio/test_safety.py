@@ -115,6 +115,15 @@ def _handshake(studio: Served, address: str, headers: dict[str, str]) -> int:
         return int(raw.recv(4096).split()[1])
 
 
+def test_a_request_without_a_path_finds_nothing(studio_at: tuple[Served, Path]) -> None:
+    studio, _ = studio_at
+    host = studio.origin.removeprefix("http://")
+    for line in ("GET * HTTP/1.1", "OPTIONS * HTTP/1.1", "GET //x/ HTTP/1.1", "GET http://evil.example/ HTTP/1.1"):
+        with socket.create_connection(("127.0.0.1", int(host.rpartition(":")[2])), timeout=PATIENCE) as raw:
+            raw.sendall(f"{line}\r\nHost: {host}\r\n\r\n".encode())
+            assert raw.recv(4096).split()[1] == b"404"
+
+
 def test_a_socket_without_an_origin_is_refused(studio_at: tuple[Served, Path]) -> None:
     with pytest.raises(InvalidStatus) as refused:
         connect(studio_at[0].socket)
@@ -147,15 +156,30 @@ def test_it_listens_on_this_machine_only(studio_at: tuple[Served, Path]) -> None
 
 # -- what is answered -------------------------------------------------------------------------------------------------
 
+COMPLETION, HOVER, RENAME = "textDocument/completion", "textDocument/hover", "textDocument/rename"
+OTHER = {"textDocument": {"uri": "file:///etc/passwd"}}
+
+
+def place(line: int) -> dict[str, int]:
+    return {"line": line, "character": 5}
+
+
 ODD: dict[str, Any] = {
     "no question": {"id": 1},
     "another question": {"id": 1, "ask": "shell", "text": "", "command": "id"},
     "a method of a worker": {"id": 1, "ask": "answer", "text": ""},
     "no text": {"id": 1, "ask": "read"},
     "a text that is none": {"id": 1, "ask": "read", "text": [1]},
-    "a place that is none": {"id": 1, "ask": "complete", "text": MODEL, "at": "x"},
-    "a place far away": {"id": 1, "ask": "hover", "text": MODEL, "at": 10**30},
-    "a place before": {"id": 1, "ask": "complete", "text": MODEL, "at": -5},
+    "a place that is none": {"id": 1, "ask": COMPLETION, "text": MODEL, "params": {"position": "x"}},
+    "no parameters": {"id": 1, "ask": COMPLETION, "text": MODEL},
+    "parameters that are none": {"id": 1, "ask": COMPLETION, "text": MODEL, "params": [1]},
+    "a place far away": {"id": 1, "ask": HOVER, "text": MODEL, "params": {"position": place(10**30)}},
+    "a place behind": {"id": 1, "ask": HOVER, "text": MODEL, "params": {"position": place(10**9)}},
+    "a place before": {"id": 1, "ask": COMPLETION, "text": MODEL, "params": {"position": place(-5)}},
+    "a name that is none": {"id": 1, "ask": RENAME, "text": MODEL, "params": {"position": place(3), "newName": "<b>"}},
+    "a text of somebody else": {"id": 1, "ask": HOVER, "text": MODEL, "params": {"position": place(3), **OTHER}},
+    "a request for more": {"id": 1, "ask": "workspace/executeCommand", "text": MODEL, "params": {"command": "id"}},
+    "a question that is a list": {"id": 1, "ask": ["read"], "text": MODEL},
     "no change": {"id": 1, "ask": "edit", "text": MODEL, "what": "data_of", "given": []},
     "a change of nothing": {"id": 1, "ask": "edit", "text": MODEL, "what": "connect", "given": []},
     "a change with too much": {"id": 1, "ask": "edit", "text": MODEL, "what": "switch", "given": ["a"] * 9},
@@ -172,7 +196,8 @@ def test_an_odd_question_is_answered_in_words(name: str, studio_at: tuple[Served
     studio, path = studio_at
     with asking(studio) as page:
         found = page.ask(**{key: each for key, each in ODD[name].items() if key != "id"})
-        assert found.keys() & {"error", "options", "words", "saved", "problems"}
+        assert found.keys() & {"error", "result", "saved", "problems"}
+        assert "root:" not in str(found)
         assert "Traceback" not in str(found)
         assert page.ask(ask="read", text=MODEL)["valid"] is True
     assert path.read_text() == MODEL
@@ -303,21 +328,42 @@ def test_a_worker_that_dies_in_a_run_is_told_of(tmp_path: Path) -> None:
         assert page.ask(ask="run", text=MODEL)["stopped"] == "stop time"
 
 
-@pytest.mark.slow
-def test_a_step_that_never_ends_is_ended(tmp_path: Path) -> None:
-    types = tmp_path / "stuck.py"
+def stuck(folder: Path) -> tuple[Path, Path, str]:
+    """A file of types, of which one never ends its firing, a model's file, and the text that uses it."""
+    types, path = folder / "stuck.py", folder / "stuck.yaml"
     types.write_text(
         "from epicycle.actors import Actor, InputPort\n\n\n"
         "class Stuck(Actor):\n    input = InputPort(object)\n\n"
         "    def fire(self) -> None:\n        while True:\n            pass\n"
     )
-    path = tmp_path / "stuck.yaml"
     text = MODEL.replace("{type: Scale, factor: 2}", "{type: Stuck}").split("run:")[0] + "run: {stop: 10 s}\n"
     path.write_text(text)
+    return types, path, text
+
+
+@pytest.mark.slow
+def test_a_step_that_never_ends_is_ended(tmp_path: Path) -> None:
+    types, path, text = stuck(tmp_path)
     with served(path, "--types", str(types), "--seconds", "2") as studio, asking(studio) as page:
         assert page.ask(ask="read", text=text)["valid"] is True
         assert page.ask(ask="run", text=text) == {"error": "the run took longer than 12 s, and was ended"}
         assert page.ask(ask="run", text=MODEL)["stopped"] == "stop time"
+
+
+@pytest.mark.slow
+def test_a_step_that_never_ends_ends_with_the_studio(tmp_path: Path) -> None:
+    types, path, text = stuck(tmp_path)
+    with served(path, "--types", str(types)) as studio, asking(studio) as page:
+        page.ask(ask="run", text=MODEL)  # the worker is there
+        page.socket.send(json.dumps({"id": 100, "ask": "run", "text": text}))
+        time.sleep(1)
+        workers = _children(studio.process.pid)
+        assert len(workers) == 1
+    for _ in range(100):
+        if not any(Path(f"/proc/{each}").exists() for each in workers):
+            break
+        time.sleep(0.1)
+    assert not any(Path(f"/proc/{each}").exists() for each in workers)
 
 
 # -- the file ---------------------------------------------------------------------------------------------------------
@@ -399,7 +445,9 @@ def test_names_and_docs_are_text_on_the_page(studio: Callable[..., Writer], tmp_
     kept = [line for line in INJECTING.splitlines() if not line.startswith((f'  "{TAG}"', "  gain", "model"))]
     valid = "\n".join(["model: x", *kept]).replace(f', "{TAG}": {{of: sink.output, take: count}}', "")
     tab.evaluate(
-        "(text) => epicycle.studio.editor.splice([{ from: 0, to: epicycle.studio.editor.text.length, text }])", valid
+        "(newText) => epicycle.studio.editor.write([{ range: { start: { line: 0, character: 0 },"
+        " end: { line: 1e6, character: 0 } }, newText }])",
+        valid,
     )
     writer.until_run()
     for view in ("signals", "sequence", "details"):

@@ -47,6 +47,7 @@ def test_a_lost_plan_is_let_through_by_two_clicks(studio: Callable[..., Writer],
     text = (MODELS / path.name).read_text(encoding="utf-8")
     path.write_text(text.replace("stop: 30 s", "stop: 5 s"), encoding="utf-8")
     shutil.copytree(MODELS / "robots", tmp_path / "robots")
+    epicycle.run(path, until=0.1, progress=False)  # the kernels are compiled, which may take longer than a run may
     writer = studio(path)
     tab = writer.tab
     tab.locator("input[type=file]").set_input_files(MODELS / "disturbances" / "wifi_burst.yaml")

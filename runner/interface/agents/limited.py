@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import signal
 import subprocess
@@ -11,7 +10,6 @@ import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from epicycle.actors import FOLDERS
 
@@ -43,7 +41,7 @@ class LimitedCall:
         self.types = [f"--types={Path(each).resolve()}" for each in types]
         self.limits = limits or Limits()
 
-    def facts(self, command: str, names: Sequence[str], *options: str, good: Sequence[int] = (0,)) -> Any:
+    def json(self, command: str, names: Sequence[str], *options: str, good: Sequence[int] = (0,)) -> str:
         """What a command prints as JSON."""
         with tempfile.TemporaryDirectory(prefix="epicycle-") as out:
             words = [each.replace("{out}", f"{out}/found") for each in options]
@@ -53,7 +51,7 @@ class LimitedCall:
                 f"the answer has {len(text):,} characters, more than {self.limits.answer:,}: "
                 "ask for less, or of a smaller model"
             )
-        return json.loads(text)
+        return text
 
     def file(self, command: str, names: Sequence[str], *options: str, name: str) -> bytes:
         """A file that a command writes with ``-o``."""

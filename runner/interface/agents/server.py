@@ -1,17 +1,18 @@
-"""The server of the Model Context Protocol: one tool for each command that looks at models."""
+"""The server of the Model Context Protocol: its tools are commands, with the words and options that these declare."""
 
 from __future__ import annotations
 
-import json
-from collections.abc import Mapping, Sequence
+import argparse
+import base64
+from collections.abc import Iterator, Mapping
 from importlib.resources import files
-from typing import Annotated, Any, Literal
+from typing import Any, NamedTuple
 
 import anyio.to_thread
-from mcp.server.mcpserver import Image, MCPServer
+from mcp import types as mcp
+from mcp.server.mcpserver import MCPServer
 from mcp.server.mcpserver.exceptions import ResourceError
 from mcp.server.mcpserver.exceptions import ToolError as Refusal
-from pydantic import BaseModel, Field
 
 from ...model.catalogue.packaged import packaged_models
 from .limited import LimitedCall, ToolError
@@ -19,163 +20,125 @@ from .limited import LimitedCall, ToolError
 INSTRUCTIONS = """Epicycle simulates networks of actors. A model is YAML: read epicycle://language first, then write a
 model, 'validate' it, apply its fixes, 'run' it. A model is named by its packaged name, by its path in the folder of the
 server, or given as YAML text."""
-_MODEL = "a packaged model, a file in the folder of this server, or the YAML text itself"
-
-Model = Annotated[str, Field(description=_MODEL)]
-Time = Annotated[float | str | None, Field(description="in s, or with a unit: '500 ms'")]
-Seed = Annotated[int | None, Field(description="of all random streams (default: the model's)", ge=0)]
-Number = Annotated[int, Field(ge=1, le=1000)]
+_FOLDER = "--out={out}"  # of the call, which goes with it
 
 
-class Changes(BaseModel, extra="forbid"):
-    """What is changed in a model before it is run."""
+class Tool(NamedTuple):
+    """A command, the options that an assistant may give it, and those that it always gets; ``good`` are exit codes."""
 
-    set: Annotated[dict[str, Any], Field(description="values of parameters, by path")] = {}
-    disturb: Annotated[list[str], Field(description="packaged disturbances, or files")] = []
-    aspects: Annotated[list[str], Field(description="such as 'loss=PacketLoss,probability=0.1,at=a.in'")] = []
-    without_aspects: Annotated[list[str], Field(description="names of aspects that are removed")] = []
+    command: str
+    options: str = "set disturb aspect without"
+    always: tuple[str, ...] = ()
+    unless_given: Mapping[str, str] = {}
+    good: tuple[int, ...] = (0,)
+    is_picture: bool = False
 
 
-def make_server(call: LimitedCall, version: str) -> MCPServer:
+_CHANGES = Tool("").options
+_RUN = f"{_CHANGES} seed until"
+TOOLS = {
+    "validate": Tool("validate", good=(0, 2)),
+    "describe": Tool("describe"),
+    "list": Tool("list", ""),
+    "run": Tool("run", f"{_RUN} max_tags", unless_given={"max_tags": "200000"}),
+    "compare": Tool("compare", f"{_RUN} vary replications", ("--jobs=1", _FOLDER)),
+    "search": Tool(
+        "search", f"{_RUN} break vary runs max_faults", ("--jobs=1", _FOLDER), {"break": "", "runs": "100"}, (0, 1, 3)
+    ),
+    "explain": Tool("explain", f"{_RUN} monitor runs", ("--jobs=1", "--no-page", _FOLDER)),
+    "diff": Tool("diff", good=(0, 1)),
+    "what_if": Tool("what-if", f"{_RUN} at change remove let_through lose", ("--no-page", _FOLDER)),
+    "draw": Tool("graph", f"{_CHANGES} depth", is_picture=True),
+}
+
+
+class Offered:
+    """A tool as the command's own parser knows it."""
+
+    def __init__(self, name: str, tool: Tool, parser: argparse.ArgumentParser) -> None:
+        self.name, self.tool, self.said = name, tool, parser.description
+        wanted = tool.options.split()
+        named = [(_name(each), each) for each in parser._actions]
+        self.known = {name: each for name, each in named if name in wanted or not each.option_strings}
+
+    def described(self) -> mcp.Tool:
+        properties = {name: _schema(each) for name, each in self.known.items()}
+        required = [name for name, each in self.known.items() if each.required and name not in self.tool.unless_given]
+        schema = {"type": "object", "properties": properties, "required": required, "additionalProperties": False}
+        return mcp.Tool(name=self.name, description=self.said, input_schema=schema)
+
+    def words(self, call: LimitedCall, given: Mapping[str, Any]) -> tuple[list[str], list[str]]:
+        """The models, or other names, and the options; raises ``ToolError``."""
+        names, options = list[str](), list(self.tool.always)
+        if missing := [name for name in self.described().input_schema["required"] if name not in given]:
+            raise ToolError(f"{self.name} needs {', '.join(missing)}")
+        for name, value in {**self.tool.unless_given, **given}.items():
+            if (action := self.known.get(name)) is None:
+                raise ToolError(f"{self.name} takes no {name!r}: it takes {', '.join(self.known)}")
+            for each in _texts(name, value):
+                if not action.option_strings:
+                    names.append(each)
+                else:
+                    said = call.inside(each) if name == "disturb" else each
+                    options.append(f"{action.option_strings[-1]}={said}")
+        return names, options
+
+
+def _name(action: argparse.Action) -> str:
+    return "".join(action.option_strings[-1:]).removeprefix("--").replace("-", "_") or action.dest
+
+
+def _schema(action: argparse.Action) -> dict[str, Any]:
+    """What an option takes, for assistants."""
+    words = " ".join((action.help or "").replace("; may be repeated", "").split())
+    one: dict[str, Any] = {"type": "string" if isinstance(action, argparse._AppendAction) else ["string", "number"]}
+    if action.choices is not None:
+        one = {"enum": list(action.choices)}
+    if isinstance(action, argparse._AppendAction):
+        return {"type": "array", "items": one, "description": f"{words} ({action.metavar})"}
+    if action.choices is None and not action.option_strings:
+        words += "; or the text of a model itself"
+    return {**one, "description": words}
+
+
+def _texts(name: str, value: Any) -> Iterator[str]:
+    for each in value if isinstance(value, list) else [value]:
+        if isinstance(each, bool) or not isinstance(each, (str, int, float)):
+            raise ToolError(f"{name}: expected a text or a number, or a list of them")
+        yield str(each)
+
+
+class Assisting(MCPServer):
     """The server whose tools run commands in one folder."""
-    server = MCPServer("epicycle", instructions=INSTRUCTIONS, version=version, log_level="ERROR")
 
-    async def facts(command: str, names: Sequence[str], *options: str, good: Sequence[int] = (0,)) -> str:
-        def found() -> str:
-            try:
-                return json.dumps(call.facts(command, names, *options, good=good), indent=1, ensure_ascii=False)
-            except ToolError as error:
-                raise Refusal(str(error)) from None
+    def __init__(self, call: LimitedCall, version: str, parsers: Mapping[str, argparse.ArgumentParser]) -> None:
+        super().__init__("epicycle", instructions=INSTRUCTIONS, version=version, log_level="ERROR")
+        self.call = call
+        self.offered = {name: Offered(name, tool, parsers[tool.command]) for name, tool in TOOLS.items()}
 
-        return await anyio.to_thread.run_sync(found)
+    async def list_tools(self) -> list[mcp.Tool]:
+        return [each.described() for each in self.offered.values()]
 
-    def changed(changes: Changes | None) -> list[str]:
-        return _options(call, changes or Changes())
+    async def call_tool(self, name: str, arguments: dict[str, Any], context: Any = None) -> mcp.CallToolResult:
+        try:
+            found = await anyio.to_thread.run_sync(self._answer, name, arguments)
+        except ToolError as error:
+            raise Refusal(str(error)) from None
+        return mcp.CallToolResult(content=[found])
 
-    @server.tool(structured_output=False)
-    async def validate(model: Model, changes: Changes | None = None) -> str:
-        """Everything that is wrong with a model: code, message, place, help, and where it is certain the change of text
-        that removes it ('fix')."""
-        return await facts("validate", [model], *changed(changes), good=(0, 2))
+    def _answer(self, name: str, given: Mapping[str, Any]) -> mcp.ContentBlock:
+        if (chosen := self.offered.get(name)) is None:
+            raise ToolError(f"there is no tool {name[:80]!r}: {', '.join(self.offered)}")
+        tool, (names, options) = chosen.tool, chosen.words(self.call, given)
+        if tool.is_picture:
+            data = base64.b64encode(self.call.file(tool.command, names, *options, name="graph.png")).decode()
+            return mcp.ImageContent(type="image", data=data, mime_type="image/png")
+        return mcp.TextContent(type="text", text=self.call.json(tool.command, names, *options, good=tool.good))
 
-    @server.tool(structured_output=False)
-    async def describe(name: Model, changes: Changes | None = None) -> str:
-        """A model: parameters, metrics, monitors, aspects, disturbances that fit it. Or a type: its ports and
-        parameters with units and defaults."""
-        return await facts("describe", [name], *changed(changes))
 
-    @server.tool(name="list", structured_output=False)
-    async def list_(what: Literal["models", "actors", "aspects"]) -> str:
-        """What there is: packaged models, disturbances and studies, or the types of actors or aspects."""
-        return await facts("list", [what])
-
-    @server.tool(structured_output=False)
-    async def run(
-        model: Model,
-        changes: Changes | None = None,
-        seed: Seed = None,
-        until: Time = None,
-        max_tags: Annotated[int, Field(ge=1, le=2_000_000)] = 200_000,
-    ) -> str:
-        """Run a model: metrics, monitors, counts of aspects, and the digest of the event log. A run that is not over
-        after 'max_tags' tags ends there, 'stopped' by the program."""
-        options = [*changed(changes), *_run(seed, until), f"--max-tags={max_tags}"]
-        return await facts("run", [model], *options)
-
-    @server.tool(structured_output=False)
-    async def compare(
-        model: Model,
-        disturb: Annotated[list[str], Field(description="a variant for each; 'none' is the unchanged model")] = [],  # noqa: B006 (read only)
-        vary: Annotated[list[str], Field(description="a variant for each, such as 'load=0.9,servers=2'")] = [],  # noqa: B006
-        replications: Number = 10,
-        changes: Changes | None = None,
-        seed: Seed = None,
-        until: Time = None,
-    ) -> str:
-        """Run variants of a model with the same seeds and compare their metrics in pairs, with intervals."""
-        given = (changes or Changes()).model_copy(update={"disturb": []})  # here each is a variant
-        options = [*changed(given), *_run(seed, until), *(f"--disturb={_inside(call, each)}" for each in disturb)]
-        options += [*(f"--vary={each}" for each in vary), f"--replications={replications}", "--jobs=1", "--out={out}"]
-        return await facts("compare", [model], *options)
-
-    @server.tool(structured_output=False)
-    async def search(
-        model: Model,
-        property: Annotated[
-            str, Field(description="a monitor, or such as 'always server.size < 3'; empty: any monitor")
-        ] = "",
-        vary: Annotated[list[str], Field(description="ranges of parameters, such as 'load=0.5..0.9'")] = [],  # noqa: B006
-        runs: Number = 100,
-        max_faults: Annotated[int, Field(ge=0, le=3)] = 0,
-        changes: Changes | None = None,
-        seed: Seed = None,
-        until: Time = None,
-    ) -> str:
-        """Search for a run that breaks a property, over seeds, parameters, or single faults of aspects."""
-        options = [*changed(changes), *_run(seed, until), f"--break={property}", *(f"--vary={each}" for each in vary)]
-        options += [f"--runs={runs}", "--jobs=1", "--out={out}"]
-        options += [f"--max-faults={max_faults}"] if max_faults else []
-        return await facts("search", [model], *options, good=(0, 1, 3))
-
-    @server.tool(structured_output=False)
-    async def explain(
-        model: Model,
-        monitor: Annotated[
-            str, Field(description="a monitor, or a property; empty: the one that is broken first")
-        ] = "",
-        runs: Number = 200,
-        changes: Changes | None = None,
-        seed: Seed = None,
-        until: Time = None,
-    ) -> str:
-        """The smallest set of faults (losses, delays, failures) that breaks a property of a run."""
-        options = [*changed(changes), *_run(seed, until), *([f"--monitor={monitor}"] if monitor else [])]
-        return await facts("explain", [model], *options, f"--runs={runs}", "--jobs=1", "--no-page", "--out={out}")
-
-    @server.tool(structured_output=False)
-    async def diff(before: Model, after: Model) -> str:
-        """What differs between two models: actors, ports, connections, values, aspects and their places."""
-        return await facts("diff", [before, after], good=(0, 1))
-
-    @server.tool(structured_output=False)
-    async def what_if(
-        model: Model,
-        at: Annotated[float | str, Field(description="the time or tag, such as '3.2 s' or '(3.2 s, 1)'")],
-        change: Annotated[dict[str, Any], Field(description="new values of parameters, by path")] = {},  # noqa: B006
-        remove: Annotated[list[str], Field(description="aspects that end")] = [],  # noqa: B006
-        let_through: Annotated[
-            list[str], Field(description="ASPECT or ASPECT@PLACE: its next fault does not happen")
-        ] = [],  # noqa: B006
-        lose: Annotated[list[str], Field(description="ports whose next token is lost")] = [],  # noqa: B006
-        changes: Changes | None = None,
-        seed: Seed = None,
-        until: Time = None,
-    ) -> str:
-        """Change something from a tag of a run on: the first firing that changes, and what follows."""
-        options = [
-            *changed(changes),
-            *_run(seed, until),
-            f"--at={at}",
-            *(f"--change={each}" for each in _settings(change)),
-        ]
-        for flag, names in (("--remove", remove), ("--let-through", let_through), ("--lose", lose)):
-            options += [f"{flag}={each}" for each in names]
-        return await facts("what-if", [model], *options, "--no-page", "--out={out}")
-
-    @server.tool(structured_output=False)
-    async def draw(
-        model: Model, depth: Annotated[int | None, Field(ge=0, le=20)] = None, changes: Changes | None = None
-    ) -> Image:
-        """The graph of a model as a picture."""
-
-        def drawn() -> bytes:
-            options = [*changed(changes), *([] if depth is None else [f"--depth={depth}"])]
-            try:
-                return call.file("graph", [model], *options, name="graph.png")
-            except ToolError as error:
-                raise Refusal(str(error)) from None
-
-        return Image(data=await anyio.to_thread.run_sync(drawn), format="png")
+def make_server(call: LimitedCall, version: str, parsers: Mapping[str, argparse.ArgumentParser]) -> MCPServer:
+    """The server, with what it offers to read; ``parsers`` are those of the commands."""
+    server = Assisting(call, version, parsers)
 
     @server.resource("epicycle://language", mime_type="text/markdown")
     def language() -> str:
@@ -186,8 +149,8 @@ def make_server(call: LimitedCall, version: str) -> MCPServer:
     async def reference(name: str) -> str:
         """Ports and parameters of a type of actors or aspects."""
         try:
-            return await facts("describe", [name])
-        except Refusal as error:
+            return await anyio.to_thread.run_sync(call.json, "describe", [name])
+        except ToolError as error:
             raise ResourceError(str(error)) from None
 
     @server.resource("epicycle://examples", mime_type="text/plain")
@@ -203,28 +166,3 @@ def make_server(call: LimitedCall, version: str) -> MCPServer:
         return packaged_models()[name].read_text(encoding="utf-8")
 
     return server
-
-
-def _run(seed: int | None, until: float | str | None) -> list[str]:
-    return [*([] if seed is None else [f"--seed={seed}"]), *([] if until is None else [f"--until={until}"])]
-
-
-def _settings(values: Mapping[str, Any]) -> list[str]:
-    return [f"{path}={each if isinstance(each, str) else json.dumps(each)}" for path, each in values.items()]
-
-
-def _inside(call: LimitedCall, name: str) -> str:
-    try:
-        return call.inside(name)
-    except ToolError as error:
-        raise Refusal(str(error)) from None
-
-
-def _options(call: LimitedCall, changes: Changes) -> list[str]:
-    """The options of what is changed; files must be in the folder."""
-    return [
-        *(f"--set={each}" for each in _settings(changes.set)),
-        *(f"--disturb={_inside(call, each)}" for each in changes.disturb),
-        *(f"--aspect={each}" for each in changes.aspects),
-        *(f"--without={each}" for each in changes.without_aspects),
-    ]

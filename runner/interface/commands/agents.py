@@ -40,5 +40,18 @@ def mcp(options: argparse.Namespace) -> int:
     from ..agents import LimitedCall, Limits
 
     call = LimitedCall(options.folder, getattr(options, "types", ()), Limits(seconds=options.seconds))
-    make_server(call, version_of("epicycle") or "").run()
+    make_server(call, version_of("epicycle") or "", _parsers()).run()
     return DONE
+
+
+def _parsers() -> dict[str, argparse.ArgumentParser]:
+    """The parsers of the commands, which know what each option is."""
+    from . import COMMANDS
+
+    found = {}
+    for each in COMMANDS:
+        words = each.description or each.summary
+        parser = found[each.name] = argparse.ArgumentParser(description=words, add_help=False)
+        for given in each.options:
+            given(parser)
+    return found

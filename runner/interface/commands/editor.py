@@ -69,7 +69,14 @@ def studio(options: argparse.Namespace) -> int:
     try:
         from ..studio.server import Document, Studio, serve
     except ImportError as error:
-        if str(error.name).partition(".")[0] not in ("starlette", "uvicorn", "websockets", "anyio"):
+        if str(error.name).partition(".")[0] not in (
+            "starlette",
+            "uvicorn",
+            "websockets",
+            "anyio",
+            "pygls",
+            "lsprotocol",
+        ):
             raise
         message = f"'epicycle studio' needs the package {error.name}, which is not installed: {_INSTALL}"
         raise EpicycleError(message) from None

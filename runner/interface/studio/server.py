@@ -25,6 +25,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from epicycle.actors import EpicycleError, read_regular
 
+from ...desk.answers import ANSWERS
 from ...model.text.document import MAX_BYTES
 from ...show.view import PARTS, part, replace_file, script
 from .workers import Workers
@@ -32,7 +33,7 @@ from .workers import Workers
 OWN = ("socket", "text", "wiring", "fields", "running", "what_if", "arrange")  # in this order
 LONGEST = 2 * MAX_BYTES + 100_000  # bytes of a message, in which a character may take several
 READING, GRACE = 30.0, 10.0  # s that reading a text may take, and that a run may take beyond its limit
-OF_READING = frozenset({"read", "complete", "hover", "colours", "types", "fields", "edit"})
+OF_READING = frozenset({"read", "types", "fields", "edit", *ANSWERS})
 
 Message = dict[str, Any]
 Scope = MutableMapping[str, Any]
@@ -114,7 +115,7 @@ class Studio:
         headers: dict[str, list[str]] = {}
         for name, value in scope["headers"]:
             headers.setdefault(name.decode("latin-1"), []).append(value.decode("latin-1"))
-        token = scope["path"].split("/")[1].encode()
+        token = scope["path"].removeprefix("/").partition("/")[0].encode("utf-8", "surrogateescape")
         hosts, origins = headers.get("host", []), headers.get("origin", [])
         if not hmac.compare_digest(token, self.token.encode()) or len(hosts) != 1 or hosts[0] not in self.hosts:
             return False
@@ -185,7 +186,7 @@ class Studio:
                 self._browser = None
 
     async def answer(self, browser: WebSocket, message: Message) -> None:
-        number, ask = message["id"], message.get("ask")
+        number, ask = message["id"], str(message.get("ask"))
         loop = asyncio.get_running_loop()
         sending = set[asyncio.Task[None]]()
 

@@ -1,7 +1,7 @@
 """A process that answers questions about a text, and makes runs: one JSON object per line comes in, and goes out.
 
-``python -m epicycle.runner.interface.studio.worker MODEL.yaml SECONDS EVENTS [FILE.py ...]``.  Places in the text are
-offsets, in UTF-16, as browsers count them.
+``python -m epicycle.runner.interface.studio.worker MODEL.yaml SECONDS EVENTS [FILE.py ...]``.  What an editor asks
+about the text, and changes of it, are those of the Language Server Protocol.
 """
 
 from __future__ import annotations
@@ -18,27 +18,20 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, TextIO
 
+from cattrs.errors import BaseValidationError
+from lsprotocol import types as lsp
+from lsprotocol.converters import get_converter
+
 from epicycle.actors import EpicycleError, Tag
 
-from ...desk import (
-    EditError,
-    Knowledge,
-    Positions,
-    Session,
-    as_data,
-    complete,
-    controls,
-    editing,
-    fix,
-    hover,
-    splices,
-)
+from ...desk import EditError, Knowledge, Session, controls, editing, edits_between
+from ...desk.answers import ANSWERS, Answers, uri_of
 from ...execution.engine import ActorError, LoopError
 from ...model.build.figures import figures_of
 from ...model.build.model import Model
 from ...model.text.document import MAX_BYTES
 from ...model.text.files import opened
-from ...model.text.problems import Problem, Problems
+from ...model.text.problems import Problems
 from ...search.what_if import Changes, what_if
 from ...show.view import Recording, data_of, drawn
 from ...study.run_spec import RunSpec, named
@@ -52,6 +45,7 @@ BEAT = 0.2  # s between two messages of a run
 REST = 0.1  # s without a question
 
 Message = dict[str, Any]
+_DATA = get_converter()  # of the Language Server Protocol, as JSON has it
 
 
 class StaleError(Exception):
@@ -67,11 +61,12 @@ class Worker:
         self.events = events
         self.files = tuple(files)
         self.session = Session(tuple(classes(self.files)))
+        self.answers = Answers(self.session)
         self.ended = ""  # why the latest run was ended
         self.say = say
-        self.waiting: queue.Queue[Message | None] = queue.Queue()
+        self.waiting: queue.Queue[Message] = queue.Queue()
 
-    def next(self) -> Message | None:
+    def next(self) -> Message:
         """The next question; what the ones before have left is cleared away when nobody waits."""
         with suppress(queue.Empty):
             return self.waiting.get(timeout=REST)
@@ -86,7 +81,8 @@ class Worker:
                 raise EpicycleError(f"a text has at most {MAX_BYTES // 1_000_000} MB")
             if self.session.texts.get(self.path) != text:
                 self.session.change(self.path, text)
-            act = ASKED.get(str(asked["ask"]))
+            method = str(asked["ask"])
+            act = Worker.language if method in ANSWERS else ASKED.get(method)
             if act is None:
                 raise EpicycleError("there is no such question")
             return act(self, asked)
@@ -94,7 +90,7 @@ class Worker:
             return {"stale": True}
         except EpicycleError as error:
             return {"error": str(error)}
-        except (KeyError, TypeError, ValueError, AttributeError, IndexError) as error:
+        except (KeyError, TypeError, ValueError, AttributeError, IndexError, BaseValidationError) as error:
             return {"error": f"this question cannot be read ({type(error).__name__})"}
         except MemoryError:
             return {"error": "there is not enough memory"}
@@ -112,8 +108,14 @@ class Worker:
     def read(self, asked: Message) -> Message:
         """Problems at once, then the graph of what is valid so far, and what can be set."""
         knowledge = self.knowledge
-        reading, at = knowledge.reading, Positions(self.text)
-        self.say({"problems": [self._problem(each, at) for each in reading.problems], "valid": reading.is_valid})
+        problems = []
+        for problem, edit in self.answers.problems(knowledge):
+            found = _DATA.unstructure(problem)
+            if edit is not None and edit.path.resolve() == self.path:
+                found["fix"] = _DATA.unstructure(self.answers.text_edit(knowledge, edit))
+            problems.append(found)
+        reading = knowledge.reading
+        self.say({"problems": problems, "valid": reading.is_valid})
         reading = controls.so_far(reading, self.session.texts)
         model, known = reading.loading.model, knowledge if reading is knowledge.reading else Knowledge(reading)
         if model is None:
@@ -126,52 +128,13 @@ class Worker:
             "aspects": list(controls.aspects(known)),
         }
 
-    def _problem(self, problem: Problem, at: Positions) -> Message:
-        """A problem with its place in this text, and how it can be removed by a change of it."""
-        edit, position = fix(self.knowledge, problem), problem.position
-        found = as_data(problem) | {"where": str(position or "")}
-        if position is not None and position.file == self.knowledge.file:
-            start = at.offset(position.line - 1, position.column - 1)
-            end = min(start + position.length, len(at.text))
-            found |= {"from": at.units(start), "to": at.units(end), "where": f"line {position.line}"}
-        if edit is not None and edit.path.resolve() == self.path:
-            found["fix"] = self._splice(at, at.offset(edit.line, edit.start), at.offset(edit.line, edit.end), edit.text)
-        return found
-
-    def _splice(self, at: Positions, start: int, end: int, text: str) -> Message:
-        """A text in place of a stretch of characters."""
-        return {"from": at.units(start), "to": at.units(end), "text": text}
-
-    def complete(self, asked: Message) -> Message:
-        at = Positions(self.text)
-        line, column = at.place(at.at_units(int(asked["at"])))
-        found = complete(self.path, line, column, self.session.texts, self.session.types)
-        return {
-            "options": [
-                {
-                    "text": each.text,
-                    "kind": each.kind,
-                    "what": each.what,
-                    "doc": each.doc,
-                    "from": at.units(at.offset(line, column - each.replaces)),
-                }
-                for each in found[:500]
-            ]
-        }
-
-    def hover(self, asked: Message) -> Message:
-        at = Positions(self.text)
-        return {"words": hover(self.knowledge, *at.place(at.at_units(int(asked["at"]))))}
-
-    def colours(self, asked: Message) -> Message:
-        """The names in the text, with what they are."""
-        at, found = Positions(self.text), []
-        for use in self.knowledge.names.uses:
-            if use.position.file == self.knowledge.file:
-                start = at.offset(use.position.line - 1, use.position.column - 1)
-                kind = sorted(each.kind for each in use.names)[0]
-                found.append([at.units(start), at.units(start + use.position.length), kind])
-        return {"colours": found}
+    def language(self, asked: Message) -> Message:
+        """What the page's editor asks about the text."""
+        method = str(asked["ask"])
+        about = {**asked["params"], "textDocument": {"uri": uri_of(self.path)}}
+        kind: Any = lsp.METHOD_TO_TYPES[method][2]
+        params: Any = _DATA.structure(about, kind)
+        return {"result": _DATA.unstructure(self.answers.ask(method, params))}
 
     def types(self, asked: Message) -> Message:
         return {"types": controls.types(self.knowledge)}
@@ -202,8 +165,8 @@ class Worker:
                 after = getattr(editing, what)(before, *given)
             case _:
                 raise EditError("there is no such change")
-        at = Positions(before)
-        return {"splices": [self._splice(at, each.start, each.end, each.text) for each in splices(before, after)]}
+        edits = edits_between(self.path, before, after)
+        return {"edits": [_DATA.unstructure(self.answers.text_edit(self.knowledge, each)) for each in edits]}
 
     # -- runs -----------------------------------------------------------------------------------------------------
 
@@ -318,9 +281,6 @@ def _metrics(recording: Recording) -> list[list[Any]]:
 
 ASKED: Mapping[str, Callable[[Worker, Message], Message]] = {
     "read": Worker.read,
-    "complete": Worker.complete,
-    "hover": Worker.hover,
-    "colours": Worker.colours,
     "types": Worker.types,
     "fields": Worker.fields,
     "edit": Worker.edit,
@@ -339,10 +299,10 @@ def _limit() -> None:
 
 
 def _listen(stream: TextIO, worker: Worker) -> None:
-    """Take questions while one is answered, so that a run can notice that it is stale."""
+    """Take questions while one is answered, so that a run can notice that it is stale; end with the studio."""
     for line in stream:
         worker.waiting.put(json.loads(line))
-    worker.waiting.put(None)
+    os._exit(0)
 
 
 def main(arguments: list[str]) -> None:
@@ -365,7 +325,8 @@ def main(arguments: list[str]) -> None:
     say({})  # it listens
     threading.Thread(target=_listen, args=(sys.stdin, worker), daemon=True).start()
     with seldom_collecting():
-        while (asked := worker.next()) is not None:
+        while True:
+            asked = worker.next()
             if asked["ask"] == "stop":  # only a run in progress heeds it
                 continue
             current = asked

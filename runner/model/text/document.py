@@ -7,9 +7,8 @@ keys, only text as keys.  Problems are noted, not raised, so that one run shows 
 import dataclasses
 import itertools
 import re
-from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Final, NoReturn, TypeAlias
+from typing import Final, NoReturn
 
 import yaml
 from yaml.events import (
@@ -25,50 +24,18 @@ from yaml.events import (
 from epicycle.actors import MAX_DEPTH, did_you_mean, irregular, open_regular
 
 from .files import note_file, note_text, opened_text, present
+from .frames import Frame
 from .kinds import FILE, KEY, SIZE, SYNTAX, Kind
+from .nodes import Entry, Mapping, Node, Scalar, Sequence, plain
 from .problems import Position, Problems
 from .scalars import SCALAR_TAGS, TAG_PREFIX, Value, resolve, short
+
+__all__ = ["Entry", "Mapping", "Node", "Scalar", "Sequence", "plain"]  # of nodes.py
 
 MAX_BYTES = 10_000_000
 MAX_NODES = 200_000  # counting each alias as often as it is used
 
 _LOADER: type[yaml.CSafeLoader] | type[yaml.SafeLoader] = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
-
-
-@dataclass(frozen=True, slots=True)
-class Scalar:
-    """A single value; `text` is as written, without quotes, and `plain` means that it had none."""
-
-    value: Value
-    text: str
-    plain: bool
-    position: Position
-    giver: str = ""  # a parameter around a part, whose value it is; its place is where the part says so
-
-
-@dataclass(frozen=True, slots=True)
-class Sequence:
-    items: tuple["Node", ...]
-    position: Position
-
-
-@dataclass(frozen=True, slots=True)
-class Entry:
-    """A key and its value; the key is always text."""
-
-    key: Scalar
-    value: "Node"
-
-
-@dataclass(frozen=True, slots=True)
-class Mapping:
-    """Entries by key, in the order of the file."""
-
-    entries: dict[str, Entry]
-    position: Position
-
-
-Node: TypeAlias = Scalar | Sequence | Mapping
 
 
 def read(path: Path, problems: Problems, shown_as: str | None = None) -> Node | None:
@@ -127,15 +94,6 @@ def parse(text: str, name: str, problems: Problems, shown_as: str | None = None,
         return _Builder(text.removeprefix("\ufeff"), name, problems, shown_as, depth).build()
 
 
-def plain(node: Node) -> object:
-    """Return the node as ordinary dicts, lists and scalars."""
-    if isinstance(node, Mapping):
-        return {key: plain(entry.value) for key, entry in node.entries.items()}
-    if isinstance(node, Sequence):
-        return [plain(item) for item in node.items]
-    return node.value
-
-
 def _too_large(name: str) -> str:
     return f"{name} is larger than {MAX_BYTES // 1_000_000} MB"
 
@@ -190,21 +148,6 @@ class _StopError(Exception):
     """The file cannot be read any further; the reason has been noted."""
 
 
-@dataclass(slots=True)
-class _Frame:
-    """A list or mapping that is still open."""
-
-    event: CollectionStartEvent
-    position: Position
-    is_mapping: bool
-    items: list[Node] = field(default_factory=list)
-    entries: dict[str, Entry] = field(default_factory=dict)
-    has_key: bool = False
-    key: Scalar | None = None  # None with has_key: a key that was refused, its value is dropped
-    weight: int = 1  # nodes within, this one included
-    height: int = 1  # levels within, this one included
-
-
 class _Builder:
     """Builds nodes from parser events with a stack of its own, so that no depth can overflow Python's."""
 
@@ -213,7 +156,7 @@ class _Builder:
         self._name = name
         self._problems = problems
         self._lines = LINE_BREAK.split(text) if shown_as is None else [shown_as]
-        self._stack: list[_Frame] = []
+        self._stack: list[Frame] = []
         self._root: Node | None = None
         self._anchors: dict[str, tuple[Node, int, int] | None] = {}  # None: still open
         self._nodes = 0
@@ -295,12 +238,21 @@ class _Builder:
         if height >= frame.height:
             frame.height = height + 1
         if not frame.is_mapping:
-            frame.items.append(node)
+            if (rest := frame.rest_of(node)) is not None:
+                frame.join(rest)
+            else:
+                frame.items.append(node)
         elif not frame.has_key:
             frame.has_key = True
-            frame.key = self._checked_key(frame, node)
+            frame.rest = frame.rest_of(node)
+            frame.key = self._checked_key(frame, node) if frame.rest is None else None
         else:
             frame.has_key = False
+            if frame.rest is not None:
+                if isinstance(node, Scalar) and node.plain and not node.text:
+                    frame.join(frame.rest)
+                    return
+                frame.key = self._checked_key(frame, frame.rest)
             if frame.key is not None:
                 frame.entries[frame.key.text] = Entry(frame.key, node)
 
@@ -315,10 +267,11 @@ class _Builder:
             self._add_tag(event.tag, f"a {kind}", self._span(event, with_properties=True))
         if event.anchor is not None:
             self._anchors[event.anchor] = None
-        self._stack.append(_Frame(event, position, is_mapping))
+        self._stack.append(Frame(event, position, is_mapping))
 
     def _close(self, event: CollectionEndEvent) -> None:
         frame = self._stack.pop()
+        frame.report(self._problems)
         position = self._collection_position(frame, event)
         node: Node
         if frame.is_mapping:
@@ -369,7 +322,7 @@ class _Builder:
             raise ValueError(f"!!{kind} does not fit {short(text)!r}")
         return float(value) if kind == "float" and isinstance(value, int) else value
 
-    def _checked_key(self, frame: _Frame, key: Node) -> Scalar | None:
+    def _checked_key(self, frame: Frame, key: Node) -> Scalar | None:
         """Return the key if it is valid; otherwise report why not."""
         at = key.position
         if not isinstance(key, Scalar):
@@ -413,7 +366,7 @@ class _Builder:
                 column = found.end()
         return Position(self._name, line + 1, column + 1, max(stop - column, 1), source)
 
-    def _collection_position(self, frame: _Frame, end: CollectionEndEvent) -> Position:
+    def _collection_position(self, frame: Frame, end: CollectionEndEvent) -> Position:
         """Return the position of a whole list or mapping: its brackets, or else its first key or dash."""
         at = frame.position
         if not frame.event.flow_style:

@@ -76,6 +76,14 @@ SIZE = _kind(
           "  many: {type: Clock, period: 1 s, count: 20000}"),
 )  # fmt: skip
 
+COMMA = _kind(
+    "E0105",
+    "a comma that ends a value",
+    """Within `{ }` and `[ ]`, YAML ends a value at a comma, even in the middle of a call or a sentence: quote the
+    value.""",
+    _with(run="run: {stop: 10 s}\nmetrics:\n  high: {of: gain.output, take: share, when: max(value, 2) > 3}"),
+)
+
 # -- keys and their values --------------------------------------------------------------------------------------------
 
 UNKNOWN_KEY = _kind(

@@ -46,3 +46,9 @@ def resolve(text: str) -> Value:
 def short(text: str) -> str:
     """A text for a message, shortened if it is very long."""
     return text if len(text) <= 40 else text[:37] + "..."
+
+
+def quoted(text: str) -> str:
+    """A text of one line as a file writes it in quotes."""
+    is_simple = '"' not in text and "\\" not in text
+    return f'"{text}"' if is_simple else "'" + text.replace("'", "''") + "'"

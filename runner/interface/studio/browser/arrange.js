@@ -4,12 +4,27 @@ const PAUSE = 70, RUN_PAUSE = 350; // ms after the last key before the text is r
 const LARGEST = 1 << 20; // characters of a file that is dropped in
 
 class Studio {
+  /** @param {HTMLElement} page @param {{ text: string, name: string, is_new: boolean }} hello */
   constructor(page, hello) {
     this.page = page;
     this.name = hello.name;
     this.saved = hello.is_new ? null : hello.text;
     this.version = 0; // of the text
-    this.editing = Promise.resolve();
+    /** @type {Promise<boolean>} */
+    this.editing = Promise.resolve(true);
+    /** @type {{ what: string, key: string, given: any[], done?: Promise<boolean> } | null} the latest change, if it waits */
+    this.pending = null;
+    /** @type {State} of the graph */
+    this.state = null;
+    /** @type {Diagram} */
+    this.diagram = null;
+    this.drawn = ""; // the drawing that the graph shows, as text
+    /** @type {Rows<Field> | null} of the chosen actor */
+    this.fields = null;
+    this.fieldsOf = "";
+    this.soon = 0; // timers
+    this.runSoon = 0;
+    /** @type {{ [section: string]: KnownType[] }} */
     this.typesKnown = { actors: [], aspects: [] };
     this.running = new Running(link, { shown: (data, run) => this.showRun(data, run) });
     this.whatIf = new WhatIf(link, { page, aspects: () => [...this.aspects.rows.keys()], names: () => this.parameterNames() });
@@ -19,14 +34,15 @@ class Studio {
     this.loadTypes();
   }
 
+  /** @param {{ text: string, name: string }} hello */
   build(hello) {
-    const pane = (name, ...content) => {
+    const pane = (/** @type {string} */ name, /** @type {Node[]} */ ...content) => {
       const made = element("section", { className: `part ${name}` }, ...content);
       made.setAttribute("aria-label", name);
       return made;
     };
     const lists = ["aspects", "actors"].map((section) => element("datalist", { id: `${section}-known` }));
-    [this.aspectList, this.actorList] = lists;
+    this.lists = { aspects: lists[0], actors: lists[1] };
     this.saveButton = button("Save", () => this.save(), "save");
     this.undoButton = button("Undo", () => CM.undo(this.editor.view));
     this.redoButton = button("Redo", () => CM.redo(this.editor.view));
@@ -36,13 +52,14 @@ class Studio {
     this.graphBox = element("div", { className: "graphbox" });
     this.hint = element("p", { className: "hint" });
     this.chosen = element("div", { className: "chosen" });
-    this.parameters = new Rows((field) => fieldRow(field, (text) => this.edit("set_parameter", "", "parameters", field.name, "", text)));
-    const edit = (...given) => this.edit(...given);
-    this.aspects = new Rows((aspect) => aspectRow(aspect, { edit, names: "aspects-known" }));
+    this.parameters = new Rows((/** @type {Field} */ field) => fieldRow(field, (text) => this.edit("set_parameter", "", "parameters", field.name, "", text)));
+    /** @type {Write} */
+    const edit = (what, ...given) => this.edit(what, ...given);
+    this.aspects = new Rows((/** @type {Aspect} */ aspect) => aspectRow(aspect, { edit, names: "aspects-known" }));
     this.attach = attachRow({ edit, names: "aspects-known", typeOf: (name) => this.typesKnown.aspects.find((each) => each.name === name), taken: () => [...this.aspects.rows.keys()] });
     const file = element("input", { type: "file", accept: ".yaml,.yml", hidden: true });
     file.addEventListener("change", () => { this.dropIn(file.files[0]); file.value = ""; });
-    const heading = (words, ...more) => element("h2", {}, words, ...more);
+    const heading = (/** @type {string} */ words, /** @type {Node[]} */ ...more) => element("h2", {}, words, ...more);
     const textBox = element("div", { className: "editor" });
     this.page.replaceChildren(
       element("header", {}, element("strong", { text: hello.name, className: "name" }), this.saveButton, this.undoButton, this.redoButton, this.message, this.pageTabs()),
@@ -50,20 +67,21 @@ class Studio {
         pane("text", textBox),
         pane("graph", this.graphBox, this.hint, this.addRow(), this.chosen),
         pane("over", this.views.box),
-        pane("side", heading("run"), this.running.box, heading("parameters"), this.parameters.box,
-          heading("aspects", button("disturbance …", () => file.click(), "small"), file), this.aspects.box, this.attach.box),
+        pane("side", heading("run"), this.running.box,
+          heading("aspects", button("disturbance …", () => file.click(), "small"), file), this.aspects.box, this.attach.box,
+          heading("parameters"), this.parameters.box),
         pane("below", this.summary, this.problems)), ...lists);
     this.page.dataset.tab = "graph";
     this.editor = new TextEditor(textBox, hello.text, this.page.dataset.nonce, {
       ask: (question) => link.ask(question), changed: () => this.changed(), save: () => this.save(),
     });
-    const drop = (event) => {
+    const drop = (/** @type {DragEvent} */ event) => {
       event.preventDefault();
       if (event.type === "drop" && event.dataTransfer.files[0]) this.dropIn(event.dataTransfer.files[0]);
     };
-    for (const kind of ["dragover", "drop"]) document.addEventListener(kind, (event) => { if (event.dataTransfer.types.includes("Files")) drop(event); }, true);
+    for (const kind of /** @type {("dragover" | "drop")[]} */ (["dragover", "drop"])) document.addEventListener(kind, (event) => { if (event.dataTransfer.types.includes("Files")) drop(event); }, true);
     addEventListener("beforeunload", (event) => { if (this.isDirty) event.preventDefault(); });
-    this.showGraph(new State({ runs: [emptyRun(EMPTY)] }), EMPTY);
+    this.showGraph(emptyState(EMPTY), EMPTY);
     this.tell();
   }
 
@@ -72,11 +90,11 @@ class Studio {
     for (const name of ["text", "graph", "run"]) {
       const tab = button(name, () => {
         this.page.dataset.tab = name;
-        for (const each of made.children) each.setAttribute("aria-pressed", each === tab);
+        for (const each of made.children) each.setAttribute("aria-pressed", String(each === tab));
         this.state?.changed();
       }, "toggle");
       tab.dataset.tab = name;
-      tab.setAttribute("aria-pressed", name === "graph");
+      tab.setAttribute("aria-pressed", String(name === "graph"));
       made.append(tab);
     }
     return made;
@@ -125,22 +143,23 @@ class Studio {
     this.showChosen();
     if (isValid) this.runSoon = setTimeout(() => this.running.start(text), RUN_PAUSE);
     else this.running.stale(this.running.now ? "not run: there are problems; these are the figures of the text before" : "runs when there are no problems");
-    const { colours: coloured } = await link.ask({ ask: "colours", text });
+    const { result: coloured } = await link.ask({ ask: "textDocument/semanticTokens/full", text, params: {} });
     if (version === this.version && coloured) this.editor.setColours(coloured);
   }
 
+  /** @param {Diagnostic[]} problems */
   showProblems(problems) {
-    this.editor.setProblems(problems.filter((each) => "from" in each));
-    const errors = problems.filter((each) => each.severity === "error").length, others = problems.length - errors;
-    const counted = (count, word) => `${count} ${word}${count === 1 ? "" : "s"}`;
+    this.editor.setProblems(problems);
+    const errors = problems.filter((each) => each.severity === 1).length, others = problems.length - errors;
+    const counted = (/** @type {number} */ count, /** @type {string} */ word) => `${count} ${word}${count === 1 ? "" : "s"}`;
     this.summary.textContent = problems.length ? [errors && counted(errors, "problem"), others && counted(others, "warning")].filter(Boolean).join(", ") : "no problems";
     this.summary.dataset.kind = errors ? "error" : others ? "warning" : "fine";
-    this.problems.replaceChildren(...problems.map((problem) => {
-      const made = element("li", { className: problem.severity }, element("button", { type: "button", className: "link", text: problem.where || "the text" }),
-        element("code", { text: problem.code }), element("span", { text: problem.message }),
-        ...problem.help.map((each) => element("em", { text: each })));
-      made.querySelector("button").addEventListener("click", () => this.editor.show(problem.from ?? 0, problem.to ?? 0));
-      if (problem.fix) made.append(button(`write ${problem.fix.text.trim()}`, () => this.editor.splice([problem.fix]), "small"));
+    this.problems.replaceChildren(...problems.map(({ range, severity, code, message, relatedInformation, fix }) => {
+      const [said, ...help] = message.split("\nhelp: ");
+      const go = button(relatedInformation ? "another file" : `line ${range.start.line + 1}`, () => this.editor.show(range), "link");
+      const made = element("li", { className: severity === 1 ? "error" : "warning" }, go,
+        element("code", { text: code }), element("span", { text: said }), ...help.filter((each) => !fix || each !== fixText(fix)).map((each) => element("em", { text: each })));
+      if (fix) made.append(button(fixText(fix), () => this.editor.write([fix]), "small"));
       return made;
     }));
   }
@@ -149,19 +168,21 @@ class Studio {
     const { types } = await link.ask({ ask: "types", text: this.editor.text });
     if (!types) return;
     this.typesKnown = types;
-    for (const [list, section] of [[this.aspectList, "aspects"], [this.actorList, "actors"]])
-      list.replaceChildren(...types[section].map(({ name, doc }) => element("option", { value: name, label: doc })));
+    for (const [section, list] of Object.entries(this.lists))
+      list.replaceChildren(...this.typesKnown[section].map(({ name, doc }) => element("option", { value: name, label: doc })));
   }
 
   // -- the graph --
 
+  /** @param {ModelDrawing} drawing */
   showDrawing(drawing) {
     const text = JSON.stringify(drawing);
     if (text === this.drawn) return;
     this.drawn = text;
-    this.showGraph(new State({ runs: [emptyRun(drawing)] }), drawing);
+    this.showGraph(emptyState(drawing), drawing);
   }
 
+  /** @param {State} state @param {ModelDrawing} drawing */
   showGraph(state, drawing) {
     const before = this.diagram;
     this.state = state;
@@ -173,6 +194,7 @@ class Studio {
     this.views.show(state, { runs: state.runs });
   }
 
+  /** @param {Page} data @param {{ text: string, until: number | null }} run */
   showRun(data, { text, until }) {
     const state = new State(data), { drawing } = state.run;
     if (this.views.state.time && this.views.state.end === state.end) state.setTime(this.views.state.time);
@@ -202,7 +224,7 @@ class Studio {
   }
 
   async showChosen(chosen = this.diagram.chosen) {
-    const { box } = { box: this.chosen };
+    const box = this.chosen;
     if (!chosen) return box.replaceChildren();
     if (chosen.aspect) {
       box.replaceChildren();
@@ -220,7 +242,7 @@ class Studio {
     if (version !== this.version || this.diagram.chosen?.path !== path) return;
     if (found.error) return box.replaceChildren(element("p", { className: "note", text: found.error }));
     if (this.fieldsOf !== path) {
-      const rows = new Rows((field) => fieldRow(field, (text) => this.edit("set_parameter", found.owner, "actors", found.name, field.name, text)));
+      const rows = new Rows((/** @type {Field} */ field) => fieldRow(field, (text) => this.edit("set_parameter", found.owner, "actors", found.name, field.name, text)));
       this.fieldsOf = path;
       this.fields = rows;
     }
@@ -235,12 +257,14 @@ class Studio {
   // -- changes --
 
   // One change of the model after the other; each is written into the text as it is then. Whether it was.
+  /** @param {string} what @param {any[]} given @returns {Promise<boolean>} */
   edit(what, ...given) {
     const key = given.slice(0, -1).join(" ");
     if (this.pending?.what === what && this.pending.key === key) {
       this.pending.given = given; // while one drags, only the latest counts
       return this.pending.done;
     }
+    /** @type {{ what: string, key: string, given: any[], done?: Promise<boolean> }} */
     const pending = { what, key, given };
     this.pending = pending;
     pending.done = this.editing = this.editing.then(async () => {
@@ -249,19 +273,21 @@ class Studio {
         const { version } = this, found = await link.ask({ ask: "edit", text: this.editor.text, what, given: pending.given });
         if (version !== this.version) continue;
         this.say(found.error ?? "");
-        if (found.splices) this.editor.splice(found.splices);
-        return Boolean(found.splices);
+        if (found.edits) this.editor.write(found.edits);
+        return Boolean(found.edits);
       }
       return false;
     });
     return pending.done;
   }
 
+  /** @param {File} file */
   async dropIn(file) {
     if (!file || file.size > LARGEST) return this.say("A disturbance is a YAML file of at most 1 MB.");
     await this.edit("drop_in", await file.text());
   }
 
+  /** @param {string} words */
   say(words) {
     this.message.textContent = words;
     this.message.title = words;
@@ -279,8 +305,15 @@ class Studio {
   }
 }
 
+/** @type {ModelDrawing} */
 const EMPTY = { note: "", width: 300, height: 100, boxes: [], wires: [], badges: [] };
-let link, studio;
+/** @type {Link} */
+let link;
+/** @type {Studio | undefined} */
+let studio;
+
+/** @param {ModelDrawing} drawing */
+const emptyState = (drawing) => new State({ runs: [emptyRun(drawing)], palette: [], story: [], difference: null, comparison: [] });
 
 function begin() {
   const page = document.getElementById("page");

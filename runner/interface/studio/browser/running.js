@@ -1,11 +1,14 @@
 // The run of what is written: its figures as they come, whether it is still the same run, and its views over time.
 
 class Running {
+  /** @param {Link} link @param {{ shown: (data: Page, run: { text: string, until: number | null }) => void }} told */
   constructor(link, { shown }) {
     this.link = link;
     this.shown = shown; // told of a run that is over
     this.latest = 0;
-    this.before = null; // the answer of the run before
+    /** @type {RunAnswer | null} */
+    this.before = null; // of the run before
+    /** @type {RunAnswer | null} */
     this.now = null;
     this.status = element("p", { className: "status", role: "status" });
     this.bar = element("progress", { max: 1, value: 0, hidden: true });
@@ -15,14 +18,17 @@ class Running {
     this.box = element("div", { className: "run" }, this.status, this.bar, this.metrics, this.monitors, this.digest);
   }
 
+  /** @param {string} words */
   say(words, kind = "") {
     this.status.textContent = words;
     this.status.dataset.kind = kind;
   }
 
+  /** @param {string} text */
   async start(text) {
     const number = ++this.latest;
     this.say("running …", "running");
+    /** @type {RunAnswer & { error?: string, stale?: boolean }} */
     const found = await this.link.ask({ ask: "run", text }, (said) => {
       if (number !== this.latest) return;
       this.bar.hidden = said.share === null;
@@ -59,6 +65,7 @@ class Running {
     if (words) this.say(words, "waiting");
   }
 
+  /** @param {Metric[]} metrics @param {Metric[]} [before] */
   table(metrics, before) {
     const old = new Map((before ?? []).map((each) => [each[0], each[4]]));
     this.metrics.replaceChildren(...metrics.map(([name, words, unit, doc, value]) => {
@@ -73,6 +80,7 @@ class Running {
 
 // The views of a run over time, one of them at a time.
 class Views {
+  /** @param {WhatIf} whatIf */
   constructor(whatIf) {
     this.whatIf = whatIf;
     this.tabs = element("div", { className: "tabs" });
@@ -85,8 +93,11 @@ class Views {
       element("div", { className: "viewbar" }, button("|◀", () => this.state.setTag(0)), button("◀", () => this.state.step(-1)), this.play,
         button("▶|", () => this.state.step(1)), this.time, this.tabs), this.whatIf.box, this.strip, this.holder);
     this.wanted = "";
+    /** @type {{ [name: string]: any } | null} the views of the run, by name */
+    this.known = null;
   }
 
+  /** @param {State} state @param {{ runs: Run[] }} data */
   show(state, data) {
     const before = this.lanes;
     this.state = state;
@@ -99,8 +110,9 @@ class Views {
     this.lanes = new Lanes(state);
     if (before) for (const name of before.shown) if (this.lanes.names.includes(name)) this.lanes.shown.add(name);
     this.scrubber = new Scrubber(state);
+    /** @type {{ [name: string]: any }} */
     const known = { signals: this.lanes, sequence: new Chart(state), details: new Details(state, this.lanes) };
-    if (data.runs.some((each) => each.marks.length)) known.space = new Space(state, 0, { scale: 0, extent: Space.extent(data.runs) });
+    if (data.runs.some((each) => each.marks.length)) known.space = new Space(state, 0, { scale: 0, x: 0, y: 0, extent: Space.extent(data.runs) });
     this.known = known;
     const names = ["space", "signals", "sequence", "details"].filter((name) => known[name]);
     this.tabs.replaceChildren(...names.map((name) => {
@@ -112,10 +124,11 @@ class Views {
     this.choose(names.includes(this.wanted) ? this.wanted : names[0], false);
   }
 
+  /** @param {string} name */
   choose(name, isWanted = true) {
     if (isWanted) this.wanted = name;
     this.name = name;
-    for (const tab of this.tabs.children) tab.setAttribute("aria-pressed", tab.dataset.view === name);
+    for (const tab of this.tabs.querySelectorAll("button")) tab.setAttribute("aria-pressed", String(tab.dataset.view === name));
     this.holder.replaceChildren(this.known[name].canvas ?? this.known[name].box);
     this.state.changed();
   }

@@ -1,10 +1,12 @@
 // Questions to the server, and their answers.
 
 class Link {
+  /** @param {(hello: { text: string, name: string, is_new: boolean }) => void} heard @param {(reason: string) => void} ended */
   constructor(heard, ended) {
     const address = new URL("socket", location.href);
     address.protocol = "ws:";
     this.socket = new WebSocket(address);
+    /** @type {Map<number, { answer: (found: any) => void, part?: (said: any) => void }>} */
     this.waiting = new Map();
     this.count = 0;
     this.socket.addEventListener("message", ({ data }) => {
@@ -23,7 +25,10 @@ class Link {
     });
   }
 
-  // The answer to a question about a text; `part` takes what comes before it.
+  /**
+   * The answer to a question about a text; `part` takes what comes before it.
+   * @param {Question} question @param {(said: any) => void} [part] @returns {Promise<any>}
+   */
   ask(question, part) {
     if (this.socket.readyState !== WebSocket.OPEN) return Promise.resolve({ error: "the studio has ended" });
     return new Promise((answer) => {

@@ -3,12 +3,20 @@
 const SEVERAL = 60; // acts or ports in a menu
 
 class WhatIf {
+  /** @param {Link} link @param {{ page: HTMLElement, names: () => string[], aspects: () => string[] }} given */
   constructor(link, { page, names, aspects }) {
     this.link = link;
     this.page = page;
     this.aspects = aspects; // functions: the names of the model's aspects, and of parameters
     this.names = names;
     this.asked = 0;
+    /** @type {State} */
+    this.state = null;
+    this.text = "";
+    /** @type {number | null} s */
+    this.until = null;
+    /** @type {Viewer | null} */
+    this.viewer = null;
     this.tag = element("span", { className: "from" });
     this.through = button("let it through", () => this.letThrough(), "small through");
     this.acts = this.menu("acts …", "what aspects did", () => this.actsFrom(), (record) => this.state.goTo({ run: 0, firing: NOTHING, record: Number(record) }));
@@ -26,6 +34,7 @@ class WhatIf {
   }
 
   // A menu whose choices are acts; what it offers is found when it opens.
+  /** @param {string} title @param {string} label @param {() => [string | number, string][]} offered @param {(value: string) => void} act */
   menu(title, label, offered, act) {
     const made = element("select", { label, title: `${label} from here on` }, element("option", { value: "", text: title }));
     const fill = () => made.replaceChildren(made.options[0], ...offered().map(([value, text]) => element("option", { value, text })));
@@ -40,6 +49,7 @@ class WhatIf {
   }
 
   // The run that is shown: its text, its state, and the time (s) at which the limits of the studio have ended it.
+  /** @param {{ text: string, state: State, until: number | null }} run */
   show({ text, state, until }) {
     Object.assign(this, { text, state, until });
     this.asked++;
@@ -61,17 +71,20 @@ class WhatIf {
     return selection && selection.record >= 0 && !run.isSend[selection.record] ? selection.record : null;
   }
 
+  /** @param {number} record */
   actText(record) {
     const { run } = this.state;
     return `${run.tagText(run.record_tag[record])} ${run.aspects[run.record_aspect[record]]}: ${run.events[run.record_event[record]]} at ${run.portPath(run.record_port[record])}`;
   }
 
+  /** @returns {[number, string][]} */
   actsFrom() {
     const { run, tag } = this.state, first = search(run.acts.length, (i) => run.record_tag[run.acts[i]] >= tag);
     return [...run.acts.subarray(first, first + SEVERAL)].map((record) => [record, this.actText(record)]);
   }
 
   // Where tokens pass: first the ports of what is selected, then all.
+  /** @returns {[string, string][]} */
   portsHere() {
     const { run, selection } = this.state, firing = selection?.firing ?? NOTHING;
     const own = firing >= 0 ? [...run.recordsOf.of(firing)].map((record) => run.record_port[record]) : [];
@@ -79,17 +92,19 @@ class WhatIf {
     return [...all].slice(0, SEVERAL).map((path) => [path, `the next token at ${path}`]);
   }
 
+  /** @returns {[string, string][]} */
   aspectsHere() {
     return [...new Set([...this.aspects(), ...this.state.run.aspects])].map((name) => [name, name]);
   }
 
   letThrough() {
-    const { run } = this.state, { act } = this, alike = (name) => (other) => run[name][other] === run[name][act];
-    const before = run.acts.filter((other) => other <= act && ["record_aspect", "record_port", "record_tag"].every((name) => alike(name)(other)));
+    const { run } = this.state, { act } = this, columns = [run.record_aspect, run.record_port, run.record_tag];
+    const before = run.acts.filter((/** @type {number} */ other) => other <= act && columns.every((column) => column[other] === column[act]));
     const name = `${run.aspects[run.record_aspect[act]]}@${run.portPath(run.record_port[act])}#${before.length}`;
     this.ask({ let_through: [name] }, run.record_tag[act]);
   }
 
+  /** @param {{ [change: string]: string[] }} changes */
   async ask(changes, tag = this.state.tag) {
     const { run, time } = this.state, isBetween = tag < 0 || (tag === this.state.tag && time > run.times[tag]);
     const at = isBetween ? [Math.ceil(time), 0] : [run.times[tag], run.microsteps[tag]], number = ++this.asked;
@@ -101,6 +116,7 @@ class WhatIf {
   }
 
   // Both futures, over everything else.
+  /** @param {Page} data */
   open(data) {
     if (this.viewer) this.close();
     this.viewer = new Viewer(data);
@@ -121,6 +137,7 @@ class WhatIf {
     this.viewer = null;
   }
 
+  /** @param {number} seconds */
   advance(seconds) {
     this.viewer?.advance(seconds);
   }

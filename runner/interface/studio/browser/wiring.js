@@ -3,18 +3,27 @@
 const NEAR = 7; // px around a port
 
 class Diagram extends Graph {
+  /**
+   * @param {State} state @param {{ connect: (source: Path, target: Path) => void, choose: (chosen: Selected | null) => void }} acts
+   * @param {Diagram} [before] what was shown before
+   */
   constructor(state, { connect, choose }, before) {
     super(state, 0);
     this.connect = connect;
     this.choose = choose;
-    this.draft = null; // a line that is being drawn
-    this.chosen = before?.chosen ?? null; // {path}, or {wire: [source, target]}
+    /** @type {{ port: Placed, x: number, y: number } | null} a line that is being drawn */
+    this.draft = null;
+    /** @type {Placed | null} a port below the pointer */
+    this.near = null;
+    /** @type {Selected | null} */
+    this.chosen = before?.chosen ?? null;
+    this.isMoved = false;
     if (before) {
       this.shut = before.shut;
       if (before.isMoved) Object.assign(this, { camera: before.camera, isMoved: true });
     }
-    for (const kind of ["wheel", "pointermove"])
-      this.canvas.addEventListener(kind, (event) => { if (kind === "wheel" || event.buttons) this.isMoved = true; });
+    this.canvas.addEventListener("wheel", () => { this.isMoved = true; });
+    this.canvas.addEventListener("pointermove", (event) => { if (event.buttons) this.isMoved = true; });
     this.canvas.addEventListener("dblclick", () => { this.isMoved = false; });
     this.canvas.addEventListener("keydown", (event) => {
       if (event.key === "Escape") this.draft = null;
@@ -26,10 +35,12 @@ class Diagram extends Graph {
     if (!this.isMoved) this.camera.scale = 0; // fit it again
   }
 
+  /** @param {number} x @param {number} y */
   at(x, y) {
     return [x / this.camera.scale + this.camera.x, y / this.camera.scale + this.camera.y];
   }
 
+  /** @param {number} px @param {number} py */
   portAt(px, py) {
     const [x, y] = this.at(px, py), reach = NEAR / this.camera.scale;
     let best = null, least = reach;
@@ -42,26 +53,30 @@ class Diagram extends Graph {
   }
 
   // The path of a port, or of those of all instances that its box stands for.
+  /** @param {Placed} port */
   pathOf({ path, box }) {
     const name = path.slice(box.path.length);
     return (box.count > 1 ? box.path.replace(/\[0\]$/, "[*]") : box.path) + name;
   }
 
   // Whether tokens between two ports come from the first: inside of a composite, its inputs send.
+  /** @param {Placed} one @param {Placed} other */
   isSource(one, other) {
     return other.box.path.startsWith(`${one.box.path}.`) ? one.side === "left" : one.side === "right";
   }
 
+  /** @param {number} x @param {number} y */
   grab(x, y) {
     const port = this.portAt(x, y);
     if (!port) return null;
     this.draft = { port, x, y };
-    return (to, down) => {
+    return (/** @type {number} */ to, /** @type {number} */ down) => {
       this.draft = { port, x: to, y: down };
       this.state.changed();
     };
   }
 
+  /** @param {number} x @param {number} y */
   drop(x, y) {
     const from = this.draft?.port, to = this.portAt(x, y);
     this.draft = null;
@@ -71,6 +86,7 @@ class Diagram extends Graph {
     this.connect(this.pathOf(source), this.pathOf(target));
   }
 
+  /** @param {number} x @param {number} y */
   hover(x, y) {
     const port = Number.isNaN(x) ? null : this.portAt(x, y);
     this.canvas.style.cursor = port ? "crosshair" : "";
@@ -81,6 +97,7 @@ class Diagram extends Graph {
     }
   }
 
+  /** @param {number} px @param {number} py */
   wireAt(px, py) {
     const [x, y] = this.at(px, py), reach = 5 / this.camera.scale;
     for (const wire of this.drawing.wires)
@@ -90,6 +107,7 @@ class Diagram extends Graph {
     return null;
   }
 
+  /** @param {number} px @param {number} py */
   pick(px, py) {
     const [x, y] = this.at(px, py);
     const badge = this.drawing.badges.find(([, aspect, left, middle, width, place]) =>
@@ -100,16 +118,17 @@ class Diagram extends Graph {
     super.pick(px, py);
     if (badge) this.chosen = { aspect: badge[1] };
     else if (wire) {
-      const ends = wire.targets.map((path) => [this.ports.get(wire.source), this.ports.get(path)]);
-      this.chosen = { wire, ends: ends.filter(([one, other]) => one && other).map((pair) => pair.map((port) => this.pathOf(port))) };
+      const source = this.ports.get(wire.source), targets = wire.targets.map((path) => this.ports.get(path)).filter(Boolean);
+      this.chosen = { wire, ends: source ? targets.map((target) => [this.pathOf(source), this.pathOf(target)]) : [] };
     } else this.chosen = box ? { path: box.path, kind: box.kind, doc: box.doc, composite: box.composite } : null;
     this.choose(this.chosen);
     this.state.changed();
   }
 
+  /** @param {Paper} paper */
   draw(paper) {
     super.draw(paper);
-    const { camera, chosen, draft, near } = this, to = (x, y) => [(x - camera.x) * camera.scale, (y - camera.y) * camera.scale];
+    const { camera, chosen, draft, near } = this, to = (/** @type {number} */ x, /** @type {number} */ y) => /** @type {Dot} */ ([(x - camera.x) * camera.scale, (y - camera.y) * camera.scale]);
     const box = chosen?.path && !this.cover(chosen.path) ? this.boxes.get(chosen.path) : null;
     if (box) {
       const [x, y, width, height] = box.at;
@@ -129,6 +148,7 @@ class Diagram extends Graph {
 }
 
 // How far a point is from a stretch of a line.
+/** @param {number} x @param {number} y @param {number} ax @param {number} ay @param {number} bx @param {number} by */
 function distance(x, y, ax, ay, bx, by) {
   const long = (bx - ax) ** 2 + (by - ay) ** 2;
   const share = long ? Math.min(1, Math.max(0, ((x - ax) * (bx - ax) + (y - ay) * (by - ay)) / long)) : 0;
@@ -136,13 +156,16 @@ function distance(x, y, ax, ay, bx, by) {
 }
 
 // The data of a run that has not been made, so that a graph can be drawn.
+/** @param {ModelDrawing} drawing */
 function emptyRun(drawing) {
+  /** @type {any} */
   const columns = {};
   for (const [kind, names] of Object.entries({
     firing: ["tag", "actor", "outside"], record: ["tag", "firing", "port", "channel", "event", "aspect", "text", "about"],
     arrival: ["firing", "port", "channel", "record"], wake: ["firing", "tag"],
   })) for (const name of names) columns[`${kind}_${name}`] = [];
+  /** @type {any} */
   const head = { columns, drawing, tags: [[], []], texts: [[], []], lanes: [], marks: [], places: [], ports: [], events: [],
     aspects: [], gaps: [], monitors: [], metrics: [], settings: [], name: "", model: "", end: 1, digest: "" };
-  return new Run(head, (column) => Int32Array.from(column));
+  return new Run(head, (/** @type {any} */ column) => Int32Array.from(column));
 }

@@ -12,7 +12,7 @@ class Chart extends Timeline {
     this.isConeOnly = false;
     state.listeners.push(() => this.follow());
     const ends = state.runs.map((run) => run.times[run.firing_tag[run.arrival_firing[AT_FIRST] ?? NOTHING]] ?? state.end);
-    state.show(0, Math.min(...ends));
+    state.show(0, Math.min(...ends) || state.end); // if all are at the start, the whole run
   }
 
   // Scrolls to the selected actor.

@@ -269,8 +269,12 @@ class Graph extends View {
       const act = aspect ? acts.get(`${aspect} ${place}`) : null, colour = this.colours.get(aspect);
       paper.beginPath();
       paper.roundRect(x, y - 6, width, 12, 6);
-      paper.fillStyle = aspect ? (act ? colour : faded(colour, 0.35)) : theme.panel;
+      paper.fillStyle = theme.panel; // so that no wire is seen through it
       paper.fill();
+      if (aspect) {
+        paper.fillStyle = act ? colour : faded(colour, 0.35);
+        paper.fill();
+      }
       paper.strokeStyle = act?.isLoss ? theme.loss : theme.soft;
       paper.lineWidth = act ? 0.8 + 2.2 * act.glow : 0.6;
       paper.stroke();

@@ -56,7 +56,8 @@ class Lanes extends Timeline {
     }
     this.tall = y + this.scroll + 4;
     if (y === RULER - this.scroll)
-      this.text("Nothing is recorded. Select an actor: each port that it sends from can be shown as a lane.", this.margin + 8, 40, { colour: theme.soft });
+      for (const [line, words] of ["Nothing is recorded. Select an actor:", "each port that it sends from can be a lane."].entries())
+        this.text(words, this.margin + 8, 40 + 15 * line, { colour: theme.soft });
     paper.restore();
     this.cursor();
   }

@@ -197,7 +197,7 @@ interface View {
   draw(paper: Paper): void;
   resized?(): void;
 }
-interface Graph extends Pick<Gestures, "grab" | "drop" | "hover"> {
+interface Graph extends Gestures {
   coned: { cone: Cone; scale: number; back: Set<Box | null>; ahead: Set<Box | null> } | null;
   shutNow: { scale: number; boxes: Rect[] } | null;
 }

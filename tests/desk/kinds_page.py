@@ -5,8 +5,8 @@ from __future__ import annotations
 import shlex
 from pathlib import Path
 
-from ..model.text.kinds import KINDS, Kind
-from .reading import Reading, read
+from epicycle.runner.desk import Reading, read
+from epicycle.runner.model.text.kinds import KINDS, Kind
 
 COMMAND = "# epicycle validate example.yaml"
 _HEAD = """# Kinds of problems

@@ -1,0 +1,222 @@
+"""What the Language Server Protocol asks about a text, for editors (``server.py``) and for the page of the studio."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from lsprotocol import types as lsp
+from pygls.uris import from_fs_path, to_fs_path
+
+from ..model.text.problems import Position, Problem
+from . import changes, completion, meaning
+from .knowledge import Knowledge
+from .positions import Positions, positions
+from .session import Session
+
+FIX_ALL = lsp.CodeActionKind("source.fixAll")
+_SEVERITY = {"error": lsp.DiagnosticSeverity.Error, "warning": lsp.DiagnosticSeverity.Warning}
+_KINDS = {
+    "key": lsp.CompletionItemKind.Property,
+    "type": lsp.CompletionItemKind.Class,
+    "actor": lsp.CompletionItemKind.Module,
+    "port": lsp.CompletionItemKind.Interface,
+    "path": lsp.CompletionItemKind.Interface,
+    "parameter": lsp.CompletionItemKind.Variable,
+    "value": lsp.CompletionItemKind.EnumMember,
+    "unit": lsp.CompletionItemKind.Unit,
+    "function": lsp.CompletionItemKind.Function,
+    "file": lsp.CompletionItemKind.File,
+}
+_SYMBOLS = {
+    "section": lsp.SymbolKind.Namespace,
+    "actor": lsp.SymbolKind.Object,
+    "composite": lsp.SymbolKind.Class,
+    "port": lsp.SymbolKind.Interface,
+    "parameter": lsp.SymbolKind.Variable,
+    "aspect": lsp.SymbolKind.Event,
+}
+# What names are; editors know how to colour these types of tokens.
+_TOKENS = {
+    "parameter": "parameter",
+    "port": "property",
+    "actor": "variable",
+    "aspect": "decorator",
+    "composite": "class",
+    "metric": "enumMember",
+    "monitor": "event",
+    "figure": "function",
+}
+LEGEND = lsp.SemanticTokensLegend([*_TOKENS.values()], [])
+
+
+class Answers:
+    """Answers about the texts of a session; ``encoding`` is that of the client's columns."""
+
+    def __init__(self, session: Session, encoding: str = "utf-16") -> None:
+        self.session = session
+        self.encoding = encoding
+
+    def ask(self, method: str, params: Any) -> Any:
+        """The answer to a request; None if that is about no text of ours."""
+        path = path_of(params.text_document.uri)
+        if path is None or path not in self.session.texts:
+            return None
+        return ANSWERS[method](self, self.session.around(path), params)
+
+    # -- places ---------------------------------------------------------------------------------------------------
+
+    def _at(self, text: str) -> Positions:
+        return positions(text, self.encoding)
+
+    def place(self, known: Knowledge, params: Any) -> tuple[int, int]:
+        """Our line and column of the place that a request is about."""
+        at = self._at(known.text)
+        return at.place(at.from_client(params.position.line, params.position.character))
+
+    def _range(self, text: str, start: int, end: int) -> lsp.Range:
+        count = self._at(text).to_client
+        return lsp.Range(lsp.Position(*count(start)), lsp.Position(*count(end)))
+
+    def range_of(self, known: Knowledge, at: Position) -> lsp.Range:
+        _, start, end = known.stretch(at)
+        return self._range(known.reading.files[at.file][1] if at.file in known.reading.files else "", start, end)
+
+    def locations(self, known: Knowledge, found: Iterable[Position]) -> list[lsp.Location]:
+        return [lsp.Location(uri_of(known.stretch(at)[0]), self.range_of(known, at)) for at in found]
+
+    def text_edit(self, known: Knowledge, edit: changes.Edit) -> lsp.TextEdit:
+        text = dict(known.reading.files.values())[edit.path]
+        return lsp.TextEdit(self._range(text, edit.start, edit.end), edit.text)
+
+    def workspace_edit(self, known: Knowledge, edits: Iterable[changes.Edit]) -> lsp.WorkspaceEdit:
+        found: dict[str, list[lsp.TextEdit]] = {}
+        for each in edits:
+            found.setdefault(uri_of(each.path), []).append(self.text_edit(known, each))
+        return lsp.WorkspaceEdit(changes=found)
+
+    # -- problems -------------------------------------------------------------------------------------------------
+
+    def problems(self, known: Knowledge) -> Iterator[tuple[lsp.Diagnostic, changes.Edit | None]]:
+        """The problems of a text, with what removes them; those in other files stand at its beginning, with a link."""
+        return ((self._diagnostic(known, each), changes.fix(known, each)) for each in known.reading.problems)
+
+    def _diagnostic(self, known: Knowledge, problem: Problem) -> lsp.Diagnostic:
+        at, message = problem.position, "\n".join([problem.message, *(f"help: {each}" for each in problem.help)])
+        found = lsp.Diagnostic(self._range("", 0, 0), message, _SEVERITY[problem.severity], problem.kind.code)
+        found.source = "epicycle"
+        if at is not None and at.file == known.file:
+            found.range = self.range_of(known, at)
+        elif at is not None:
+            found.message = f"{at}: {message}"
+            [location] = self.locations(known, [at])
+            found.related_information = [lsp.DiagnosticRelatedInformation(location, problem.message)]
+        return found
+
+    def actions(self, known: Knowledge, params: lsp.CodeActionParams) -> list[lsp.CodeAction]:
+        """Fixes of the problems in a range, and of all problems."""
+        found, wanted = [], params.range
+        for problem, edit in self.problems(known):
+            if edit is None or problem.range.start > wanted.end or wanted.start > problem.range.end:
+                continue
+            shown = edit.text.strip().removeprefix(", ")
+            title = f"add {shown!r}" if edit.start == edit.end else f"write {shown!r}"
+            action = lsp.CodeAction(title, lsp.CodeActionKind.QuickFix, [problem], is_preferred=True)
+            action.edit = self.workspace_edit(known, [edit])
+            found.append(action)
+        if edits := changes.fix_all(known):
+            everything = lsp.CodeAction("fix all problems that have one certain fix", FIX_ALL)
+            everything.edit = self.workspace_edit(known, edits)
+            found.append(everything)
+        only = [_value(each) for each in params.context.only or ()]
+        return [each for each in found if not only or any(_value(each.kind).startswith(kind) for kind in only)]
+
+    # -- requests about a place -----------------------------------------------------------------------------------
+
+    def complete(self, known: Knowledge, params: lsp.CompletionParams) -> list[lsp.CompletionItem]:
+        line, column = self.place(known, params)
+        text, at, found, session = known.text, self._at(known.text), [], self.session
+        before = session.readings.get(known.path)
+        for each in completion.complete(known.path, line, column, session.texts, session.types, before):
+            start = at.offset(line, max(column - each.replaces, 0))
+            item = lsp.CompletionItem(each.text.strip().removesuffix(":"), kind=_KINDS[each.kind])
+            item.detail, item.documentation, item.filter_text = each.what or None, each.doc or None, each.text
+            item.text_edit = lsp.TextEdit(self._range(text, start, at.offset(line, column)), each.text)
+            found.append(item)
+        return found
+
+    def hover(self, known: Knowledge, params: lsp.HoverParams) -> lsp.Hover | None:
+        text = meaning.hover(known, *self.place(known, params))
+        return lsp.Hover(lsp.MarkupContent(lsp.MarkupKind.Markdown, text)) if text else None
+
+    def definition(self, known: Knowledge, params: lsp.DefinitionParams) -> list[lsp.Location]:
+        return self.locations(known, meaning.definition(known, *self.place(known, params)))
+
+    def references(self, known: Knowledge, params: lsp.ReferenceParams) -> list[lsp.Location]:
+        return self.locations(known, meaning.references(known, *self.place(known, params)))
+
+    def prepare(self, known: Knowledge, params: lsp.PrepareRenameParams) -> lsp.Range | None:
+        use = known.names.at(known.file, *self.place(known, params))
+        return None if use is None else self.range_of(known, use.position)
+
+    def rename(self, known: Knowledge, params: lsp.RenameParams) -> lsp.WorkspaceEdit:
+        edits = changes.rename(known, *self.place(known, params), params.new_name, self.session.texts)
+        return self.workspace_edit(known, edits)
+
+    # -- requests about a text ------------------------------------------------------------------------------------
+
+    def symbols(self, known: Knowledge, params: Any) -> list[lsp.DocumentSymbol]:
+        def symbol(each: meaning.Symbol) -> lsp.DocumentSymbol:
+            where, kind = self.range_of(known, each.position), _SYMBOLS.get(each.kind, lsp.SymbolKind.Field)
+            inside = [symbol(inner) for inner in each.inside]
+            return lsp.DocumentSymbol(each.name or " ", kind, where, where, each.kind, children=inside)
+
+        return [symbol(each) for each in meaning.symbols(known.reading.nodes.get(known.file))]
+
+    def links(self, known: Knowledge, params: Any) -> list[lsp.DocumentLink]:
+        return [lsp.DocumentLink(self.range_of(known, at), uri_of(path)) for at, path in meaning.links(known)]
+
+    def tokens(self, known: Knowledge, params: Any) -> lsp.SemanticTokens:
+        """The names in a text with what they are, each by its distance from the one before."""
+        kinds, found = list(_TOKENS), set[tuple[int, int, int, int]]()
+        for use in known.names.uses:
+            if use.position.file == known.file:
+                where, kind = self.range_of(known, use.position), min(each.kind for each in use.names)
+                found.add((where.start.line, where.start.character, where.end.character, kinds.index(kind)))
+        data, before = list[int](), (0, 0)
+        for line, start, end, number in sorted(found):
+            data += [line - before[0], start - before[1] if line == before[0] else start, end - start, number, 0]
+            before = line, start
+        return lsp.SemanticTokens(data)
+
+
+ANSWERS: Mapping[str, Callable[[Answers, Knowledge, Any], Any]] = {
+    lsp.TEXT_DOCUMENT_COMPLETION: Answers.complete,
+    lsp.TEXT_DOCUMENT_HOVER: Answers.hover,
+    lsp.TEXT_DOCUMENT_DEFINITION: Answers.definition,
+    lsp.TEXT_DOCUMENT_REFERENCES: Answers.references,
+    lsp.TEXT_DOCUMENT_PREPARE_RENAME: Answers.prepare,
+    lsp.TEXT_DOCUMENT_RENAME: Answers.rename,
+    lsp.TEXT_DOCUMENT_DOCUMENT_SYMBOL: Answers.symbols,
+    lsp.TEXT_DOCUMENT_DOCUMENT_LINK: Answers.links,
+    lsp.TEXT_DOCUMENT_SEMANTIC_TOKENS_FULL: Answers.tokens,
+    lsp.TEXT_DOCUMENT_CODE_ACTION: Answers.actions,
+}
+
+
+def path_of(uri: str) -> Path | None:
+    """The file of an address; None if it is no file."""
+    try:
+        path = to_fs_path(uri) if uri.startswith("file:") else None
+        return None if path is None else Path(path).resolve()
+    except (OSError, RuntimeError, ValueError):
+        return None
+
+
+def uri_of(path: Path) -> str:
+    return from_fs_path(str(path.resolve())) or ""
+
+
+def _value(kind: Any) -> str:
+    return str(getattr(kind, "value", kind))
