@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import json
-import os
 from collections.abc import Iterable, Iterator
 from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass
@@ -16,6 +15,8 @@ from pathlib import Path
 from typing import IO, Any, BinaryIO, Protocol
 
 from epicycle.actors import EpicycleError, did_you_mean, open_regular
+
+from ..support.files import replacing
 
 FOLDERS = "epicycle.recordings"  # entry points of what reads folders
 COLUMNS = ["time", "topic", "value"]
@@ -85,22 +86,6 @@ def _folder(path: Path) -> Recording:
         made: Recording = point.load()(path)
         return made
     raise RecordingError(f"{path} is a folder, and no installed package reads those")
-
-
-@contextmanager
-def replaced(path: Path) -> Iterator[BinaryIO]:
-    """A new file that replaces the one at a path once it is complete; raises ``RecordingError``."""
-    aside = path.with_name(f".{path.name}")
-    try:
-        with open(aside, "wb") as file:
-            yield file
-        os.replace(aside, path)
-    except BaseException as error:
-        with suppress(OSError):
-            aside.unlink()
-        if isinstance(error, OSError):
-            raise RecordingError(f"{path} cannot be written: {error.strerror or error}") from None
-        raise
 
 
 # -- CSV --------------------------------------------------------------------------------------------------------------
@@ -176,7 +161,7 @@ class CsvRecording:
 
     @contextmanager
     def replacing(self, path: Path) -> Iterator[Writing]:
-        with replaced(path) as file:
+        with replacing(path, RecordingError) as file:
             yield _CsvWriting(self.channels, file)
 
 
@@ -282,7 +267,7 @@ class McapRecording:
 
     @contextmanager
     def replacing(self, path: Path) -> Iterator[Writing]:
-        with replaced(path) as file:
+        with replacing(path, RecordingError) as file:
             yield _McapWriting(self, file)
 
     def copy_to(self, writer: Any) -> dict[int, int]:

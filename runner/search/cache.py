@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import json
 import logging
-import os
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -14,6 +13,7 @@ from epicycle.actors import counted, read_regular
 
 from ..model.build.model import Model
 from ..study.provenance import version_of
+from ..support.files import replace_file
 
 _LOGGER = logging.getLogger("epicycle")
 NUMBER = (int, float)
@@ -39,10 +39,8 @@ class EvaluationCache:
         if made_of is not None:
             self._read(self._path, shape)
         folder.mkdir(parents=True, exist_ok=True)
-        aside = self._path.with_name(f".{self._path.name}")
         whole = [self._head, *(self._line(key, outcome) for key, outcome in self._known.items())]
-        aside.write_text("\n".join(whole) + "\n", encoding="utf-8")
-        os.replace(aside, self._path)
+        replace_file(self._path, "\n".join(whole) + "\n")
 
     def _read(self, path: Path, shape: Any) -> None:
         """Take what is known from the file; what was not written like this is tried again."""

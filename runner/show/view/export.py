@@ -20,8 +20,7 @@ from ...execution.results import Results
 from ...model.catalogue.figure import Mark
 from ...support.shown import short
 from ..sheet import LIMIT, PALETTE
-from .recording import NOTHING, Recording
-from .writing import ViewError
+from .recording import NOTHING, Recording, ViewError
 
 TRAIL = 200  # points of a trail, and how often it is drawn again
 STALE = 1.6  # usual intervals after which a line of sight ends
