@@ -88,10 +88,27 @@ def _folder(path: Path) -> Recording:
     raise RecordingError(f"{path} is a folder, and no installed package reads those")
 
 
+class _InFile:
+    """What recordings of both kinds of files have in common."""
+
+    path: Path
+
+    @contextmanager
+    def replacing(self, path: Path) -> Iterator[Writing]:
+        with replacing(path, RecordingError) as file:
+            yield self._writing(file)
+
+    def _writing(self, file: BinaryIO) -> Writing:
+        raise NotImplementedError
+
+    def _error(self, reason: str) -> RecordingError:
+        return RecordingError(f"{self.path} is not a recording: {reason}")
+
+
 # -- CSV --------------------------------------------------------------------------------------------------------------
 
 
-class CsvRecording:
+class CsvRecording(_InFile):
     """A CSV file with the columns time (s, ascending), topic and value (a number, JSON, or any text)."""
 
     def __init__(self, path: Path, file: BinaryIO) -> None:
@@ -156,13 +173,8 @@ class CsvRecording:
             raise self._error(f"line {line:,}: {text[:50]!r} is not a time in s")
         return time
 
-    def _error(self, reason: str) -> RecordingError:
-        return RecordingError(f"{self.path} is not a recording: {reason}")
-
-    @contextmanager
-    def replacing(self, path: Path) -> Iterator[Writing]:
-        with replacing(path, RecordingError) as file:
-            yield _CsvWriting(self.channels, file)
+    def _writing(self, file: BinaryIO) -> Writing:
+        return _CsvWriting(self.channels, file)
 
 
 class _CsvWriting:
@@ -183,7 +195,7 @@ class _CsvWriting:
 # -- MCAP -------------------------------------------------------------------------------------------------------------
 
 
-class McapRecording:
+class McapRecording(_InFile):
     """An MCAP file; messages with the encoding json are read, others pass as they are."""
 
     def __init__(self, path: Path, file: BinaryIO) -> None:
@@ -262,13 +274,8 @@ class McapRecording:
             said = " ".join(str(error).split())[:200]
             raise self._error(f"{said or type(error).__name__}") from None
 
-    def _error(self, reason: str) -> RecordingError:
-        return RecordingError(f"{self.path} is not a recording: {reason}")
-
-    @contextmanager
-    def replacing(self, path: Path) -> Iterator[Writing]:
-        with replacing(path, RecordingError) as file:
-            yield _McapWriting(self, file)
+    def _writing(self, file: BinaryIO) -> Writing:
+        return _McapWriting(self, file)
 
     def copy_to(self, writer: Any) -> dict[int, int]:
         """Write everything but messages; the numbers of the channels in the new file by those in this one."""

@@ -19,23 +19,13 @@ from ..model.build.disturbance import disturb_ports
 from ..model.build.model import Model
 from ..model.language.settings import Setting
 from ..support.shown import finite
+from .disturbed import Disturbed
 from .files import Message, Recording, RecordingError, check_topics, opened
 
 SENDER = "recording"
 _LONGEST = 1_000_000_000 * 10**9  # ns
 _MESSAGE = "\0"  # the field of a token that says which message it was: a text, which no aspect alters
 _VALUE = "value"  # the field of a token with the content, if that has no fields
-
-
-@dataclass(frozen=True)
-class Passed:
-    """What came of a recording: messages by topic, before and after, and what the aspects counted."""
-
-    came: dict[str, int]
-    delivered: dict[str, int]
-    aspects: dict[str, dict[str, float | None]]
-    left_out: list[str]  # aspects and settings of the disturbances that are not for recordings
-    seed: int
 
 
 class Opaque:
@@ -119,7 +109,7 @@ def pass_recording(
     set: Iterable[str | Setting] | Mapping[str, object] = (),
     seed: int = 0,
     types: Iterable[type] = (),
-) -> Passed:
+) -> Disturbed:
     """Write a recording as it is after its messages have passed the aspects of disturbances.
 
     ``at`` are patterns of topics, in place of those of the disturbances.  Raises ``EpicycleError``.
@@ -143,7 +133,7 @@ def pass_recording(
             left_out, model.exactly = disturb_ports(model, map(str, disturbances), places, set, types)
             results = _run(model, seed)
             writing.finish()
-    return Passed(came, delivered, results.aspects, left_out, seed)
+    return Disturbed(source, target, came, delivered, results.aspects, left_out, seed)
 
 
 def _run(model: Model, seed: int) -> Results:

@@ -16,6 +16,7 @@ from ..execution.results import Results, Verdict, canonical, plain
 from ..model.build.model import Model
 from ..model.graph.acts import Act, ActName
 from ..model.graph.model_graph import ModelGraph
+from ..study.run.processes import Worker
 from .cache import NUMBER, EvaluationCache
 from .evaluator import Evaluator, Recipe, jobs_for
 from .explanation import INTERRUPT, LIMIT, RUNS, Effect, Explanation, Step
@@ -30,7 +31,7 @@ class _LimitError(Exception):
     """There are as many runs as a search may make."""
 
 
-class _Worker:
+class _Worker(Worker):
     """Makes runs of a model in which some acts happen and, of those that are looked at, no others."""
 
     def __init__(
@@ -49,9 +50,6 @@ class _Worker:
         """What comes of the run with these acts; with None, with all."""
         acts = Interventions(None if exactly is None else self._others.union(exactly))
         return Simulation(self._model, seed=self._seed, acts=acts, keep_log=keep_log).run(until=self._until)
-
-    def prepare(self, request: object) -> None:
-        """There is nothing to load."""
 
     def make(self, request: tuple[frozenset[ActName], bool]) -> list[Any]:
         """Whether the property holds, its robustness, and if it is broken the places of acts that are not to blame."""

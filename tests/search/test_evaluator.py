@@ -130,7 +130,7 @@ def test_each_search_answers_the_same_with_several(line: str) -> None:
     assert module.PATIENCE > 0.0
 
 
-class Strange(EpicycleError):
+class StrangeError(EpicycleError):
     """An error that is written as it is, and cannot be read."""
 
     def __init__(self, one: str, other: str) -> None:
@@ -151,7 +151,7 @@ class Unreadable:
 
     def make(self, request: object) -> object:
         """Nothing."""
-        raise Strange("it is ", "strange")
+        raise StrangeError("it is ", "strange")
 
 
 def test_what_cannot_be_read_is_reported() -> None:
@@ -160,7 +160,7 @@ def test_what_cannot_be_read_is_reported() -> None:
         with pytest.raises(WorkerError) as caught:
             evaluator.make(1, 1)
         assert str(caught.value) == (
-            "the answer of a process cannot be read: TypeError: Strange.__init__() missing 1 required positional "
+            "the answer of a process cannot be read: TypeError: StrangeError.__init__() missing 1 required positional "
             "argument: 'other'"
         )
         with pytest.raises(EpicycleError) as unread:

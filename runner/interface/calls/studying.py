@@ -87,7 +87,6 @@ def study(
 
     from ...study.judge.study_results import open_study
     from ...study.run.progress import progress
-    from ...study.run.share import ALL, Share
     from ...study.session import run_study
 
     plan, folder = plan_of(study, set=set, replications=replications, seed=seed, out=out, types=types)
@@ -96,13 +95,13 @@ def study(
             plan,
             folder,
             jobs=jobs,
-            timeout=run_timeout,
+            run_timeout=run_timeout,
             retry=retry,
             tell=tell,
             executor=executor,
             scheduler=scheduler,
-            share=ALL if part is None else Share.named(part),
-            others=map(Path, merge),
+            part=part,
+            merge=merge,
         )
     return open_study(folder)
 

@@ -260,9 +260,6 @@ class StudyResults(Tabled):
         found: xarray.Dataset = xarray.Dataset.from_dataframe(frame)
         return found
 
-    def __repr__(self) -> str:
-        return f"<StudyResults {self._caption()}>"
-
     def _caption(self) -> str:
         counts, plan = self.counts(), self.plan
         told = ", ".join(f"{number:,} {status}" for status, number in sorted(counts.items())) or "none is over"

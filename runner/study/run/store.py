@@ -151,7 +151,7 @@ def prepare(folder: Path, manifest: Mapping[str, Any], share: Share = ALL) -> St
     return store
 
 
-def merge(store: Store, folder: Path) -> None:
+def take(store: Store, folder: Path) -> None:
     """Add the rows of another results folder of the same study; raises ``StoreError`` for one of another study."""
     other, known = Store(folder), store.known()
     _check_same(folder, other.manifest, store.manifest)
