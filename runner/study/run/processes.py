@@ -48,7 +48,8 @@ class Worker(Protocol):
     """Makes things in a process, one after another."""
 
     def prepare(self, request: Any) -> None:
-        """Load what is needed, if anything is; has the same time limit as ``make``."""
+        """Load what is needed; has the same time limit as ``make``."""
+        return  # there may be nothing to load
 
     def make(self, request: Any) -> Any:
         """The result, as plain data."""
