@@ -21,7 +21,6 @@ from .changes import (
     UNTIL,
     WITHOUT,
     Changes,
-    as_settings,
     first_seed,
 )
 from .running import REFERENCE, opened
@@ -108,7 +107,7 @@ def search(
     >>> epicycle.search("pid_loop", goal, vary={"plant.time_constant": "0.5 s..5 s"}).best
     """
     from ...search.searching import found
-    from ...study.run_spec import seconds
+    from ...study.run_spec import as_settings, seconds
     from ...support.bars import bar
 
     if unknown := given.keys() - SearchOptions.__annotations__.keys():

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from ...support.declare.parameters import COUNT, argument, option, repeated
-from .changes import JOBS, RUN_TIMEOUT, SEED, TYPES, UNTIL, as_settings, first_seed
+from .changes import JOBS, RUN_TIMEOUT, SEED, TYPES, UNTIL, first_seed
 
 if TYPE_CHECKING:
     from ...model.build.model import Model
@@ -130,6 +130,7 @@ def plan_of(
     from ...show.report import check_figures
     from ...study.plan.plan import Plan
     from ...study.run.manifest import StoreError
+    from ...study.run_spec import as_settings
     from ...study.session import plan_of_folder
 
     files, settings = [Path(each) for each in types], as_settings(set)
