@@ -53,7 +53,7 @@ class ComparedRun:
 
 
 _VALUE = (int, float, bool, str, type(None))
-_SHAPE = [{"": _VALUE}, {"": {"": _VALUE}}, (int,), (str,)]  # of a run in a folder
+_SHAPE = [{str: _VALUE}, {str: {str: _VALUE}}, int, str]  # of a run in a folder
 
 
 @dataclass(repr=False)

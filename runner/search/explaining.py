@@ -9,7 +9,7 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
-from epicycle.actors import EpicycleError, did_you_mean, to_seconds
+from epicycle.actors import EpicycleError, to_seconds
 
 from ..execution.engine import Interventions, Simulation
 from ..execution.results import Results, Verdict, canonical, plain
@@ -21,7 +21,7 @@ from .cache import NUMBER, EvaluationCache
 from .evaluator import Evaluator, Recipe, jobs_for
 from .explanation import INTERRUPT, LIMIT, RUNS, Effect, Explanation, Step
 from .minimal import minimal
-from .monitored import property_of
+from .monitored import aspect_named, property_of
 
 _NONE = type(None)
 _SHAPE = [(bool, _NONE), (*NUMBER, _NONE), [(int,)]]  # of an outcome
@@ -150,7 +150,7 @@ def explain(
     one has.  Raises ``EpicycleError`` if the run does not break it.
     """
     sources = {monitor: property_of(model, monitor) for monitor in monitors}
-    chosen = _chosen(model, only)
+    chosen = frozenset(aspect_named(model, name).name for name in only)  # of which the acts are looked at; if none, all
     whole = _Worker(model, "", seed, until).results(model.exactly)
     monitor, *also = _broken(model.name, {each: whole.monitors[each] for each in monitors})
     verdict, source = whole.monitors[monitor], sources[monitor]
@@ -247,18 +247,6 @@ def _broken(model: str, verdicts: Mapping[str, Verdict]) -> list[str]:
             f"monitor {name} {'holds' if verdict.holds else 'cannot be judged'} in this run of {model}{reason}"
         )
     raise EpicycleError(f"{' and '.join(states)}: there is nothing to explain")
-
-
-def _chosen(model: Model, only: Collection[str]) -> frozenset[str]:
-    """The aspects whose acts are looked at, where not all are; raises ``EpicycleError``."""
-    known = [woven.name for woven in model.aspects]
-    for name in only:
-        if name not in known:
-            raise EpicycleError(
-                f"{model.name} has no aspect {name!r}{did_you_mean(name, known)}\n"
-                f"   help: its aspects: {', '.join(known) or 'none'}"
-            )
-    return frozenset(only)
 
 
 def _steps(graph: ModelGraph, ports: Collection[str], ours: Results, theirs: Results) -> list[Step]:

@@ -304,7 +304,7 @@ def rare(
         "runs": runs,
         "digest": "" if folder is None else first.run(until=until).digest,
     }  # fmt: skip
-    cache = EvaluationCache(model, about, [[NUMBER], NUMBER, (int,), (int,)], folder)
+    cache = EvaluationCache(model, about, [[NUMBER], NUMBER, int, int], folder)
     others = (monitor, guide, seed, until, runs)
     found: list[list[float]] = []
     here = _Branches(model, *others)
