@@ -37,7 +37,8 @@ def completion(options: argparse.Namespace) -> int:
             add(made)
         made.add_argument("--debug", action="store_true", help="show the full traceback of an error")
     _complete(parser, _packaged())
-    tell(shtab.complete(parser, options.shell))
+    script = shtab.complete(parser, options.shell)
+    tell(f"eval {quote(script)}" if options.shell == "zsh" else script)  # so that it may be sourced, too
     return DONE
 
 
