@@ -179,7 +179,7 @@ def compare(
     """
     from ...search.comparing import compare as compare_models
     from ...study.run_spec import seconds
-    from ...support.bars import SOON, bar
+    from ...support.bars import SOON, bar, telling
     from .running import opened
     from .searching import folder_for
 
@@ -191,11 +191,6 @@ def compare(
     }
     folder = folder_for([*models.values()], out, "comparison")
     with bar("compare", after=SOON) as show:
-
-        def tell(done: int, runs: int, what: str) -> None:
-            if show is not None and progress:
-                show(done, runs, what)
-
         answer = compare_models(
             models,
             replications=replications,
@@ -203,7 +198,7 @@ def compare(
             until=seconds("until", until),
             folder=folder,
             jobs=jobs,
-            tell=tell,
+            tell=telling(show, lambda *told: told, progress),
         )
     answer.folder = folder
     return answer

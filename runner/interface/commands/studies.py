@@ -188,17 +188,16 @@ def report(options: argparse.Namespace) -> int:
     from ...show.report import write_report
     from ...study.judge.study_results import open_study
     from ...study.session import available_cores
-    from ...support.bars import bar
+    from ...support.bars import bar, telling
 
     results = open_study(options.folder, types=getattr(options, "types", ()))
     folder, jobs = options.out or options.folder, getattr(options, "jobs", available_cores())
+
+    def words(done: int, total: int) -> tuple[float, float, str]:
+        return done, total, f"{done:,} of {total:,} runs repeated for their signals"
+
     with bar("report") as show:
-
-        def tell_of(done: int, total: int) -> None:
-            if show is not None:
-                show(done, total, f"{done:,} of {total:,} runs repeated for their signals")
-
-        written = write_report(results, folder, jobs=jobs, tell=tell_of)
+        written = write_report(results, folder, jobs=jobs, tell=telling(show, words))
     for path in written.files:
         tell(f"wrote {path}")
     if written.verdicts:
