@@ -30,9 +30,9 @@ def texts() -> dict[str, str]:
     from epicycle.runner.model.catalogue.figure import own_figures
     from epicycle.runner.model.catalogue.types import built_in
     from epicycle.runner.model.language.schema import json_schema, schema_text
-    from epicycle.runner.show import markdown
     from epicycle.runner.show.report import own_study_figures
     from tests.desk.kinds_page import page
+    from tests.reference_page import markdown
 
     own, figures, of_studies = built_in(), own_figures(), own_study_figures()
     schema = schema_text(json_schema(own, figures, of_studies))

@@ -45,7 +45,7 @@ _LARGEST: Final = f"{float(MAX_INT)!r}"
 Written = tuple[str, str]  # text and kind
 
 
-class _UnfitError(Exception):
+class _UntranslatableError(Exception):
     """What must be left to the evaluator."""
 
 
@@ -62,7 +62,7 @@ def translated(source: str, arguments: tuple[str, ...], fields: tuple[str, ...] 
         text = _Writer(source, names, _ANY).whole(tree)
         if not fields:
             text = _of_floats(source, tree, names) + text
-    except _UnfitError:
+    except _UntranslatableError:
         return None
     known = [names[name] for name in arguments]
     if fields:
@@ -93,7 +93,7 @@ def all_translated(sources: tuple[str, ...], names: tuple[str, ...]) -> Callable
         writer = _Writer(source, places, _FLOAT)
         try:
             text, kind = writer.settled(parse(source))
-        except _UnfitError:
+        except _UntranslatableError:
             return None
         if kind not in (_FLOAT, _NUMBER) or writer.weighs:
             return None
@@ -117,7 +117,7 @@ def _of_floats(source: str, tree: ast.expr, names: dict[str, str]) -> str:
         return ""
     try:
         text = _Writer(source, names, _FLOAT).whole(tree)
-    except _UnfitError:
+    except _UntranslatableError:
         return ""
     return f"{text} if {''.join(f'type({each}) is ' for each in used)}float else "
 
@@ -146,7 +146,7 @@ class _Writer:
         self.weighs = False  # whether there is something to be paid for by its size
 
     def whole(self, tree: ast.expr) -> str:
-        """The text of the whole expression, whose value is checked; raises ``_UnfitError``."""
+        """The text of the whole expression, whose value is checked; raises ``_UntranslatableError``."""
         text, kind = self._write(tree)
         if kind == _FLOAT:
             text = f"(r if -1e999 < (r := {text}) < 1e999 else undecided())"
@@ -190,7 +190,7 @@ class _Writer:
     # -- nodes ----------------------------------------------------------------------------------------------------
 
     def _write(self, node: ast.expr) -> Written:
-        """A node's text and kind; raises ``_UnfitError``."""
+        """A node's text and kind; raises ``_UntranslatableError``."""
         if not free_names(node, frozenset()) - (CONSTANTS.keys() - self._names.keys()) and (
             found := self._constant(node)
         ):
@@ -227,7 +227,7 @@ class _Writer:
                 return self._called(name, node.args)
             case ast.ListComp(generators=[ast.comprehension(target=ast.Name())]):
                 return self._list_of(node)
-        raise _UnfitError
+        raise _UntranslatableError
 
     def _constant(self, node: ast.expr) -> Written | None:
         """A part without names that is a number or a text."""
@@ -239,7 +239,7 @@ class _Writer:
             try:
                 value = evaluate(self._source[node.col_offset : node.end_col_offset], {})
             except ExpressionError:
-                raise _UnfitError from None
+                raise _UntranslatableError from None
         else:
             return None
         if value is None or isinstance(value, str):
@@ -255,7 +255,7 @@ class _Writer:
     def _dict(self, node: ast.Dict) -> Written:
         keys = [each.value if isinstance(each, ast.Constant) else None for each in node.keys]
         if not all(isinstance(key, str) for key in keys) or len({*keys}) < len(keys):
-            raise _UnfitError
+            raise _UntranslatableError
         items = zip(keys, map(self.settled, node.values), strict=True)
         return self._weighed(f"{{{', '.join(f'{key!r}: {text}' for key, (text, _) in items)}}}")
 
@@ -337,7 +337,7 @@ class _Writer:
     def _subscript(self, node: ast.Subscript) -> Written:
         whole, kind = self._write(node.value)
         if kind != _ANY:
-            raise _UnfitError
+            raise _UntranslatableError
         if isinstance(node.slice, ast.Slice):
             bounds = [each and self.settled(each)[0] for each in (node.slice.lower, node.slice.upper, node.slice.step)]
             return f"cut({whole}, {', '.join(each or 'None' for each in bounds)}, {self._left()})", _ANY
@@ -383,7 +383,7 @@ class _Writer:
         try:
             given = tables_of([evaluate(self._source[each.col_offset : each.end_col_offset], {}) for each in tables])
         except (ExpressionError, TypeError, ValueError):  # the evaluator says what is wrong
-            raise _UnfitError from None
+            raise _UntranslatableError from None
         if {kind for _, kind in numbers} == {_FLOAT}:
             texts = [text for text, _ in numbers] + [repr(each) for each in given]
             return f"{'along' if many == 1 else 'across'}({', '.join(texts)})", _FLOAT
@@ -394,7 +394,7 @@ class _Writer:
         (generator,) = node.generators
         whole, kind = self._write(generator.iter)
         if kind != _ANY:
-            raise _UnfitError
+            raise _UntranslatableError
         assert isinstance(generator.target, ast.Name)
         source, item, before = self._new(), f"b{self._held}", (self._names, self._kinds)
         self._names, self._kinds = (

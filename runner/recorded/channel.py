@@ -5,47 +5,83 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Iterable
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import yaml
 
 from epicycle.actors import counted
+from epicycle.aspects import Trace
 
 from ..support.shown import finite, short
 from ..support.tables import Table, Tabled
-from .delays import DelayLaw
-from .fitting import Fitted
-from .losses import Goodness, LossModel
+from .delays import DelayLaw, autocorrelation, delay_laws
+from .losses import Goodness, LossModel, loss_models
 
 _NOTABLE = 0.1  # correlation of successive delays
 
 
+@dataclass(repr=False)
 class Fit(Tabled):
     """Models of the losses and delays in a trace, how well they fit, and a disturbance with the best ones.
 
-    ``fitted`` holds the models: ``fitted.losses`` and ``fitted.delays`` are those with the least BIC, Schwarz's
-    Bayesian information criterion.
+    ``losses`` and ``delays`` are those with the least BIC, Schwarz's Bayesian information criterion, of the models in
+    order of freedom.  ``overtakes``: whether messages overtook each other; None if the trace does not say when they
+    were sent.
     """
 
-    def __init__(self, file: Path, fitted: Fitted, at: Iterable[str]) -> None:
-        self.file = file
-        self.fitted = fitted
-        self.at = [at] if isinstance(at, str) else list(at)
+    file: Path
+    at: list[str]
+    messages: int
+    lost: int
+    losses: LossModel
+    delays: DelayLaw | None
+    loss_models: list[LossModel]
+    delay_laws: list[DelayLaw]
+    at_once: int  # messages without any delay
+    correlation: float  # of successive delays
+    overtakes: bool | None
+
+    @classmethod
+    def of(cls, file: Path, trace: Trace, at: str | Iterable[str]) -> Fit:
+        """All models fitted to a trace, which stands in a file."""
+        losses, arrived = loss_models(trace.lost), ~trace.lost
+        laws: list[DelayLaw] = []
+        at_once, correlation, overtakes = 0, 0.0, None
+        if trace.delays is not None and arrived.any():
+            delays = trace.delays[arrived] / 1e9
+            laws, correlation = delay_laws(delays), autocorrelation(delays)
+            at_once = int(np.count_nonzero(delays == 0.0))
+            if trace.times is not None:
+                overtakes = bool((np.diff((trace.times + trace.delays)[arrived]) < 0).any())
+        return cls(
+            file,
+            [at] if isinstance(at, str) else list(at),
+            len(trace),
+            int(np.count_nonzero(trace.lost)),
+            min(losses, key=lambda each: each.bic),
+            min(laws, key=lambda each: each.bic, default=None),
+            losses,
+            laws,
+            at_once,
+            correlation,
+            overtakes,
+        )
 
     def aspects(self) -> dict[str, dict[str, Any]]:
         """The aspects of the disturbance, by name."""
-        losses, law = self.fitted.losses, self.fitted.delays
+        losses, law = self.losses, self.delays
         found: dict[str, dict[str, Any]] = {}
-        if self.fitted.lost:
+        if self.lost:
             found["losses"] = {"type": losses.aspect, **_rounded(losses.parameters), "at": list(self.at)}
         if law is not None and law.shift + law.mean > 0.0:
             rest: dict[str, Any] = {"jitter": _time(law.mean), "distribution": "exponential"} if law.mean > 0.0 else {}
             if law.shape != 1.0:
                 rest["distribution"] = {"type": "Gamma", **_rounded({"shape": law.shape}), "mean": 1}
             # Where it is unknown whether messages overtake each other, their delays at least follow the law.
-            given = {"delay": _time(law.shift), **rest, "reordering": self.fitted.overtakes is not False}
+            given = {"delay": _time(law.shift), **rest, "reordering": self.overtakes is not False}
             found["delays"] = {"type": "Latency", **given, "at": list(self.at)}
         return found
 
@@ -64,52 +100,47 @@ class Fit(Tabled):
 
     def facts(self) -> dict[str, Any]:
         """Everything that was found, as JSON-like data."""
-        found: dict[str, Any] = finite({"file": str(self.file), **asdict(self.fitted), "aspects": self.aspects()})
+        found: dict[str, Any] = finite({**asdict(self), "file": str(self.file), "aspects": self.aspects()})
         return found
 
-    def __repr__(self) -> str:
-        return f"<Fit of {self._caption()}>"
-
     def _caption(self) -> str:
-        found = self.fitted
-        share = f"{100.0 * found.lost / found.messages:.3g} %"
-        said = f"{self.file.name}: {counted(found.messages, 'message')}, {found.lost:,} lost ({share})"
-        said += f"; losses: {found.losses.name}{_verdict(found.losses.runs)}" if found.lost else ""
-        law = found.delays
+        share = f"{100.0 * self.lost / self.messages:.3g} %"
+        said = f"{self.file.name}: {counted(self.messages, 'message')}, {self.lost:,} lost ({share})"
+        said += f"; losses: {self.losses.name}{_verdict(self.losses.runs)}" if self.lost else ""
+        law = self.delays
         if law is not None:
             said += f"; delays: {law.name}{_verdict(law.spread)}"
-            if found.at_once and law.name != "constant":
-                verb = "is" if found.at_once == 1 else "are"
-                said += f"; {counted(found.at_once, 'delay')} {verb} 0, so no gamma law can be fitted"
-            if abs(found.correlation) > max(_NOTABLE, 3.0 / math.sqrt(found.messages)):
+            if self.at_once and law.name != "constant":
+                verb = "is" if self.at_once == 1 else "are"
+                said += f"; {counted(self.at_once, 'delay')} {verb} 0, so no gamma law can be fitted"
+            if abs(self.correlation) > max(_NOTABLE, 3.0 / math.sqrt(self.messages)):
                 said += (
-                    f"; successive delays have the correlation {found.correlation:.2f}, but Latency draws independent "
+                    f"; successive delays have the correlation {self.correlation:.2f}, but Latency draws independent "
                     "ones: to keep that, replay the trace with TraceReplay"
                 )
         return said
 
     def _tables(self) -> list[Table]:
-        found = self.fitted
         losses = [
             (
-                _mark(each, found.losses),
+                _mark(each, self.losses),
                 _words(each.parameters),
                 f"{each.log_likelihood:,.1f}",
                 f"{each.bic:,.1f}",
                 _test(each.gain),
                 _test(each.runs),
             )
-            for each in found.loss_models
+            for each in self.loss_models
         ]
         laws = [
             (
-                _mark(each, found.delays),
+                _mark(each, self.delays),
                 _words({"shift": each.shift, "mean": each.mean, "shape": each.shape}),
                 f"{each.log_likelihood:,.1f}",
                 f"{each.bic:,.1f}",
                 _test(each.spread),
             )
-            for each in found.delay_laws
+            for each in self.delay_laws
         ]
         head = ("parameters", "log likelihood", "BIC")
         return [

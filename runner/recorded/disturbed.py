@@ -2,42 +2,40 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 from ..support.shown import short
 from ..support.tables import Table, Tabled
-from .passing import Passed
 
 
+@dataclass(repr=False)
 class Disturbed(Tabled):
-    """A recording that was disturbed: messages of each topic, and what the aspects did, in ``passed``."""
+    """A recording that was disturbed: messages by topic, before and after, and what the aspects counted."""
 
-    def __init__(self, source: Path, path: Path, passed: Passed) -> None:
-        self.source = source
-        self.path = path
-        self.passed = passed
+    recording: Path
+    out: Path
+    came: dict[str, int]
+    delivered: dict[str, int]
+    aspects: dict[str, dict[str, float | None]]
+    left_out: list[str]  # aspects and settings of the disturbances that are not for recordings
+    seed: int
 
     def facts(self) -> dict[str, Any]:
         """Everything that is known of it, as JSON-like data."""
-        return {"recording": str(self.source), "out": str(self.path), **asdict(self.passed)}
-
-    def __repr__(self) -> str:
-        return f"<Disturbed {self._caption()}>"
+        return {**asdict(self), "recording": str(self.recording), "out": str(self.out)}
 
     def _caption(self) -> str:
-        found = self.passed
-        came, delivered = (sum(each.values()) for each in (found.came, found.delivered))
-        left_out = f"; not for recordings, and left out: {', '.join(found.left_out)}" if found.left_out else ""
-        return f"{self.source}: {came:,} messages came, {delivered:,} were delivered, seed {found.seed}{left_out}"
+        came, delivered = (sum(each.values()) for each in (self.came, self.delivered))
+        left_out = f"; not for recordings, and left out: {', '.join(self.left_out)}" if self.left_out else ""
+        return f"{self.recording}: {came:,} messages came, {delivered:,} were delivered, seed {self.seed}{left_out}"
 
     def _tables(self) -> list[Table]:
-        found = self.passed
-        topics = [(topic, f"{came:,}", f"{found.delivered[topic]:,}") for topic, came in found.came.items()]
+        topics = [(topic, f"{came:,}", f"{self.delivered[topic]:,}") for topic, came in self.came.items()]
         figures = [
             (name, what, "-" if figure is None else short(figure))
-            for name, each in found.aspects.items()
+            for name, each in self.aspects.items()
             for what, figure in each.items()
         ]
         return [Table(("topic", "came", "delivered"), topics), Table(("aspect", "figure", "value"), figures)]

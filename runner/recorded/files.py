@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import json
-import os
 from collections.abc import Iterable, Iterator
 from contextlib import AbstractContextManager, contextmanager, suppress
 from decimal import Decimal, InvalidOperation
@@ -17,6 +16,8 @@ from struct import Struct
 from typing import IO, Any, BinaryIO, NamedTuple, Protocol
 
 from epicycle.actors import EpicycleError, did_you_mean, open_regular
+
+from ..support.files import replacing
 
 FOLDERS = "epicycle.recordings"  # entry points of what reads folders
 ENCODINGS = "epicycle.encodings"  # and messages in an encoding, by its name
@@ -103,26 +104,27 @@ def _folder(path: Path) -> Recording:
     raise RecordingError(f"{path} is a folder, and no installed package reads those")
 
 
-@contextmanager
-def replaced(path: Path) -> Iterator[BinaryIO]:
-    """A new file that replaces the one at a path once it is complete; raises ``RecordingError``."""
-    aside = path.with_name(f".{path.name}")
-    try:
-        with open(aside, "wb") as file:
-            yield file
-        os.replace(aside, path)
-    except BaseException as error:
-        with suppress(OSError):
-            aside.unlink()
-        if isinstance(error, OSError):
-            raise RecordingError(f"{path} cannot be written: {error.strerror or error}") from None
-        raise
+class _InFile:
+    """What recordings of both kinds of files have in common."""
+
+    path: Path
+
+    @contextmanager
+    def replacing(self, path: Path) -> Iterator[Writing]:
+        with replacing(path, RecordingError) as file:
+            yield self._writing(file)
+
+    def _writing(self, file: BinaryIO) -> Writing:
+        raise NotImplementedError
+
+    def _error(self, reason: str) -> RecordingError:
+        return RecordingError(f"{self.path} is not a recording: {reason}")
 
 
 # -- CSV --------------------------------------------------------------------------------------------------------------
 
 
-class CsvRecording:
+class CsvRecording(_InFile):
     """A CSV file with the columns time (s, ascending), topic and value (a number, JSON, or any text)."""
 
     def __init__(self, path: Path, file: BinaryIO) -> None:
@@ -187,16 +189,11 @@ class CsvRecording:
             raise self._error(f"line {line:,}: {text[:50]!r} is not a time in s")
         return time
 
-    def _error(self, reason: str) -> RecordingError:
-        return RecordingError(f"{self.path} is not a recording: {reason}")
-
     def codec(self) -> None:
         """None: there are no bytes."""
 
-    @contextmanager
-    def replacing(self, path: Path) -> Iterator[Writing]:
-        with replaced(path) as file:
-            yield _CsvWriting(self.channels, file)
+    def _writing(self, file: BinaryIO) -> Writing:
+        return _CsvWriting(self.channels, file)
 
 
 class _CsvWriting:
@@ -217,7 +214,7 @@ class _CsvWriting:
 # -- MCAP -------------------------------------------------------------------------------------------------------------
 
 
-class McapRecording:
+class McapRecording(_InFile):
     """An MCAP file; messages with the encoding json are read, others are bytes."""
 
     def __init__(self, path: Path, file: BinaryIO) -> None:
@@ -303,9 +300,6 @@ class McapRecording:
             said = " ".join(str(error).split())[:200]
             raise self._error(f"{said or type(error).__name__}") from None
 
-    def _error(self, reason: str) -> RecordingError:
-        return RecordingError(f"{self.path} is not a recording: {reason}")
-
     def codec(self) -> Codec | None:
         """What an installed package has for the encoding of the messages."""
         used = {each.message_encoding for each in self._summary.channels.values()}
@@ -315,10 +309,8 @@ class McapRecording:
                 return made
         return None
 
-    @contextmanager
-    def replacing(self, path: Path) -> Iterator[Writing]:
-        with replaced(path) as file:
-            yield _McapWriting(self, file)
+    def _writing(self, file: BinaryIO) -> Writing:
+        return _McapWriting(self, file)
 
     def copy_to(self, writer: Any) -> dict[int, int]:
         """Write everything but messages; the numbers of the channels in the new file by those in this one."""

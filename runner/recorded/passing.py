@@ -17,23 +17,13 @@ from ..model.build.disturbance import disturb_ports
 from ..model.build.model import Model
 from ..model.language.settings import Setting
 from ..support.shown import finite
+from .disturbed import Disturbed
 from .files import Codec, Message, Recording, RecordingError, opened, topics_like
 
 SENDER = "recording"
 _LONGEST = 1_000_000_000 * 10**9  # ns
 _MESSAGE = "\0"  # the field of a token that says which message it was: a text, which no aspect alters
 _VALUE = "value"  # the field of a token with the content, if that has no fields
-
-
-@dataclass(frozen=True)
-class Passed:
-    """What came of a recording: messages by topic, before and after, and what the aspects counted."""
-
-    came: dict[str, int]
-    delivered: dict[str, int]
-    aspects: dict[str, dict[str, float | None]]
-    left_out: list[str]  # aspects and settings of the disturbances that are not for recordings
-    seed: int
 
 
 class Opaque:
@@ -121,7 +111,7 @@ def pass_recording(
     set: Iterable[str | Setting] | Mapping[str, object] = (),
     seed: int = 0,
     types: Iterable[type] = (),
-) -> Passed:
+) -> Disturbed:
     """Write a recording as it is after its messages have passed the aspects of disturbances.
 
     ``at`` are patterns of topics, in place of those of the disturbances.  Raises ``EpicycleError``.
@@ -137,13 +127,13 @@ def pass_recording(
             return left_out
 
         try:
-            return _pass(recording, target, weave, seed, None)  # of bytes that nobody reads, which is faster
+            return _pass(source, recording, target, weave, seed, None)  # of bytes that nobody reads, which is faster
         except ActorError as error:
             if isinstance(error.__cause__, RecordingError):
                 raise error.__cause__ from None
             codec = _codec(recording, error)
         try:
-            return _pass(recording, target, weave, seed, codec)
+            return _pass(source, recording, target, weave, seed, codec)
         except ActorError as error:
             raise (error.__cause__ if isinstance(error.__cause__, RecordingError) else error) from None
 
@@ -164,8 +154,13 @@ def _codec(recording: Recording, error: ActorError) -> Codec:
 
 
 def _pass(
-    recording: Recording, target: Path, weave: Callable[[Model, _Channels], list[str]], seed: int, codec: Codec | None
-) -> Passed:
+    source: Path,
+    recording: Recording,
+    target: Path,
+    weave: Callable[[Model, _Channels], list[str]],
+    seed: int,
+    codec: Codec | None,
+) -> Disturbed:
     """Let the messages pass, those that aspects reach with their fields if there is a codec."""
     channels, tokens = _names(recording.channels), _Tokens(recording.channels, codec)
     with recording.replacing(target) as writing:
@@ -184,7 +179,7 @@ def _pass(
         tokens.are_read = {number for number, each in channels.items() if not reached.isdisjoint(each.paths)}
         results = Simulation(model, seed=seed).run()
         writing.finish()
-    return Passed(came, delivered, results.aspects, left_out, seed)
+    return Disturbed(source, target, came, delivered, results.aspects, left_out, seed)
 
 
 # -- the model --------------------------------------------------------------------------------------------------------

@@ -9,6 +9,9 @@ from typing import Any, ClassVar
 
 from epicycle.actors import EpicycleError
 
+from ..study.judge.study_results import StudyResults, open_study
+from ..study.provenance import version_of
+from ..support.shown import finite
 from ..support.tables import Tabled
 
 
@@ -28,6 +31,10 @@ class Answer(Tabled):
 
     def facts(self) -> dict[str, Any]:
         """Everything that was found, for programs."""
+        found: dict[str, Any] = finite(self._facts())
+        return {**found, "sentence": self.sentence, "version": version_of("epicycle")}
+
+    def _facts(self) -> dict[str, Any]:
         raise NotImplementedError
 
     def save(self, folder: str | Path | None = None) -> list[Path]:
@@ -43,13 +50,26 @@ class Answer(Tabled):
         found.mkdir(parents=True, exist_ok=True)
         return found
 
-    def __repr__(self) -> str:
-        return f"<{type(self).__name__}: {self.sentence}>"
-
     def _caption(self) -> str:
         return self.sentence
 
 
-def listed(texts: Sequence[str], last: str = "and") -> str:
-    """Texts as a list in a sentence."""
+class StudyAnswer(Answer):
+    """One whose runs are in its folder, as those of a study are."""
+
+    @property
+    def results(self) -> StudyResults:
+        """All runs, by what was set."""
+        assert self.folder is not None
+        return open_study(self.folder)
+
+    def save(self, folder: str | Path | None = None) -> list[Path]:
+        """Write the facts as JSON; the table of the runs is there."""
+        return [self.results.path, *super().save(folder)]
+
+
+def listed(texts: Sequence[str], last: str = "and", most: int = 1_000_000) -> str:
+    """Texts as a list in a sentence, of which as many are shown as ``most``."""
+    if len(texts) > most:
+        texts = [*texts[:most], f"{len(texts) - most:,} more"]
     return f" {last} ".join([", ".join(texts[:-1]), texts[-1]] if len(texts) > 1 else texts)

@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import hashlib
 import json
 import logging
-import os
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
@@ -14,6 +12,9 @@ from epicycle.actors import counted, read_regular
 
 from ..model.build.model import Model
 from ..study.provenance import version_of
+from ..study.run.manifest import checksum
+from ..support.files import replace_file
+from ..support.shapes import fits
 
 _LOGGER = logging.getLogger("epicycle")
 NUMBER = (int, float)
@@ -24,8 +25,7 @@ class EvaluationCache:
 
     They are kept in a file of the ``folder`` whose name depends on all that the outcomes depend on; without a folder,
     in memory alone.  Of a model that a program made or changed, nobody can say whether it is the same: then everything
-    is tried again.  ``shape`` is that of an outcome: a tuple of types, a list of shapes or of one for
-    all items, or a dictionary of one for all values.
+    is tried again.  ``shape`` is that of an outcome.
     """
 
     def __init__(self, model: Model, about: Mapping[str, Any], shape: Any, folder: Path | None = None) -> None:
@@ -35,14 +35,12 @@ class EvaluationCache:
             return
         made_of = None if model.origin is None else model.origin.facts()
         self._head = json.dumps({**about, "epicycle": version_of("epicycle"), "model": made_of}, sort_keys=True)
-        self._path = folder / f"tried-{_digest(self._head)[:12]}.jsonl"
+        self._path = folder / f"tried-{checksum(self._head.encode())[:12]}.jsonl"
         if made_of is not None:
             self._read(self._path, shape)
         folder.mkdir(parents=True, exist_ok=True)
-        aside = self._path.with_name(f".{self._path.name}")
         whole = [self._head, *(self._line(key, outcome) for key, outcome in self._known.items())]
-        aside.write_text("\n".join(whole) + "\n", encoding="utf-8")
-        os.replace(aside, self._path)
+        replace_file(self._path, "\n".join(whole) + "\n")
 
     def _read(self, path: Path, shape: Any) -> None:
         """Take what is known from the file; what was not written like this is tried again."""
@@ -57,7 +55,7 @@ class EvaluationCache:
         for line in lines[1:-1]:  # what follows the last end of a line is of a process that was killed
             try:
                 key, outcome, check = json.loads(line)
-                is_whole = isinstance(key, str) and _fits(outcome, shape) and check == self._check(key, outcome)
+                is_whole = isinstance(key, str) and fits(outcome, shape) and check == self._check(key, outcome)
             except (ValueError, TypeError, RecursionError):
                 is_whole = False
             if is_whole:
@@ -71,7 +69,7 @@ class EvaluationCache:
         return json.dumps([key, outcome, self._check(key, outcome)])
 
     def _check(self, key: str, outcome: Any) -> str:
-        return _digest(json.dumps([self._head, key, outcome]))[:16]
+        return checksum(json.dumps([self._head, key, outcome]).encode())
 
     def __contains__(self, key: str) -> bool:
         return key in self._known
@@ -84,17 +82,3 @@ class EvaluationCache:
                 with self._path.open("a", encoding="utf-8") as file:
                     file.write(self._line(key, outcome) + "\n")
         return self._known[key]
-
-
-def _digest(text: str) -> str:
-    return hashlib.sha256(text.encode()).hexdigest()
-
-
-def _fits(value: Any, shape: Any) -> bool:
-    if isinstance(shape, tuple):
-        return type(value) in shape
-    if isinstance(shape, dict):
-        return isinstance(value, dict) and all(_fits(each, shape[""]) for each in value.values())
-    if not isinstance(value, list) or len(shape) not in (1, len(value)):
-        return False
-    return all(map(_fits, value, shape if len(shape) > 1 else shape * len(value)))

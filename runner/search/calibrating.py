@@ -18,6 +18,7 @@ from ..model.language.dimensions import number_node
 from ..model.language.settings import Setting
 from ..model.text.files import COMMAND_LINE
 from ..model.text.problems import ModelError, Position, Problems
+from ..study.run.processes import Worker
 from ..study.session import available_cores
 from ..support.student import student_quantile
 from .cache import NUMBER, EvaluationCache
@@ -208,14 +209,11 @@ class _Task:
         ]
 
 
-class _Worker:
+class _Worker(Worker):
     """Makes runs with given parameters."""
 
     def __init__(self, task: _Task) -> None:
         self._task = task
-
-    def prepare(self, request: object) -> None:
-        """There is nothing to load."""
 
     def make(self, request: tuple[Point, str]) -> list[float]:
         """What the model sends at the times of all measured values."""

@@ -16,8 +16,7 @@ from epicycle.actors import counted, to_seconds
 
 from ..model.language.dimensions import number_node
 from ..model.text.program import call_site
-from ..study.provenance import version_of
-from ..support.shown import finite, rounded
+from ..support.shown import rounded
 from ..support.tables import Table
 from .answer import Answer
 
@@ -108,26 +107,20 @@ class Calibration(Answer):
         if self.agreeing < self.starts and all(math.isfinite(each.error) for each in self.parameters):
             yield f"Only {self.agreeing} of {self.starts} starts ended there: there may be lower minima."
 
-    def facts(self) -> dict[str, Any]:
+    def _facts(self) -> dict[str, Any]:
         matches = [
             {"signal": each.signal, "count": len(each.times), "rms": each.rms, "correlation": each.correlation}
             for each in self.matches
         ]
-        facts = finite(
-            {
-                "model": self.model,
-                "seed": self.seed,
-                "parameters": [asdict(each) for each in self.parameters],
-                "matches": matches,
-                "correlated": [list(each) for each in self.pairs],
-                "starts": self.starts,
-                "agreeing": self.agreeing,
-                "sentence": self.sentence,
-                "version": version_of("epicycle"),
-            }
-        )
-        assert isinstance(facts, dict)
-        return facts
+        return {
+            "model": self.model,
+            "seed": self.seed,
+            "parameters": [asdict(each) for each in self.parameters],
+            "matches": matches,
+            "correlated": [list(each) for each in self.pairs],
+            "starts": self.starts,
+            "agreeing": self.agreeing,
+        }
 
     def save(self, folder: str | Path | None = None) -> list[Path]:
         """Write parameters.yaml, calibration.json and residuals.csv."""

@@ -15,7 +15,7 @@ from epicycle.actors import EpicycleError, counted, did_you_mean
 from ..execution.engine import ActorError, LoopError, Simulation
 from ..model.build.model import Model
 from ..study.inference import Estimate, average, holm, paired_difference, with_interval
-from ..support.shown import finite
+from ..study.run.processes import Worker
 from ..support.tables import Table, pandas_module
 from .answer import Answer
 from .cache import EvaluationCache
@@ -53,7 +53,7 @@ class ComparedRun:
 
 
 _VALUE = (int, float, bool, str, type(None))
-_SHAPE = [{"": _VALUE}, {"": {"": _VALUE}}, (int,), (str,)]  # of a run in a folder
+_SHAPE = [{str: _VALUE}, {str: {str: _VALUE}}, int, str]  # of a run in a folder
 
 
 @dataclass(repr=False)
@@ -148,15 +148,9 @@ class Comparison(Answer):
             writer.writerows(rows)
         return path
 
-    def facts(self) -> dict[str, Any]:
-        """Everything that was found, for programs."""
+    def _facts(self) -> dict[str, Any]:
         told = {"model": self.model, "seeds": list(self.seeds), "units": self.units}
-        found = finite({**told, "differences": [asdict(each) for each in self.differences()]})
-        assert isinstance(found, dict)
-        return found
-
-    def __repr__(self) -> str:
-        return f"<Comparison of {self.sentence}>"
+        return {**told, "differences": [asdict(each) for each in self.differences()]}
 
     def _sentences(self) -> Iterable[str]:
         failed = f"; {counted(len(self.failures), 'run')} failed" if self.failures else ""
@@ -229,15 +223,12 @@ def _made(evaluator: Evaluator, run: tuple[str, int]) -> list[Any]:
     return made
 
 
-class _Worker:
+class _Worker(Worker):
     """Makes runs of the variants."""
 
     def __init__(self, models: Mapping[str, Model], until: float | None) -> None:
         self._models = models
         self._until = until
-
-    def prepare(self, asked: tuple[str, int]) -> None:
-        """There is nothing to load."""
 
     def make(self, asked: tuple[str, int]) -> list[Any] | EpicycleError:
         """What is kept of a run of a variant with a seed, or the error that it ends with."""

@@ -9,18 +9,19 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
-from epicycle.actors import EpicycleError, did_you_mean, to_seconds
+from epicycle.actors import EpicycleError, to_seconds
 
 from ..execution.engine import Interventions, Simulation
 from ..execution.results import Results, Verdict, canonical, plain
 from ..model.build.model import Model
 from ..model.graph.acts import Act, ActName
 from ..model.graph.model_graph import ModelGraph
+from ..study.run.processes import Worker
 from .cache import NUMBER, EvaluationCache
 from .evaluator import Evaluator, Recipe, jobs_for
 from .explanation import INTERRUPT, LIMIT, RUNS, Effect, Explanation, Step
 from .minimal import minimal
-from .monitored import property_of
+from .monitored import aspect_named, property_of
 
 _NONE = type(None)
 _SHAPE = [(bool, _NONE), (*NUMBER, _NONE), [(int,)]]  # of an outcome
@@ -30,7 +31,7 @@ class _LimitError(Exception):
     """There are as many runs as a search may make."""
 
 
-class _Worker:
+class _Worker(Worker):
     """Makes runs of a model in which some acts happen and, of those that are looked at, no others."""
 
     def __init__(
@@ -49,9 +50,6 @@ class _Worker:
         """What comes of the run with these acts; with None, with all."""
         acts = Interventions(None if exactly is None else self._others.union(exactly))
         return Simulation(self._model, seed=self._seed, acts=acts, keep_log=keep_log).run(until=self._until)
-
-    def prepare(self, request: object) -> None:
-        """There is nothing to load."""
 
     def make(self, request: tuple[frozenset[ActName], bool]) -> list[Any]:
         """Whether the property holds, its robustness, and if it is broken the places of acts that are not to blame."""
@@ -152,7 +150,7 @@ def explain(
     one has.  Raises ``EpicycleError`` if the run does not break it.
     """
     sources = {monitor: property_of(model, monitor) for monitor in monitors}
-    chosen = _chosen(model, only)
+    chosen = frozenset(aspect_named(model, name).name for name in only)  # of which the acts are looked at; if none, all
     whole = _Worker(model, "", seed, until).results(model.exactly)
     monitor, *also = _broken(model.name, {each: whole.monitors[each] for each in monitors})
     verdict, source = whole.monitors[monitor], sources[monitor]
@@ -249,18 +247,6 @@ def _broken(model: str, verdicts: Mapping[str, Verdict]) -> list[str]:
             f"monitor {name} {'holds' if verdict.holds else 'cannot be judged'} in this run of {model}{reason}"
         )
     raise EpicycleError(f"{' and '.join(states)}: there is nothing to explain")
-
-
-def _chosen(model: Model, only: Collection[str]) -> frozenset[str]:
-    """The aspects whose acts are looked at, where not all are; raises ``EpicycleError``."""
-    known = [woven.name for woven in model.aspects]
-    for name in only:
-        if name not in known:
-            raise EpicycleError(
-                f"{model.name} has no aspect {name!r}{did_you_mean(name, known)}\n"
-                f"   help: its aspects: {', '.join(known) or 'none'}"
-            )
-    return frozenset(only)
 
 
 def _steps(graph: ModelGraph, ports: Collection[str], ours: Results, theirs: Results) -> list[Step]:

@@ -16,10 +16,9 @@ from epicycle.actors import counted, to_seconds
 from ..execution.results import Verdict
 from ..model.build.model import Model
 from ..model.graph.acts import Act, ActName
-from ..study.provenance import version_of
-from ..support.shown import finite, short
+from ..support.shown import short
 from ..support.tables import Table
-from .answer import Answer
+from .answer import Answer, listed
 
 if TYPE_CHECKING:
     from ..show.view.pages import Page
@@ -151,10 +150,8 @@ class Explanation(Answer):
             return said + "exactly: []\n"
         return said + "exactly:\n" + "".join(f"  - {_flow(each)}\n" for each in names)
 
-    def facts(self) -> dict[str, Any]:
-        found = finite(asdict(self) | {"others": sorted(self.others)})
-        assert isinstance(found, dict)
-        return {**found, "command": list(self.command), "sentence": self.sentence, "version": version_of("epicycle")}
+    def _facts(self) -> dict[str, Any]:
+        return asdict(self) | {"others": sorted(self.others), "command": list(self.command)}
 
     def page(self, *, progress: bool = True) -> Page:
         """A page with the run of these acts beside the one without any."""
@@ -209,7 +206,7 @@ def _grouped(effects: Iterable[Effect]) -> list[tuple[str, str]]:
         came = "" if act.source == name.place or not act.source else f" a token of {act.source}"
         what = f"{name.aspect} {' and '.join(dict.fromkeys(act.events))}{came} at {name.place}"
         times.setdefault(what, []).append(_when(act))
-    return [(what, _listed(each, _TIMES)) for what, each in times.items()]
+    return [(what, listed(each, most=_TIMES)) for what, each in times.items()]
 
 
 def _moved(effects: Iterable[Effect]) -> list[str]:
@@ -234,15 +231,8 @@ def _before(effect: Effect) -> str:
     return ", ".join(told)
 
 
-def _listed(texts: Sequence[str], most: int) -> str:
-    """Texts as a list in a sentence, of which as many are shown as ``most``."""
-    if len(texts) > most:
-        texts = [*texts[:most], f"{len(texts) - most:,} more"]
-    return " and ".join([", ".join(texts[:-1]), texts[-1]] if len(texts) > 1 else texts)
-
-
 def _either(names: Sequence[str]) -> str:
-    return _listed(names, len(names)).replace(" and ", " or ")
+    return listed(names, "or")
 
 
 def _when(act: Act) -> str:

@@ -9,7 +9,6 @@ import shlex
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field
-from pathlib import Path
 from typing import Any
 
 from epicycle.actors import EpicycleError, counted
@@ -22,13 +21,11 @@ from ..model.language.dimensions import Level, split_number
 from ..model.language.disturbance import EXACTLY
 from ..model.language.settings import Setting
 from ..model.text.document import Node, Scalar, plain
-from ..study.judge.study_results import StudyResults, open_study
-from ..study.provenance import version_of
 from ..study.run.backlog import OK
 from ..study.run_spec import RunSpec
-from ..support.shown import finite, short
+from ..support.shown import short
 from ..support.tables import Table
-from .answer import Answer, listed
+from .answer import StudyAnswer, listed
 from .faults import FaultSpace
 from .monitored import with_monitors
 from .proposals import BATCH, SPREAD
@@ -60,7 +57,7 @@ class Run:
 
 
 @dataclass(repr=False)
-class Falsification(Answer):
+class Falsification(StudyAnswer):
     """What a search for a run that breaks a property has found: all its runs, in order, and the first that is broken.
 
     ``broken`` is that run, or None, which does not show that there is none; ``verdict`` is its verdict, ``command``
@@ -106,16 +103,6 @@ class Falsification(Answer):
         margin = run.robustness
         if margin is not None and not math.isnan(margin) and (self.margin is None or margin < self.margin):
             self.least, self.margin = run, margin
-
-    @property
-    def results(self) -> StudyResults:
-        """All runs, by what was set."""
-        assert self.folder is not None
-        return open_study(self.folder)
-
-    def save(self, folder: str | Path | None = None) -> list[Path]:
-        """Write the facts as JSON; the table of the runs is there."""
-        return [self.results.path, *super().save(folder)]
 
     @property
     def command(self) -> list[str]:
@@ -176,7 +163,7 @@ class Falsification(Answer):
         if len(runs) > 1 and len({each.digest for each in runs if each.status == OK}) == 1:
             yield "All runs were the same: nothing in the model depends on the seed or on what was varied."
 
-    def facts(self) -> dict[str, Any]:
+    def _facts(self) -> dict[str, Any]:
         names = self.broken.broken if self.broken is not None else tuple(self.monitors)
         monitor = names[0] if self.broken is not None or len(names) == 1 else None
         return {
@@ -187,7 +174,7 @@ class Falsification(Answer):
             "broken": [] if self.broken is None else list(self.broken.broken),
             "found": self.broken is not None,
             "run": None if self.broken is None else _facts(self.broken),
-            "verdict": None if self.verdict is None else finite(asdict(self.verdict)),
+            "verdict": None if self.verdict is None else asdict(self.verdict),
             "command": self.command,
             "explain": self.explain,
             "runs": len(self.runs),
@@ -197,7 +184,6 @@ class Falsification(Answer):
             "guided": self.guided,
             "covered": self.covered,
             "folder": str(self.folder),
-            "version": version_of("epicycle"),
         }
 
     def _tables(self) -> list[Table]:
@@ -249,7 +235,7 @@ def _said(run: Run) -> str:
 
 def _facts(run: Run) -> dict[str, Any]:
     said = {"number": run.number, "set": {each.path: plain(each.node) for each in run.level.settings}}
-    return {**said, "seed": run.seed, "robustness": finite(run.robustness), "run": run.key}
+    return {**said, "seed": run.seed, "robustness": run.robustness, "run": run.key}
 
 
 def _covered(found: Falsification) -> Iterator[str]:

@@ -12,7 +12,7 @@ from epicycle.actors import EpicycleError, Tag, counted
 from ..execution.engine import Interventions
 from ..execution.results import Results, plain
 from ..model.build.model import Model
-from ..support.shown import finite, short
+from ..support.shown import short
 from ..support.tables import Table
 from .answer import Answer, listed
 
@@ -91,32 +91,25 @@ class WhatIf(Answer):
             said.append(f"The other future ends in an error: {self.error}")
         return said
 
-    def facts(self) -> dict[str, Any]:
-        """Everything that was found, for programs."""
+    def _facts(self) -> dict[str, Any]:
         both = {AS_IT_WAS: self.before, INSTEAD: self.after}
-        found: Any = finite(
-            {
-                "model": self.model,
-                "seed": self.seed,
-                "at": {"time": self.at.seconds, "microstep": self.at.microstep},
-                "changes": self.changes,
-                "same": self.is_same,
-                "first_firing": None if self.first is None else asdict(self.first),
-                "first_difference": dict(zip(both, self.record, strict=False)),
-                "affected": self.affected,
-                "digests": {name: each.digest for name, each in both.items()},
-                "stopped": {name: each.stopped for name, each in both.items()},
-                "metrics": {name: plain(each.metrics) for name, each in both.items()},
-                "monitors": {
-                    name: {key: asdict(verdict) for key, verdict in each.monitors.items()}
-                    for name, each in both.items()
-                },
-                "error": self.error,
-                "sentence": self.sentence,
-            }
-        )
-        assert isinstance(found, dict)
-        return found
+        return {
+            "model": self.model,
+            "seed": self.seed,
+            "at": {"time": self.at.seconds, "microstep": self.at.microstep},
+            "changes": self.changes,
+            "same": self.is_same,
+            "first_firing": None if self.first is None else asdict(self.first),
+            "first_difference": dict(zip(both, self.record, strict=False)),
+            "affected": self.affected,
+            "digests": {name: each.digest for name, each in both.items()},
+            "stopped": {name: each.stopped for name, each in both.items()},
+            "metrics": {name: plain(each.metrics) for name, each in both.items()},
+            "monitors": {
+                name: {key: asdict(verdict) for key, verdict in each.monitors.items()} for name, each in both.items()
+            },
+            "error": self.error,
+        }
 
     def page(self) -> Page:
         """A page with both futures; the first firing that changes is marked."""

@@ -1,4 +1,4 @@
-"""The monitor that a search is about: one of the model's, or a property that is given as a text."""
+"""What a search is about: a monitor of the model's, a property that is given as a text, or aspects."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from dataclasses import replace
 from epicycle.actors import EpicycleError, did_you_mean
 
 from ..model.build.model import Model
+from ..model.graph.woven import WovenAspect
 from ..model.text.files import COMMAND_LINE
 from ..model.text.problems import ModelError, Position
 
@@ -42,6 +43,17 @@ def monitors_named(model: Model, text: str | None, flag: str = "") -> list[str]:
             f"{flag or 'monitor='}{' ' if flag else ''}'always server.size < 40'"
         )
     return [each.name for each in model.output.monitors]
+
+
+def aspect_named(model: Model, name: str) -> WovenAspect:
+    """An aspect of a model; raises ``EpicycleError`` if there is none of that name."""
+    known = {woven.name: woven for woven in model.aspects}
+    if name not in known:
+        raise EpicycleError(
+            f"{model.name} has no aspect {name!r}{did_you_mean(name, known)}\n"
+            f"   help: its aspects: {', '.join(known) or 'none'}"
+        )
+    return known[name]
 
 
 def with_monitors(model: Model, monitors: Mapping[str, str]) -> Model:

@@ -7,7 +7,6 @@ import math
 import shlex
 from collections.abc import Iterator
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 from epicycle.actors import counted
@@ -15,9 +14,8 @@ from epicycle.actors import counted
 from ..model.language.dimensions import Level, split_number
 from ..model.text.document import Scalar, plain
 from ..study.inference import Estimate, with_interval
-from ..study.judge.study_results import StudyResults, open_study
 from ..support.tables import Table
-from .answer import Answer
+from .answer import StudyAnswer
 from .space import Interval, Space
 from .spec import Maximise, Minimise
 
@@ -49,7 +47,7 @@ class Tested:
 
 
 @dataclass(repr=False)
-class Optimum(Answer):
+class Optimum(StudyAnswer):
     """What a search for the best parameters has found.
 
     ``best`` are the parameters of the best point that was tried and meets all conditions, by their paths, or None;
@@ -79,16 +77,6 @@ class Optimum(Answer):
     def checked(self) -> Estimate | None:
         """The same with new seeds."""
         return None if self.check is None else self.check.value
-
-    @property
-    def results(self) -> StudyResults:
-        """All runs, by what was set."""
-        assert self.folder is not None
-        return open_study(self.folder)
-
-    def save(self, folder: str | Path | None = None) -> list[Path]:
-        """Write the facts as JSON; the table of the runs is there."""
-        return [self.results.path, *super().save(folder)]
 
     @property
     def greatest(self) -> bool:
@@ -156,7 +144,7 @@ class Optimum(Answer):
         told = "; ".join([value, *broken])
         yield f"In {counted(check.runs, 'run')} with new seeds it is {told}."
 
-    def facts(self) -> dict[str, Any]:
+    def _facts(self) -> dict[str, Any]:
         goal, found = self.goal, self.point
 
         def estimate(outcome: Outcome | None) -> dict[str, Any] | None:

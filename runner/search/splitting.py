@@ -25,8 +25,8 @@ from epicycle.actors import EpicycleError, Process, counted, elementary, random_
 from ..execution.engine import Simulation
 from ..model.build.model import Model
 from ..model.temporal import TINY
-from ..study.provenance import version_of
-from ..support.shown import finite, short
+from ..study.run.processes import Worker
+from ..support.shown import short
 from ..support.student import student_quantile
 from ..support.tables import Table
 from .answer import Answer
@@ -137,12 +137,9 @@ class RareEvent(Answer):
         if not self.levels:
             yield "There was no level on the way, so this is plain sampling."
 
-    def facts(self) -> dict[str, Any]:
+    def _facts(self) -> dict[str, Any]:
         own = {"probability": self.probability, "interval": self.interval, "error": self.error}
-        more = {"estimates": self.estimates, "plain_runs": self.plain_runs, "sentence": self.sentence}
-        found = finite({**own, **more, **asdict(self), "version": version_of("epicycle")})
-        assert isinstance(found, dict)
-        return found
+        return {**own, "estimates": self.estimates, "plain_runs": self.plain_runs, **asdict(self)}
 
     def _tables(self) -> list[Table]:
         rows = []
@@ -162,7 +159,7 @@ class _Branch(NamedTuple):
     tags: int
 
 
-class _Branches:
+class _Branches(Worker):
     """Branches of a model, from level to level."""
 
     def __init__(self, model: Model, monitor: str, guide: str, seed: int, until: float | None, runs: int) -> None:
@@ -259,9 +256,6 @@ class _Branches:
                 break
         return shares
 
-    def prepare(self, request: object) -> None:
-        """There is nothing to load."""
-
     def make(self, request: tuple[str, Sequence[Any]]) -> list[Any]:
         """What the request is for, some whole runs, the levels or a repetition; and the runs and tags that it took."""
         key, given = request
@@ -310,7 +304,7 @@ def rare(
         "runs": runs,
         "digest": "" if folder is None else first.run(until=until).digest,
     }  # fmt: skip
-    cache = EvaluationCache(model, about, [[NUMBER], NUMBER, (int,), (int,)], folder)
+    cache = EvaluationCache(model, about, [[NUMBER], NUMBER, int, int], folder)
     others = (monitor, guide, seed, until, runs)
     found: list[list[float]] = []
     here = _Branches(model, *others)

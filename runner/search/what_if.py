@@ -23,6 +23,7 @@ from ..model.text.problems import Problems
 from ..study.run_spec import opened, seconds, spec_of
 from ..support.shown import short
 from .future import WhatIf, future_of
+from .monitored import aspect_named
 
 if TYPE_CHECKING:
     from ..show.view.pages import Watch
@@ -194,19 +195,9 @@ def _selected(what: str, pattern: str, known: Sequence[str], unknown: str) -> li
 # -- aspects and tokens -----------------------------------------------------------------------------------------------
 
 
-def _aspect(model: Model, name: str) -> WovenAspect:
-    known = {woven.name: woven for woven in model.aspects}
-    if name not in known:
-        raise EpicycleError(
-            f"{model.name} has no aspect {name!r}{did_you_mean(name, known)}\n"
-            f"   help: its aspects: {', '.join(known) or 'none'}"
-        )
-    return known[name]
-
-
 def _check_removable(model: Model, name: str) -> None:
     """Refuse an aspect that does more than to act on what passes it."""
-    aspect = _aspect(model, name).aspect
+    aspect = aspect_named(model, name).aspect
     is_self_acting = isinstance(aspect, ExecutionAspect) and type(aspect).begin is not ExecutionAspect.begin
     if isinstance(aspect, ClockAspect) or is_self_acting:
         kind = type(aspect).__name__
@@ -228,7 +219,7 @@ def _next_acts(
     for each in names:
         if (said := _LET_THROUGH.fullmatch(each)) is None:
             raise EpicycleError(f"let through {each!r}: expected an aspect, such as lossy, lossy@gain.input or lossy#2")
-        _aspect(model, said["aspect"])
+        aspect_named(model, said["aspect"])
         wanted.append((said["aspect"], said["place"] or "", int(said["number"] or 1)))
     if not wanted:
         return []

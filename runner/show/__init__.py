@@ -4,7 +4,7 @@ from ..model.catalogue.figure import Figure
 from .canvas import FigureError, draw
 from .figures import Histogram, TimeSeries
 from .outcome import check_folder, draw_figures, summary_object, summary_table, write_folder
-from .reference import aspects_at, described, detail, markdown, overview, parts_described, weaving
+from .reference import aspects_at, described, detail, overview, parts_described, weaving
 from .sheet import Sheet
 from .trajectories import Trajectories
 
@@ -21,7 +21,6 @@ __all__ = [
     "detail",
     "draw",
     "draw_figures",
-    "markdown",
     "overview",
     "parts_described",
     "summary_object",

@@ -19,6 +19,7 @@ from ..model.build.model import Model
 from ..model.catalogue.figure import Figure
 from ..model.graph.woven import extent
 from ..study.provenance import versions
+from ..support.files import replace_file
 from ..support.printing import columns
 from ..support.shown import finite, in_time, in_words
 from .canvas import FigureError, draw
@@ -123,9 +124,7 @@ def write_folder(
         told["run"] = again
     if error:
         told["error"] = error
-    aside = folder / ".manifest.json"
-    aside.write_text(json.dumps(told, indent=2) + "\n", encoding="utf-8")
-    os.replace(aside, manifest)
+    replace_file(manifest, json.dumps(told, indent=2) + "\n")
     return [signals, manifest]
 
 

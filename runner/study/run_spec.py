@@ -30,6 +30,17 @@ FLAGS: Final = {
 _MALFORMED: Final = (OSError, ValueError, LookupError, TypeError, RecursionError)
 
 
+def as_settings(said: Iterable[str | Setting] | Mapping[str, object], *, are_ranges: bool = False) -> list[str]:
+    """What the command line says of values by path, ``path=value``; ranges and lists may be texts."""
+    site = call_site()
+    if isinstance(said, Mapping):
+        said = [
+            f"{path}={value}" if are_ranges and isinstance(value, str) else Setting(path, node_of(value, site), site)
+            for path, value in said.items()
+        ]
+    return [f"{each.path}={json.dumps(plain(each.node))}" if isinstance(each, Setting) else each for each in said]
+
+
 @dataclass(frozen=True)
 class RunSpec:
     """How a run is made: by a model, with all that changes it, or as the run of that name in a study's folder.
@@ -64,16 +75,9 @@ class RunSpec:
             each_of = [given] if isinstance(given, (str, Path)) else cast(Iterable[object], given)
             return tuple(map(str, each_of))
 
-        settings = changes.get("set", ())
-        if isinstance(settings, Mapping):
-            site = call_site()
-            settings = [Setting(path, node_of(each, site), site) for path, each in settings.items()]
-        settings = [
-            f"{each.path}={json.dumps(plain(each.node))}" if isinstance(each, Setting) else each for each in settings
-        ]
         return cls(
             str(model),
-            texts(settings),
+            tuple(as_settings(changes.get("set", ()))),
             texts(changes.get("overrides", ())),
             texts(changes.get("disturb", ())),
             texts(changes.get("aspects", ())),

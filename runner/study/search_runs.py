@@ -15,7 +15,7 @@ from .run.making import Recorder, make_in, recording
 from .run.manifest import manifest_text
 from .run.processes import Processes
 from .run.runner import Runner
-from .run.store import BEST_FIRST, Row, prepare, replace_file
+from .run.store import BEST_FIRST, Row, prepare, write
 from .session import manifest_of
 
 
@@ -75,7 +75,7 @@ class SearchRuns:
     def describe(self, plan: Plan) -> None:
         """Say in the folder's manifest which runs it has: those of a plan."""
         store = self._recorder.store
-        replace_file(store.folder / "manifest.json", manifest_text({**store.manifest, **plan.manifest()}).encode())
+        write(store.folder / "manifest.json", manifest_text({**store.manifest, **plan.manifest()}))
 
     def _keep(self, row: Row) -> None:
         self._known[row["run"]] = row

@@ -22,7 +22,7 @@ from .run.making import Recorder, make_here, recording
 from .run.manifest import FORMAT, StoreError, read_manifest
 from .run.progress import duration
 from .run.share import ALL, Share
-from .run.store import merge, prepare
+from .run.store import prepare, take
 
 LOCAL, DASK = "local", "dask"  # executors
 MANY = 100_000  # runs; larger studies need confirmation
@@ -49,33 +49,33 @@ def run_study(
     folder: Path,
     *,
     jobs: int | None = None,
-    timeout: float | None = None,
+    run_timeout: float | None = None,
     retry: bool = False,
     tell: Callable[[Backlog], None] | None = None,
     executor: str = LOCAL,
     scheduler: str | None = None,
-    share: Share = ALL,
-    others: Iterable[Path] = (),
+    part: str | None = None,
+    merge: Iterable[str | Path] = (),
 ) -> Outcome:
     """Make all runs of a plan that are not yet in the folder, in ``jobs`` processes at a time (default: one per core).
 
-    A run that raises gets a row with the status ``failed``, one that takes longer than ``timeout`` seconds a row
+    A run that raises gets a row with the status ``failed``, one that takes longer than ``run_timeout`` seconds a row
     ``timeout``.  One whose process dies is repeated, and after three attempts gets a row ``killed``; ``retry`` repeats
     both kinds.  ``tell`` is called now and then.  ``executor``: ``local``, or ``dask`` for the workers of the Dask
-    ``scheduler`` at that address or, without one, a cluster on this machine.  With a ``share`` of the runs, others may
-    write to the folder at the same time, if it is a whole session that ends the study.  The rows of ``others``, results
-    folders of the same study, are taken first.  Raises ``StoreError`` and ``WorkerError``, and ``EpicycleError`` if
-    Dask is requested but not installed.
+    ``scheduler`` at that address or, without one, a cluster on this machine.  With a ``part`` of the runs, such as
+    3/16, others may write to the folder at the same time, if it is a whole session that ends the study.  The rows of
+    the folders to ``merge``, which hold results of the same study, are taken first.  Raises ``StoreError`` and
+    ``WorkerError``, and ``EpicycleError`` if Dask is requested but not installed.
     """
-    make = _maker(executor, scheduler)  # before anything is written
+    make, share = _maker(executor, scheduler), Share.named(part)  # before anything is written
     with lock(folder, share):
         store = prepare(folder, manifest_of(plan), share)
-        for other in others:
-            merge(store, other)
+        for other in merge:
+            take(store, Path(other))
         known = store.known(plan.decides, journals=share == ALL)
         known = {key: done for key, done in known.items() if not (retry and done.status in RETRIED)}
         backlog = Backlog(plan, known, share=share)
-        with recording(store, backlog, timeout) as recorder:
+        with recording(store, backlog, run_timeout) as recorder:
             make(recorder, jobs or available_cores(), lambda: None if tell is None else tell(backlog))
         table = StudyResults(folder).write_table() if share == ALL else None
     made, there = backlog.made.total(), backlog.there.total()

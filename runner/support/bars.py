@@ -42,6 +42,23 @@ def bar(name: str, *, after: float = 0.0, terminal: Console | None = None) -> It
         yield show
 
 
+def telling(
+    show: Show | None, words: Callable[..., tuple[float, float | None, str]], progress: object = True
+) -> Callable[..., None]:
+    """A function that shows how far something has come, by what ``words`` make of it; or ``progress``, if it is one.
+
+    Nothing is shown if ``progress`` is false.
+    """
+
+    def tell(*told: Any) -> None:
+        if callable(progress):
+            progress(*told)
+        elif show is not None and progress:
+            show(*words(*told))
+
+    return tell
+
+
 def in_notebook() -> bool:
     """Whether a notebook shows what this process displays."""
     shell = getattr(sys.modules.get("IPython"), "get_ipython", lambda: None)()

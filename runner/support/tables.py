@@ -58,6 +58,9 @@ class Tabled:
     def _tables(self) -> list[Table]:
         raise NotImplementedError
 
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__}: {self._caption()}>"
+
     def __str__(self) -> str:
         return as_text(self._caption(), self._tables())
 

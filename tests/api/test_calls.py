@@ -125,7 +125,7 @@ STUDY = {"study": "load", "model": "mm1", "vary": {"load": [0.5, 0.9]}, "replica
 
 def test_a_study_is_a_mapping_and_shows_its_table() -> None:
     results = epicycle.study(STUDY, set={"mean_service": "500 ms"}, replications=2, seed=5, jobs=1)
-    assert repr(results) == "<StudyResults load: 4 of 4 runs (4 ok), in results/load>"
+    assert repr(results) == "<StudyResults: load: 4 of 4 runs (4 ok), in results/load>"
     caption, _, head, first, _ = str(results).splitlines()
     assert caption == "load: 4 of 4 runs (4 ok), in results/load"
     assert head.split() == ["load", "mean_wait", "(s)", "runs"]
@@ -158,7 +158,7 @@ def test_mistakes_in_a_study_are_told_with_their_place() -> None:
 def test_variants_run_with_the_same_seeds() -> None:
     found = epicycle.compare("mm1", {"a": {}, "b": {"set": {"load": 0.5}}}, replications=4, until=1000)
     assert found.seeds == range(1, 5)
-    assert repr(found) == "<Comparison of mm1: a, b; seeds 1 to 4>"
+    assert repr(found) == "<Comparison: mm1: a, b; seeds 1 to 4>"
     alone = epicycle.run("mm1", seed=4, until=1000, set={"load": 0.5})
     assert found.runs["b"][4].digest == alone.digest
     test = paired_difference(found.values("a", "mean_wait"), found.values("b", "mean_wait"))

@@ -25,7 +25,7 @@ def in_bash(text: str, line: str, folder: Path) -> list[str]:
     (folder / "my_model.yaml").write_text("")
     (folder / "my_folder").mkdir(exist_ok=True)
     words = f'epicycle {line}""' if line.endswith(" ") else f"epicycle {line}"
-    ask = f"source ./script; COMP_WORDS=({words}); COMP_CWORD=$((${{#COMP_WORDS[@]}} - 1)); _epicycle; "
+    ask = f"source ./script; COMP_WORDS=({words}); COMP_CWORD=$((${{#COMP_WORDS[@]}} - 1)); _shtab_epicycle; "
     ask += 'printf "%s\\n" "${COMPREPLY[@]}"'
     done = subprocess.run(["bash", "-c", ask], cwd=folder, capture_output=True, text=True, check=True)
     assert done.stderr == ""
@@ -36,7 +36,8 @@ def in_bash(text: str, line: str, folder: Path) -> list[str]:
 def test_bash_completes_commands_options_and_names(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     text = script("bash", capsys)
     offers = {
-        "": sorted([*(each.name for each in commands()), "--help", "--version"]),
+        "": sorted(each.name for each in commands()),
+        "--": ["--help", "--version"],
         "comp": ["compare", "completion"],
         "run mm": ["mm1"],
         "run my": ["my_folder", "my_model.yaml"],
@@ -47,7 +48,9 @@ def test_bash_completes_commands_options_and_names(capsys: pytest.CaptureFixture
         "study wait": ["waiting_time"],
         "describe Pois": ["PoissonClock"],
         "describe Pack": ["PacketLoss"],
-        "completion ": ["bash", "fish", "zsh"],
+        "completion ": ["bash", "fish", "powershell", "tcsh", "zsh"],
+        "recording f": ["fit"],
+        "recording fit link.csv --delay": ["--delay", "--delay-unit"],
         "study load --executor ": ["dask", "local"],
         "list schema -o my": ["my_folder", "my_model.yaml"],
         "run --debu": ["--debug"],
@@ -57,7 +60,7 @@ def test_bash_completes_commands_options_and_names(capsys: pytest.CaptureFixture
 
 
 @pytest.mark.parametrize("shell", ["zsh", "fish"])
-def test_the_other_shells_read_theirs(shell: str, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_other_shells_read_theirs(shell: str, capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     text = script(shell, capsys)
     for name in (*packaged_models(), *packaged_disturbances(), *(each.name for each in commands())):
         assert name in text

@@ -187,7 +187,7 @@ def test_delays_that_are_zero_are_told(tmp_path: Path) -> None:
     file = tmp_path / "t.csv"
     file.write_text("delay\n0\n" + "\n".join(map(str, np.random.default_rng(1).gamma(4.0, 0.01, 500))))
     fit = epicycle.fit(file)
-    assert [law.name for law in fit.fitted.delay_laws] == ["exponential"]
+    assert [law.name for law in fit.delay_laws] == ["exponential"]
     assert "; delays: exponential (does not fit: p = " in str(fit)
     assert "); 1 delay is 0, so no gamma law can be fitted\n" in str(fit)
 
@@ -224,7 +224,7 @@ def test_a_fit_is_a_disturbance(trace: Path) -> None:
     dropped, late = results.aspects["losses"]["dropped"], results.aspects["delays"]["delayed"]
     assert dropped is not None
     assert late is not None
-    assert dropped / (dropped + late) == pytest.approx(fit.fitted.lost / COUNT, rel=0.5)
+    assert dropped / (dropped + late) == pytest.approx(fit.lost / COUNT, rel=0.5)
     again = epicycle.fit(trace, at="server.input", delay="rtt", delay_unit="ms")
     assert again.disturbance("link_3") == path.read_text()
 
@@ -251,9 +251,9 @@ def test_correlated_delays_are_told(tmp_path: Path) -> None:
     file = tmp_path / "t.csv"
     file.write_text("delay\n" + "\n".join(f"{each:.6f}" for each in noise[1:] + 3 * noise[:-1]))
     fit = epicycle.fit(file)
-    assert fit.fitted.correlation == pytest.approx(0.3, abs=0.05)  # 3 / (1 + 9)
+    assert fit.correlation == pytest.approx(0.3, abs=0.05)  # 3 / (1 + 9)
     assert (
-        f"successive delays have the correlation {fit.fitted.correlation:.2f}, but Latency draws independent ones: to "
+        f"successive delays have the correlation {fit.correlation:.2f}, but Latency draws independent ones: to "
         "keep that, replay the trace with TraceReplay"
     ) in str(fit)
 

@@ -128,3 +128,41 @@ def test_each_search_answers_the_same_with_several(line: str) -> None:
 
     assert facts(1) == facts(2)
     assert module.PATIENCE > 0.0
+
+
+class StrangeError(EpicycleError):
+    """An error that is written as it is, and cannot be read."""
+
+    def __init__(self, one: str, other: str) -> None:
+        super().__init__(one + other)
+
+
+class Unreadable:
+    """Raises what only its own process can read, or cannot be read itself."""
+
+    def __init__(self, where: str) -> None:
+        self._where = where
+
+    def __setstate__(self, state: dict[str, str]) -> None:
+        raise LookupError(f"there is no {state['_where']} here")
+
+    def prepare(self, request: object) -> None:
+        """There is nothing to load."""
+
+    def make(self, request: object) -> object:
+        """Nothing."""
+        raise StrangeError("it is ", "strange")
+
+
+def test_what_cannot_be_read_is_reported() -> None:
+    """Nobody waits for ever for an answer that no process can give, or for one that this process cannot read."""
+    with Evaluator(Squares(), 2, Unreadable, "it", patience=0.0) as evaluator:
+        with pytest.raises(WorkerError) as caught:
+            evaluator.make(1, 1)
+        assert str(caught.value) == (
+            "the answer of a process cannot be read: TypeError: StrangeError.__init__() missing 1 required positional "
+            "argument: 'other'"
+        )
+        with pytest.raises(EpicycleError) as unread:
+            evaluator.make(2, Unreadable("request"))
+        assert str(unread.value) == "LookupError: there is no request here"

@@ -6,7 +6,6 @@ short run (0.5 s of 1.4 s).
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -14,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import DTypeLike
 
+from ...support.files import replacing
 from .results import Results
 
 
@@ -70,9 +70,8 @@ def write_signals(results: Results, path: Path) -> None:
             for name, values in columns.items()
         }
     )
-    aside = path.with_name(f".{path.name}")
     # Most times are close to the one before; using that, Parquet needs two thirds of the space for both columns.
     encoding = dict.fromkeys(("time", "value"), "BYTE_STREAM_SPLIT") | {"time_ns": "DELTA_BINARY_PACKED"}
     few = [name for name in columns if name not in encoding]
-    pq.write_table(table, aside, compression="zstd", use_dictionary=few, column_encoding=encoding)
-    os.replace(aside, path)
+    with replacing(path) as file:
+        pq.write_table(table, file, compression="zstd", use_dictionary=few, column_encoding=encoding)

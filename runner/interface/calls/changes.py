@@ -68,23 +68,6 @@ class Changes(TypedDict, total=False):
     types: Annotated[Iterable[type | str | Path], TYPES]
 
 
-def as_settings(said: Iterable[str] | Mapping[str, object], *, are_ranges: bool = False) -> list[str]:
-    """What the command line says of values by path, ``path=value``; ranges and lists may be texts."""
-    import json
-
-    from ...model.text.document import plain
-    from ...model.text.program import call_site, node_of
-
-    if not isinstance(said, Mapping):
-        return list(said)
-
-    def text(value: object) -> str:
-        is_text = are_ranges and isinstance(value, str)
-        return str(value) if is_text else json.dumps(plain(node_of(value, call_site())))
-
-    return [f"{path}={text(value)}" for path, value in said.items()]
-
-
 def classes(types: Iterable[type | str | Path]) -> list[type]:
     """Classes, and those that files define."""
     from ...model.catalogue.types import types_of_file

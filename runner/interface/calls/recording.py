@@ -50,7 +50,6 @@ def fit(
     from epicycle.aspects import TraceFile
 
     from ...recorded.channel import Fit
-    from ...recorded.fitting import fitted
 
     columns = {
         "time": time,
@@ -62,7 +61,7 @@ def fit(
     }
     given = {name: value for name, value in columns.items() if value is not None}
     file = TraceFile(file=trace, delay_unit=delay_unit, **given)
-    return Fit(file.file, fitted(file.read()), at)
+    return Fit.of(file.file, file.read(), at)
 
 
 def disturb(
@@ -96,12 +95,10 @@ def disturb(
 
     >>> epicycle.disturb("recording.mcap", "wifi_burst", "out.mcap", at="/robot*/plan", seed=3)
     """
-    from ...recorded.disturbed import Disturbed
     from ...recorded.passing import pass_recording
     from .changes import classes
 
     disturbances = [disturbance] if isinstance(disturbance, (str, Path)) else disturbance
-    source, path = Path(recording), Path(out)
     patterns = [at] if isinstance(at, str) else at
-    passed = pass_recording(source, path, disturbances, at=patterns, set=set, seed=seed, types=classes(types))
-    return Disturbed(source, path, passed)
+    source, target = Path(recording), Path(out)
+    return pass_recording(source, target, disturbances, at=patterns, set=set, seed=seed, types=classes(types))

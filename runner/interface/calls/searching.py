@@ -21,7 +21,6 @@ from .changes import (
     UNTIL,
     WITHOUT,
     Changes,
-    as_settings,
     first_seed,
 )
 from .running import REFERENCE, opened
@@ -108,7 +107,7 @@ def search(
     >>> epicycle.search("pid_loop", goal, vary={"plant.time_constant": "0.5 s..5 s"}).best
     """
     from ...search.searching import found
-    from ...study.run_spec import seconds
+    from ...study.run_spec import as_settings, seconds
     from ...support.bars import bar
 
     if unknown := given.keys() - SearchOptions.__annotations__.keys():
@@ -168,21 +167,17 @@ def explain(
     from ...search.explaining import explain as search
     from ...search.monitored import monitors_named
     from ...study.run_spec import spec_of
-    from ...support.bars import bar
+    from ...support.bars import bar, telling
 
     found = opened(model, seed, until, changes)
     made, seed = copy.copy(found.model), found.model.output.seed if found.seed is None else found.seed
     spec = spec_of(made, seed, found.until)
     folder = folder_for([made], out, "explanation")
+
+    def words(tried: int, faults: int) -> tuple[float, float, str]:
+        return tried, runs, f"{tried:,} of at most {runs:,} runs, smallest set: {faults:,} faults"
+
     with bar(made.name) as show:
-
-        def tell(tried: int, faults: int) -> None:
-            if callable(progress):
-                progress(tried, faults)
-            elif show is not None and progress:
-                words = f"{tried:,} of at most {runs:,} runs, smallest set: {faults:,} faults"
-                show(float(tried), float(runs), words)
-
         answer = search(
             made,
             monitors_named(made, monitor, flag=flag),
@@ -192,7 +187,7 @@ def explain(
             only=[only] if isinstance(only, str) else [*only],
             folder=folder,
             jobs=jobs,
-            tell=tell,
+            tell=telling(show, words, progress),
             command=["epicycle", "run", made.name, "--seed", str(seed)] if spec is None else spec.command(),
         )
     answer.folder = folder
@@ -230,19 +225,12 @@ def rare(
     """
     from ...search.monitored import monitor_named
     from ...search.splitting import rare as search
-    from ...support.bars import bar
+    from ...support.bars import bar, telling
 
     found = opened(model, seed, until, changes)
     made = copy.copy(found.model)
     monitor, folder = monitor_named(made, monitor), folder_for([made], out, "rare")
     with bar(made.name) as show:
-
-        def tell(tried: int, done: int) -> None:
-            if callable(progress):
-                progress(tried, done)
-            elif show is not None and progress:
-                show(float(done), float(repetitions), f"{tried:,} runs")
-
         answer = search(
             made,
             monitor,
@@ -253,7 +241,7 @@ def rare(
             until=found.until,
             folder=folder,
             jobs=jobs,
-            tell=tell,
+            tell=telling(show, lambda tried, done: (done, repetitions, f"{tried:,} runs"), progress),
         )
     answer.folder = folder
     return answer

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 from ...support.declare.parameters import COUNT, argument, option, repeated
-from .changes import JOBS, RUN_TIMEOUT, SEED, TYPES, UNTIL, as_settings, first_seed
+from .changes import JOBS, RUN_TIMEOUT, SEED, TYPES, UNTIL, first_seed
 
 if TYPE_CHECKING:
     from ...model.build.model import Model
@@ -87,7 +87,6 @@ def study(
 
     from ...study.judge.study_results import open_study
     from ...study.run.progress import progress
-    from ...study.run.share import ALL, Share
     from ...study.session import run_study
 
     plan, folder = plan_of(study, set=set, replications=replications, seed=seed, out=out, types=types)
@@ -96,13 +95,13 @@ def study(
             plan,
             folder,
             jobs=jobs,
-            timeout=run_timeout,
+            run_timeout=run_timeout,
             retry=retry,
             tell=tell,
             executor=executor,
             scheduler=scheduler,
-            share=ALL if part is None else Share.named(part),
-            others=map(Path, merge),
+            part=part,
+            merge=merge,
         )
     return open_study(folder)
 
@@ -131,6 +130,7 @@ def plan_of(
     from ...show.report import check_figures
     from ...study.plan.plan import Plan
     from ...study.run.manifest import StoreError
+    from ...study.run_spec import as_settings
     from ...study.session import plan_of_folder
 
     files, settings = [Path(each) for each in types], as_settings(set)
@@ -179,7 +179,7 @@ def compare(
     """
     from ...search.comparing import compare as compare_models
     from ...study.run_spec import seconds
-    from ...support.bars import SOON, bar
+    from ...support.bars import SOON, bar, telling
     from .running import opened
     from .searching import folder_for
 
@@ -191,11 +191,6 @@ def compare(
     }
     folder = folder_for([*models.values()], out, "comparison")
     with bar("compare", after=SOON) as show:
-
-        def tell(done: int, runs: int, what: str) -> None:
-            if show is not None and progress:
-                show(done, runs, what)
-
         answer = compare_models(
             models,
             replications=replications,
@@ -203,7 +198,7 @@ def compare(
             until=seconds("until", until),
             folder=folder,
             jobs=jobs,
-            tell=tell,
+            tell=telling(show, lambda *told: told, progress),
         )
     answer.folder = folder
     return answer

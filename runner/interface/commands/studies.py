@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ...support.declare.commands import arguments
-from ...support.printing import complain, complain_traceback, console, tell, tell_json
+from ...support.printing import complain, complain_traceback, tell, tell_json
 from ..calls import studying
 from .options import DONE, FAILED, INTERRUPTED, command, option, taken
 
@@ -41,11 +41,11 @@ def study(options: argparse.Namespace) -> int:
 
     given = arguments(studying.study, options)
     names = ("executor", "scheduler", "jobs", "run_timeout", "retry", "part", "merge")
-    session = {name: given.pop(name, None) for name in names}
-    if (scheduler := session["scheduler"]) is not None:
-        if session["executor"] != "dask":
-            raise EpicycleError(f"--scheduler {scheduler} is for --executor dask")
-        if session["jobs"] is not None:
+    session = {name: given.pop(name) for name in names if name in given}
+    if "scheduler" in session:
+        if session.get("executor") != "dask":
+            raise EpicycleError(f"--scheduler {session['scheduler']} is for --executor dask")
+        if "jobs" in session:
             raise EpicycleError(
                 "--jobs counts processes on this machine and does not go with --scheduler, which has its own workers"
             )
@@ -53,7 +53,7 @@ def study(options: argparse.Namespace) -> int:
     if given.get("replications") is not None and plan.study.until is not None:
         complain(f"{plan.study.name} decides by 'until' how many replications it needs: --replications has no effect")
     if not options.yes and not Path(options.study).is_dir():
-        check_size(plan, session["jobs"] or available_cores())
+        check_size(plan, session.get("jobs", available_cores()))
     return _session(plan, folder, options, session)
 
 
@@ -65,25 +65,12 @@ def _session(plan: Plan, folder: Path, options: argparse.Namespace, session: dic
     from ...study.run.processes import WorkerError
     from ...study.run.progress import progress
     from ...study.run.runner import again
-    from ...study.run.share import ALL, Share
     from ...study.run.store import WriteError
     from ...study.session import run_study
 
-    share = ALL if session["part"] is None else Share.named(session["part"])
     try:
         with progress(plan.study.name) as told:
-            outcome = run_study(
-                plan,
-                folder,
-                jobs=session["jobs"],
-                timeout=session["run_timeout"],
-                retry=bool(session["retry"]),
-                tell=told,
-                executor=session["executor"] or "local",
-                scheduler=session["scheduler"],
-                share=share,
-                others=map(Path, session["merge"] or ()),
-            )
+            outcome = run_study(plan, folder, tell=told, **session)
     except KeyboardInterrupt:
         complain(f"interrupted; finished runs are kept: 'epicycle study {folder}' continues")
         return INTERRUPTED
@@ -94,7 +81,7 @@ def _session(plan: Plan, folder: Path, options: argparse.Namespace, session: dic
         f"{plan.study.name}: {counted(plan.conditions, 'condition')}, {counted(outcome.made, 'new run')}, "
         f"{outcome.there:,} already there"
         + (f", {outcome.stopped_early:,} not needed" if outcome.stopped_early else "")
-        + ("" if share == ALL else f", in part {share}")
+        + (f", in part {session['part']}" if "part" in session else "")
     )
     if outcome.table is None:
         tell(f"once all parts are over, 'epicycle study {folder}' makes what they have left and writes the table")
@@ -198,21 +185,19 @@ def status(options: argparse.Namespace) -> int:
 )
 def report(options: argparse.Namespace) -> int:
     """Write report.html, a single self-contained file, and its figures; the study need not be finished."""
-    from rich.progress import Progress
-
     from ...show.report import write_report
     from ...study.judge.study_results import open_study
     from ...study.session import available_cores
+    from ...support.bars import bar, telling
 
-    results, terminal = open_study(options.folder, types=getattr(options, "types", ())), console(stderr=True)
-    folder, jobs = options.out or options.folder, getattr(options, "jobs", None) or available_cores()
-    with Progress(console=terminal, transient=True, disable=not terminal.is_terminal) as bar:
-        task = bar.add_task("repeating runs for their signals", total=None)
+    results = open_study(options.folder, types=getattr(options, "types", ()))
+    folder, jobs = options.out or options.folder, getattr(options, "jobs", available_cores())
 
-        def tell_of(done: int, total: int) -> None:
-            bar.update(task, completed=done, total=total)
+    def words(done: int, total: int) -> tuple[float, float, str]:
+        return done, total, f"{done:,} of {total:,} runs repeated for their signals"
 
-        written = write_report(results, folder, jobs=jobs, tell=tell_of)
+    with bar("report") as show:
+        written = write_report(results, folder, jobs=jobs, tell=telling(show, words))
     for path in written.files:
         tell(f"wrote {path}")
     if written.verdicts:

@@ -27,7 +27,8 @@ from epicycle.actors import EpicycleError, read_regular
 
 from ...desk.answers import ANSWERS
 from ...model.text.document import MAX_BYTES
-from ...show.view import PARTS, part, replace_file, script
+from ...show.view import PARTS, ViewError, part, script
+from ...support.files import replace_file
 from .workers import Workers
 
 OWN = ("socket", "text", "wiring", "fields", "running", "what_if", "arrange")  # in this order
@@ -64,7 +65,7 @@ class Document:
         if on_disk != self.data and not anyway:
             return {"conflict": f"{self.path.name} was changed by another program since it was read"}
         data = (text.replace("\n", "\r\n") if self.has_crlf else text).encode("utf-8")
-        replace_file(self.path, data)
+        replace_file(self.path, data, ViewError)
         self.data = data
         return {"saved": True}
 

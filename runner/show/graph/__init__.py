@@ -18,7 +18,7 @@ from pathlib import Path
 from epicycle.actors import EpicycleError
 
 from . import mermaid_text
-from .chart import Statechart, chart_text, statechart, write_statechart
+from .chart import Statechart, chart_text, statechart
 from .layout import Drawing, Scope, draw
 from .outlines import Outline, outline
 
@@ -55,19 +55,19 @@ def check_graph_path(path: Path) -> None:
         raise GraphError(f"{path} cannot be written: there is no folder {path.parent}")
 
 
-def mermaid(drawn: Outline | Statechart) -> str:
-    """An outline or a statechart as Mermaid text."""
-    return mermaid_text.mermaid(drawn) if isinstance(drawn, Outline) else chart_text(drawn)
+def mermaid(drawn: Outline) -> str:
+    """An outline, such as a statechart, as Mermaid text."""
+    return chart_text(drawn) if isinstance(drawn, Statechart) else mermaid_text.mermaid(drawn)
 
 
-def write_graph(drawn: Outline | Statechart, path: Path) -> None:
-    """Write an outline or a statechart to a file whose ending determines the format; raises ``GraphError``."""
+def write_graph(drawn: Outline, path: Path) -> None:
+    """Write an outline, such as a statechart, to a file whose ending determines the format; raises ``GraphError``."""
     check_graph_path(path)
     try:
         if path.suffix.lower() in TEXTS:
             text = mermaid(drawn)
             path.write_text(f"```mermaid\n{text}```\n" if path.suffix.lower() == ".md" else text, encoding="utf-8")
-        elif isinstance(drawn, Outline):
+        else:
             from .picture import write_picture
 
             if (boxes := drawn.size) > MOST_BOXES:
@@ -77,7 +77,5 @@ def write_graph(drawn: Outline | Statechart, path: Path) -> None:
                     "Mermaid text (.mmd) has no limit"
                 )
             write_picture(draw(drawn), path)
-        else:
-            write_statechart(drawn, path)
     except OSError as error:
         raise GraphError(f"{path} cannot be written: {error.strerror or error}") from error

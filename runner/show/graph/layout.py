@@ -13,13 +13,14 @@ from itertools import pairwise
 
 from ..canvas import text_width
 from .layers import Cell, Net, Pin, Run, layer, order
-from .outlines import Box, Link, Outline, Port, label
+from .outlines import START, Box, Link, Outline, Port, label
 from .places import Trunk, place, tracks
 
 NAME, KIND, PORT, BADGE = 9.0, 7.5, 7.0, 6.5  # font sizes in points
 ROW = 14.0  # distance between ports of an actor
 HEADER, TITLE = 28.0, 20.0  # heights of the names of an actor and a composite
 BADGE_HEIGHT, BADGE_GAP = 12.0, 3.0
+LINE = 10.0  # from one line of a text to the next
 HEAD = 9.0  # space for an arrowhead
 PADDING, TRACK = 10.0, 9.0  # beside and between the tracks of a channel
 MARGIN = 12.0
@@ -80,6 +81,10 @@ class Badge:
     def width(self) -> float:
         return badge_width(self.text)
 
+    @property
+    def height(self) -> float:
+        return badge_height(self.text)
+
 
 @dataclass(frozen=True)
 class Words:
@@ -128,7 +133,11 @@ def draw(outline: Outline, known: dict[str, Scope] | None = None) -> Drawing:
 
 
 def badge_width(words: str) -> float:
-    return text_width(words, BADGE) + 8.0
+    return max(text_width(line, BADGE) for line in words.split("\n")) + 8.0
+
+
+def badge_height(words: str) -> float:
+    return BADGE_HEIGHT + LINE * words.count("\n")
 
 
 class Scope:
@@ -178,7 +187,7 @@ class Scope:
             groups.setdefault((link.source, label(link)), []).append(link)
         nets = {}
         for (source, words), links in groups.items():
-            size = (badge_width(words) + 8.0, BADGE_HEIGHT) if words else None
+            size = (badge_width(words) + 8.0, badge_height(words)) if words else None
             nets[Net(self.pins[source], [self.pins[link.target] for link in links], size)] = links[0]
         return nets
 
@@ -222,10 +231,24 @@ class Scope:
                 pin.offset = HEADER + ROW * row + ROW / 2
         rows = max(len(cell.left), len(cell.right))
         hidden = max((badge_width(name) for name in child.aspects), default=0.0)
-        names = max(text_width(child.name, NAME, bold=True), text_width(child.kind, KIND))
+        names = max(
+            text_width(child.name, NAME, bold=True), *(text_width(each, KIND) for each in child.kind.split("\n"))
+        )
         names += 16.0 if child.is_closed else 0.0  # beside the symbol of a closed one
         cell.width = max(names + 16.0, sum(widths) + 12.0 + (10.0 if all(widths) else 0.0), hidden + 16.0, 44.0)
         cell.height = HEADER + ROW * rows + 3.0 + (BADGE_HEIGHT + BADGE_GAP) * len(child.aspects)
+        if child.shape:
+            self._measure_mode(child, cell, names, rows)
+
+    def _measure_mode(self, child: Box, cell: Cell, names: float, rows: int) -> None:
+        """The same for a mode, whose arrows end anywhere at its sides."""
+        if child.shape == START:
+            cell.width = cell.height = 8.0
+        else:
+            cell.width, cell.height = names + 20.0, max(HEADER + LINE * child.kind.count("\n") + 6.0, ROW * rows + 6.0)
+        for pins in (cell.left, cell.right):
+            for row, pin in enumerate(pins):
+                pin.offset = round(cell.height * (row + 0.5) / len(pins))
 
     def _columns(self) -> float:
         """Set the positions of the layers and of the tracks between them; returns the total width."""
@@ -292,7 +315,7 @@ class Scope:
                         drawing.badges.append(Badge(text, aspect, start, at, place=port.path))
                         start += badge_width(text) + BADGE_GAP
                     drawing.words.append(_port_name(ports[-1], child.is_open))
-            drawing.words += self._names(child, left, upper, cell.width)
+            drawing.words += self._names(child, left, upper, cell)
             hidden = upper + cell.height - BADGE_GAP - BADGE_HEIGHT / 2
             for name in reversed(child.aspects):
                 middle = left + (cell.width - badge_width(name)) / 2
@@ -311,15 +334,20 @@ class Scope:
                 at = top + cell.y + cell.height / 2
                 drawing.badges.append(Badge(label(link), "", x + start + 4.0, at, delay=link.delay))
 
-    def _names(self, box: Box, x: float, y: float, width: float) -> list[Words]:
+    def _names(self, box: Box, x: float, y: float, cell: Cell) -> list[Words]:
         """The name and type of a box: on one line above the inside of a composite, otherwise on two."""
         if box.is_open:
             name = Words(box.name, x + MARGIN, y + 14.0, NAME, bold=True)
             return [name, Words(f": {box.kind}", name.x + name.width, name.y, NAME, is_soft=True)]
-        middle = x + width / 2
+        middle, lines = x + cell.width / 2, box.kind.split("\n")
+        if box.shape:
+            y += (cell.height - LINE * len(lines) - (16.0 if box.kind else 9.0)) / 2
         return [
             Words(box.name, middle, y + 12.0, NAME, bold=True, align="center"),
-            Words(box.kind, middle, y + 22.5, KIND, is_soft=True, align="center"),
+            *(
+                Words(line, middle, y + 22.5 + LINE * number, KIND, is_soft=True, align="center")
+                for number, line in enumerate(lines)
+            ),
         ]
 
     def _wire(self, net: Net, x: float, y: float, level: int) -> Wire:

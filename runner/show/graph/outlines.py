@@ -19,6 +19,7 @@ from ...model.graph.nodes import Edge
 from ...model.graph.woven import WovenAspect
 
 MANY = 60  # boxes that a reader can take in; a larger model is folded by default
+START, MODE, FINAL = "start", "mode", "final mode"  # shapes of boxes in a statechart
 
 
 @dataclass(eq=False)
@@ -35,13 +36,14 @@ class Port:
 class Link:
     """A connection; ``delay`` is in ns.
 
-    If it represents several, ``count`` states how many, unless it is one for each instance of the boxes at its ends.
+    If it represents several, ``words`` state how many, unless it is one for each instance of the boxes at its ends; of
+    a transition, they are its label.
     """
 
     source: str
     target: str
     delay: int | None
-    count: str = ""
+    words: str = ""
 
 
 @dataclass(eq=False)
@@ -49,6 +51,7 @@ class Box:
     """An actor or a composite; the model itself is the outermost box, with an empty path.
 
     ``kind`` is its type and, if it has a local clock, the settings of that; ``has_director``: it fires as one actor.
+    A mode has a ``shape`` instead, and its ``kind`` are lines of what it does.
     ``count`` is the number of instances of an array that it represents.  ``is_closed``: a composite whose inside is not
     shown.  ``aspects`` are attached to the actor itself, or inside the closed composite.
     """
@@ -65,6 +68,7 @@ class Box:
     has_director: bool = False
     is_closed: bool = False
     aspects: tuple[str, ...] = ()
+    shape: str = ""
 
     @property
     def is_open(self) -> bool:
@@ -293,7 +297,7 @@ def duration(nanoseconds: int) -> str:
 def label(link: Link) -> str:
     """The label of a connection."""
     parts = [] if link.delay is None else [duration(link.delay)]
-    return ", ".join([*parts, link.count] if link.count else parts)
+    return ", ".join([*parts, link.words] if link.words else parts)
 
 
 def short_name(aspect: str) -> str:

@@ -18,8 +18,23 @@ from epicycle.aspects import Processor
 
 from ...model.graph.woven import WovenAspect, extent
 from ..canvas import font, new_canvas, save, style, text_width
-from .layout import BADGE, BADGE_HEIGHT, MARGIN, PORT, Badge, Drawing, Line, PlacedBox, Point, Wire, Words, badge_width
-from .outlines import duration, shared, short_name
+from .layout import (
+    BADGE,
+    BADGE_HEIGHT,
+    LINE,
+    MARGIN,
+    PORT,
+    Badge,
+    Drawing,
+    Line,
+    PlacedBox,
+    Point,
+    Wire,
+    Words,
+    badge_height,
+    badge_width,
+)
+from .outlines import FINAL, START, duration, shared, short_name
 
 INK, SOFT, FAINT = "#1a1a1a", "#5f6672", "#a9afb8"
 FRAMES = ("#f3f5f8", "#e9edf3", "#dfe5ed", "#d5dde7")
@@ -27,7 +42,7 @@ ASPECTS = ("#E69F00", "#56B4E9", "#009E73", "#CC79A7", "#F0E442", "#D55E00", "#0
 DARK = ("#D55E00", "#0072B2", "#009E73")  # text on these is white
 # For a PNG: whole pixels per point, so that lines are sharp; the most pixels in all, and on one side.
 DPI, PIXELS, SIDE = (144, 72), 1.6e7, 12000
-LINE = 15.0  # height of a line of the legend
+ROW = 15.0  # height of a line of the legend
 
 
 def write_picture(drawing: Drawing, path: Path) -> None:
@@ -35,7 +50,7 @@ def write_picture(drawing: Drawing, path: Path) -> None:
     aspects = aspects_seen(drawing)
     legend = legend_of(drawing, aspects)
     width = max([drawing.width, *(row.indent + text_width(row.explanation, PORT) + 2 * MARGIN for row in legend)])
-    height = drawing.height + LINE * len(legend) + (MARGIN if legend else 0.0)
+    height = drawing.height + ROW * len(legend) + (MARGIN if legend else 0.0)
     most = 72 * min(SIDE / max(width, height), math.sqrt(PIXELS / (width * height)))
     with style({"path.simplify": False}):
         canvas = new_canvas(width / 72, height / 72)
@@ -143,7 +158,7 @@ class Painter:
             self.path(ties(group), self.colours[group[0].aspect], 3.0, dashes=(1.2, 1.0))
         self.wires(drawing.wires)
         for placed in drawing.boxes:
-            for port in placed.ports:
+            for port in placed.ports if not placed.box.shape else ():
                 self.port(port.x, port.y, INK if port.is_joined else FAINT, port.port.is_multi)
         self.marks()
         for words in drawing.words:
@@ -151,18 +166,22 @@ class Painter:
         for badge in drawing.badges:
             self.badge(badge.text, badge.aspect, badge.x, badge.y)
         for number, row in enumerate(legend):
-            self.row(row, MARGIN, drawing.height + MARGIN / 2 + LINE * (number + 0.5))
+            self.row(row, MARGIN, drawing.height + MARGIN / 2 + ROW * (number + 0.5))
         self.marks()
 
     def box(self, placed: PlacedBox) -> None:
         """A box: white for an actor, shaded for a composite, with a double border if it has a director."""
         box, x, y = placed.box, placed.x, placed.y
+        if box.shape == START:
+            self.sheet.add_artist(self.shapes.Circle((x + placed.width / 2, y + placed.height / 2), 4.0, facecolor=INK))
+            return
         fill = FRAMES[placed.level % len(FRAMES)] if box.is_composite else "white"
         for inset in (8.0, 4.0) if box.count > 1 else ():
             self.rectangle(x + inset, y + inset, placed.width - 2 * inset, placed.height - inset / 4, fill)
-        self.rectangle(x, y, placed.width, placed.height, fill)
-        if box.has_director:
-            self.rectangle(x + 2.5, y + 2.5, placed.width - 5.0, placed.height - 5.0, fill)
+        radius = 9.0 if box.shape else 3.0
+        self.rectangle(x, y, placed.width, placed.height, fill, radius)
+        if box.has_director or box.shape == FINAL:
+            self.rectangle(x + 2.5, y + 2.5, placed.width - 5.0, placed.height - 5.0, fill, radius - 0.5)
         if box.is_closed:
             self.closed(x + placed.width - 10.0, y + 3.0)
 
@@ -233,10 +252,12 @@ class Painter:
 
     def badge(self, words: str, aspect: str, x: float, y: float) -> None:
         """A badge: coloured for an aspect, white for a label of the connection."""
-        fill, half, width = self.colours[aspect] if aspect else "white", BADGE_HEIGHT / 2, badge_width(words)
-        self.rectangle(x, y - half, width, BADGE_HEIGHT, fill, half, linewidth=0.6, zorder=4)
+        fill, width, height = self.colours[aspect] if aspect else "white", badge_width(words), badge_height(words)
+        self.rectangle(x, y - height / 2, width, height, fill, BADGE_HEIGHT / 2, linewidth=0.6, zorder=4)
         ink = "white" if fill in DARK else INK
-        self.words(Words(words, x + width / 2, y + 0.35 * BADGE, BADGE, align="center"), ink)
+        first = y - (height - BADGE_HEIGHT) / 2 + 0.35 * BADGE
+        for number, line in enumerate(words.split("\n")):
+            self.words(Words(line, x + width / 2, first + LINE * number, BADGE, align="center"), ink)
 
     def words(self, words: Words, colour: str = "") -> None:
         look = {"color": colour or (SOFT if words.is_soft else INK), "ha": words.align, "va": "baseline", "zorder": 5}

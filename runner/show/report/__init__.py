@@ -16,7 +16,7 @@ from ...model.text.program import describe, raised_at
 from ...study.judge.claims import ranked
 from ...study.judge.study_results import StudyResults
 from ...study.run.runner import Replay, repeat
-from ...study.run.store import replace_file
+from ...study.run.store import write
 from ...study.session import plan_of_folder
 from ..canvas import FORMATS, FigureError, style
 from ..outcome import MAX_NAME
@@ -91,7 +91,7 @@ def write_report(
     texts["report.html"] = report_page(data, pictures, judgements, recommendations)
     for name, text in texts.items():
         path = folder / name
-        replace_file(path, text.encode())
+        write(path, text)
         report.files.append(path)
     report.verdicts = Counter(each.verdict for each in judgements)
     return report

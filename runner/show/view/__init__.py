@@ -3,9 +3,8 @@
 from .drawing import drawn
 from .mcap_file import require_mcap, write_mcap
 from .page import PARTS, data_of, page_of, part, script, write_page
-from .recording import Recording
+from .recording import Recording, ViewError
 from .rerun_file import require_rerun, write_rerun
-from .writing import ViewError, replace_file
 
 __all__ = [
     "PARTS",
@@ -15,7 +14,6 @@ __all__ = [
     "drawn",
     "page_of",
     "part",
-    "replace_file",
     "require_mcap",
     "require_rerun",
     "script",

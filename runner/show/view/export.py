@@ -1,5 +1,6 @@
 """Prepares a run for other viewers: its marks as points, discs and paths, its firings, and the acts of its aspects.
 
+There are two exporters, because rerun (0.41) loads MCAP messages in JSON, which Foxglove reads, as raw bytes alone.
 These viewers have neither figures nor superdense time.  A mark becomes scenes, each of which holds until the next; at
 any moment, a viewer needs only the latest scene.
 """
@@ -20,8 +21,7 @@ from ...execution.results import Results
 from ...model.catalogue.figure import Mark
 from ...support.shown import short
 from ..sheet import LIMIT, PALETTE
-from .recording import NOTHING, Recording
-from .writing import ViewError
+from .recording import NOTHING, Recording, ViewError
 
 TRAIL = 200  # points of a trail, and how often it is drawn again
 STALE = 1.6  # usual intervals after which a line of sight ends

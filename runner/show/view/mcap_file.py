@@ -19,10 +19,10 @@ from typing import TYPE_CHECKING, Any
 from epicycle.actors import Tag
 
 from ...execution.results import Signal, plain
+from ...support.files import replace_file
 from ...support.shown import finite
 from .export import Act, Colour, Disc, Point, Scene, Thing, about, acts, extent, firings, parts, results_of, things
-from .recording import Recording
-from .writing import ViewError, replace_file
+from .recording import Recording, ViewError
 
 if TYPE_CHECKING:
     from mcap.writer import Writer
@@ -40,7 +40,7 @@ Message = tuple[int, int, Any]  # time (ns), channel, content to write as JSON
 
 def write_mcap(recording: Recording, path: Path) -> None:
     """Write an MCAP file of a run; raises ``ViewError``."""
-    replace_file(path, mcap(recording))
+    replace_file(path, mcap(recording), ViewError)
 
 
 def require_mcap() -> type[Writer]:

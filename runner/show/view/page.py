@@ -18,6 +18,7 @@ from ...execution.results import Results, Verdict
 from ...model.build.model import Model
 from ...model.catalogue.figure import Figure
 from ...model.graph.model_graph import ModelGraph
+from ...support.files import replace_file
 from ...support.html import Html, tag
 from ...support.shown import short
 from ..sheet import PALETTE
@@ -25,8 +26,7 @@ from .differing import comparison, difference, four
 from .drawing import drawn
 from .lanes import lanes
 from .packing import Pack
-from .recording import Recording
-from .writing import ViewError, replace_file
+from .recording import Recording, ViewError
 
 # In this order, because each uses the ones before it; a program that arranges them follows.
 PARTS = ("data", "causes", "paint", "state", "space", "graph", "timeline", "lanes", "chart", "details", "viewer")
@@ -36,7 +36,7 @@ def write_page(
     recordings: Sequence[Recording], path: Path, *, names: Sequence[str] = (), story: Sequence[str] = ()
 ) -> None:
     """Write the page of one run, or of two that are compared; raises ``ViewError``."""
-    replace_file(path, page_of(recordings, names=names, story=story).encode())
+    replace_file(path, page_of(recordings, names=names, story=story), ViewError)
 
 
 def page_of(recordings: Sequence[Recording], *, names: Sequence[str] = (), story: Sequence[str] = ()) -> str:

@@ -13,7 +13,7 @@ from bisect import bisect_right
 from collections.abc import Callable, Mapping
 from typing import Any, NamedTuple
 
-from epicycle.actors import Tag
+from epicycle.actors import EpicycleError, Tag
 
 from ...execution.engine import Firing, Interventions, Simulation, Tracer
 from ...execution.results import Record, Results, canonical, plain
@@ -26,6 +26,10 @@ MOST = 1_600_000  # firings that are kept: a page of some 15 MB
 STRETCH = 512  # firings in a row that are kept or left out together
 LONGEST = 160  # characters per token
 MISSING, NOTHING = -2, -1  # in a column of numbers: left out, or non-existent
+
+
+class ViewError(EpicycleError):
+    """A page or another file that shows a run cannot be made."""
 
 
 class Names(dict[Any, int]):

@@ -15,10 +15,10 @@ from epicycle.actors import Tag
 from epicycle.aspects import STAMP
 
 from ...execution.results import Signal, cell, leaves
+from ...support.files import replace_file
 from ..samples import selected
 from .export import Act, Disc, Thing, about, acts, encodable, extent, firings, parts, results_of, things
-from .recording import Recording
-from .writing import ViewError, replace_file
+from .recording import Recording, ViewError
 
 PIXELS = 5.0  # radius of a point
 AWAY = 1.4  # times the width of the space: from there, the camera sees all of it
@@ -29,7 +29,7 @@ LAST = 2**62  # microstep after all others of an instant
 
 def write_rerun(recording: Recording, path: Path) -> None:
     """Write a recording for rerun; raises ``ViewError``."""
-    replace_file(path, _Writer(recording).written())
+    replace_file(path, _Writer(recording).written(), ViewError)
 
 
 def require_rerun() -> Any:

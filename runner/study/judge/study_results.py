@@ -21,7 +21,7 @@ from ..plan.columns import Column
 from ..plan.plan import Plan
 from ..run.backlog import OK
 from ..run.manifest import StoreError
-from ..run.store import BEST_FIRST, Store, parquet_of, replace_file
+from ..run.store import BEST_FIRST, Store, parquet_of, write
 from .claims import ClaimVerdict, Ranking, judge, ranked
 from .guideline import Recommendation, recommend
 from .samples import Samples
@@ -260,9 +260,6 @@ class StudyResults(Tabled):
         found: xarray.Dataset = xarray.Dataset.from_dataframe(frame)
         return found
 
-    def __repr__(self) -> str:
-        return f"<StudyResults {self._caption()}>"
-
     def _caption(self) -> str:
         counts, plan = self.counts(), self.plan
         told = ", ".join(f"{number:,} {status}" for status, number in sorted(counts.items())) or "none is over"
@@ -287,7 +284,7 @@ class StudyResults(Tabled):
 
     def write_table(self) -> Path:
         """Write ``table.parquet``."""
-        replace_file(self.path, parquet_of(self.table()))
+        write(self.path, parquet_of(self.table()))
         return self.path
 
     def is_written(self) -> bool:

@@ -78,7 +78,7 @@ def make_in(processes: Processes, recorder: Recorder, jobs: int, tell: Callable[
     """Make the runs in these processes."""
     backlog, tasks = recorder.backlog, dict[Future[Outcome], Task]()
     over: queue.SimpleQueue[Future[Outcome]] = queue.SimpleQueue()
-    with ThreadPoolExecutor(jobs) as threads:
+    with ThreadPoolExecutor(jobs) as threads, _ending(processes):
         while True:
             # More than there are processes: each starts its next run before the last one is written.
             while len(tasks) < 2 * jobs and (task := backlog.next()) is not None:
@@ -93,6 +93,16 @@ def make_in(processes: Processes, recorder: Recorder, jobs: int, tell: Callable[
             except queue.Empty:
                 pass
             tell()
+
+
+@contextmanager
+def _ending(processes: Processes) -> Iterator[None]:
+    """End processes if anything goes wrong: threads that wait for their runs could wait for ever."""
+    try:
+        yield
+    except BaseException:
+        processes.end()
+        raise
 
 
 def _make(processes: Processes, task: Task, timeout: float | None) -> Outcome:

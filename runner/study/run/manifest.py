@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 from epicycle.actors import EpicycleError, read_regular
 
 from ...model.language.study import MAX_REPLICATIONS, MAX_STUDY_SEED
+from ...support.shapes import fits
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -27,8 +28,7 @@ class DamagedError(StoreError):
     """A file of a results folder that no longer holds what was written."""
 
 
-# The entries from which a plan is restored, and their shapes: a type, some of the values, a list or mapping of these
-# (of two of the same, if there are two), a record, or (in a tuple) one of several.
+# The entries from which a plan is restored, and their shapes.
 _KINDS = frozenset({"bool", "int", "float", "text"})
 _COLUMN = {"unit": str, "doc": str}
 _COLUMNS = ({**_COLUMN, "label": str, "is_share": bool}, {**_COLUMN, "label": str}, _COLUMN)
@@ -60,23 +60,6 @@ _MORE: dict[str, Any] = {
     "code": {str: str},
     "seal": (None, str),
 }
-
-
-def _fits(value: Any, shape: Any) -> bool:
-    match shape:
-        case tuple():
-            return any(_fits(value, each) for each in shape)
-        case list():
-            has_length = isinstance(value, list) and len(shape) in (1, len(value))
-            return has_length and all(_fits(each, shape[0]) for each in value)
-        case dict():
-            has_keys = isinstance(value, dict) and (str in shape or value.keys() == shape.keys())
-            return has_keys and all(_fits(each, shape.get(str) or shape[name]) for name, each in value.items())
-        case range():
-            return type(value) is int and value in shape  # for any other type it would compare every number
-        case frozenset():
-            return type(value) is str and value in shape
-    return value is None if shape is None else type(value) is shape
 
 
 def columns_of_rows(factors: Mapping[str, str], metrics: Iterable[str]) -> dict[str, str]:
@@ -145,6 +128,6 @@ def read_manifest(folder: Path) -> dict[str, Any]:
     if missing := [repr(name) for name in (*_SHAPE, "checksum") if name not in manifest]:
         raise damaged(f"is damaged: it has no {', '.join(missing)}")
     shapes = _SHAPE | {name: shape for name, shape in _MORE.items() if name in manifest}
-    if unlike := [repr(name) for name, shape in shapes.items() if not _fits(manifest[name], shape)]:
+    if unlike := [repr(name) for name, shape in shapes.items() if not fits(manifest[name], shape)]:
         raise damaged(f"is damaged: {', '.join(unlike)} cannot have been written like this")
     return manifest

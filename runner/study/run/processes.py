@@ -49,6 +49,7 @@ class Worker(Protocol):
 
     def prepare(self, request: Any) -> None:
         """Load what is needed; has the same time limit as ``make``."""
+        return  # there may be nothing to load
 
     def make(self, request: Any) -> Any:
         """The result, as plain data."""
@@ -118,6 +119,9 @@ class _Process:
                 self._told.put(pickle.load(self._process.stdout))
         except (EOFError, OSError, pickle.UnpicklingError):
             self._told.put((DEAD, self._process.wait()))
+        except Exception as error:  # of a class that only that process knows; somebody waits for an answer
+            told = f"the answer of a process cannot be read: {type(error).__name__}: {error}"
+            self._told.put((RAISED, WorkerError(told)))
 
 
 class Processes:
@@ -209,14 +213,19 @@ def serve() -> None:
         replies.write(pickle.dumps((what, told)))
         replies.flush()
 
+    def taken() -> Any:
+        if isinstance(found := given.get(), Exception):
+            raise found
+        return found
+
     try:
         with seldom_collecting():
-            begin, arguments = given.get()
+            begin, arguments = taken()
             worker: Worker = begin(*arguments)
             tell(READY)
             is_settled = False
             while True:
-                request = given.get()
+                request = taken()
                 worker.prepare(request)
                 tell(BEGUN)
                 tell(DONE, worker.make(request))
@@ -238,3 +247,5 @@ def _listen(requests: BinaryIO, given: queue.SimpleQueue[Any]) -> None:
             given.put(pickle.load(requests))
     except (EOFError, OSError):
         os._exit(1)
+    except Exception as error:  # what it is made of is not there
+        given.put(error)

@@ -14,38 +14,32 @@ from .backlog import Backlog
 EVERY = 60.0  # s between two lines where there is no bar
 
 
-class Rate:
-    """The rate of a session, and the work left."""
-
-    def __init__(self) -> None:
-        self.started = time.monotonic()
-
-    def line(self, backlog: Backlog) -> str:
-        """``120 of 6,000 runs, 2 failed, 3.1 runs/s, 32 min left``."""
-        parts = [f"{backlog.over:,} of {backlog.total:,} runs"]
-        if backlog.failed:
-            parts.append(f"{backlog.failed:,} failed")
-        if rate := backlog.made.total() / ((time.monotonic() - self.started) or math.inf):
-            parts += [f"{rate:.3g} runs/s", f"{duration(backlog.left / rate)} left"]
-        return ", ".join(parts)
+def line(backlog: Backlog, elapsed: float) -> str:
+    """``120 of 6,000 runs, 2 failed, 3.1 runs/s, 32 min left``, after so many seconds."""
+    parts = [f"{backlog.over:,} of {backlog.total:,} runs"]
+    if backlog.failed:
+        parts.append(f"{backlog.failed:,} failed")
+    if rate := backlog.made.total() / (elapsed or math.inf):
+        parts += [f"{rate:.3g} runs/s", f"{duration(backlog.left / rate)} left"]
+    return ", ".join(parts)
 
 
 @contextmanager
 def progress(name: str) -> Iterator[Callable[[Backlog], None]]:
     """A function for a session to call now and then."""
-    rate = Rate()
     with bar(name) as show:
-        last = rate.started
+        started = last = time.monotonic()
         if show is not None:
             show(0.0, None, "")
 
         def tell(backlog: Backlog) -> None:
             nonlocal last
+            said = line(backlog, (now := time.monotonic()) - started)
             if show is not None:
-                show(backlog.over, backlog.total, rate.line(backlog))
-            elif time.monotonic() - last >= EVERY:
-                last = time.monotonic()
-                complain(f"{time.strftime('%H:%M:%S')} {name}: {rate.line(backlog)}")
+                show(backlog.over, backlog.total, said)
+            elif now - last >= EVERY:
+                last = now
+                complain(f"{time.strftime('%H:%M:%S')} {name}: {said}")
 
         yield tell
 

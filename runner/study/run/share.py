@@ -25,8 +25,10 @@ class Share:
     of: int = 1
 
     @classmethod
-    def named(cls, text: str) -> Share:
-        """That of a text such as ``3/16``; raises ``EpicycleError``."""
+    def named(cls, text: str | None) -> Share:
+        """That of a text such as ``3/16``, or without one the only share; raises ``EpicycleError``."""
+        if text is None:
+            return ALL
         found = re.fullmatch(r"([0-9]{1,6})/([0-9]{1,6})", text)
         if found is None or not 1 <= int(found[1]) <= int(found[2]) <= MAX_SHARES:
             raise EpicycleError(f"{text!r} is not a part such as 3/16, the third of 16")

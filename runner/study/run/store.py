@@ -37,6 +37,7 @@ from uuid import uuid4
 
 from epicycle.actors import counted, irregular, read_regular
 
+from ...support.files import replace_file
 from .backlog import FAILED, KILLED, OK, TIMEOUT, Done
 from .manifest import OF_SESSION, DamagedError, StoreError, checksum, manifest_text, read_manifest, schema_of
 from .share import ALL, Share
@@ -128,7 +129,7 @@ def prepare(folder: Path, manifest: Mapping[str, Any], share: Share = ALL) -> St
         for name in ("parts", "journals"):
             (folder / name).mkdir(exist_ok=True)
         if share == ALL or before is None or _plan_in(before) != _plan_in(manifest):
-            _replace(path, manifest_text(manifest).encode())
+            _replace(path, manifest_text(manifest))
         for pattern in ("parts/.*.parquet.*", ".manifest.json.*", ".table.parquet.*") if share == ALL else ():
             for aside in folder.glob(pattern):
                 aside.unlink()  # left by a process that was killed while writing
@@ -150,7 +151,7 @@ def prepare(folder: Path, manifest: Mapping[str, Any], share: Share = ALL) -> St
     return store
 
 
-def merge(store: Store, folder: Path) -> None:
+def take(store: Store, folder: Path) -> None:
     """Add the rows of another results folder of the same study; raises ``StoreError`` for one of another study."""
     other, known = Store(folder), store.known()
     _check_same(folder, other.manifest, store.manifest)
@@ -278,24 +279,14 @@ def parquet_of(table: pa.Table) -> bytes:
     return buffer.getvalue()
 
 
-def replace_file(path: Path, data: bytes) -> None:
+def write(path: Path, data: bytes | str) -> None:
     """Write a file of the folder so that it appears all at once; raises ``WriteError``."""
     with writing(path.parent):
         _replace(path, data)
 
 
-def _replace(path: Path, data: bytes) -> None:
-    """Write a temporary file, bring it to the disk, and move it into its place."""
-    aside = path.with_name(f".{path.name}.{uuid4().hex}")  # other machines may write to the folder, too
-    try:
-        with aside.open("wb") as file:
-            file.write(data)
-            file.flush()
-            os.fsync(file.fileno())
-        os.replace(aside, path)
-    except BaseException:
-        aside.unlink(missing_ok=True)
-        raise
+def _replace(path: Path, data: bytes | str) -> None:
+    replace_file(path, data)
     _sync_folder(path.parent)
 
 

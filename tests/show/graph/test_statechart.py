@@ -8,7 +8,7 @@ import pytest
 
 from epicycle.actors import EpicycleError
 from epicycle.runner import load_model
-from epicycle.runner.show.graph import mermaid, statechart, write_graph
+from epicycle.runner.show.graph import draw, mermaid, statechart, write_graph
 from tests.actors.feeding import load
 
 MODEL = """
@@ -55,15 +55,16 @@ def test_the_same_machine_gives_the_same_picture(tmp_path: Path, ending: str) ->
     assert files[0].stat().st_size > 5_000
 
 
-def test_labels_and_modes_keep_clear_of_each_other(tmp_path: Path) -> None:
-    """No two modes of the packaged machines lie on each other."""
+def test_labels_and_modes_keep_clear_of_each_other() -> None:
+    """No two modes or labels of the packaged machines lie on each other."""
     for name, path in (("bouncing_modes", "ball"), ("traffic_light", "cars"), ("thermostat", "room")):
-        chart = statechart(load_model(name), path)
-        write_graph(chart, tmp_path / "it.svg")
-        for place, one in enumerate(chart.states):
-            for other in chart.states[place + 1 :]:
-                apart = abs(one.x - other.x) > (one.width + other.width) / 2
-                assert apart or abs(one.y - other.y) > (one.height + other.height) / 2
+        drawing = draw(statechart(load_model(name), path))
+        spaces = [(each.x, each.y, each.width, each.height) for each in drawing.boxes if not each.box.is_composite]
+        spaces += [(each.x, each.y - each.height / 2, each.width, each.height) for each in drawing.badges]
+        assert len(spaces) > 4
+        for place, (x, y, width, height) in enumerate(spaces):
+            for left, top, across, down in spaces[place + 1 :]:
+                assert x + width < left or left + across < x or y + height < top or top + down < y
 
 
 def test_what_has_no_modes_is_told() -> None:

@@ -56,19 +56,17 @@ def test_progress_is_a_line_a_minute_without_a_terminal(
     ]
 
 
-def test_what_is_left_is_only_what_has_to_be_made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_is_left_is_only_what_has_to_be_made(tmp_path: Path) -> None:
     """A study continues with more replications: half of its runs exist, and not only at the beginning."""
     plan = plan_of(write(tmp_path))
     keys = [plan.key(plan.condition(each), one) for each in range(2) for one in range(5)]
     there = {key: Done(OK) for key in (*keys[:2], *keys[5:8], "a run of another model")}
-    now = 1000.0
-    monkeypatch.setattr(progress_module.time, "monotonic", lambda: now)
-    backlog, rate = Backlog(plan, there), progress_module.Rate()
+    backlog, elapsed = Backlog(plan, there), 0.0
     lines = []
     while (task := backlog.next()) is not None:
-        now += 12.0
+        elapsed += 12.0
         backlog.finished(task, Done(OK))
-        lines.append(rate.line(backlog))
+        lines.append(progress_module.line(backlog, elapsed))
     assert lines == [
         "3 of 10 runs, 0.0833 runs/s, 48 s left",
         "4 of 10 runs, 0.0833 runs/s, 36 s left",

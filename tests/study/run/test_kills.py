@@ -128,6 +128,23 @@ def test_an_interrupt_ends_it_with_a_word(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
+def test_an_interrupt_does_not_wait_for_runs(tmp_path: Path) -> None:
+    write(tmp_path)
+    out = tmp_path / "out"
+    arguments = ("study", tmp_path / "walks.yaml", "--types", THIS, "--set", "pause=1000", "--out", out, "--jobs", 2)
+    process = subprocess.Popen(command(*arguments), start_new_session=True, stderr=subprocess.PIPE, text=True)
+    deadline = time.monotonic() + 60
+    while len(members(process.pid)) < 2 and time.monotonic() < deadline:
+        time.sleep(0.05)
+    time.sleep(5.0)
+    os.killpg(process.pid, signal.SIGINT)
+    _, said = process.communicate(timeout=30)
+    assert process.returncode == 130
+    assert said == f"interrupted; finished runs are kept: 'epicycle study {out}' continues\n"
+    assert members(process.pid) == []
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("jobs", [1, 2])
 @pytest.mark.parametrize("executor", ["local", "dask"])
 def test_nothing_is_lost_in_twenty_kills(executor: str, jobs: int, tmp_path: Path) -> None:

@@ -190,6 +190,9 @@ function list(title, items) {
 /** @param {(string | number)[][]} rows @param {string} className */
 function table(rows, className) {
   const made = element("table", { className });
-  for (const row of rows) made.append(element("tr", {}, ...row.map((cell, i) => element(i ? "td" : "th", { text: String(cell) }))));
+  for (const [name, ...cells] of rows) {
+    const parts = String(name).split(/(?<=[_.])/).flatMap((part) => [part, element("wbr")]); // long names break between words
+    made.append(element("tr", {}, element("th", {}, ...parts), ...cells.map((cell) => element("td", { text: String(cell) }))));
+  }
   return made;
 }

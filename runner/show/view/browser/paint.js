@@ -63,7 +63,7 @@ class View {
   }
 
   /** @param {string} words @param {number} x @param {number} y @param {TextStyle} style */
-  text(words, x, y, { colour = theme.ink, size = 11, align = "left", bold = false, width = Infinity, isApart = false } = {}) {
+  text(words, x, y, { colour = theme.ink, size = 11, align = "left", bold = false, width = Infinity, isApart = false, isWhole = false } = {}) {
     const { paper } = this;
     paper.font = `${bold ? "600 " : ""}${size}px system-ui, sans-serif`;
     paper.fillStyle = colour;
@@ -74,6 +74,7 @@ class View {
       const fits = search(words.length, (count) => paper.measureText(`${words.slice(0, count + 1)}…`).width > width);
       words = `${words.slice(0, fits)}…`;
     }
+    if (isWhole && x < this.width) x = Math.min(x, this.width - paper.measureText(words).width - 3); // not cut off at the edge
     if (isApart) { // from what is drawn behind it
       Object.assign(paper, { strokeStyle: theme.panel, lineWidth: 4 });
       paper.setLineDash([]);

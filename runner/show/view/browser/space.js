@@ -148,7 +148,7 @@ class Space extends View {
       this.dot(x, y, mark.radius * this.camera.scale, faded(colour, 0.14), faded(colour, 0.6));
     }
     this.dot(x, y, isChosen ? 8 : 5.5, colour, isChosen ? theme.ink : theme.paper);
-    this.text(mark.name.replace(/\.[^.]*$/, ""), x + 9, y - 8, { bold: isChosen, size: 11.5 });
+    this.text(mark.name.replace(/\.[^.]*$/, ""), x + 9, y - 8, { bold: isChosen, size: 11.5, isWhole: true });
   }
 
   /** @param {Paper} paper @param {Mark} mark */
@@ -162,7 +162,7 @@ class Space extends View {
     paper.closePath();
     paper.fillStyle = this.colour(mark);
     paper.fill();
-    this.text(mark.name, x + 12, y + 4, { colour: theme.soft });
+    this.text(mark.name, x + 12, y + 4, { colour: theme.soft, isWhole: true });
   }
 
   /** @param {Paper} paper @param {Mark} mark @param {number} time */
