@@ -87,9 +87,9 @@ def test_published_inputs_do_what_is_published(monitor: str) -> None:
 def test_a_search_of_the_board(tmp_path: Any) -> None:
     case = {
         "search": "transmission", "monitor": "AT2", "vary": {"throttle": "0..100", "brake": "0..350"}, "until": "7 s",
-        "published": {"found": 50, "mean": 9.22},
+        "searches": 1, "published": {"found": 50, "mean": 9.22},
     }  # fmt: skip
-    falsified, runs = falsifying.searches(FOLDER / "transmission.yaml", case, tmp_path, 1, searches=1)
+    falsified, runs = falsifying.searches(FOLDER / "transmission.yaml", case, tmp_path, 1)
     assert falsified[:4] == ("AT2 falsified", "50 of 50 searches", "1 of 1 searches", True)
     assert runs[0] == "mean number of runs until AT2 is broken"
     assert runs[3]

@@ -3,7 +3,8 @@
 - ``replay: NAME`` with ``monitor``: inputs that are published as breaking it do, and what the port ``of`` sends then is
   ``within`` so much of what is published there.
 - ``search: NAME`` with ``monitor`` and ``vary``: searches with several seeds, each of at most as many runs as were
-  published; ``published`` has in how many of 50 something was ``found``, and the ``mean`` number of runs of these.
+  published, so many ``searches``; ``published`` has in how many of 50 something was ``found``, and the ``mean``
+  number of runs of these.
 """
 
 from __future__ import annotations
@@ -22,10 +23,9 @@ from epicycle.runner.execution.results import Results
 
 PUBLISHED = "counterexamples/published.yaml"
 SEGMENT = 5.0  # s
-SEARCHES = 5  # of each property; 50 were published, and take hours
 FIRST, APART = 50_000, 1_000  # the seed of the first search, of which none was looked at before; between seeds
 MOST = 300  # runs of a search
-OF = 50  # published searches
+OF = 50  # published searches of each property
 
 
 @cache
@@ -81,11 +81,11 @@ def replays(file: Path, case: Mapping[str, Any]) -> tuple[str, str, str, bool, s
 
 
 def searches(
-    file: Path, case: Mapping[str, Any], folder: Path, jobs: int | None, searches: int = SEARCHES
+    file: Path, case: Mapping[str, Any], folder: Path, jobs: int | None
 ) -> Iterator[tuple[str, str, str, bool, str]]:
     """How often searches find something, and after how many runs: asked, published, found, whether it is met."""
     runs = []
-    until = case.get("until")
+    until, searches = case.get("until"), case["searches"]
     for number in range(searches):
         found = epicycle.search(
             file, epicycle.Break(case["monitor"], runs=MOST), vary=case["vary"], set=case.get("set", {}), until=until,
