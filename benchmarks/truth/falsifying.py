@@ -82,7 +82,7 @@ def replays(file: Path, case: Mapping[str, Any]) -> Iterator[tuple[str, str, str
         command,
     )
     yield (
-        f"robustness of {case['monitor']} there, by rtamt",
+        f"robustness of {case['monitor']} with published inputs, by rtamt",
         ", ".join(f"{example['rtamt']:.4g}" for example in examples),
         "the same within 1e-9" if apart <= EQUAL else f"{apart:.2g} away",
         apart <= EQUAL,
