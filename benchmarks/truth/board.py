@@ -158,8 +158,8 @@ def _beside(name: str, case: Mapping[str, Any], jobs: int | None) -> Iterator[Li
 
 def _of_replay(name: str, case: Mapping[str, Any], jobs: int | None) -> Iterator[Line]:
     file = HERE / name / f"{case['replay']}.yaml"
-    *told, command = replays(file, case)
-    yield Line(case["replay"], *told, f"epicycle run {file.relative_to(ROOT)}{command}", is_interval=False)
+    for *told, command in replays(file, case):
+        yield Line(case["replay"], *told, f"epicycle run {file.relative_to(ROOT)}{command}", is_interval=False)
 
 
 def _of_search(name: str, case: Mapping[str, Any], jobs: int | None) -> Iterator[Line]:

@@ -1,9 +1,10 @@
 """The cases of the board that are about falsification, in two ways:
 
 - ``replay: NAME`` with ``monitor``: inputs that are published as breaking it do, and what the port ``of`` sends then is
-  ``within`` so much of what is published there.
+  ``within`` so much of what is published there; the robustness of the monitor is that of rtamt.
 - ``search: NAME`` with ``monitor`` and ``vary``: searches with several seeds, each of at most as many runs as were
-  published; ``published`` has in how many of 50 something was ``found``, and the ``mean`` number of runs of these.
+  published, so many ``searches``; ``published`` has in how many of 50 something was ``found``, and the ``mean``
+  number of runs of these.
 """
 
 from __future__ import annotations
@@ -22,10 +23,10 @@ from epicycle.runner.execution.results import Results
 
 PUBLISHED = "counterexamples/published.yaml"
 SEGMENT = 5.0  # s
-SEARCHES = 5  # of each property; 50 were published, and take hours
+EQUAL = 1e-9  # the most by which margins differ that are the same
 FIRST, APART = 50_000, 1_000  # the seed of the first search, of which none was looked at before; between seeds
 MOST = 300  # runs of a search
-OF = 50  # published searches
+OF = 50  # published searches of each property
 
 
 @cache
@@ -59,33 +60,42 @@ def deviation(found: Results, case: Mapping[str, Any], example: Mapping[str, Any
     return max(far)
 
 
-def replays(file: Path, case: Mapping[str, Any]) -> tuple[str, str, str, bool, str]:
+def replays(file: Path, case: Mapping[str, Any]) -> Iterator[tuple[str, str, str, bool, str]]:
     """What is asked, published and found for published inputs, whether it is the same, and a command."""
     examples = counterexamples(file.parent)[case["monitor"]]
-    broken, furthest = 0, 0.0
+    broken, furthest, apart = 0, 0.0, 0.0
     for example in examples:
         found = replayed(file, case, example)
+        apart = max(apart, abs(found.metrics[f"{case['monitor']}_robustness"] - example["rtamt"]))
         broken += found.monitors[case["monitor"]].holds is False
         furthest = max(furthest, deviation(found, case, example))
     asked = f"{case['monitor']} with published inputs; {case['of']}"
     ours = f"broken in {broken} of {len(examples)}; within {furthest:.3f}"
     settings = {**case.get("set", {}), "throttle": examples[0]["throttle"], "brake": examples[0]["brake"]}
     sets = "".join(f" --set {shlex.quote(f'{name}={value}')}" for name, value in settings.items())
-    return (
+    command = f"{sets} --until {case['until']} --check"
+    yield (
         asked,
         f"broken in {len(examples)} of {len(examples)}; to {case['within']:g}",
         ours,
         broken == len(examples) and furthest <= case["within"],
-        f"{sets} --until {case['until']} --check",
+        command,
+    )
+    yield (
+        f"robustness of {case['monitor']} with published inputs, by rtamt",
+        ", ".join(f"{example['rtamt']:.4g}" for example in examples),
+        "the same within 1e-9" if apart <= EQUAL else f"{apart:.2g} away",
+        apart <= EQUAL,
+        command,
     )
 
 
 def searches(
-    file: Path, case: Mapping[str, Any], folder: Path, jobs: int | None, searches: int = SEARCHES
+    file: Path, case: Mapping[str, Any], folder: Path, jobs: int | None
 ) -> Iterator[tuple[str, str, str, bool, str]]:
     """How often searches find something, and after how many runs: asked, published, found, whether it is met."""
     runs = []
-    until = case.get("until")
+    until, searches = case.get("until"), case["searches"]
     for number in range(searches):
         found = epicycle.search(
             file, epicycle.Break(case["monitor"], runs=MOST), vary=case["vary"], set=case.get("set", {}), until=until,

@@ -89,7 +89,7 @@ class _Searching:
             stop=spec.until,
         )
         self.growing = Growing(study, keys, searched, Search(runs=goal.runs, command=list(spec.command)))
-        guided = is_guided() and space.has_ranges
+        guided = is_guided(space.widths) and space.has_ranges
         self.found = Falsification(spec, goal, model.name, monitors, searched, guided)
         self._proposals = (
             searched.proposals(self._seed)

@@ -95,7 +95,7 @@ class _Optimising:
         self._others = base.conditions
         runs = (goal.points + 1) * self._others * study.replications
         self.growing = Growing(study, keys, space, Search(runs=runs, command=list(spec.command)))
-        guided = is_guided() and space.has_ranges
+        guided = is_guided(space.widths) and space.has_ranges
         self.found = Optimum(goal, space, guided)
 
     @property

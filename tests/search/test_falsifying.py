@@ -143,7 +143,7 @@ def test_it_follows_robustness_where_the_library_is() -> None:
 
 @pytest.mark.slow
 def test_without_the_library_it_goes_on_at_random_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(falsifying, "is_guided", lambda: False)
+    monkeypatch.setattr(falsifying, "is_guided", lambda widths: False)
     found = epicycle.search("far.yaml", epicycle.Break("away", runs=70), vary=BOX, set=ALONE, out="out", jobs=1)
     assert found.broken is None
     assert found.sentence.endswith(

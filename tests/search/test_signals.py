@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -39,31 +39,44 @@ def test_a_range_of_a_list_is_that_of_each_of_its_numbers(
     )
 
 
-def test_signals_begin_constant_at_the_ends_and_then_rarely_change() -> None:
-    batches = proposing.proposals([4, 1], 0, guided=False)
-    corners = next(batches)
-    assert sorted(corners) == [(one,) * 4 + (two,) for one in (0.0, 1.0) for two in (0.0, 1.0)]
-    assert corners == next(proposing.proposals([4, 1], 0, guided=True))
-    assert corners != next(proposing.proposals([4, 1], 1, guided=False))
-    seen, points = set(), corners
-    for _ in range(20):
-        points = batches.send([1.0] * len(points))
-        assert len(points) == proposing.SMALL
-        for place, point in enumerate(points):
-            values = set(point)
-            assert (values <= {0.0, 1.0}) is (place % 2 == 1)
-            seen.add(sum(one != other for one, other in pairwise(point[:4])))
-    assert seen == {0, 1, 2, 3}
+def test_signals_begin_constant_at_the_ends_the_best_corner_first() -> None:
+    for seed in range(8):
+        batches = proposing.proposals([4, 1], seed, guided=False)
+        first, spread = next(batches)
+        assert len(set(spread)) == 5
+        corners = [first]
+        for _ in range(3):  # least where the first signal is 1 and the second 0
+            corners += batches.send([1.0 - point[0] + point[4] for point in (corners[-1], spread)][: len(corners)])
+        assert sorted(corners) == [(one,) * 4 + (two,) for one in (0.0, 1.0) for two in (0.0, 1.0)]
+        assert corners.index((1.0, 1.0, 1.0, 1.0, 0.0)) < 3
+        assert corners[0] == next(proposing.proposals([4, 1], seed, guided=True))[0]
+    assert len({next(proposing.proposals([4, 1], seed, guided=False))[0] for seed in range(8)}) > 1
 
 
-def test_signals_are_guided_where_margins_differ() -> None:
-    pytest.importorskip("cma")
-    batches = proposing.proposals([3, 2], 0, guided=True)
+def _searched(widths: list[int], robustness: Callable[[proposing.Point], float]) -> list[proposing.Point]:
+    """Points of a search, without the corners, with which it begins."""
+    batches, found = proposing.proposals(widths, 0, guided=False), list[proposing.Point]()
     points = next(batches)
-    for number in range(3):  # no slope
-        points = batches.send([0.0] * len(points))
-        assert points == proposing.stepped([3, 2], 0, number)
-    for _ in range(25):
-        points = batches.send([sum(abs(share - 0.3) for share in point) for point in points])
-    assert all(abs(share - 0.3) < 0.2 for point in points for share in point)
-    assert len(points) == proposing.SMALL
+    for _ in range(100):
+        if len(points) == proposing.SMALL:
+            found += points
+        points = batches.send(list(map(robustness, points)))
+    return found
+
+
+def test_signals_are_as_different_as_can_be_where_robustness_tells_nothing() -> None:
+    found = [point for point in _searched([6, 6], lambda point: 0.0) if not set(point) <= {0.0, 1.0}]
+    assert {len(set(point)) for point in found} == {12}
+    assert len(found) > 250
+
+
+def test_signals_are_guided_where_robustness_differs() -> None:
+    def distance(point: proposing.Point) -> float:
+        return sum(abs(share - 0.3) for share in point)
+
+    assert min(map(distance, _searched([3, 2], distance))) < 0.2
+
+
+def test_signals_are_oftener_of_a_kind_that_was_good() -> None:
+    found = _searched([8, 8], lambda point: sum(abs(share - 0.5) for share in point))
+    assert sum(set(point) <= {0.0, 1.0} for point in found[200:]) < 30
