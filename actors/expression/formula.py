@@ -9,6 +9,7 @@ import ast
 import copy
 import re
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any, TypeVar
 
 from ..core import REQUIRED, EpicycleError, Parameter, ParameterError, counted_in_si
@@ -220,8 +221,8 @@ class ExpressionParameter(Parameter[T]):
         try:
             return self._made(value)
         except ExpressionError as error:
-            prefix = f"{value!r} is not an {self.words}: "
-            raise ParameterError.several(error.within(prefix=prefix)) from None
+            message = f"{value!r} is not an {self.words}: {error.reason}"
+            raise ParameterError.several(replace(each, message=message) for each in error.faults) from None
 
 
 class FormulaParameter(ExpressionParameter[Formula]):

@@ -19,15 +19,19 @@ _ALLOWED: Final = (
 
 
 class ExpressionError(FaultError):
-    """An expression that cannot be evaluated; `offset` and `length` locate the part at fault."""
+    """An expression that cannot be evaluated; `offset` and `length` locate the part at fault.
+
+    ``reason`` is the message for somebody who knows that this is not an expression.
+    """
 
     kind = "expression"
 
-    def __init__(self, message: str, offset: int = 0, length: int = 0, meant: str = "") -> None:
+    def __init__(self, message: str, offset: int = 0, length: int = 0, meant: str = "", reason: str = "") -> None:
         super().__init__(message, span=(offset, length), meant=meant)
-        self.args = (message, offset, length)  # what pickle rebuilds the error from
+        self.args = (message, offset, length, meant, reason)  # what pickle rebuilds the error from
         self.offset = offset
         self.length = length
+        self.reason = reason or message
 
 
 _NODES: Final = (
@@ -73,12 +77,13 @@ def parse(source: str) -> ast.expr:
     except SyntaxError as error:
         offset = max(error.offset or 1, 1) - 1 + indent
         length = max((error.end_offset or 0) - (error.offset or 0), 1)
-        message = "this is not an expression: " + error.msg.replace(" or ':='", "")
-        raise ExpressionError(message, min(offset, len(source)), length) from None
+        reason = error.msg.replace(" or ':='", "")
+        message = f"this is not an expression: {reason}"
+        raise ExpressionError(message, min(offset, len(source)), length, reason=reason) from None
     except (RecursionError, MemoryError):
         raise ExpressionError(f"nested deeper than {MAX_NESTING} levels", 0, len(source)) from None
     except (ValueError, Warning) as error:
-        raise ExpressionError(f"this is not an expression: {error}", 0, len(source)) from None
+        raise ExpressionError(f"this is not an expression: {error}", 0, len(source), reason=str(error)) from None
     for node in ast.walk(tree):
         if isinstance(node, (ast.expr, ast.keyword)):
             end = node.end_col_offset or 0

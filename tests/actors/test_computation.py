@@ -119,7 +119,7 @@ def test_a_number_of_numpy_divides_as_any_other(number: Any) -> None:
 @pytest.mark.parametrize(
     ("expression", "message"),
     [
-        ("x +", "it.expression: 'x +' is not an expression: this is not an expression: invalid syntax"),
+        ("x +", "it.expression: 'x +' is not an expression: invalid syntax"),
         ("open('x')", None),
         ("x.real", None),
         ("max + x", "it.expression: 'max + x' is not an expression: 'max' is a function: write max(...)"),
@@ -180,7 +180,7 @@ def test_an_expression_that_cannot_be_made_makes_no_problems_downstream() -> Non
             "run: {record: bad.output}\n"
         )
     assert [problem.message for problem in caught.value.problems] == [
-        "bad.expression: 'x +' is not an expression: this is not an expression: invalid syntax"
+        "bad.expression: 'x +' is not an expression: invalid syntax"
     ]
 
 

@@ -224,7 +224,7 @@ def test_a_loop_through_the_states_needs_no_delay() -> None:
         ),
         (
             {"derivatives": {"height": "speed +", "speed": 1}},
-            "it.derivatives: height: 'speed +' is not an expression: this is not an expression: invalid syntax",
+            "it.derivatives: height: 'speed +' is not an expression: invalid syntax",
         ),
         (
             {"directions": {"bounce": "down"}},

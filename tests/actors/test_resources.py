@@ -356,7 +356,7 @@ def test_channels_that_do_not_belong_together() -> None:
         ("Pool, patience: 2 *", "it.patience: '2 *' has an unreadable unit '*': a unit is missing before '*'"),
         (
             "Pool, patience: due -",
-            "it.patience: 'due -' is not an expression: this is not an expression: invalid syntax",
+            "it.patience: 'due -' is not an expression: invalid syntax",
         ),
         ("Pools, capacity: {}", "it: capacity: there is no pool; name at least one, as in {doctor: 3, room: 4}"),
         ("Pools, capacity: 3", "it.capacity: 3 is not a mapping of names to integer"),
