@@ -105,19 +105,4 @@ int fmi3SetUInt64(Model *m, const uint32_t *vr, size_t n, const uint64_t *v, siz
     m->n = v[0];
     return m->configuring && v[0] <= MOST ? OK : ERROR;
 }
-int fmi3GetFMUState(Model *m, void **state) {
-    if (!*state) *state = malloc(sizeof(Model));
-    memcpy(*state, m, sizeof(Model));
-    return OK;
-}
-int fmi3SetFMUState(Model *m, void *state) {
-    memcpy(m, state, sizeof(Model));
-    return OK;
-}
-int fmi3FreeFMUState(Model *m, void **state) {
-    free(*state);
-    *state = NULL;
-    return OK;
-}
-int fmi3Terminate(Model *m) { return OK; }
-void fmi3FreeInstance(Model *m) { free(m); }
+#include "state.h"

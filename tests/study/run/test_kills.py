@@ -109,39 +109,42 @@ def test_nothing_is_lost(tmp_path: Path) -> None:
     kill_and_resume(tmp_path, "--jobs", 2, kills=2, replications=15, seed=2)
 
 
-@pytest.mark.slow
-def test_an_interrupt_ends_it_with_a_word(tmp_path: Path) -> None:
-    write(tmp_path)
-    out = tmp_path / "out"
-    arguments = ("study", tmp_path / "walks.yaml", "--types", THIS, "--set", "pause=0.5", "--out", out, "--jobs", 1)
-    process = subprocess.Popen(command(*arguments), start_new_session=True, stderr=subprocess.PIPE, text=True)
-    wait_for_rows(out, process)
-    os.killpg(process.pid, signal.SIGINT)  # as a terminal does
-    _, said = process.communicate(timeout=30)
-    assert process.returncode == 130
-    assert said == f"interrupted; finished runs are kept: 'epicycle study {out}' continues\n"
-    assert 0 < len(rows(out)) < 10
-    deadline = time.monotonic() + 30
-    while members(process.pid) and time.monotonic() < deadline:
-        time.sleep(0.05)
-    assert members(process.pid) == []
-
-
-@pytest.mark.slow
-def test_an_interrupt_does_not_wait_for_runs(tmp_path: Path) -> None:
-    write(tmp_path)
-    out = tmp_path / "out"
-    arguments = ("study", tmp_path / "walks.yaml", "--types", THIS, "--set", "pause=1000", "--out", out, "--jobs", 2)
-    process = subprocess.Popen(command(*arguments), start_new_session=True, stderr=subprocess.PIPE, text=True)
-    deadline = time.monotonic() + 60
-    while len(members(process.pid)) < 2 and time.monotonic() < deadline:
-        time.sleep(0.05)
-    time.sleep(5.0)
+def interrupted(out: Path, jobs: int, pause: float, wait: Callable[[subprocess.Popen[str]], object]) -> int:
+    """Interrupt a study after a wait, as a terminal does; its process."""
+    write(out.parent)
+    arguments = ("--types", THIS, "--set", f"pause={pause}", "--out", out, "--jobs", jobs)
+    started = command("study", out.parent / "walks.yaml", *arguments)
+    process = subprocess.Popen(started, start_new_session=True, stderr=subprocess.PIPE, text=True)
+    wait(process)
     os.killpg(process.pid, signal.SIGINT)
     _, said = process.communicate(timeout=30)
     assert process.returncode == 130
     assert said == f"interrupted; finished runs are kept: 'epicycle study {out}' continues\n"
-    assert members(process.pid) == []
+    return process.pid
+
+
+def until(is_so: Callable[[], bool], seconds: float) -> None:
+    deadline = time.monotonic() + seconds
+    while not is_so() and time.monotonic() < deadline:
+        time.sleep(0.05)
+
+
+@pytest.mark.slow
+def test_an_interrupt_ends_it_with_a_word(tmp_path: Path) -> None:
+    out = tmp_path / "out"
+    process = interrupted(out, 1, 0.5, lambda process: wait_for_rows(out, process))
+    assert 0 < len(rows(out)) < 10
+    until(lambda: not members(process), 30)
+    assert members(process) == []
+
+
+@pytest.mark.slow
+def test_an_interrupt_does_not_wait_for_runs(tmp_path: Path) -> None:
+    def wait(process: subprocess.Popen[str]) -> None:
+        until(lambda: len(members(process.pid)) >= 2, 60)
+        time.sleep(5.0)  # until both of them make a run
+
+    assert members(interrupted(tmp_path / "out", 2, 1000, wait)) == []
 
 
 @pytest.mark.slow
