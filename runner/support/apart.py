@@ -7,15 +7,20 @@ import secrets
 import signal
 import subprocess
 import sys
+import time
 from collections.abc import Callable
 from contextlib import suppress
-from multiprocessing.connection import Client, Listener
+from multiprocessing import AuthenticationError
+from multiprocessing.connection import Client, Connection, Listener
+from queue import SimpleQueue
+from threading import Thread
 from typing import Any
 
 from epicycle.actors import EpicycleError
 
 _KEY = "EPICYCLE_APART"
 _BEGIN_LIMIT = 30.0  # s until a process has started
+_LOOK = 0.005  # s between two looks whether it has
 _PROGRAM = "from epicycle.runner.support.apart import serve; serve()"
 
 
@@ -29,12 +34,31 @@ class Apart:
         self._name, self._limit = name, limit
         key = secrets.token_bytes(16)
         with Listener(authkey=key) as listener:
-            words = [sys.executable, "-c", _PROGRAM, str(listener.address)]
+            words = [sys.executable, "-P", "-c", _PROGRAM, str(listener.address)]
             environment = {**os.environ, _KEY: key.hex(), "PYTHONPATH": os.pathsep.join(sys.path)}
             self._process = subprocess.Popen(words, env=environment)
-            self._connection = listener.accept()
+            self._connection = self._accepted(listener)
         self._connection.send((make, given))
         self._answer("loading", _BEGIN_LIMIT)
+
+    def _accepted(self, listener: Listener) -> Connection:
+        """The connection that the process makes, unless it ends, or waits, instead: ``accept`` would wait for ever."""
+        came: SimpleQueue[Connection] = SimpleQueue()
+
+        def accept() -> None:
+            with suppress(AuthenticationError, EOFError, OSError):
+                came.put(listener.accept())
+
+        Thread(target=accept, daemon=True).start()
+        latest = time.monotonic() + _BEGIN_LIMIT
+        while came.empty() and self._process.poll() is None and time.monotonic() < latest:
+            time.sleep(_LOOK)
+        if came.empty():
+            self._process.kill()
+            raise EpicycleError(
+                f"{self._name}: its process did not start; it ended with exit code {self._process.wait()}"
+            )
+        return came.get()
 
     def __getattr__(self, method: str) -> Callable[..., Any]:
         if method.startswith("_"):
