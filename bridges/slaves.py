@@ -39,7 +39,6 @@ KINDS: Mapping[str, type] = {
     CLOCK: bool,
 }
 
-
 T = TypeVar("T")
 
 
@@ -66,18 +65,21 @@ def described(path: Path) -> Any:
         for each in about.modelVariables:
             each.clocks = [clock.name for clock in each.clocks or ()]
             if each.type == CLOCK:
-                each.intervalDecimal = _seconds(clocks[each.name], "interval")
-                each.shiftDecimal = _seconds(clocks[each.name], "shift")
+                each.intervalDecimal = _seconds(clocks[each.name], "interval", 1e-9)
+                each.shiftDecimal = _seconds(clocks[each.name], "shift", 0.0)
     except Exception as error:  # of many kinds: no archive, no description, wrong XML
         raise FMUError(f"{path} is not an FMU: {reason_of(error)}") from None
     return about
 
 
-def _seconds(clock: Any, name: str) -> Fraction | None:
+def _seconds(clock: Any, name: str, least: float) -> Fraction | None:
     """The interval or the shift of a clock, a decimal number or counted in its resolution."""
-    if (counter := clock.get(f"{name}Counter")) is not None:
-        return Fraction(int(counter), int(clock.get("resolution")))
-    return None if (decimal := clock.get(f"{name}Decimal")) is None else Fraction(decimal)
+    counter = clock.get(f"{name}Counter")
+    number = clock.get(f"{name}Decimal") if counter is None else counter
+    parts = 1 if counter is None else int(clock.get("resolution"))
+    if number is None or least <= float(number) / parts <= BEYOND:  # the fraction of 1e999999999 would never come
+        return None if number is None else Fraction(number) / parts
+    raise FMUError(f"the {name} of the clock {clock.get('name')} is not from {least:g} s to {BEYOND:g} s")
 
 
 def is_asked(clock: Any) -> bool:

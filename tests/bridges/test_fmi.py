@@ -202,6 +202,31 @@ def test_the_digest_of_a_run_has_that_of_the_fmu(stair: Path, tmp_path: Path) ->
     assert ran(other).digest != results.digest
 
 
+@pytest.mark.parametrize(
+    ("interval", "reason"),
+    [
+        ('intervalDecimal="1e999999999"', "the interval of the clock c is not from 1e-09 s to 4e+09 s"),
+        ('intervalDecimal="0"', "the interval of the clock c is not from 1e-09 s to 4e+09 s"),
+        ('intervalDecimal="nan"', "the interval of the clock c is not from 1e-09 s to 4e+09 s"),
+        ('intervalCounter="-1" resolution="3"', "the interval of the clock c is not from 1e-09 s to 4e+09 s"),
+        ('intervalCounter="1" resolution="0"', "float division by zero"),
+        ('intervalDecimal="1" shiftDecimal="-1"', "the shift of the clock c is not from 0 s to 4e+09 s"),
+    ],
+)
+def test_a_clock_whose_interval_is_no_time(interval: str, reason: str, tmp_path: Path) -> None:
+    clock = f'<Clock name="c" valueReference="1" causality="input" intervalVariability="constant" {interval}/>'
+    with zipfile.ZipFile(path := tmp_path / "odd.fmu", "w") as archive:
+        archive.writestr(
+            "modelDescription.xml",
+            '<fmiModelDescription fmiVersion="3.0" modelName="odd" instantiationToken="odd">'
+            '<CoSimulation modelIdentifier="odd" hasEventMode="true"/>'
+            f"<ModelVariables>{clock}</ModelVariables><ModelStructure/></fmiModelDescription>",
+        )
+    with pytest.raises(EpicycleError) as caught:
+        FMU.told(path)
+    assert str(caught.value) == f"{path} is not an FMU: {reason}"
+
+
 def test_describe(stair: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["describe", str(stair)]) == 0
     lines = capsys.readouterr().out.splitlines()
