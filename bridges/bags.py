@@ -268,15 +268,12 @@ class Bag(Actor):
     def initialize(self) -> None:
         self._start = self._bag.start
         self._position = _Position(self._bag, tuple(self.ports))
-        self._prepare()
+        self._next = self._position.next()
+        self._wake()
 
     def restart(self) -> None:
         while self._next is not None and self._next[0] - self._start < self.context.time:
             self._next = self._position.next()
-        self._wake()
-
-    def _prepare(self) -> None:
-        self._next = self._position.next()
         self._wake()
 
     def _wake(self) -> None:
@@ -290,7 +287,8 @@ class Bag(Actor):
         assert self._next is not None
         _, topic, message = self._next
         self.outputs[self.ports[topic]].send(message)
-        self._prepare()
+        self._next = self._position.next()
+        self._wake()
 
 
 class _Node(Actor):

@@ -139,9 +139,8 @@ class FMU(Actor):
             if (causality := self._variables[name].causality) not in _SETTABLE:
                 raise ParameterError(f"values: {name} of {self.file.name} is of causality {causality}, and has its own")
             self._given(name, value)
-        own = self._about.defaultExperiment
-        own = None if own is None else own.stepSize
-        self._step = to_nanoseconds(self.step or float(own or self._about.coSimulation.fixedInternalStepSize or 0.01))
+        own = getattr(self._about.defaultExperiment, "stepSize", None) or self._about.coSimulation.fixedInternalStepSize
+        self._step = to_nanoseconds(self.step or float(own or 0.01))
 
     def _given(self, name: str, value: Any) -> list[Any]:
         """The elements of a value that may be a text with a unit."""
@@ -193,7 +192,10 @@ class FMU(Actor):
         self._sampled: dict[str, list[Any]] = {}  # for those with clocks
         self._ticked: list[str] = []  # by tokens
         self._event, self._ends, self._following = self._has_events, False, NEVER
-        self._call("start", {name: self._given(name, value) for name, value in self.values.items()}, self._time)
+        given = {name: self._given(name, value) for name, value in self.values.items()}
+        intervals, shifts = self._call("start", given, self._time)
+        self._plan([], intervals)
+        self._due |= {name: Fraction(shift) for name, shift in shifts.items()}
         self._saved_at = self._time
         self._is_first = True
         self._wake = self.wake_in(0.0)

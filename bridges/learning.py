@@ -181,25 +181,22 @@ def deploy(model: Model, agent: Agent, policy: Callable[[Observation], Any], nam
 
 def _seat(model: Model, name: str, agent: Agent, base: type[_Desk] = _Desk, **more: Any) -> None:
     """Add an agent to a model, and connect it; raises ``ModelError``."""
-    ports: dict[str, Any] = {f"seen_{place}": InputPort[Any]() for place, _ in enumerate(agent.observe)}
-    ports |= {f"reward_{place}": InputPort[Any]() for place, _ in enumerate(agent.weights)}
-    ports |= {f"act_{place}": OutputPort[Any](depends_on=()) for place, _ in enumerate(agent.act)}
-    if agent.when is not None:
-        ports["trigger"] = InputPort[Any]()
-    kind = type("Agent", (base,), {**ports, **more, "of": agent, "__doc__": base.__doc__, "__module__": __name__})
-    model.add(kind(name, every=agent.every))
-    for place, port in enumerate(agent.observe):
-        model.connect(f"{port} -> {name}.seen_{place}")
-    for place, port in enumerate(agent.weights):
-        model.connect(f"{port} -> {name}.reward_{place}")
-    for place, port in enumerate(agent.act):
+    sources = {f"seen_{place}": port for place, port in enumerate(agent.observe)}
+    sources |= {f"reward_{place}": port for place, port in enumerate(agent.weights)}
+    sources |= {} if agent.when is None else {"trigger": agent.when}
+    targets = {f"act_{place}": port for place, port in enumerate(agent.act)}
+    ports: dict[str, Any] = {each: InputPort[Any]() for each in sources}
+    ports |= {each: OutputPort[Any](depends_on=()) for each in targets}
+    about = {**ports, **more, "of": agent, "__doc__": base.__doc__, "__module__": __name__}
+    model.add(type("Agent", (base,), about)(name, every=agent.every))
+    for own, port in sources.items():
+        model.connect(f"{port} -> {name}.{own}")
+    for own, port in targets.items():
         node = model.graph.ports.get(port)
         if node is not None and node.port is not None and not node.port.multi:
             for edge in list(model.graph.incoming(port)):
                 model.disconnect(edge.source, port)
-        model.connect(f"{name}.act_{place} -> {port}")
-    if agent.when is not None:
-        model.connect(f"{agent.when} -> {name}.trigger")
+        model.connect(f"{name}.{own} -> {port}")
 
 
 class _World:
@@ -223,8 +220,7 @@ class _World:
         for name, agent in self.agents.items():
             own = copy.deepcopy(agent.observations)  # environments do not share the generators of spaces
             self.spaces[name] = own or spaces.Box(-np.inf, np.inf, (len(self._seen(name)),), np.float64)
-        limits = {name: (space.low.tolist(), space.high.tolist()) for name, space in self.spaces.items()}
-        self._limits: dict[str, tuple[list[float], list[float]]] = limits
+        self._limits = {name: (space.low.tolist(), space.high.tolist()) for name, space in self.spaces.items()}
         self.simulation = None
 
     def _model(self, options: Mapping[str, Any]) -> Model:
@@ -273,15 +269,12 @@ class _World:
         """The agents that are to decide."""
         return [name for name, desk in self._desks.items() if desk.asks]
 
-    def _is_asked(self) -> bool:
-        return any(desk.asks for desk in self._desks.values())
-
     def go_on(self) -> Results | None:
         """Run until an agent is to decide, or to the end, which has results."""
         simulation = self.running
         if self.results is not None:
             raise AgentError("the run is over: reset() starts another one")
-        if not simulation.advance_until(self._is_asked):
+        if not simulation.advance_until(lambda: bool(self.asking())):
             self.results = simulation.finish()
         return self.results
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import hashlib
-import math
 import shutil
 from collections.abc import Mapping
 from contextlib import suppress
@@ -26,6 +25,7 @@ from .names import reason_of
 
 CLOCK = "Clock"
 TIMED = ("constant", "fixed", "calculated", "tunable", "changing", "countdown")  # clocks that the importer lets tick
+APERIODIC = ("changing", "countdown")  # of these, those that begin with their first interval
 DISCARD = 2  # the status of a step that has not been completed
 BEYOND = 4e9  # s, longer than any run
 CHANGED = 2  # the qualifier of an interval that the importer has not heard of
@@ -76,16 +76,17 @@ def _seconds(clock: Any, name: str, least: float) -> Fraction | None:
     """The interval or the shift of a clock, a decimal number or counted in its resolution."""
     counter = clock.get(f"{name}Counter")
     number = clock.get(f"{name}Decimal") if counter is None else counter
+    if number is None:
+        return None
     parts = 1 if counter is None else int(clock.get("resolution"))
-    if number is None or least <= float(number) / parts <= BEYOND:  # the fraction of 1e999999999 would never come
-        return None if number is None else Fraction(number) / parts
-    raise FMUError(f"the {name} of the clock {clock.get('name')} is not from {least:g} s to {BEYOND:g} s")
+    _within(least, float(number) / parts, name, clock.get("name"))  # before the fraction of 1e999999999, which is huge
+    return Fraction(number) / parts
 
 
-def is_asked(clock: Any) -> bool:
-    """Whether the FMU decides during a run when a clock ticks."""
-    kind = clock.intervalVariability
-    return kind in ("tunable", "changing", "countdown") or (kind in TIMED and clock.intervalDecimal is None)
+def _within(least: float, seconds: float, name: str, clock: str) -> float:
+    if least <= seconds <= BEYOND:
+        return seconds
+    raise ValueError(f"the {name} of the clock {clock} is not from {least:g} s to {BEYOND:g} s")
 
 
 def runnable(path: Path, about: Any) -> None:
@@ -112,7 +113,9 @@ class Slave:
         self.has_events = bool(self.is_new and self.about.coSimulation.hasEventMode)
         clocks = {name: each for name, each in self.variables.items() if each.type == CLOCK}
         self._outward = [name for name, each in clocks.items() if each.causality == "output"]
-        self._asked = [name for name, each in clocks.items() if each.causality == "input" and is_asked(each)]
+        timed = {name: each for name, each in clocks.items() if each.intervalVariability in TIMED}
+        self._asked = [name for name, each in timed.items() if each.intervalDecimal is None]  # as the FMU decides
+        self._periodic = [name for name in self._asked if timed[name].intervalVariability not in APERIODIC]
         self._is_stepping = False  # and not handling events, with which it begins
         self._folder = fmpy.extract(str(self.path))
         self._saved: Any = None
@@ -128,8 +131,8 @@ class Slave:
         except Exception as error:  # of the system, for a library that it cannot load
             raise FMUError(f"{path} cannot be loaded: {reason_of(error)}") from None
 
-    def start(self, values: Mapping[str, list[Any]], time: float) -> None:
-        """Initialise it with values of parameters and inputs."""
+    def start(self, values: Mapping[str, list[Any]], time: float) -> tuple[dict[str, float], dict[str, float]]:
+        """Initialise it with values of parameters and inputs; the intervals and shifts of clocks that it decides."""
         sizes = {name for name in values if self.variables[name].causality == "structuralParameter"}
         others = {name: value for name, value in values.items() if name not in sizes}
         if self.is_new:
@@ -149,7 +152,9 @@ class Slave:
             self._fmu.setupExperiment(startTime=time)
             self.put(others)
             self._fmu.enterInitializationMode()
+        told = self._intervals(), {name: self._shift(name) for name in self._periodic}
         self._fmu.exitInitializationMode()
+        return told
 
     def _hear(self, *given: Any) -> None:
         """Keep what the FMU says of an error; all else that it would write to the terminal is nobody's business."""
@@ -222,7 +227,7 @@ class Slave:
             if ends or not again:
                 break
         else:
-            raise FMUError("its discrete states do not settle")
+            raise ValueError("its discrete states do not settle")
         self._fmu.enterStepMode()
         self._is_stepping = True
         return Event(came, told, intervals, following, bool(ends))
@@ -234,10 +239,13 @@ class Slave:
             interval, qualifier = (c_double * 1)(), (c_int * 1)()
             self._fmu.getIntervalDecimal((c_uint32 * 1)(self.variables[name].valueReference), interval, qualifier)
             if qualifier[0] == CHANGED:
-                if not 0 <= interval[0] < math.inf:
-                    raise FMUError(f"{self.path}: the interval of the clock {name} is {interval[0]:g} s")
-                found[name] = float(interval[0])
+                found[name] = _within(0.0, interval[0], "interval", name)
         return found
+
+    def _shift(self, name: str) -> float:
+        shift = (c_double * 1)()
+        self._fmu.getShiftDecimal((c_uint32 * 1)(self.variables[name].valueReference), shift)
+        return _within(0.0, shift[0], "shift", name)
 
     def _of(self, clocks: list[str], each: Mapping[str, T]) -> dict[str, T]:
         """Those variables that have one of these clocks."""

@@ -61,6 +61,8 @@ CLOCKS = """<?xml version="1.0" encoding="UTF-8"?>
     <Clock name="full" valueReference="13" causality="output" intervalVariability="triggered"/>
     <Int32 name="overflows" valueReference="14" causality="output" variability="discrete"/>
     <String name="words" valueReference="15" causality="output"><Dimension start="2"/></String>
+    <Clock name="pulse" valueReference="16" causality="input" intervalVariability="changing"/>
+    <Clock name="paced" valueReference="17" causality="input" intervalVariability="fixed"/>
   </ModelVariables>
   <ModelStructure>
     <Output valueReference="4" dependencies="3"/>

@@ -140,6 +140,9 @@ def test_clocks_tick_at_their_times_with_their_values(ticking: Path, apart: bool
     assert list(results["fmu.sample"].times) == [round(0.1 + 0.25 * number, 9) for number in range(16)]
     assert changes(results, "fmu.sampled") == [(0.1, 0.0), (0.35, 1.0)]
     assert list(results["fmu.thirds"].times) == [round(number / 3, 9) for number in range(13)]
+    # Others ask the FMU for their interval: twice the last and 0.1 s from tick to tick; the factor, from 0.5 s on.
+    assert list(results["fmu.pulse"].times) == [0.1, 0.4, 1.1, 2.6]
+    assert list(results["fmu.paced"].times) == [0.5, 1.5, 2.5, 3.5]
 
 
 def test_arrays_are_arrays(ticking: Path) -> None:

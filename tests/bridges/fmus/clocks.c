@@ -6,14 +6,14 @@
 #include <string.h>
 
 enum { OK, WARNING, DISCARD, ERROR };
-enum { N = 1, FACTOR, U, Y, PUSH, AMOUNT, TOTAL, SAMPLE, SAMPLED, DELAY, LATE, THIRDS, FULL, OVERFLOWS, WORDS };
+enum { N = 1, FACTOR, U, Y, PUSH, AMOUNT, TOTAL, SAMPLE, SAMPLED, DELAY, LATE, THIRDS, FULL, OVERFLOWS, WORDS, PULSE, PACED };
 enum { MOST = 8 };
 
 typedef struct {
     uint64_t n;
-    double factor, u[MOST], amount, total, sampled, countdown;
+    double factor, u[MOST], amount, total, sampled, countdown, pulse;
     int32_t late, thirds, overflows;
-    bool push, sample, delay, third, full, configuring, events;
+    bool push, sample, delay, third, full, pulsed, configuring, starting, events;
 } Model;
 
 void *fmi3InstantiateCoSimulation(const char *name, const char *token, const char *path, bool visible, bool logging,
@@ -27,8 +27,11 @@ void *fmi3InstantiateCoSimulation(const char *name, const char *token, const cha
 }
 int fmi3EnterConfigurationMode(Model *m) { m->configuring = true; return OK; }
 int fmi3ExitConfigurationMode(Model *m) { m->configuring = false; return OK; }
-int fmi3EnterInitializationMode(Model *m, bool t, double tolerance, double start, bool s, double stop) { return OK; }
-int fmi3ExitInitializationMode(Model *m) { m->events = true; return OK; }
+int fmi3EnterInitializationMode(Model *m, bool t, double tolerance, double start, bool s, double stop) {
+    m->starting = m->pulsed = true;
+    return OK;
+}
+int fmi3ExitInitializationMode(Model *m) { m->starting = m->pulsed = false, m->events = true; return OK; }
 int fmi3EnterEventMode(Model *m) { m->events = true; return OK; }
 int fmi3EnterStepMode(Model *m) { m->events = false; return OK; }
 int fmi3SetClock(Model *m, const uint32_t *vr, size_t n, const bool *v) {
@@ -38,6 +41,7 @@ int fmi3SetClock(Model *m, const uint32_t *vr, size_t n, const bool *v) {
         if (vr[i] == SAMPLE) m->sample = v[i], m->sampled = m->u[0];
         if (vr[i] == DELAY) m->delay = v[i], m->late++;
         if (vr[i] == THIRDS) m->third = v[i], m->thirds++;
+        if (vr[i] == PULSE) m->pulsed = v[i];
     }
     return OK;
 }
@@ -56,12 +60,28 @@ int fmi3UpdateDiscreteStates(Model *m, bool *again, bool *ends, bool *nominals, 
     *ends = *nominals = *values = *defined = false;
     return OK;
 }
+/* A clock's interval is new when it has ticked, or another event says so; that of a fixed clock only at the start. */
 int fmi3GetIntervalDecimal(Model *m, const uint32_t *vr, size_t n, double *interval, int *qualifier) {
+    if (vr[0] == PACED) {
+        *qualifier = m->starting ? 2 : 1;
+        *interval = m->factor;
+        return OK;
+    }
+    if (vr[0] == PULSE) {
+        *qualifier = m->pulsed ? 2 : 1;
+        *interval = m->pulse = m->pulsed ? 2 * m->pulse + 0.1 : m->pulse;
+        m->pulsed = false;
+        return OK;
+    }
     if (vr[0] != DELAY) return ERROR;
     *qualifier = m->countdown < 0 ? 1 : 2;
     *interval = m->countdown;
     m->countdown = -1;
     return OK;
+}
+int fmi3GetShiftDecimal(Model *m, const uint32_t *vr, size_t n, double *shift) {
+    *shift = 0.5;
+    return m->starting && vr[0] == PACED ? OK : ERROR;
 }
 int fmi3DoStep(Model *m, double t, double h, bool no, bool *event, bool *ends, bool *early, double *last) {
     *event = *ends = *early = false;
