@@ -9,13 +9,13 @@ import shlex
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field
+from functools import cached_property
 from typing import Any
 
 from epicycle.actors import EpicycleError, counted
 
 from ..execution.engine import Interventions, Simulation
-from ..execution.results import Verdict
-from ..model.build.model import Model
+from ..execution.results import Results, Verdict
 from ..model.graph.acts import ActName
 from ..model.language.dimensions import Level, split_number
 from ..model.language.disturbance import EXACTLY
@@ -60,9 +60,9 @@ class Run:
 class Falsification(StudyAnswer):
     """What a search for a run that breaks a property has found: all its runs, in order, and the first that is broken.
 
-    ``broken`` is that run, or None, which does not show that there is none; ``verdict`` is its verdict, ``command``
-    makes it again, and ``explain`` asks which faults broke it, if there were any.  ``sentence`` says it all,
-    ``covered`` what was tried, and ``results`` has all runs as a study has them.
+    ``broken`` is that run, or None, which does not show that there is none.  ``verdict`` is its verdict, for which the
+    run is made once more, ``command`` makes it again, and ``explain`` asks which faults broke it, if there were any.
+    ``sentence`` says it all, ``covered`` what was tried, and ``results`` has all runs as a study has them.
     """
 
     NAME = "falsification"
@@ -77,8 +77,6 @@ class Falsification(StudyAnswer):
     broken: Run | None = None  # the first run that breaks the property
     least: Run | None = None  # the first run of least robustness
     margin: float | None = None  # its robustness
-    verdict: Verdict | None = None
-    explain: list[str] = field(default_factory=list)
 
     @property
     def failed(self) -> list[Run]:
@@ -116,21 +114,31 @@ class Falsification(StudyAnswer):
         own = [f"{path}={value}" for path, value in _settings(run)]
         return RunSpec.of(spec.model, run.seed, spec.until, {"set": [*spec.set, *own], **changes}).command()
 
-    def repeat(self, run: Run) -> None:
-        """Make the broken run once more, for its verdict and the faults in it."""
-        model, name = self._loaded(run), run.broken[0]
+    @property
+    def verdict(self) -> Verdict | None:
+        """The verdict of the broken run; raises ``EpicycleError`` if that cannot be repeated."""
+        return None if self.broken is None else self._again.monitors[self.broken.broken[0]]
+
+    @property
+    def explain(self) -> list[str]:
+        """The command that asks which faults broke the run, if there were any."""
+        if self.broken is None or not self._again.acts:
+            return []
+        return ["epicycle", "explain", *self.command[2:], "--monitor", self.goal.monitor or self.broken.broken[0]]
+
+    @cached_property
+    def _again(self) -> Results:
+        """The broken run once more, for what its row does not tell; made when that is asked for."""
+        run = self.broken
+        assert run is not None
+        model = with_monitors(self.spec.load(run.level.settings), self.monitors)
         results = Simulation(model, seed=run.seed, acts=Interventions(model.exactly)).run()
         if results.digest != run.digest:
             raise EpicycleError(
                 f"run {run.number} (seed {run.seed}) does not repeat: its digest is {results.digest[:16]}..., but was "
                 f"{(run.digest or '')[:16]}...; something has changed since"
             )
-        self.verdict = results.monitors[name]
-        if results.acts:
-            self.explain = ["epicycle", "explain", *self.command[2:], "--monitor", self.goal.monitor or name]
-
-    def _loaded(self, run: Run) -> Model:
-        return with_monitors(self.spec.load(run.level.settings), self.monitors)
+        return results
 
     @property
     def covered(self) -> str:

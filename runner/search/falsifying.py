@@ -55,8 +55,6 @@ def falsify(
                 points = [] if found.broken else searching.next()
         finally:
             growing.tell(made, over=True)
-    if found.broken is not None:
-        found.repeat(found.broken)
     return found
 
 
