@@ -16,9 +16,10 @@ from typing import Any
 from epicycle.actors import EpicycleError
 
 from ..model.build.model import Model
-from ..study.run.processes import DONE, Outcome, Processes, Worker, WorkerError
+from ..study.run.processes import Processes, Worker
 from ..study.run_spec import RunSpec, opened, spec_of
 from ..study.session import available_cores
+from ..support.apart import DONE, Outcome, WorkerError
 from .monitored import with_monitors
 
 PATIENCE = 1.0  # s of work before processes are started, which takes as long

@@ -1,27 +1,139 @@
-"""An object in a process of its own, for what may crash or never come to an end."""
+"""An object in a process of its own: for what may crash, hang or run out of memory, or is to have a core for itself."""
 
 from __future__ import annotations
 
 import os
-import secrets
+import pickle
+import queue
 import signal
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Callable
 from contextlib import suppress
-from multiprocessing import AuthenticationError
-from multiprocessing.connection import Client, Connection, Listener
-from queue import SimpleQueue
-from threading import Thread
-from typing import Any
+from typing import Any, BinaryIO
 
 from epicycle.actors import EpicycleError
 
-_KEY = "EPICYCLE_APART"
+from .collection import keep_for_good, seldom_collecting
+
+_PROGRAM = f"from {__name__} import serve; serve()"
 _BEGIN_LIMIT = 30.0  # s until a process has started
-_LOOK = 0.005  # s between two looks whether it has
-_PROGRAM = "from epicycle.runner.support.apart import serve; serve()"
+_LOOK = 0.5  # s between two checks whether an answer is still wanted
+_GRACE = 1.0  # s for an object to close itself
+_SETTLED = 2  # calls after which everything is loaded
+# One thread a process: N processes of N threads each would only be in each other's way.
+_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS", "NUMBA_NUM_THREADS")
+
+# What comes of a call: its result, it took too long, or the process ended with that exit code.
+DONE, LATE, DEAD = "done", "late", "dead"
+_RAISED = "raised"
+Outcome = tuple[str, Any]
+
+
+class RaisedError(EpicycleError):
+    """An exception in another process that is not Epicycle's own; ``text`` is its message."""
+
+    def __init__(self, kind: str, text: str) -> None:
+        super().__init__(f"{kind}: {text}")
+        self.text = " ".join(text.split()) or kind
+
+
+class WorkerError(EpicycleError):
+    """Processes that cannot work."""
+
+
+class UnwantedError(EpicycleError):
+    """Nobody waits for the result any longer."""
+
+
+def _always() -> bool:
+    return True
+
+
+class Process:
+    """A process that makes an object by ``make(*given)``, and then calls its methods, one after another.
+
+    It reads from standard input what it is to do, and answers on its original standard output.  It ends when its input
+    does: at once, or in the middle of a call, unless the object can be closed before.
+    """
+
+    def __init__(self, make: Callable[..., Any], *given: object) -> None:
+        environment = {**os.environ, **dict.fromkeys(_THREADS, "1"), "PYTHONPATH": os.pathsep.join(sys.path)}
+        # No multiprocessing: the processes of Dask are daemons, which it allows no children. With -P they import what
+        # this process would, and no module of the same name that happens to be in the working directory.
+        self._process = subprocess.Popen(
+            [sys.executable, "-P", "-c", _PROGRAM],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            env=environment,
+            process_group=0,  # an interrupt from the terminal is not meant for it; it ends when its input does
+        )
+        self._told: queue.SimpleQueue[Outcome] = queue.SimpleQueue()
+        threading.Thread(target=self._listen, daemon=True).start()
+        self._give((make, given))
+        self.has_started = self.is_ready = False
+
+    def begin(self, limit: float | None = None, is_wanted: Callable[[], bool] = _always) -> Outcome:
+        """Wait until the object is there; raises as ``call``."""
+        outcome: Outcome = DONE, None
+        if not self.has_started and (outcome := self._answer(limit, is_wanted))[0] == DONE:
+            self.has_started = True
+        if self.has_started and not self.is_ready and (outcome := self._answer(limit, is_wanted))[0] == DONE:
+            self.is_ready = True
+        return outcome
+
+    def call(
+        self, method: str, *given: object, limit: float | None = None, is_wanted: Callable[[], bool] = _always
+    ) -> Outcome:
+        """The outcome of a call, in at most ``limit`` s.
+
+        Raises what the object raises, ``RaisedError`` where that is of another package, and ``UnwantedError``.
+        """
+        self._give((method, given))
+        return self._answer(limit, is_wanted)
+
+    def _answer(self, limit: float | None, is_wanted: Callable[[], bool]) -> Outcome:
+        since = time.monotonic()
+        while True:
+            try:
+                what, told = self._told.get(timeout=_LOOK if limit is None else min(_LOOK, limit))
+            except queue.Empty:
+                if not is_wanted():
+                    raise UnwantedError from None
+                if limit is not None and time.monotonic() - since > limit:
+                    return LATE, None
+                continue
+            if what == _RAISED:
+                raise told if isinstance(told, Exception) else RaisedError(*told)
+            if what == DEAD:
+                self._told.put((what, told))  # as of every later call
+            return what, told
+
+    def end(self) -> int:
+        """Kill it if it still runs; its exit code."""
+        self._process.kill()
+        return self._process.wait()
+
+    def _give(self, what: object) -> None:
+        assert self._process.stdin is not None
+        try:
+            pickle.dump(what, self._process.stdin)
+            self._process.stdin.flush()
+        except OSError:  # it has died, which the listener reports
+            return
+
+    def _listen(self) -> None:
+        assert self._process.stdout is not None
+        try:
+            while True:
+                self._told.put(pickle.load(self._process.stdout))
+        except (EOFError, OSError, pickle.UnpicklingError):
+            self._told.put((DEAD, self._process.wait()))
+        except Exception as error:  # of a class that only that process knows; somebody waits for an answer
+            told = f"the answer of a process cannot be read: {type(error).__name__}: {error}"
+            self._told.put((_RAISED, WorkerError(told)))
 
 
 class Apart:
@@ -32,93 +144,93 @@ class Apart:
 
     def __init__(self, name: str, limit: float, make: Callable[..., Any], *given: object) -> None:
         self._name, self._limit = name, limit
-        key = secrets.token_bytes(16)
-        with Listener(authkey=key) as listener:
-            words = [sys.executable, "-P", "-c", _PROGRAM, str(listener.address)]
-            environment = {**os.environ, _KEY: key.hex(), "PYTHONPATH": os.pathsep.join(sys.path)}
-            self._process = subprocess.Popen(words, env=environment)
-            self._connection = self._accepted(listener)
-        self._connection.send((make, given))
-        self._answer("loading", _BEGIN_LIMIT)
-
-    def _accepted(self, listener: Listener) -> Connection:
-        """The connection that the process makes, unless it ends, or waits, instead: ``accept`` would wait for ever."""
-        came: SimpleQueue[Connection] = SimpleQueue()
-
-        def accept() -> None:
-            with suppress(AuthenticationError, EOFError, OSError):
-                came.put(listener.accept())
-
-        Thread(target=accept, daemon=True).start()
-        latest = time.monotonic() + _BEGIN_LIMIT
-        while came.empty() and self._process.poll() is None and time.monotonic() < latest:
-            time.sleep(_LOOK)
-        if came.empty():
-            self._process.kill()
-            raise EpicycleError(
-                f"{self._name}: its process did not start; it ended with exit code {self._process.wait()}"
-            )
-        return came.get()
+        self._process = Process(make, *given)
+        self._asked("loading", _BEGIN_LIMIT, self._process.begin)
 
     def __getattr__(self, method: str) -> Callable[..., Any]:
         if method.startswith("_"):
             raise AttributeError(method)
+        return lambda *given: self._asked(method, self._limit, self._process.call, method, *given)
 
-        def call(*given: object) -> Any:
-            self._connection.send((method, given))
-            return self._answer(method, self._limit)
-
-        return call
-
-    def _answer(self, doing: str, limit: float) -> Any:
+    def _asked(self, doing: str, limit: float, ask: Callable[..., Outcome], *given: object) -> Any:
         try:
-            if not self._connection.poll(limit):
-                self._end()
-                raise EpicycleError(f"{self._name}: {doing} takes longer than {limit:g} s; its process was ended")
-            is_right, answer = self._connection.recv()
-        except (EOFError, OSError):
-            code = self._process.wait()
-            ended = signal.Signals(-code).name if code < 0 else f"exit code {code}"
-            raise EpicycleError(f"{self._name}: its process ended in {doing}, with {ended}") from None
-        if not is_right:
-            raise EpicycleError(answer if answer.startswith(self._name) else f"{self._name}: {answer}")
-        return answer
+            what, told = ask(*given, limit=limit)
+        except EpicycleError as error:
+            text = error.text if isinstance(error, RaisedError) else str(error)
+            raise EpicycleError(text if text.startswith(self._name) else f"{self._name}: {text}") from None
+        if what == DONE:
+            return told
+        code = self._process.end()
+        if not self._process.has_started:
+            raise EpicycleError(f"{self._name}: its process did not start; it ended with exit code {code}")
+        if what == LATE:
+            raise EpicycleError(f"{self._name}: {doing} takes longer than {limit:g} s; its process was ended")
+        ended = signal.Signals(-code).name if code < 0 else f"exit code {code}"
+        raise EpicycleError(f"{self._name}: its process ended in {doing}, with {ended}")
 
     def close(self) -> None:
         """Let the object close itself, and end the process."""
-        with suppress(Exception):
-            self._connection.send(("close", ()))
-            self._connection.poll(1.0)
-        self._end()
+        with suppress(EpicycleError):
+            self._process.call("close", limit=_GRACE)
+        self._process.end()
 
-    def _end(self) -> None:
-        self._process.kill()
-        self._process.wait()
-        self._connection.close()
+
+# -- inside such a process --------------------------------------------------------------------------------------------
 
 
 def serve() -> None:
-    """What the process does: the methods of the object, as it is asked for them."""
-    with Client(sys.argv[-1], authkey=bytes.fromhex(os.environ.pop(_KEY))) as connection:
-        try:
-            make, given = connection.recv()
-            made = make(*given)
-            connection.send((True, None))
-        except Exception as error:
-            connection.send((False, _told(error)))
-            return
-        method = ""
-        while method != "close":
-            try:
-                method, given = connection.recv()
-            except EOFError:
-                made.close()
-                return
-            try:
-                connection.send((True, getattr(made, method)(*given)))
-            except Exception as error:
-                connection.send((False, _told(error)))
+    """Serve the process that started this one."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the waiting process decides what an interrupt means
+    requests, replies = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
+    nothing = os.open(os.devnull, os.O_RDWR)
+    for each in (0, 1):  # an object that prints would corrupt the answers
+        os.dup2(nothing, each)
+    given: queue.SimpleQueue[Any] = queue.SimpleQueue()
+    threading.Thread(target=_listen, args=(requests, given), daemon=True).start()
+
+    it: list[Any] = []  # the object, once it is there
+    try:
+        with seldom_collecting():
+            replies.write(_answer_to(it, None))
+            replies.flush()
+            for number, request in enumerate(iter(given.get, None)):
+                replies.write(_answer_to(it, request))
+                replies.flush()
+                if number == _SETTLED:  # what has been loaded until now need not be searched for garbage again
+                    keep_for_good()
+        if it and hasattr(it[0], "close"):
+            it[0].close()
+    except BrokenPipeError:
+        os._exit(1)
 
 
-def _told(error: Exception) -> str:
-    return " ".join(str(error).split()) or type(error).__name__
+def _answer_to(it: list[Any], request: Any) -> bytes:
+    """The answer to a request: nothing, a function that makes the object, or a method of this."""
+    try:
+        if isinstance(request, Exception):
+            raise request
+        made = None
+        if request is not None:
+            what, given = request
+            if it:
+                made = getattr(it[0], what)(*given)
+            else:
+                it.append(what(*given))
+        return pickle.dumps((DONE, made))
+    except EpicycleError as error:
+        return pickle.dumps((_RAISED, error))
+    except Exception as error:
+        return pickle.dumps((_RAISED, (type(error).__name__, str(error))))
+
+
+def _listen(requests: BinaryIO, given: queue.SimpleQueue[Any]) -> None:
+    """Read the requests; if the process that sends them ends in any way, end even in the middle of a call."""
+    try:
+        while True:
+            given.put(pickle.load(requests))
+    except (EOFError, OSError):
+        given.put(None)
+        time.sleep(_GRACE)
+        os._exit(1)
+    except Exception as error:  # what it is made of is not there
+        given.put(error)

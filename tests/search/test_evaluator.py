@@ -12,7 +12,7 @@ import epicycle
 from epicycle.actors import EpicycleError
 from epicycle.runner.search import evaluator as module
 from epicycle.runner.search.evaluator import Evaluator, Recipe, jobs_for
-from epicycle.runner.study.run.processes import WorkerError
+from epicycle.runner.support.apart import WorkerError
 
 
 class Squares:

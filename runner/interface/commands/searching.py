@@ -127,8 +127,8 @@ def _about(options: argparse.Namespace, call: Callable[..., Any], **more: Any) -
 
 def answer(options: argparse.Namespace, search: Callable[[], Any], code: Callable[[Any], int], **saving: Any) -> int:
     """Make a search, tell what it found and the files that have it, and give its exit code."""
-    from ...study.run.processes import WorkerError
     from ...study.run.store import WriteError
+    from ...support.apart import WorkerError
 
     try:
         found = search()

@@ -62,11 +62,11 @@ def _session(plan: Plan, folder: Path, options: argparse.Namespace, session: dic
     from epicycle.actors import counted
 
     from ...study.judge.study_results import open_study
-    from ...study.run.processes import WorkerError
     from ...study.run.progress import progress
     from ...study.run.runner import again
     from ...study.run.store import WriteError
     from ...study.session import run_study
+    from ...support.apart import WorkerError
 
     try:
         with progress(plan.study.name) as told:

@@ -16,10 +16,10 @@ from typing import Any
 
 from epicycle.actors import EpicycleError
 
+from ...support.apart import DONE, Outcome, WorkerError
 from .backlog import Task
 from .making import Recorder
 from .parcel import SENT, ParcelOnWorker, environment, mismatch, pack
-from .processes import DONE, Outcome, WorkerError
 
 CONNECT = 10.0  # s for a scheduler to answer
 PATIENCE = 60.0  # s without any worker

@@ -8,8 +8,9 @@ from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
 
+from ...support.apart import DEAD, DONE, Outcome
 from .backlog import KILLED, TIMEOUT, Backlog, Done, Task
-from .processes import DEAD, DONE, Outcome, Processes
+from .processes import Processes
 from .runner import Runner, empty_row
 from .store import Row, Store, Writer, writing
 

@@ -22,10 +22,11 @@ from typing import Any
 from ...model.catalogue.code import code_of
 from ...model.text.files import noting
 from ...model.text.problems import ModelError
+from ...support.apart import Outcome, UnwantedError, WorkerError
 from ..plan.plan import Plan
 from ..provenance import version_of, versions
 from .backlog import Task
-from .processes import Outcome, Processes, UnwantedError, WorkerError
+from .processes import Processes
 from .runner import Runner
 from .store import Row
 

@@ -1,47 +1,19 @@
 """Processes that make runs for this one; some may hang, run out of memory or be killed.
 
-This process survives runs that hang or kill their process, and can end them.  Each process reads from standard input
-what it needs to make a worker, and then one request after another; it answers on its original standard output, and ends
-when its input does.
+This process survives runs that hang or kill their process, and can end them.
 """
 
 from __future__ import annotations
 
-import os
-import pickle
-import queue
 import shutil
-import signal
-import subprocess
-import sys
 import tempfile
 import threading
-import time
 from collections.abc import Callable
-from typing import Any, BinaryIO, Protocol
+from typing import Any, Protocol
 
-from epicycle.actors import EpicycleError
-
-from ...support.collection import keep_for_good, seldom_collecting
+from ...support.apart import DONE, Outcome, Process, UnwantedError, WorkerError
 
 MAX_STILLBORN = 5  # processes in a row that end before they start work
-_LOOK = 0.5  # s between two checks whether a run is still wanted
-# One thread a process: N processes of N threads each would only be in each other's way.
-_THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS", "NUMBA_NUM_THREADS")
-
-# The answers of a process, with an exception for ``RAISED`` and the result for ``DONE``.
-READY, BEGUN, DONE, RAISED = "ready", "begun", "done", "raised"
-# Other outcomes of a request: it took too long, or the process ended with that exit code.
-LATE, DEAD = "late", "dead"
-Outcome = tuple[str, Any]
-
-
-class WorkerError(EpicycleError):
-    """Workers that cannot work."""
-
-
-class UnwantedError(EpicycleError):
-    """Nobody waits for the result any longer."""
 
 
 class Worker(Protocol):
@@ -53,75 +25,6 @@ class Worker(Protocol):
 
     def make(self, request: Any) -> Any:
         """The result, as plain data."""
-
-
-class _Process:
-    def __init__(self, begin: Callable[..., Worker], arguments: tuple[object, ...], folder: str) -> None:
-        self._folder = folder
-        environment = {**os.environ, **dict.fromkeys(_THREADS, "1"), "PYTHONPATH": os.pathsep.join(sys.path)}
-        # No multiprocessing: the processes of Dask are daemons, which it allows no children. With -P they import what
-        # this process would, and no module of the same name that happens to be in the working directory.
-        self._process = subprocess.Popen(
-            [sys.executable, "-P", "-c", f"from {__name__} import serve; serve()"],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            env=environment,
-            process_group=0,  # an interrupt from the terminal is not meant for it; it ends when its input does
-        )
-        self._told: queue.SimpleQueue[Outcome] = queue.SimpleQueue()
-        threading.Thread(target=self._listen, daemon=True).start()
-        self._first: object = begin, arguments
-        self.is_ready = False
-
-    def make(self, request: object, timeout: float | None, is_wanted: Callable[[], bool]) -> Outcome:
-        """The outcome of a request; raises what the worker has raised, and ``UnwantedError``."""
-        if self._first is not None:
-            self._give(self._first)
-            self._first = None
-        self._give(request)
-        since = time.monotonic()
-        while True:
-            try:
-                what, told = self._told.get(timeout=_LOOK if timeout is None else min(_LOOK, timeout))
-            except queue.Empty:
-                if not is_wanted():
-                    raise UnwantedError from None
-                if timeout is not None and self.is_ready and time.monotonic() - since > timeout:
-                    return LATE, None
-                continue
-            since = time.monotonic()
-            if what == READY:
-                self.is_ready = True
-            elif what == RAISED:
-                raise told
-            elif what in (DONE, DEAD):
-                return what, told
-
-    def end(self) -> None:
-        """Kill it if it still runs, and leave nothing behind."""
-        self._process.kill()
-        self._process.wait()
-        if self._folder:
-            shutil.rmtree(self._folder, ignore_errors=True)
-
-    def _give(self, what: object) -> None:
-        assert self._process.stdin is not None
-        try:
-            pickle.dump(what, self._process.stdin)
-            self._process.stdin.flush()
-        except OSError:  # it has died, which the listener reports
-            return
-
-    def _listen(self) -> None:
-        assert self._process.stdout is not None
-        try:
-            while True:
-                self._told.put(pickle.load(self._process.stdout))
-        except (EOFError, OSError, pickle.UnpicklingError):
-            self._told.put((DEAD, self._process.wait()))
-        except Exception as error:  # of a class that only that process knows; somebody waits for an answer
-            told = f"the answer of a process cannot be read: {type(error).__name__}: {error}"
-            self._told.put((RAISED, WorkerError(told)))
 
 
 class Processes:
@@ -136,8 +39,8 @@ class Processes:
         self._arguments = arguments
         self._place = place
         self._guard = threading.Lock()
-        self._idle: list[_Process] = []
-        self._busy: set[_Process] = set()
+        self._idle: list[Process] = []
+        self._folders: dict[Process, str] = {}  # of all of them
         self._is_over = False
 
     def make(
@@ -152,7 +55,11 @@ class Processes:
             process = self._taken()
             is_good = False
             try:
-                what, told = process.make(request, timeout, is_wanted)
+                what, told = process.begin(is_wanted=is_wanted)
+                for method in ("prepare", "make") if what == DONE else ():
+                    what, told = process.call(method, request, limit=timeout, is_wanted=is_wanted)
+                    if what != DONE:
+                        break
                 is_good = what == DONE
             finally:
                 self._give_back(process, is_good)
@@ -165,9 +72,9 @@ class Processes:
         """End all, even in the middle of their work."""
         with self._guard:
             self._is_over = True
-            there = [*self._idle, *self._busy]
+            there = [*self._folders]
         for each in there:
-            each.end()
+            self._end(each)
 
     def __enter__(self) -> Processes:
         return self
@@ -175,77 +82,26 @@ class Processes:
     def __exit__(self, *_: object) -> None:
         self.end()
 
-    def _taken(self) -> _Process:
+    def _taken(self) -> Process:
         with self._guard:
             if self._is_over:
                 raise UnwantedError
             if self._idle:
-                found = self._idle.pop()
-            else:
-                folder = tempfile.mkdtemp(prefix="epicycle-", dir=self._place) if self._place else ""
-                found = _Process(self._begin, (*self._arguments, folder) if folder else self._arguments, folder)
-            self._busy.add(found)
+                return self._idle.pop()
+            folder = tempfile.mkdtemp(prefix="epicycle-", dir=self._place) if self._place else ""
+            found = Process(self._begin, *self._arguments, *([folder] if folder else []))
+            self._folders[found] = folder
         return found
 
-    def _give_back(self, process: _Process, is_good: bool) -> None:
+    def _give_back(self, process: Process, is_good: bool) -> None:
         with self._guard:
-            self._busy.remove(process)
             if is_good and not self._is_over:
                 self._idle.append(process)
                 return
+        self._end(process)
+
+    def _end(self, process: Process) -> None:
+        """End a process, and leave nothing behind."""
         process.end()
-
-
-# -- inside such a process --------------------------------------------------------------------------------------------
-
-
-def serve() -> None:
-    """Serve the process that started this one."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the waiting process decides what an interrupt means
-    requests, replies = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
-    nothing = os.open(os.devnull, os.O_RDWR)
-    for each in (0, 1):  # an actor that prints would corrupt the answers
-        os.dup2(nothing, each)
-    given: queue.SimpleQueue[Any] = queue.SimpleQueue()
-    threading.Thread(target=_listen, args=(requests, given), daemon=True).start()
-
-    def tell(what: str, told: object = None) -> None:
-        replies.write(pickle.dumps((what, told)))
-        replies.flush()
-
-    def taken() -> Any:
-        if isinstance(found := given.get(), Exception):
-            raise found
-        return found
-
-    try:
-        with seldom_collecting():
-            begin, arguments = taken()
-            worker: Worker = begin(*arguments)
-            tell(READY)
-            is_settled = False
-            while True:
-                request = taken()
-                worker.prepare(request)
-                tell(BEGUN)
-                tell(DONE, worker.make(request))
-                if not is_settled:  # what the first run has loaded need not be scanned in later ones
-                    keep_for_good()
-                    is_settled = True
-    except BrokenPipeError:
-        os._exit(1)
-    except EpicycleError as error:
-        tell(RAISED, error)
-    except Exception as error:
-        tell(RAISED, EpicycleError(f"{type(error).__name__}: {error}"))
-
-
-def _listen(requests: BinaryIO, given: queue.SimpleQueue[Any]) -> None:
-    """Read the requests; if the process that sends them ends in any way, end even in the middle of a run."""
-    try:
-        while True:
-            given.put(pickle.load(requests))
-    except (EOFError, OSError):
-        os._exit(1)
-    except Exception as error:  # what it is made of is not there
-        given.put(error)
+        if folder := self._folders.pop(process, ""):
+            shutil.rmtree(folder, ignore_errors=True)

@@ -13,11 +13,12 @@ from epicycle.actors import EpicycleError, readable
 
 from ...execution.engine import LogFilter, Results, Simulation
 from ...model.build.model import Model
+from ...support.apart import DONE
 from ..plan.columns import value_of
 from ..plan.plan import Condition, Plan
 from .backlog import FAILED, OK, Task
 from .manifest import columns_of_rows
-from .processes import DONE, Processes
+from .processes import Processes
 from .store import Row
 
 _MODELS_KEPT = 4
