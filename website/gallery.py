@@ -14,9 +14,9 @@ from epicycle.runner.interface.cli import main
 from epicycle.runner.model.build.figures import figures_of
 from epicycle.runner.model.catalogue.packaged import packaged_models
 from epicycle.runner.model.text.problems import Problems
-from epicycle.runner.show import draw_figures
-from epicycle.runner.show.outcome import shown
-from epicycle.runner.show.view import Recording, write_page
+from epicycle.runner.show.outcome import draw_figures, shown
+from epicycle.runner.show.view.page import write_page
+from epicycle.runner.show.view.recording import Recording
 
 UNTIL = {"mg1": 1000.0, "mm1": 1000.0, "switched_network": 0.2}  # s; as much as a page can show in full
 

@@ -18,7 +18,7 @@ from epicycle.runner.interface.cli import main
 from epicycle.runner.model.catalogue.metrics import TAKES, MetricOptions, MetricSpec, TakeName
 from epicycle.runner.model.catalogue.reference import describe
 from epicycle.runner.search.comparing import Comparison
-from epicycle.runner.show import TimeSeries
+from epicycle.runner.show.figures import TimeSeries
 from epicycle.runner.study.inference import paired_difference
 
 

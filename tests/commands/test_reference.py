@@ -16,7 +16,7 @@ from epicycle.actors import Actor, InputPort, OutputPort, Parameter, array_param
 from epicycle.runner.interface.cli import main
 from epicycle.runner.model.catalogue.reference import TypeReference, describe, parts_of
 from epicycle.runner.model.catalogue.types import built_in, installed
-from epicycle.runner.show import detail
+from epicycle.runner.show.reference import detail
 
 
 class Gate(Actor):

@@ -186,7 +186,9 @@ def test_what_is_missing_for_other_viewers_is_said_before_the_run(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setitem(sys.modules, module, None)
-    monkeypatch.setattr("epicycle.runner.show.view.Recording.run", lambda *_, **__: pytest.fail("the model was run"))
+    monkeypatch.setattr(
+        "epicycle.runner.show.view.recording.Recording.run", lambda *_, **__: pytest.fail("the model was run")
+    )
     assert said(capsys, line, flag, "run", code=2) == f"error: {message}\n"
 
 

@@ -16,7 +16,7 @@ from epicycle.runner.execution.engine.measurement import Measurement, Outcome
 from epicycle.runner.execution.engine.statistic import Total
 from epicycle.runner.model.catalogue.metrics import TAKES, MetricSpec
 from epicycle.runner.model.graph.outputs import Metric
-from epicycle.runner.show import summary_object
+from epicycle.runner.show.outcome import summary_object
 from tests.engine.engine_parts import simulate
 
 SECOND = 10**9

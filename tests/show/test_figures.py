@@ -14,7 +14,8 @@ from epicycle.runner import Simulation, load_model
 from epicycle.runner.model.build.figures import figures_of
 from epicycle.runner.model.catalogue.packaged import packaged_models
 from epicycle.runner.model.text.problems import Problems
-from epicycle.runner.show import FigureError, draw
+from epicycle.runner.show import FigureError
+from epicycle.runner.show.canvas import draw
 from epicycle.runner.show.sheet import PALETTE, Sheet
 from epicycle.runner.show.trajectories import Trajectories
 from tests.demo_models import DURATIONS

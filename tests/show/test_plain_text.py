@@ -12,9 +12,10 @@ import yaml
 from epicycle.actors import Clock, Parameter
 from epicycle.runner import Model, Results, Simulation
 from epicycle.runner.interface.cli import main
-from epicycle.runner.show import Figure, FigureError, draw, draw_figures
-from epicycle.runner.show.canvas import style
+from epicycle.runner.show import Figure, FigureError
+from epicycle.runner.show.canvas import draw, style
 from epicycle.runner.show.graph import outline, write_graph
+from epicycle.runner.show.outcome import draw_figures
 from epicycle.runner.show.report.data import shown
 from epicycle.runner.show.sheet import Sheet
 

@@ -13,9 +13,11 @@ from PIL import Image
 
 from epicycle.actors import Actor, CircularMotion, Clock, InputPort, OutputPort
 from epicycle.runner import Model, Results, Simulation
-from epicycle.runner.show import FigureError, Histogram, TimeSeries, Trajectories, draw
-from epicycle.runner.show.canvas import style
+from epicycle.runner.show import FigureError
+from epicycle.runner.show.canvas import draw, style
+from epicycle.runner.show.figures import Histogram, TimeSeries
 from epicycle.runner.show.sheet import FEW, MAX_TIPS, PALETTE, Sheet, tips_of
+from epicycle.runner.show.trajectories import Trajectories
 
 HOSTILE = '<script>alert(1)</script> & "]]>" \'--> \x1b\u202e'
 

@@ -207,7 +207,7 @@ def _from_elsewhere(path: Path) -> str | None:
 
 
 def _weaving(options: argparse.Namespace) -> int:
-    from ...show import aspects_at, weaving
+    from ...show.reference import aspects_at, weaving
 
     model = load(options)
     if options.json:
@@ -226,7 +226,7 @@ def _describe_type(options: argparse.Namespace) -> int:
     from ...model.catalogue.packaged import packaged_models
     from ...model.catalogue.reference import describe, parts_of
     from ...model.catalogue.types import load_all
-    from ...show import described, detail, parts_described
+    from ...show.reference import described, detail, parts_described
 
     known, name = known_types(options), options.model
     types = {**known.actors, **known.aspects}

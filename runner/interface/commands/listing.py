@@ -82,7 +82,7 @@ def _types(options: argparse.Namespace) -> int:
     from dataclasses import asdict
 
     from ...model.catalogue.types import load_all
-    from ...show import described, overview
+    from ...show.reference import described, overview
 
     known = known_types(options)
     loaded, errors = load_all(known.actors if options.what == "actors" else known.aspects)

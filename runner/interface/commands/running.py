@@ -27,7 +27,7 @@ from .options import (
 
 if TYPE_CHECKING:
     from ...model.build.model import Model
-    from ...show.view import Recording
+    from ...show.view.recording import Recording
 
 
 @command(
@@ -65,7 +65,7 @@ def run(options: argparse.Namespace) -> int:
 
     from ...execution.engine import LogFilter, Pace
     from ...execution.results import LogFile
-    from ...show import summary_object, summary_table
+    from ...show.outcome import summary_object, summary_table
     from ...show.performing import perform
 
     given = arguments(running.run, options)
@@ -185,7 +185,8 @@ def _exports(options: argparse.Namespace) -> list[tuple[Path, Callable[[Recordin
     """The files for other viewers and the functions that write them; obstacles are reported before a run."""
     from epicycle.actors import EpicycleError
 
-    from ...show.view import require_mcap, require_rerun, write_mcap, write_rerun
+    from ...show.view.mcap_file import require_mcap, write_mcap
+    from ...show.view.rerun_file import require_rerun, write_rerun
 
     found: list[tuple[Path, Callable[[Recording, Path], None]]] = []
     for flag, path, require, write in (

@@ -27,7 +27,8 @@ from epicycle.actors import EpicycleError, read_regular
 
 from ...desk.answers import ANSWERS
 from ...model.text.document import MAX_BYTES
-from ...show.view import PARTS, ViewError, part, script
+from ...show.view.page import PARTS, part, script
+from ...show.view.recording import ViewError
 from ...support.files import replace_file
 from .workers import Workers
 

@@ -33,7 +33,9 @@ from ...model.text.document import MAX_BYTES
 from ...model.text.files import opened
 from ...model.text.problems import Problems
 from ...search.what_if import Changes, what_if
-from ...show.view import Recording, data_of, drawn
+from ...show.view.drawing import drawn
+from ...show.view.page import data_of
+from ...show.view.recording import Recording
 from ...study.run_spec import RunSpec, named
 from ...support.collection import keep_for_good, seldom_collecting
 from ...support.shown import in_words

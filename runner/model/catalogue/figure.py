@@ -54,5 +54,6 @@ class Figure(Configurable):
 
 def own_figures() -> dict[str, type[Figure]]:
     """The figures that Epicycle and the running program define, by name."""
-    import_module("...show", __package__)
+    for name in ("figures", "trajectories"):
+        import_module(f"...show.{name}", __package__)
     return dict(sorted(variants(Figure).items()))

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from epicycle.runner.model.build.model import Model
-from epicycle.runner.show import aspects_at
+from epicycle.runner.show.reference import aspects_at
 from tests.aspects.core.composite_parts import PAIR, acts, load, run, sends
 
 CPU = """

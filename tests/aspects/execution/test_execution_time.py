@@ -117,7 +117,7 @@ def test_measured_once_and_replayed(tmp_path: Path) -> None:
     assert len(times) == 41
     assert sorted(times[2::3])[6] > sorted(times[0::3])[6] > 0  # medians: it was measured, and not made up
 
-    from epicycle.runner.show import write_folder
+    from epicycle.runner.show.outcome import write_folder
 
     write_folder(tmp_path, results, [])
     model = text.format("type: ExecutionTime, times: signals.parquet, at: a")

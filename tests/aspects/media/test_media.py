@@ -11,7 +11,7 @@ from epicycle.aspects import JoinPoint, Medium
 from epicycle.runner import ActorError, Results, Simulation
 from epicycle.runner.execution.engine import Firing, Tracer
 from epicycle.runner.model.build.load import load_model
-from epicycle.runner.show import summary_object
+from epicycle.runner.show.outcome import summary_object
 from tests.engine.engine_parts import TYPES, load, seen, simulate
 
 

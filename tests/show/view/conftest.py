@@ -11,7 +11,8 @@ import pytest
 from epicycle.runner import load_model
 from epicycle.runner.model.build.figures import figures_of
 from epicycle.runner.model.text.problems import Problems
-from epicycle.runner.show.view import Recording, write_page
+from epicycle.runner.show.view.page import write_page
+from epicycle.runner.show.view.recording import Recording
 
 
 class Opened:

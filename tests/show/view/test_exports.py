@@ -24,9 +24,10 @@ from epicycle.runner.model.build.model import Model
 from epicycle.runner.model.catalogue.packaged import packaged_models
 from epicycle.runner.model.text.problems import Problems
 from epicycle.runner.show.space import ellipses
-from epicycle.runner.show.view import Recording, ViewError, write_mcap, write_rerun
 from epicycle.runner.show.view.export import TRAIL
-from epicycle.runner.show.view.recording import STRETCH
+from epicycle.runner.show.view.mcap_file import write_mcap
+from epicycle.runner.show.view.recording import STRETCH, Recording, ViewError
+from epicycle.runner.show.view.rerun_file import write_rerun
 
 from .test_page import SHORT
 

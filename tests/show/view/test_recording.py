@@ -13,8 +13,7 @@ from epicycle.runner.execution.engine import Firing, Simulation, Tracer
 from epicycle.runner.model.build.figures import figures_of
 from epicycle.runner.model.build.model import Model
 from epicycle.runner.model.text.problems import Problems
-from epicycle.runner.show.view import Recording
-from epicycle.runner.show.view.recording import MISSING, NOTHING, STRETCH
+from epicycle.runner.show.view.recording import MISSING, NOTHING, STRETCH, Recording
 
 
 def recorded(model: Model, until: float | None = None, **given: Any) -> Recording:
