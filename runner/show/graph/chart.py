@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -20,9 +20,10 @@ FLAGS = ("else", "immediate", "nondeterministic", "preemptive", "history", "erro
 
 @dataclass
 class Statechart(Outline):
-    """The content of a machine's drawing: a box for each mode, and the labels of the transitions between two modes."""
+    """The content of a machine's drawing: a box for each mode, what these do, and the labels of the transitions."""
 
     initial: Box
+    does: Mapping[str, list[str]]
     labels: Mapping[tuple[str, str], list[str]]
 
 
@@ -38,13 +39,13 @@ def statechart(model: Model, path: str) -> Statechart:
         raise EpicycleError(f"{path} has no modes{did_you_mean(path, known)}; machines: {valid}")
     domain = model.graph.domains.get(found.path.rpartition(".")[0])
     refinements = {} if domain is None else domain.refinements
-    modes = {}
+    modes, does = dict[str, Box](), dict[str, list[str]]()
     for name, mode in found.modes.items():
-        lines = [f"{variable}' = {formula.source}" for variable, formula in mode.flow.items()]
-        lines += [f"{when} / {_actions(does)}" for when, does in (("entry", mode.entry), ("exit", mode.exit)) if does]
+        lines = does[name] = [f"{variable}' = {formula.source}" for variable, formula in mode.flow.items()]
+        lines += [f"{when} / {_actions(acts)}" for when, acts in (("entry", mode.entry), ("exit", mode.exit)) if acts]
         if name in refinements:
             lines.append(f"refinement {model.graph.components[refinements[name]].kind}")
-        modes[name] = Box(f"{found.path}.{name}", name, "\n".join(lines), shape=FINAL if mode.final else MODE)
+        modes[name] = Box(f"{found.path}.{name}", name, _wrapped(lines), shape=FINAL if mode.final else MODE)
     labels: dict[tuple[str, str], list[str]] = {}
     for each in found.transitions:
         sources = each.from_
@@ -57,7 +58,7 @@ def statechart(model: Model, path: str) -> Statechart:
     links += [_link(modes[source], modes[target], said) for (source, target), said in labels.items()]
     whole = found.path.removesuffix(".machine")
     chart = Box(whole, whole, "modes", children=[start, *modes.values()], links=links, is_composite=True)
-    return Statechart(model, Box("", model.name, "", children=[chart], is_composite=True), 1, 1, initial, labels)
+    return Statechart(model, Box("", model.name, "", children=[chart], is_composite=True), 1, 1, initial, does, labels)
 
 
 def _link(source: Box, target: Box, labels: list[str]) -> Link:
@@ -66,7 +67,11 @@ def _link(source: Box, target: Box, labels: list[str]) -> Link:
     for box, ports in ((source, source.outputs), (target, target.inputs)):
         ends.append(f"{box.path} {len(box.inputs) + len(box.outputs)}")
         ports.append(Port(ends[-1], "", False, ()))
-    return Link(ends[0], ends[1], None, "\n".join(line for each in labels for line in textwrap.wrap(each, WIDEST)))
+    return Link(ends[0], ends[1], None, _wrapped(labels))
+
+
+def _wrapped(texts: Iterable[str]) -> str:
+    return "\n".join(line for each in texts for line in textwrap.wrap(each, WIDEST))
 
 
 def _actions(actions: Any) -> str:
@@ -78,6 +83,8 @@ def _label(each: Any) -> str:
     flags = [flag for flag in FLAGS if vars(each)[flag]]
     words = [*flags, *([f"priority {each.priority}"] if each.priority else []), *each.on]
     words += [f"after {each.after.source} s"] if each.after is not None else []
+    words += [f"probability {each.probability.source}"] if each.probability is not None else []
+    words += [f"rate {each.rate.source}"] if each.rate is not None else []
     words += [f"[{each.when.source}]"] if each.when is not None else []
     return " ".join(words) + (f" / {_actions(each.do)}" if each.do else "")
 
@@ -87,7 +94,7 @@ def chart_text(chart: Statechart) -> str:
     (machine,) = chart.root.children
     lines = ["---", f"title: {machine.path}", "---", "stateDiagram-v2", f"    [*] --> {chart.initial.name}"]
     for mode in machine.children[1:]:
-        said = map(_plain, mode.kind.splitlines())
+        said = map(_plain, chart.does[mode.name])
         lines += [f"    {mode.name}: {' ⏎ '.join([mode.name, *said])}"] if mode.kind else []
         lines += [f"    {mode.name} --> [*]"] if mode.shape == FINAL else []
     lines += [

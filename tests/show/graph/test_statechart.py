@@ -9,6 +9,7 @@ import pytest
 from epicycle.actors import EpicycleError
 from epicycle.runner import load_model
 from epicycle.runner.show.graph import draw, mermaid, statechart, write_graph
+from epicycle.runner.show.graph.chart import WIDEST
 from tests.actors.feeding import load
 
 MODEL = """
@@ -65,6 +66,26 @@ def test_labels_and_modes_keep_clear_of_each_other() -> None:
         for place, (x, y, width, height) in enumerate(spaces):
             for left, top, across, down in spaces[place + 1 :]:
                 assert x + width < left or left + across < x or y + height < top or top + down < y
+
+
+def test_what_a_mode_does_goes_over_several_lines() -> None:
+    """Long texts are broken in the picture alone, where no line is wider than a label."""
+    chart = statechart(load_model("lift_group"), "lift[0]")
+    (machine,) = chart.root.children
+    (deciding,) = [box for box in machine.children if box.name == "deciding"]
+    assert 10 < len(deciding.kind.splitlines()) < 16
+    assert max(map(len, deciding.kind.splitlines())) <= WIDEST
+    (line,) = [line for line in mermaid(chart).splitlines() if line.startswith("    deciding: ")]
+    assert line.count("⏎") == 1
+
+
+def test_probabilities_and_rates_are_shown() -> None:
+    text = MODEL.replace("variables: {n: 0}", "variables: {n: 0, rest: 0.25}").replace(
+        "transitions:", "transitions:\n      - on -> off probability rest on go\n      - off -> on rate 2 * rest"
+    )
+    found = mermaid(statechart(load(text), "it"))
+    assert "    on --> off: go probability rest\n" in found
+    assert "    off --> on: rate 2 * rest\n" in found
 
 
 def test_what_has_no_modes_is_told() -> None:
