@@ -47,6 +47,8 @@ class Recorder(Actor):
     def fire(self) -> None:
         tokens = self.input.tokens
         self.seen += len(tokens)
+        if self.capacity == 0:
+            return  # it only counts
         self.tokens.extend(tokens)
         self.tags.extend([self.tag] * len(tokens))
         if self.capacity is not None and len(self.tokens) > self.capacity:
