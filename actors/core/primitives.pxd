@@ -3,11 +3,15 @@
 from libc.stdint cimport uint64_t
 
 
+cdef struct Source:  # how the interface of NumPy's bit generators begins
+    void* state
+    uint64_t (*next_uint64)(void*) noexcept
+
+
 cdef class Words:
-    cdef public object _bits
-    cdef public int _block
-    cdef uint64_t words[64]
-    cdef int left
+    cdef public list _ahead
+    cdef object bits
+    cdef Source* source
     cpdef uint64_t word(self) except? 0
 
 

@@ -9,24 +9,22 @@ import numpy as np
 nearest: Final = round  # the nearest whole number, of two the even one
 
 
-_MOST: Final = 64  # words taken from the generator at once, at a tenth of the cost of one by one
+_MANY: Final = 64  # words taken from the generator at once, at a tenth of the cost of one by one
 
 
 class Words:
     """Random bits, 64 at a time."""
 
-    __slots__ = ("_ahead", "_bits", "_block")
+    __slots__ = ("_ahead", "_bits")
 
     def __init__(self, bits: np.random.PCG64) -> None:
         self._bits = bits
         self._ahead: list[int] = []  # words taken in advance, the next one last
-        self._block = 16
 
     def word(self) -> int:
         """The next 64 random bits, as a non-negative number."""
         if not self._ahead:
-            self._block = min(2 * self._block, _MOST)
-            self._ahead = self._bits.random_raw(self._block)[::-1].tolist()
+            self._ahead = self._bits.random_raw(_MANY)[::-1].tolist()
         return self._ahead.pop()
 
 

@@ -4,6 +4,7 @@
 import copyreg
 
 from cpython.object cimport PyObject
+from cpython.pycapsule cimport PyCapsule_GetPointer
 from cpython.ref cimport Py_DECREF
 from libc.math cimport frexp, rint
 from libc.stdint cimport uint64_t
@@ -54,32 +55,31 @@ cdef double log(double x) except? -1.0:
 
 
 cdef class Words:
-    __slots__ = ("_ahead", "_bits", "_block")
+    __slots__ = ("_ahead", "_bits")
 
     def __init__(self, bits):
+        self._ahead = []  # the generator gives one word at a time, and that in C
         self._bits = bits
-        self._block = 16
 
     def __reduce__(self):
         return reduced(self)
 
     @property
-    def _ahead(self):
-        return [self.words[place] for place in range(self.left)]
+    def _bits(self):
+        return self.bits
 
-    @_ahead.setter
-    def _ahead(self, words):
-        self.left = 0
-        for word in words[:64]:
-            self.words[self.left] = word
-            self.left += 1
+    @_bits.setter
+    def _bits(self, bits):
+        capsule = getattr(bits, "capsule", None)
+        self.bits = bits
+        self.source = NULL if capsule is None else <Source*>PyCapsule_GetPointer(capsule, "BitGenerator")
 
     cpdef uint64_t word(self) except? 0:
-        if not self.left:
-            self._block = min(2 * self._block, 64)
-            self._ahead = self._bits.random_raw(self._block)[::-1].tolist()
-        self.left -= 1
-        return self.words[self.left]
+        if self._ahead:
+            return self._ahead.pop()
+        if self.source == NULL:
+            return self.bits.random_raw()
+        return self.source.next_uint64(self.source.state)
 
 
 cdef tuple reduced(thing):

@@ -294,4 +294,4 @@ class Streams:
         self._seed = seed
         for stream, path, purpose in self._made:
             other = cast(RandomStream, random_stream(seed, path, purpose))
-            stream._bits, stream._block, stream._ahead = other._bits, other._block, other._ahead
+            stream._bits, stream._ahead = other._bits, other._ahead

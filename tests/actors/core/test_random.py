@@ -177,7 +177,9 @@ def test_many_integers_are_refused_as_single_ones_are() -> None:
         def __init__(self) -> None:
             self.words = [0, 2**63, 0, 5, 2**64 - 1, 0, 0, 7, 2**62, 1, 2, 3] * 9
 
-        def random_raw(self, count: int) -> np.ndarray:
+        def random_raw(self, count: int | None = None) -> np.ndarray | int:
+            if count is None:
+                return self.words.pop(0)
             taken, self.words = self.words[:count], self.words[count:]
             return np.array(taken, np.uint64)
 
