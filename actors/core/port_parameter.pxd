@@ -23,4 +23,5 @@ cdef class ParameterPort(InputPort):
 @cython.final
 cdef class PortParameter(Parameter):
     cdef public ParameterPort port
+    cdef public object port_name
     cpdef ParameterPort port_of(self, instance)

@@ -98,10 +98,12 @@ class PortParameter(Parameter[T]):
     def __init__(self, type: Any, default: Any = REQUIRED, **options: Any) -> None:
         Parameter.__init__(self, type, default, **options)
         self.port: ParameterPort[T] = ParameterPort(self, type, self.doc)
+        self.port_name = ""
 
     def __set_name__(self, owner: type, name: str) -> None:
         Parameter.__set_name__(self, owner, name)
         self.port.__set_name__(owner, name)
+        self.port_name = name
 
     @overload
     def __get__(self, instance: None, owner: type) -> PortParameter[T]: ...
@@ -124,5 +126,5 @@ class PortParameter(Parameter[T]):
 
     def port_of(self, instance: Any) -> ParameterPort[T]:
         """The port of one instance."""
-        port: ParameterPort[T] = instance.inputs[self.port.name]
+        port: ParameterPort[T] = instance.inputs[self.port_name]
         return port

@@ -119,7 +119,7 @@ class Director:
     @property
     def time(self) -> int:
         """Its time (ns)."""
-        return self.now().time
+        return self.now().time if self.present is None else self.present.time
 
     @property
     def last(self) -> Tag:
