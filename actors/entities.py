@@ -46,14 +46,18 @@ class SetFields(Actor):
     )
     remove = texts_parameter((), doc="fields to remove, after all others are set")
 
+    def initialize(self) -> None:
+        self._draws = [(name, each.draw, self.random_stream(name)) for name, each in self.draw.items()]
+
     def fire(self) -> None:
+        now = self.now
         for token in self.input.tokens:
             seen = operand(token)
             fields = dict(seen) if isinstance(seen, Mapping) else {}
-            for name, distribution in self.draw.items():
-                fields[name] = distribution.draw(self.random_stream(name))
+            for name, draw, stream in self._draws:
+                fields[name] = draw(stream)
             for name, formula in self.set.items():
-                fields[name] = formula(fields, seen, self.now)
+                fields[name] = formula(fields, seen, now)
             for name in self.remove:
                 fields.pop(name, None)
             self.output.send(fields)

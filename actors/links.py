@@ -57,7 +57,7 @@ class _Transmitting(Actor):
 
     def initialize(self) -> None:
         self._transmitters = [_Transmitter() for _ in range(max(self.outputs["output"].width, 1))]
-        self._came = 0
+        self._came = self._waits = 0  # frames
         self._count = Tally(self.outputs["waiting"])
 
     def _finish(self) -> list[tuple[int, Any]]:
@@ -78,11 +78,13 @@ class _Transmitting(Actor):
         order = self.order.number("an order", token, self.now)
         frame = Waiter(token, channel, order, float(self._came), size, self._came)
         self._came += 1
+        self._waits += 1
         transmitter.waiting.add(frame)
         if self.buffer is not None:
             sizes = [each.size for each in transmitter.waiting]
             if math.fsum(sizes if transmitter.wake is not None else sizes[1:]) > self.buffer:
                 transmitter.waiting.remove(frame)
+                self._waits -= 1
                 return False
         return True
 
@@ -96,13 +98,11 @@ class _Transmitting(Actor):
                 continue
             frame = transmitter.waiting.first
             transmitter.waiting.remove(frame)
+            self._waits -= 1
             assert self.rate is not None
             time = frame.size / self.rate + transmitter.rest
             transmitter.rest = below_nanoseconds(time)
             transmitter.sent, transmitter.wake = frame.token, self.wake_in(time)
-
-    def _tell_waiting(self) -> None:
-        self._count.tell(sum(len(each.waiting) for each in self._transmitters))
 
 
 class Link(_Transmitting):
@@ -139,7 +139,7 @@ class Link(_Transmitting):
             elif not self._enqueue(token, 0):
                 self.rejected.send(token)
         self._begin()
-        self._tell_waiting()
+        self._count.tell(self._waits)
 
     def _travel(self, token: Any) -> None:
         is_lost = self.loss > 0 and self.random.random() < self.loss
@@ -182,7 +182,7 @@ class NetworkSwitch(_Transmitting):
         self._begin()
         for token in self.input.tokens:
             self._looked_at.put(token, self.latency)
-        self._tell_waiting()
+        self._count.tell(self._waits)
 
 
 @dataclass(slots=True)
