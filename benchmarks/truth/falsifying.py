@@ -1,7 +1,8 @@
 """The cases of the board that are about falsification, in two ways:
 
 - ``replay: NAME`` with ``monitor``: inputs that are published as breaking it do, and what the port ``of`` sends then is
-  ``within`` so much of what is published there; the robustness of the monitor is that of rtamt.
+  ``within`` so much of what is published there; the robustness of the monitor is that of rtamt.  Where no inputs are
+  published, they are ours; ``least`` is the least robustness that is published, and ours is ``within`` so much of it.
 - ``search: NAME`` with ``monitor`` and ``vary``: searches with several seeds, each of at most as many runs as were
   published, so many ``searches``; ``published`` has in how many of 50 something was ``found``, and the ``mean``
   number of runs of these.
@@ -21,8 +22,9 @@ import epicycle
 from epicycle.runner import Simulation
 from epicycle.runner.execution.results import Results
 
-PUBLISHED = "counterexamples/published.yaml"
+EXAMPLES = ("published.yaml", "ours.yaml")
 SEGMENT = 5.0  # s
+OUTCOMES = ("sent", "rtamt")  # of an example; all else in it are inputs
 EQUAL = 1e-9  # the most by which margins differ that are the same
 FIRST, APART = 50_000, 1_000  # the seed of the first search, of which none was looked at before; between seeds
 MOST = 300  # runs of a search
@@ -31,15 +33,19 @@ OF = 50  # published searches of each property
 
 @cache
 def counterexamples(folder: Path) -> Mapping[str, Any]:
-    """What is published of each property."""
-    found: Mapping[str, Any] = yaml.safe_load((folder / PUBLISHED).read_text(encoding="utf-8"))
-    return found
+    """The examples of each property: published ones, or ours."""
+    texts = [(folder / "counterexamples" / name).read_text(encoding="utf-8") for name in EXAMPLES]
+    return {monitor: examples for text in texts for monitor, examples in yaml.safe_load(text).items()}
+
+
+def inputs(example: Mapping[str, Any]) -> dict[str, Any]:
+    """The inputs of an example, by the parameters that they are."""
+    return {name: value for name, value in example.items() if name not in OUTCOMES}
 
 
 def replayed(file: Path, case: Mapping[str, Any], example: Mapping[str, Any]) -> Results:
-    """The run of a published counterexample, with no monitor but the one that it breaks."""
-    inputs = {name: example[name] for name in ("throttle", "brake")}
-    model = epicycle.load(file, set={**case.get("set", {}), **inputs})
+    """The run of an example, with no monitor but the one that it is of."""
+    model = epicycle.load(file, set={**case.get("set", {}), **inputs(example)})
     output = model.output
     output.monitors = [each for each in output.monitors if each.name == case["monitor"]]
     output.metrics = [each for each in output.metrics if each.monitor == case["monitor"]]
@@ -61,28 +67,37 @@ def deviation(found: Results, case: Mapping[str, Any], example: Mapping[str, Any
 
 
 def replays(file: Path, case: Mapping[str, Any]) -> Iterator[tuple[str, str, str, bool, str]]:
-    """What is asked, published and found for published inputs, whether it is the same, and a command."""
-    examples = counterexamples(file.parent)[case["monitor"]]
-    broken, furthest, apart = 0, 0.0, 0.0
+    """What is asked, published and found for the inputs of a case, whether it is the same, and a command."""
+    examples, monitor, until = counterexamples(file.parent)[case["monitor"]], case["monitor"], case["until"]
+    is_published = "of" in case
+    robustness, broken, furthest = [], 0, 0.0
     for example in examples:
         found = replayed(file, case, example)
-        apart = max(apart, abs(found.metrics[f"{case['monitor']}_robustness"] - example["rtamt"]))
-        broken += found.monitors[case["monitor"]].holds is False
-        furthest = max(furthest, deviation(found, case, example))
-    asked = f"{case['monitor']} with published inputs; {case['of']}"
-    ours = f"broken in {broken} of {len(examples)}; within {furthest:.3f}"
-    settings = {**case.get("set", {}), "throttle": examples[0]["throttle"], "brake": examples[0]["brake"]}
+        robustness.append(float(found.metrics[f"{monitor}_robustness"]))
+        broken += found.monitors[monitor].holds is False
+        furthest = max(furthest, deviation(found, case, example)) if is_published else 0.0
+    settings = {**case.get("set", {}), **inputs(examples[0])}
     sets = "".join(f" --set {shlex.quote(f'{name}={value}')}" for name, value in settings.items())
-    command = f"{sets} --until {case['until']} --check"
+    command = f"{sets} --until {until} --check"
+    if is_published:
+        yield (
+            f"{monitor} with published inputs; {case['of']}",
+            f"broken in {len(examples)} of {len(examples)}; to {case['within']:g}",
+            f"broken in {broken} of {len(examples)}; within {furthest:.3f}",
+            broken == len(examples) and furthest <= case["within"],
+            command,
+        )
+    if "least" in case:
+        yield (
+            f"least robustness of {monitor}",
+            f"{case['least']:.4g}; to {case['within']:g}",
+            f"{min(robustness):.4g}",
+            abs(min(robustness) - case["least"]) <= case["within"],
+            command,
+        )
+    apart = max(abs(ours - example["rtamt"]) for ours, example in zip(robustness, examples, strict=True))
     yield (
-        asked,
-        f"broken in {len(examples)} of {len(examples)}; to {case['within']:g}",
-        ours,
-        broken == len(examples) and furthest <= case["within"],
-        command,
-    )
-    yield (
-        f"robustness of {case['monitor']} with published inputs, by rtamt",
+        f"robustness of {monitor} with {'published' if is_published else 'our'} inputs, by rtamt",
         ", ".join(f"{example['rtamt']:.4g}" for example in examples),
         "the same within 1e-9" if apart <= EQUAL else f"{apart:.2g} away",
         apart <= EQUAL,

@@ -2,8 +2,8 @@
 
     python -m benchmarks.truth.psy_taliro [--searches N] [--optimizer DualAnnealing] [MONITOR ...]
 
-psy-taliro is on PyPI, and no part of what we install: ``pip install psy-taliro``.  An input is a number for each
-segment, as in our searches; so are the number of runs at most and the seeds.
+psy-taliro is on PyPI, and no part of what we install: ``pip install psy-taliro``.  An input is a number, or one for
+each segment, as in our searches; so are the number of runs at most and the seeds.
 """
 
 from __future__ import annotations
@@ -31,10 +31,9 @@ def runs_until_broken(case: Mapping[str, Any], optimizer: str, seed: int) -> int
     file = board.HERE / "falsification" / f"{case['search']}.yaml"
     said: Any = yaml.safe_load(file.read_text(encoding="utf-8"))["parameters"]
     ends = {name: list(map(float, ends.split(".."))) for name, ends in case["vary"].items()}
+    lists = {name: len(said[name]["value"]) for name in ends if isinstance(said[name]["value"], list)}
     numbers = {
-        f"{name}_{place}": (low, high)
-        for name, (low, high) in ends.items()
-        for place in range(len(said[name]["value"]))
+        f"{name}_{place}": (low, high) for name, (low, high) in ends.items() for place in range(lists.get(name, 1))
     }
     until = float(case["until"].split()[0]) if "until" in case else None  # s
     made = 0
@@ -42,9 +41,10 @@ def runs_until_broken(case: Mapping[str, Any], optimizer: str, seed: int) -> int
     def robustness(sample: Any) -> float:
         nonlocal made
         made += 1
-        given = {
-            name: [float(sample.static[each]) for each in numbers if each.rpartition("_")[0] == name] for name in ends
-        }
+        given: dict[str, Any] = dict(case.get("set", {}))
+        for name in ends:
+            values = [float(sample.static[each]) for each in numbers if each.rpartition("_")[0] == name]
+            given[name] = values if name in lists else values[0]
         model = epicycle.load(file, set=given)
         output = model.output
         output.monitors = [each for each in output.monitors if each.name == case["monitor"]]

@@ -85,10 +85,20 @@ class _Version(argparse.Action):
         parser.exit()
 
 
+class _Parser(argparse.ArgumentParser):
+    """Refuses unknown options itself: otherwise the top one does, which does not tell those of a command."""
+
+    def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
+        options, unknown = super().parse_known_args(args, namespace)
+        if unknown:
+            self.error(f"unrecognized arguments: {' '.join(unknown)}")
+        return options, unknown
+
+
 def parser(arguments: Sequence[str] = ()) -> argparse.ArgumentParser:
     """The parser for all commands; only those that arguments may name get their options, which take long to make."""
     known = commands(arguments)
-    top = argparse.ArgumentParser(
+    top = _Parser(
         prog="epicycle",
         description="Discrete-event simulation of actor models written in YAML.",
         epilog=grouped(known),
