@@ -92,9 +92,8 @@ class Expression(Actor):
     def _checked(self, value: Any) -> Any:
         if _IS_KIND[self._kind](value):
             return value
-        raise EpicycleError(
-            f"{self.expression} gives {value!r}, which is not a {self._kind}; set 'gives' to the type of the value"
-        )
+        fits = next(kind for kind, is_kind in _IS_KIND.items() if is_kind(value))
+        raise EpicycleError(f"{self.expression} gives {value!r}, which is not a {self._kind}; set 'gives: {fits}'")
 
 
 class FunctionParameter(Parameter[Callable[..., Any]]):

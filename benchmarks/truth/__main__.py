@@ -12,7 +12,7 @@ import argparse
 import sys
 from pathlib import Path
 
-from benchmarks.truth.board import BESIDE, FOUND, HERE, SOURCES, as_text, lines_of, page, section, source
+from benchmarks.truth.board import FOUND, HERE, SOURCES, as_text, lines_of, page, section, source
 
 PAGE = HERE.parent / "TRUTH.md"
 
@@ -20,8 +20,7 @@ PAGE = HERE.parent / "TRUTH.md"
 def main() -> None:
     """Run the sources that the command line names, or all."""
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    known = (*SOURCES, *BESIDE)
-    options.add_argument("sources", nargs="*", metavar="SOURCE", choices=[*known, []], help=", ".join(known))
+    options.add_argument("sources", nargs="*", metavar="SOURCE", choices=[*SOURCES, []], help=", ".join(SOURCES))
     options.add_argument("--jobs", type=int, help="processes at a time (default: one per core)")
     options.add_argument("--check", action="store_true", help="compare with the page instead of writing it")
     given = options.parse_args()

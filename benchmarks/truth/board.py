@@ -38,8 +38,7 @@ from .falsifying import replays, searches
 
 HERE = Path(__file__).parent
 ROOT = HERE.parent.parent
-SOURCES = ("stochastic", "simpy", "queues", "superdense", "falsification", "tracking")
-BESIDE = ("searches",)  # which take hours, and are made when they are named
+SOURCES = ("stochastic", "simpy", "queues", "superdense", "falsification", "searches", "tracking")
 FOUND = HERE.parent / "TRUTH.json"
 RESULTS = Path("results/truth")
 LEAST, MOST = 90.0, 99.0  # % of 95 % intervals that should hold the published value

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import shlex
 from collections.abc import Iterator, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -21,6 +22,7 @@ import yaml
 import epicycle
 from epicycle.runner import Simulation
 from epicycle.runner.execution.results import Results
+from epicycle.runner.study.session import available_cores
 
 EXAMPLES = ("published.yaml", "ours.yaml")
 SEGMENT = 5.0  # s
@@ -109,15 +111,18 @@ def searches(
     file: Path, case: Mapping[str, Any], folder: Path, jobs: int | None
 ) -> Iterator[tuple[str, str, str, bool, str]]:
     """How often searches find something, and after how many runs: asked, published, found, whether it is met."""
-    runs = []
     until, searches = case.get("until"), case["searches"]
-    for number in range(searches):
+
+    def search(number: int) -> int | None:
+        """The number of the first run that breaks the requirement."""
         found = epicycle.search(
             file, epicycle.Break(case["monitor"], runs=MOST), vary=case["vary"], set=case.get("set", {}), until=until,
-            seed=FIRST + number * APART, out=folder / f"{case['monitor']}_{number}", jobs=jobs, progress=False,
+            seed=FIRST + number * APART, out=folder / f"{case['monitor']}_{number}", jobs=1, progress=False,
         )  # fmt: skip
-        runs.append(found.broken.number if found.broken is not None else None)
-    made = [each for each in runs if each is not None]
+        return None if found.broken is None else found.broken.number
+
+    with ThreadPoolExecutor(jobs or available_cores()) as threads:  # each search makes its runs in another process
+        made = [each for each in threads.map(search, range(searches)) if each is not None]
     published = case["published"]
     vary = "".join(f" --vary {name}={values}" for name, values in case["vary"].items())
     sets = "".join(f" --set {shlex.quote(f'{name}={value}')}" for name, value in case.get("set", {}).items())

@@ -82,18 +82,12 @@ def test_an_expression_without_names_has_nothing_to_wait_for() -> None:
         (
             "[x]",
             1,
-            (
-                "it failed in fire() at (1 s, 1): '[x]' gives [1], which is not a number; set 'gives' to the type of "
-                "the value"
-            ),
+            "it failed in fire() at (1 s, 1): '[x]' gives [1], which is not a number; set 'gives: any value'",
         ),
         (
             "x",
             True,
-            (
-                "it failed in fire() at (1 s, 1): 'x' gives True, which is not a number; set 'gives' to the type of "
-                "the value"
-            ),
+            "it failed in fire() at (1 s, 1): 'x' gives True, which is not a number; set 'gives: truth value'",
         ),
         (
             "sqrt(x)",

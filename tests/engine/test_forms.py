@@ -30,7 +30,7 @@ SOURCES = (
     ("distributions.py", "Gamma", "a02963690b8f422f"),
     ("distributions.py", "Normal", "41b7f712051a423b"),
     ("distributions.py", "Uniform", "6d1f653751253aab"),
-    ("functions.py", "Expression", "601ad33500f16235"),
+    ("functions.py", "Expression", "04f953415b946d4b"),
     ("queues.py", "Server", "e65ecdcaca20a7d6"),
     ("sources.py", "Clock", "dea6cfe22e657223"),
     ("sources.py", "PoissonClock", "410ecc2b87997e98"),
