@@ -1,5 +1,5 @@
 from epicycle.actors.core.moment cimport Moment, Wake, new_wake
-from epicycle.actors.core.order cimport TimedQueue, ReadyQueue, Calendar
+from epicycle.actors.core.order cimport TimedQueue, ReadyQueue
 from epicycle.actors.core.port_parameter cimport ParameterPort
 from epicycle.actors.core.ports cimport Emitter, InputPort, OutputPort, Receiver
 from epicycle.actors.core.primitives cimport is_alone

@@ -34,7 +34,7 @@ __all__ = [
     "ABSENT", "CORE", "CORE_MODULES", "CORE_REASON", "FOLDERS", "FORMER", "MAX_DEPTH", "NANOSECONDS_PER_SECOND",
     "NEVER", "NO_TOKENS", "ODE", "PID", "REQUIRED", "Accumulator", "Ackermann", "Actor", "AddSubtract", "ArqReceiver",
     "ArqSender", "Barrier", "Batch", "Beliefs", "Bernoulli", "Binomial", "BlockExpression", "BodyState",
-    "BooleanSelect", "BooleanSwitch", "BroadcastChannel", "Butterworth", "Calendar", "Casadi", "Cauchy", "Changes",
+    "BooleanSelect", "BooleanSwitch", "BroadcastChannel", "Butterworth", "Casadi", "Cauchy", "Changes",
     "ChannelError", "ChiSquare", "Choice", "CircularMotion", "ClearanceMonitor", "Clock", "Collect", "Commutator",
     "Comparator", "Configurable", "Const", "Constant", "Context", "Counter", "CurrentMicrostep", "CurrentTime",
     "DeadZone", "Default", "Derivative", "Detections", "Difference", "DiscreteFilter", "Display", "DistanceMonitor",

@@ -22,7 +22,7 @@ from .messages import (
     visible_lines,
 )
 from .moment import Moment, Wake, new_wake
-from .order import NEVER, Calendar, ReadyQueue, TimedQueue
+from .order import NEVER, ReadyQueue, TimedQueue
 from .parameter import (
     REQUIRED,
     Configurable,
@@ -48,7 +48,7 @@ from .units import UnitError, convert, in_si, parse_unit, units_like
 
 __all__ = [
     "ABSENT", "FOLDERS", "MAX_DEPTH", "NANOSECONDS_PER_SECOND", "NEVER", "NO_TOKENS", "REQUIRED", "Actor",
-    "Calendar", "Configurable", "Context", "Emitter", "Environment", "EpicycleError", "Events", "Fault", "FaultError",
+    "Configurable", "Context", "Emitter", "Environment", "EpicycleError", "Events", "Fault", "FaultError",
     "Host", "InputPort", "Latest", "MappingParameter", "Moment", "OutputPort", "Parameter", "ParameterError", "Pending",
     "PortError", "PortParameter", "Process", "Quantity", "Queues", "ReadyQueue", "Receiver", "Span", "Stream",
     "Streams", "Tag", "Tally", "TimedQueue", "UnitError", "Wake", "abridged", "accepts", "any_parameter",

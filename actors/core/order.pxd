@@ -1,7 +1,7 @@
 # Types for C; order.py documents everything.
 
 cimport cython
-from epicycle.actors.core.moment cimport Moment, Wake
+from epicycle.actors.core.moment cimport Wake
 
 
 @cython.final
@@ -11,28 +11,6 @@ cdef class ReadyQueue:
     cdef Py_ssize_t room
     cdef int push(self, long long rank) except -1
     cdef long long pop(self) except? -1
-
-
-cdef struct Slot:
-    long long time
-    Py_ssize_t number  # of what is to be done, in the list; below 0 where there is nothing
-
-
-@cython.final
-cdef class Calendar:
-    cdef ReadyQueue heap
-    cdef list instants
-    cdef Py_ssize_t* free  # places in the list
-    cdef Slot* table
-    cdef readonly Py_ssize_t size
-    cdef Py_ssize_t room, mask, unused  # room of free
-    cdef long long first(self)
-    cdef object at(self, long long time)
-    cdef int add(self, Moment instant) except -1
-    cdef int put_in(self, long long time, instant) except -1
-    cdef object pop(self)
-    cdef int _widen(self) except -1
-    cdef void _put(self, long long time, Py_ssize_t number) noexcept
 
 
 cdef struct Item:
@@ -46,8 +24,10 @@ cdef class TimedQueue:
     cdef list wakes, values
     cdef Item* heap
     cdef Py_ssize_t* free
-    cdef Py_ssize_t size, room, unused
+    cdef readonly Py_ssize_t size
+    cdef Py_ssize_t room, unused
     cdef public long long number
+    cdef long long first(self) noexcept
     cpdef push(self, Wake wake, value)
     cdef int put(self, long long time, long microstep, Wake wake, value) except -1
     cdef bint is_before(self, long long time, long microstep) noexcept

@@ -1,4 +1,4 @@
-"""Heaps: of numbers, of times with the work due at them, and of values with the wake-ups that they wait for.
+"""Heaps: of numbers, and of values with the tags that they wait for.
 
 Compiled (``order.pyx``) if a compiler was available.
 """
@@ -9,7 +9,7 @@ from heapq import heappop, heappush
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from .moment import Moment, Wake
+    from .moment import Wake
 
 NEVER = 2**63 - 1  # ns
 
@@ -36,14 +36,18 @@ class ReadyQueue:
         return heappop(self.content)
 
 
-class Calendar:
-    """The work due at the first microstep of future times."""
+class TimedQueue:
+    """Values that wait for tags, or for wake-ups, in the order of these, and in the order of entry for the same tag."""
 
-    __slots__ = ("_heap", "content")
+    __slots__ = ("content", "number")
 
     def __init__(self) -> None:
-        self.content: dict[int, Moment] = {}
-        self._heap: list[int] = []
+        # The number keeps the order of entry among equals, and values are never compared.
+        self.content: list[tuple[int, int, int, Wake | None, Any]] = []
+        self.number = 0
+
+    def __len__(self) -> int:
+        return len(self.content)
 
     @property
     def size(self) -> int:
@@ -51,44 +55,21 @@ class Calendar:
         return len(self.content)
 
     def first(self) -> int:
-        """The earliest time; ``NEVER`` if there is none."""
-        return self._heap[0] if self._heap else NEVER
+        """The time of the first; ``NEVER`` if there is none."""
+        return self.content[0][0] if self.content else NEVER
 
-    def at(self, time: int) -> Any:
-        """The work due at a time, if any."""
-        return self.content.get(time)
-
-    def add(self, instant: Moment) -> None:
-        """Add a new time."""
-        heappush(self._heap, instant.time)
-        self.content[instant.time] = instant
-
-    def pop(self) -> Any:
-        """Remove the earliest time."""
-        return self.content.pop(heappop(self._heap))
-
-
-class TimedQueue:
-    """Values that wait for wake-ups, in the order of these, and in the order of entry for the same tag."""
-
-    __slots__ = ("content", "number")
-
-    def __init__(self) -> None:
-        # The number keeps the order of entry among equals, and values are never compared.
-        self.content: list[tuple[int, int, int, Wake, Any]] = []
-        self.number = 0
-
-    def __len__(self) -> int:
-        return len(self.content)
-
-    def push(self, wake: Wake, value: Any) -> None:
+    def put(self, time: int, microstep: int, wake: Wake | None, value: Any) -> None:
         """Add an entry."""
-        heappush(self.content, (wake.time, wake.microstep, self.number, wake, value))
+        heappush(self.content, (time, microstep, self.number, wake, value))
         self.number += 1
 
+    def push(self, wake: Wake, value: Any) -> None:
+        """Add an entry that waits for a wake-up."""
+        self.put(wake.time, wake.microstep, wake, value)
+
     def is_due(self) -> bool:
-        """Whether the time of the first has come."""
-        return bool(self.content) and self.content[0][3].due
+        """Whether the wake-up of the first is due."""
+        return bool(self.content) and (wake := self.content[0][3]) is not None and wake.due
 
     def pop(self) -> Any:
         """Remove the first one."""

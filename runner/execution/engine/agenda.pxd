@@ -33,6 +33,8 @@ cdef class Instant(Moment):
     cdef public Activation activation
     cdef public Wake wake
     cpdef add(self, Activation activation, Wake wake)
+    @cython.locals(place=cython.Py_ssize_t)
+    cpdef join(self, Instant other)
 
 
 @cython.locals(instant=Instant)

@@ -104,6 +104,16 @@ class Instant(Moment):
             self.activations.append(activation)
             self.wakes.append(wake)
 
+    def join(self, other: Instant) -> None:
+        """Add the work of a later entry for the same tag."""
+        if other.activation is not None:
+            self.add(other.activation, other.wake)
+        if other.activations is not None and other.wakes is not None:
+            for place in range(len(other.activations)):
+                self.add(other.activations[place], other.wakes[place])
+        if other.pending is not None:
+            self.pending = [*(self.pending or ()), *other.pending]
+
 
 def new_instant(time: int, microstep: int, past: Instant | None = None) -> Instant:
     """An instant without work yet; a past one is reused if nobody has kept it."""

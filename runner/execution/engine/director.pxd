@@ -1,7 +1,7 @@
 # Types for C; director.py has the documentation.
 
 cimport cython
-from epicycle.actors cimport InputPort, Moment, ReadyQueue, Calendar, Wake, Receiver, new_wake
+from epicycle.actors cimport InputPort, Moment, ReadyQueue, TimedQueue, Wake, Receiver, new_wake
 from epicycle.runner.execution.engine.agenda cimport Delivery, Form, Instant, Activation, new_instant
 
 
@@ -9,10 +9,10 @@ cdef class Director:
     cdef public object _environment, events, seed, streams, crowd, ranks, watch, _stop_after, _reason
     cdef public list _recent, activations
     cdef public ReadyQueue _ready
-    cdef public Calendar _times
+    cdef public TimedQueue _times
     cdef public long long firings, steps, _on_their_way, _most_times, _most_microsteps, _most_steps, _time
     cdef public long rank
-    cdef public Instant present, _last, _next, _past
+    cdef public Instant present, _last, _latest, _next, _past
     cdef public bint _is_interrupted, is_plain
     @cython.locals(last=Instant, time=cython.longlong)
     cpdef Instant now(self)
@@ -40,6 +40,8 @@ cdef class Director:
     cpdef _await_present(self)
     @cython.locals(instant=Instant, past=Instant)
     cpdef Instant _await(self, long long time, long microstep)
+    @cython.locals(instant=Instant)
+    cpdef Instant take(self)
     cpdef enqueue(self, Activation activation)
     @cython.locals(activation=Activation)
     cpdef Activation next_activation(self)

@@ -33,7 +33,6 @@ from typing import TYPE_CHECKING, Any, NoReturn
 from simpy.events import Event, EventPriority
 
 from epicycle.actors import (
-    Calendar,
     Environment,
     Events,
     InputPort,
@@ -43,6 +42,7 @@ from epicycle.actors import (
     Receiver,
     Streams,
     Tag,
+    TimedQueue,
     Wake,
     new_wake,
 )
@@ -67,8 +67,8 @@ class Director:
     """Fires the actors of one run."""
 
     __slots__ = (
-        "_environment", "_is_interrupted", "_last", "_most_microsteps", "_most_steps", "_most_times", "_next",
-        "_on_their_way", "_past", "_queue", "_ready", "_reason", "_recent", "_stop_after", "_time", "_times",
+        "_environment", "_is_interrupted", "_last", "_latest", "_most_microsteps", "_most_steps", "_most_times",
+        "_next", "_on_their_way", "_past", "_queue", "_ready", "_reason", "_recent", "_stop_after", "_time", "_times",
         "activations", "crowd", "events", "firings", "is_plain", "present", "rank", "ranks", "seed", "steps",
         "streams", "watch",
     )  # fmt: skip
@@ -99,7 +99,8 @@ class Director:
         # One entry per actor and tag, whatever the number of its tokens.
         self._ready = ReadyQueue()
         self._next: Instant | None = None
-        self._times = Calendar()
+        self._times = TimedQueue()  # instants
+        self._latest: Instant | None = None  # of them, the one that was added last
         self.rank = -1  # the rank of the activation handled now
         self.is_plain = type(self) is Director  # a subclass may have another order
         self._stop_after: Tag | None = None
@@ -291,9 +292,8 @@ class Director:
 
     def _to_come(self, now: Instant, time: int) -> Instant:
         """The work after the present tag: at the next microstep, or at the first one of a later time."""
-        if time > now.time:
-            instant = self._times.at(time)
-            return self._await(time, 1) if instant is None else instant
+        if time > now.time:  # several instants may be of one time; they join when it comes
+            return self._latest if self._latest is not None and self._latest.time == time else self._await(time, 1)
         if self._next is None:
             self._next = new_instant(now.time, now.microstep + 1)
             if self.present is None:
@@ -303,7 +303,7 @@ class Director:
     def _await_present(self) -> None:
         """Between tags: make sure that the present one will be handled."""
         now = self.now()
-        if self._times.at(now.time) is None:
+        if self._times.first() != now.time:
             self._await(now.time, now.microstep)
 
     def _await(self, time: int, microstep: int) -> Instant:
@@ -313,7 +313,17 @@ class Director:
             raise CrowdError(Tag(time, microstep), self._most_times, what, self._who())
         past, self._past = self._past, None
         instant = new_instant(time, microstep, past)
-        self._times.add(instant)
+        self._times.put(time, microstep, None, instant)
+        self._latest = instant
+        return instant
+
+    def take(self) -> Instant:
+        """Take the next tag out of the agenda, with all that it is to do."""
+        instant: Instant = self._times.pop()
+        if self._latest is not None and self._latest.time == instant.time:
+            self._latest = None
+        while self._times.first() == instant.time:
+            instant.join(self._times.pop())
         return instant
 
     # -- time -----------------------------------------------------------------------------------------------------

@@ -78,7 +78,7 @@ def handle_events(
                 director.handle(instant)
             else:
                 director._time = upcoming
-                director.handle(times.pop())
+                director.handle(director.take())
         except BaseException as error:
             director.present = None
             if isinstance(error, (ActorError, LoopError, KeyboardInterrupt)):
