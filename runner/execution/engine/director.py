@@ -318,7 +318,7 @@ class Director:
         return instant
 
     def take(self) -> Instant:
-        """Take the next tag out of the agenda, with all that it is to do."""
+        """Take the next tag out of the agenda, with everything it is to do."""
         instant: Instant = self._times.pop()
         if self._latest is not None and self._latest.time == instant.time:
             self._latest = None
