@@ -75,6 +75,7 @@ class FMU(Actor):
         """What ``epicycle describe`` says of an FMU: version, platforms, and its variables."""
         about = described(path)
         kinds = {"co-simulation": about.coSimulation, "model exchange": about.modelExchange}
+        kinds["scheduled execution"] = about.scheduledExecution
         lines = [f"{about.modelName}: FMI {about.fmiVersion} for {' and '.join(kind for kind in kinds if kinds[kind])}"]
         lines += [about.description] if about.description else []
         lines += [f"platforms: {', '.join(sorted(fmpy.supported_platforms(str(path))))}; sha256:{digest_of(path)}"]

@@ -361,8 +361,7 @@ class GymEnv(gymnasium.Env[Any, Any]):
         if world.results is None:
             world.decide(self._name, action)
         world.go_on()
-        seen, gained = world.observation(self._name), world.reward(self._name)
-        return seen, gained, world.is_done, world.is_stopped, world.info()
+        return world.observation(self._name), world.reward(self._name), world.is_done, world.is_stopped, world.info()
 
 
 class ZooEnv(pettingzoo.AECEnv):  # type: ignore[misc]  # it has no types
