@@ -12,10 +12,9 @@ from epicycle.actors import units_like
 from epicycle.actors.expression import FUNCTIONS
 
 from ..model.catalogue.packaged import packaged_models
-from ..model.text.document import Mapping
-from .knowledge import Keys, Knowledge, Known, owner_of
+from .knowledge import Knowledge, Known, owner_of
 from .names import MODEL
-from .places import Place, lines_of, place_at
+from .places import Keys, Place, lines_of, place_at, value_of
 from .reading import NO_TEXTS, Reading, Texts, read
 from .schema import allowed, applying, language
 
@@ -146,7 +145,7 @@ def _ends(owner: str, keys: Keys, before: str, knowledge: Knowledge, place: Plac
     for name, entry in knowledge.names.declared(owner, "actor").items():
         if not any(knowledge.ports_of(owner, name, direction)) and knowledge.names.types_of(owner, name):
             continue
-        is_array = isinstance(entry.value, Mapping) and "count" in entry.value.entries
+        is_array = value_of(entry.value, "count") is not None
         kind = ", ".join(knowledge.names.types_of(owner, name))
         yield Suggestion(f"{name}[*]" if is_array else name, "actor", kind, "", len(part))
     # Seen from inside, tokens come from an own input.

@@ -11,8 +11,6 @@ from collections.abc import Callable, Iterator, Mapping
 from functools import wraps
 from typing import Any, Concatenate, ParamSpec
 
-from epicycle.actors import declared_parameters
-
 from ..model.language.parts import BESIDE
 from ..model.language.places import PORT_SCHEMA, connection
 from ..model.text.document import parse
@@ -140,8 +138,7 @@ def switch(data: Any, owner: str, name: str, on: bool) -> None:
 def swap(data: Any, knowledge: Knowledge, owner: str, name: str, kind: str) -> None:
     """Put an aspect of another type in the place of one; of its values, those remain that the other type takes."""
     _check_type(kind)
-    cls = knowledge.type_called(kind, "aspects")
-    known = knowledge.composite_parameters(kind) if cls is None else declared_parameters(cls)
+    known = knowledge.parameters_of(kind, "aspects")
     part = _set(data, (*_keys(owner), "aspects", name, "type"), kind)
     for key in [each for each in part if each not in known and each not in ("type", *BESIDE.keys)]:
         del part[key]

@@ -17,9 +17,9 @@ from ..model.text.patterns import in_general
 from ..model.text.problems import Position, Problems
 from ..model.text.reading import Text
 from ..support.shown import short
-from .knowledge import Keys, Knowledge, owner_of
+from .knowledge import Knowledge, owner_of
 from .names import MODEL, SECTIONS, Name, Use
-from .places import Place, place_at
+from .places import Keys, Place, place_at
 from .schema import allowed, language
 
 # The keys of a file that name others, and of which kind those are that may be packaged; a study names a model, too.
@@ -100,14 +100,14 @@ def _of_name(knowledge: Knowledge, name: Name) -> str:
             said.append("at " + ", ".join(dict.fromkeys(f"`{in_general(place)}`" for place in made.places)))
         return "\n\n".join(said)
     if name.kind == "port":
-        direction = "input" if name.name in names.ports(name.owner, "input") else "output"
+        direction = "input" if name.name in names.declared(name.owner, "inputs") else "output"
         found = next((each for each in knowledge.own_ports(name.owner, direction) if each.name == name.name), None)
         words = [each for each in (found.what, found.doc) if each] if found is not None else []
         return ": ".join([f"**{name.name}**: {direction}{inside}", *words])
     if name.kind == "parameter":
         return _of_parameter(knowledge, name)
     if name.kind == "composite":
-        ports = ", ".join((*names.ports(name.name, "input"), "→", *names.ports(name.name, "output")))
+        ports = ", ".join((*names.declared(name.name, "inputs"), "→", *names.declared(name.name, "outputs")))
         return f"**{name.name}**: composite, {ports}\n\n{knowledge.of_type(name.name, 'actors')}".rstrip()
     model = knowledge.reading.loading.model
     metrics = model.output.metrics if model is not None else []
