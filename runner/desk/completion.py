@@ -99,8 +99,8 @@ def _values(place: Place, knowledge: Knowledge) -> Iterator[Suggestion]:
     named = [key for key in keys if isinstance(key, str)]
     if before.rfind("${") > before.rfind("}"):
         yield from _names(owner, before, knowledge)
-    elif keys[:1] == ("connections",):
-        yield from _ends(owner, keys, before, knowledge, place)
+    elif keys[:1] == ("connections",) and named[-1] in ("connections", "from", "to"):
+        yield from _ends(owner, named, before, knowledge)
     elif named[-1:] == ["type"]:
         yield from _types(owner, keys, before, knowledge, place)
     elif named[-1:] in (["extends"], ["include"]):
@@ -125,16 +125,9 @@ def _names(owner: str, before: str, knowledge: Knowledge) -> Iterator[Suggestion
     yield from (Suggestion(name, "function", replaces=length) for name in sorted(FUNCTIONS))
 
 
-def _ends(owner: str, keys: Keys, before: str, knowledge: Knowledge, place: Place) -> Iterator[Suggestion]:
+def _ends(owner: str, keys: list[str], before: str, knowledge: Knowledge) -> Iterator[Suggestion]:
     """The ends of a connection."""
-    named = [key for key in keys if isinstance(key, str)]
-    if named[-1:] == ["delay"]:
-        yield from _units("s", before)
-        return
-    if named[-1:] in (["all"], ["shared"]):
-        yield from (Suggestion(each, "value", replaces=len(before)) for each in ("true", "false"))
-        return
-    is_source = named[-1] == "from" if named[-1] in ("from", "to") else not re.search("->|=>", before)
+    is_source = not re.search("->|=>", before) if keys[-1] not in ("from", "to") else keys[-1] == "from"
     direction = "output" if is_source else "input"
     part = _ENDS.split(before)[-1].lstrip()
     actor, dot, port = part.rpartition(".")

@@ -67,7 +67,7 @@ class Names:
         self.classes: dict[str, list[MappingNode]] = defaultdict(list)  # what declares each, in one file or several
         for node in reading.nodes.values():
             if isinstance(node, MappingNode):
-                for name, entry in _declared(node, "composites").items():
+                for name, entry in declared_in(node, "composites").items():
                     if isinstance(entry.value, MappingNode):
                         self.classes[name].append(entry.value)
                 self.classes[MODEL].append(node)
@@ -76,7 +76,7 @@ class Names:
         for owner, mappings in self.classes.items():
             found = self._declared[owner] = defaultdict(dict)
             for section, kind in SECTIONS.items():
-                for name, entry in [each for mapping in mappings for each in _declared(mapping, section).items()]:
+                for name, entry in [each for mapping in mappings for each in declared_in(mapping, section).items()]:
                     found[section].setdefault(name, entry)
                     found[kind].setdefault(name, entry)
 
@@ -232,12 +232,14 @@ class Names:
         return {kind for each in classes for actor in self.declared(each, "actor") for kind in self.inner(each, actor)}
 
 
-def _declared(mapping: MappingNode, section: str) -> Mapping[str, Entry]:
-    """What a section declares, by name; ports may be a list of names."""
+def declared_in(
+    mapping: MappingNode, section: str, listed: Iterable[str] = ("inputs", "outputs")
+) -> Mapping[str, Entry]:
+    """What a section declares, by name; some may be a list of names."""
     node = value_of(mapping, section)
     if isinstance(node, MappingNode):
         return node.entries
-    return {each.text: Entry(each, each) for each in scalars(node)} if section in ("inputs", "outputs") else {}
+    return {each.text: Entry(each, each) for each in scalars(node) if each.text and section in listed}
 
 
 def _whole(node: Scalar) -> Position | None:

@@ -2,7 +2,7 @@
 
 from .drawing import drawn
 from .mcap_file import require_mcap, write_mcap
-from .page import PARTS, data_of, page_of, part, script, write_page
+from .page import PARTS, data_of, metrics, page_of, part, script, write_page
 from .recording import Recording, ViewError
 from .rerun_file import require_rerun, write_rerun
 
@@ -12,6 +12,7 @@ __all__ = [
     "ViewError",
     "data_of",
     "drawn",
+    "metrics",
     "page_of",
     "part",
     "require_mcap",

@@ -96,7 +96,7 @@ interface RunHead {
   stopped: string;
   digest: string;
   settings: string[];
-  metrics: [name: string, value: string, unit: string, doc: string][];
+  metrics: [name: string, value: string, unit: string, doc: string, number: number | null][];
   monitors: Monitor[];
   firings: number;
   records: number;
