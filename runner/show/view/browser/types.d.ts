@@ -47,6 +47,7 @@ interface Box {
   composite: boolean;
   director: boolean;
   count: number;
+  members: Path[]; // of a box that is no array, if it stands for several
   ports: [path: Path, name: string, side: "left" | "right", x: number, y: number, isMulti: boolean][];
 }
 
