@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from typing import Any
 
 from ..model.text.document import LINE_BREAK, MAX_NODES, Entry, Mapping, Node, Scalar, Sequence, parse
 from ..model.text.problems import Position, Problems
@@ -91,11 +92,11 @@ def _changed(node: Node, change: _Change, end: int, depth: int) -> Node | None:
     at = node.position if one else made.position
     if isinstance(node, Mapping) and isinstance(made, Mapping):
         entries = {key: node.entries[key] for key in keys[:one]} | made.entries
-        entries |= {key: moved_entry(node.entries[key], by) for key in keys[other:]}
+        entries |= {key: _moved(node.entries[key], by) for key in keys[other:]}
         known = one + len(made.entries) + len(keys) - other
         return Mapping(entries, at) if len(entries) == known else None
     if isinstance(node, Sequence) and isinstance(made, Sequence):
-        return Sequence((*values[:one], *made.items, *(moved(each, by) for each in values[other:])), at)
+        return Sequence((*values[:one], *made.items, *(_moved(each, by) for each in values[other:])), at)
     return None
 
 
@@ -109,28 +110,16 @@ def _begins_line(at: Position, is_key: bool) -> bool:
     return not before.strip(" ") if is_key else _DASH.match(before) is not None
 
 
-# -- other lines ------------------------------------------------------------------------------------------------------
-
-
-def moved_entry(entry: Entry, by: int) -> Entry:
-    """An entry that stands so many lines below."""
-    return Entry(_moved_scalar(entry.key, by), moved(entry.value, by)) if by else entry
-
-
-def moved(node: Node, by: int) -> Node:
-    """A node that stands so many lines below."""
+def _moved(node: Any, by: int) -> Any:
+    """A node, or an entry, that stands so many lines below."""
     if not by:
         return node
+    if isinstance(node, Entry):
+        return Entry(_moved(node.key, by), _moved(node.value, by))
+    at = node.position
+    at = Position(at.file, at.line + by, at.column, at.length, at.source)
     if isinstance(node, Scalar):
-        return _moved_scalar(node, by)
+        return Scalar(node.value, node.text, node.plain, at)
     if isinstance(node, Sequence):
-        return Sequence(tuple([moved(each, by) for each in node.items]), _below(node.position, by))
-    return Mapping({key: moved_entry(each, by) for key, each in node.entries.items()}, _below(node.position, by))
-
-
-def _moved_scalar(node: Scalar, by: int) -> Scalar:
-    return Scalar(node.value, node.text, node.plain, _below(node.position, by))
-
-
-def _below(at: Position, by: int) -> Position:
-    return Position(at.file, at.line + by, at.column, at.length, at.source)
+        return Sequence(tuple([_moved(each, by) for each in node.items]), at)
+    return Mapping({key: _moved(each, by) for key, each in node.entries.items()}, at)

@@ -5,8 +5,6 @@ from __future__ import annotations
 from importlib import import_module
 from typing import Any
 
-from epicycle.actors import EpicycleError
-
 EXTRAS = {  # by which extra each is installed
     "anyio": "studio",
     "control": "control",
@@ -34,6 +32,8 @@ def needed(module: str, who: str, extra: str = "") -> Any:
         package = (error.name or "").partition(".")[0]
         if package not in EXTRAS:
             raise
+        from epicycle.actors import EpicycleError  # here, because help needs nothing heavy
+
         raise EpicycleError(
             f"{who} needs the package {package}, which is not installed: "
             f"pip install 'epicycle[{extra or EXTRAS[package]}]'"
