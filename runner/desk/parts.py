@@ -60,9 +60,9 @@ class Part:
     text: str = ""
 
     def find(self, key: str | int) -> int:
-        """The number of a key's value among the items; -1 if there is none."""
-        if self.kind == "list" and isinstance(key, int):
-            return key if key < len(self.items) else -1
+        """The number of a key's value among the items; -1 if no text is that key."""
+        if isinstance(key, int):
+            return key
         return next((number for number, each in enumerate(self.keys) if each.text == key), -1)
 
     def begin(self, text: str, number: int) -> int:
@@ -273,16 +273,14 @@ def _delete(text: str, keys: Keys, value: None) -> str:
             return text[:begin] + text[part.begin(text, number + 1) :]
         return text[:start] + text[_line_end(text, end) :].removeprefix("\r").removeprefix("\n")
     if number + 1 < len(part.items):  # with the comma behind it
-        following = part.begin(text, number + 1)
-        comma = _comma(text, end, following)
-        between = text[comma + 1 : following]
-        return text[:begin] + (text[following:] if not between.strip() else text[comma + 1 :].lstrip(" "))
-    if number:  # with the comma before it
-        before = part.stop(number - 1)
-        comma = _comma(text, before, begin)
-        between = text[comma + 1 : begin]
-        return text[:comma] + ("" if not between.strip() else between.rstrip(" ")) + text[end:]
-    return text[:begin] + text[end:]
+        stop = part.begin(text, number + 1)
+        kept = text[_comma(text, end, stop) + 1 : stop].lstrip(" ")
+    elif number:  # with the comma before it
+        end, begin, stop = begin, _comma(text, part.stop(number - 1), begin), end
+        kept = text[begin + 1 : end].rstrip(" ")
+    else:
+        stop, kept = end, ""
+    return text[:begin] + (kept if kept.strip() else "") + text[stop:]  # comments stay
 
 
 def _comma(text: str, start: int, end: int) -> int:
