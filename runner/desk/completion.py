@@ -12,13 +12,13 @@ from epicycle.actors import units_like
 from epicycle.actors.expression import FUNCTIONS
 
 from ..model.catalogue.packaged import packaged_models
+from ..model.text.document import Mapping
 from .knowledge import Knowledge, Known, owner_of
 from .names import MODEL
 from .places import Keys, Place, lines_of, place_at, value_of
 from .reading import NO_TEXTS, Reading, Texts, read
 from .schema import allowed, applying, language
 
-_WORD = re.compile(r"[\w*]*(?:\[[^\]]*\]?)?\Z")
 _PATH = re.compile(r"!?\s*((?:[\w*]+(?:\[[^\]\s]*\])?\.)*)[\w*\[\]]*\Z")
 _QUANTITY = re.compile(r"\s*[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?(\s*)([^\s\d]*)\Z")
 _ENDS = re.compile(r"->|=>|,|\[(?![\d*.])")
@@ -68,8 +68,8 @@ def complete(
 
 
 def _keys(place: Place, knowledge: Knowledge, follows: str) -> Iterator[Suggestion]:
-    root, mapping = language(knowledge.reading.types), place.mapping() if place.is_key else None
-    there = set(mapping.entries) if mapping is not None else set()
+    root, here = language(knowledge.reading.types), place.around[-1]
+    there = here.entries if place.is_key and isinstance(here, Mapping) else {}
     ending = "" if re.match(r"\w*\s*:", follows) else ": "
     found: dict[str, tuple[str, str]] = {}
     for each in allowed(root, place.around[0], place.keys):
@@ -102,7 +102,7 @@ def _values(place: Place, knowledge: Knowledge) -> Iterator[Suggestion]:
     elif keys[:1] == ("connections",) and named[-1] in ("connections", "from", "to"):
         yield from _ends(owner, named, before, knowledge)
     elif named[-1:] == ["type"]:
-        yield from _types(owner, keys, before, knowledge, place)
+        yield from _types(keys, before, knowledge, place)
     elif named[-1:] in (["extends"], ["include"]):
         yield from _files(owner, named[-1], before, knowledge)
     elif named[-1:] == ["inherit"]:
@@ -146,7 +146,7 @@ def _ends(owner: str, keys: list[str], before: str, knowledge: Knowledge) -> Ite
     yield from _known(own, "port", len(part))
 
 
-def _types(owner: str, keys: Keys, before: str, knowledge: Knowledge, place: Place) -> Iterator[Suggestion]:
+def _types(keys: Keys, before: str, knowledge: Knowledge, place: Place) -> Iterator[Suggestion]:
     section = str(keys[0])
     if len(keys) == 3 and section in ("actors", "aspects"):
         for name in knowledge.names.classes:

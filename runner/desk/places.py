@@ -50,11 +50,6 @@ class Place:
     around: tuple[Node, ...]
     text: str  # as it was parsed, with the mark
 
-    def mapping(self, depth: int = 1) -> Mapping | None:
-        """The mapping that is so many levels around, if it is one."""
-        node = self.around[-depth] if len(self.around) >= depth else None
-        return node if isinstance(node, Mapping) else None
-
 
 def lines_of(text: str) -> list[str]:
     """The lines of a text, as positions count them."""
