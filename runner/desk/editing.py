@@ -22,14 +22,14 @@ from .parts import EditError, Keys, data_of, path, rendered, typed, written
 
 _ENDS = re.compile(PORT_SCHEMA["pattern"])
 _TYPE = re.compile(r"[A-Za-z_]\w*(?:[.:][A-Za-z_]\w*)*\Z")
-P = ParamSpec("P")
+_P = ParamSpec("_P")
 
 
-def _of_text(act: Callable[Concatenate[Any, P], None]) -> Callable[Concatenate[str, P], str]:
+def _of_text(act: Callable[Concatenate[Any, _P], None]) -> Callable[Concatenate[str, _P], str]:
     """A change of a text, by what changes the data that it holds."""
 
     @wraps(act)
-    def change(text: str, /, *given: P.args, **named: P.kwargs) -> str:
+    def change(text: str, /, *given: _P.args, **named: _P.kwargs) -> str:
         data = data_of(text)
         data = {} if data is None else data
         act(data, *given, **named)

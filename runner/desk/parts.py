@@ -198,12 +198,12 @@ def _steps(before: Any, after: Any, keys: Keys) -> Iterator[tuple[Callable[[str,
         return
     if isinstance(before, dict) and isinstance(after, dict) and after:
         new = _kept(after)
-        yield from ((_delete, (*keys, key), None) for key in _kept(before) if key not in new)
         for key, value in new.items():
             if key in before:
                 yield from _steps(before[key], value, (*keys, key))
             else:
                 yield _add, (*keys, key), value
+        yield from ((_delete, (*keys, key), None) for key in _kept(before) if key not in new)
     elif isinstance(before, list) and isinstance(after, list) and after:
         found = SequenceMatcher(None, [*map(_canonical, before)], [*map(_canonical, after)], autojunk=False)
         for _, a, b, c, d in reversed([each for each in found.get_opcodes() if each[0] != "equal"]):
