@@ -11,7 +11,7 @@ from .changes import edits_between
 from .comparing import Difference, difference
 from .knowledge import Knowledge
 from .parts import EditError
-from .problem_data import of_problems, report
+from .problem_data import report
 from .reading import Reading, read
 from .session import Session
 
@@ -25,7 +25,6 @@ __all__ = [
     "difference",
     "editing",
     "edits_between",
-    "of_problems",
     "read",
     "report",
 ]

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
+from typing import Any
 
 from ..model.text.document import LINE_BREAK, MAX_NODES, Entry, Mapping, Node, Scalar, Sequence, parse
 from ..model.text.problems import Position, Problems
@@ -61,11 +62,8 @@ def _changed(node: Node, change: _Change, end: int, depth: int) -> Node | None:
     """A mapping or list, whose lines ended before ``end``, after a change within it."""
     if isinstance(node, Scalar) or _has_brackets(node):
         return None
-    if isinstance(node, Mapping):
-        keys, values = list(node.entries), [each.value for each in node.entries.values()]
-        places = [each.key.position for each in node.entries.values()]
-    else:
-        keys, values, places = [], list(node.items), [each.position for each in node.items]
+    parts, is_mapping = _parts(node), isinstance(node, Mapping)
+    places = [(each.key if is_mapping else each).position for each in parts]
     lines = [place.line - 1 for place in places]
     if not lines or change.first < lines[0]:
         return None
@@ -73,30 +71,28 @@ def _changed(node: Node, change: _Change, end: int, depth: int) -> Node | None:
     one = max(0, sum(line < change.first for line in lines) - 1)
     other = next((number for number, line in enumerate(lines) if number > one and line >= change.old), len(lines))
     stop = lines[other] if other < len(lines) else end
-    if other == one + 1 and (inner := _changed(values[one], change, stop, depth + 1)) is not None:
-        made: Node = inner
-        if isinstance(node, Mapping):
-            made = Mapping({keys[one]: Entry(node.entries[keys[one]].key, inner)}, node.position)
-        else:
-            made = Sequence((inner,), node.position)
+    inner = parts[one].value if is_mapping else parts[one]
+    if other == one + 1 and (inner := _changed(inner, change, stop, depth + 1)) is not None:
+        made, at = [Entry(parts[one].key, inner) if is_mapping else inner], node.position
     else:
         edges = [places[one], *places[other : other + 1]]
-        if not all(_begins_line(each, isinstance(node, Mapping)) for each in edges):
+        if not all(_begins_line(each, is_mapping) for each in edges):
             return None
         read = change.read(lines[one], stop, depth)
         if type(read) is not type(node) or read.position.column != node.position.column or _has_brackets(read):
             return None
-        made = read
-    by = change.new - change.old
-    at = node.position if one else made.position
-    if isinstance(node, Mapping) and isinstance(made, Mapping):
-        entries = {key: node.entries[key] for key in keys[:one]} | made.entries
-        entries |= {key: moved_entry(node.entries[key], by) for key in keys[other:]}
-        known = one + len(made.entries) + len(keys) - other
-        return Mapping(entries, at) if len(entries) == known else None
-    if isinstance(node, Sequence) and isinstance(made, Sequence):
-        return Sequence((*values[:one], *made.items, *(moved(each, by) for each in values[other:])), at)
-    return None
+        made, at = _parts(read), read.position
+    whole = [*parts[:one], *made, *(_moved(each, change.new - change.old) for each in parts[other:])]
+    at = node.position if one else at
+    if not is_mapping:
+        return Sequence(tuple(whole), at)
+    entries = {each.key.text: each for each in whole}
+    return Mapping(entries, at) if len(entries) == len(whole) else None
+
+
+def _parts(node: Mapping | Sequence) -> list[Any]:
+    """The entries of a mapping, or the items of a list."""
+    return list(node.entries.values() if isinstance(node, Mapping) else node.items)
 
 
 def _has_brackets(node: Node) -> bool:
@@ -109,28 +105,16 @@ def _begins_line(at: Position, is_key: bool) -> bool:
     return not before.strip(" ") if is_key else _DASH.match(before) is not None
 
 
-# -- other lines ------------------------------------------------------------------------------------------------------
-
-
-def moved_entry(entry: Entry, by: int) -> Entry:
-    """An entry that stands so many lines below."""
-    return Entry(_moved_scalar(entry.key, by), moved(entry.value, by)) if by else entry
-
-
-def moved(node: Node, by: int) -> Node:
-    """A node that stands so many lines below."""
+def _moved(node: Any, by: int) -> Any:
+    """A node, or an entry, that stands so many lines below."""
     if not by:
         return node
+    if isinstance(node, Entry):
+        return Entry(_moved(node.key, by), _moved(node.value, by))
+    at = node.position
+    at = Position(at.file, at.line + by, at.column, at.length, at.source)
     if isinstance(node, Scalar):
-        return _moved_scalar(node, by)
+        return Scalar(node.value, node.text, node.plain, at)
     if isinstance(node, Sequence):
-        return Sequence(tuple([moved(each, by) for each in node.items]), _below(node.position, by))
-    return Mapping({key: moved_entry(each, by) for key, each in node.entries.items()}, _below(node.position, by))
-
-
-def _moved_scalar(node: Scalar, by: int) -> Scalar:
-    return Scalar(node.value, node.text, node.plain, _below(node.position, by))
-
-
-def _below(at: Position, by: int) -> Position:
-    return Position(at.file, at.line + by, at.column, at.length, at.source)
+        return Sequence(tuple([_moved(each, by) for each in node.items]), at)
+    return Mapping({key: _moved(each, by) for key, each in node.entries.items()}, at)

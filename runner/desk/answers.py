@@ -17,38 +17,27 @@ from .session import Session
 
 FIX_ALL = lsp.CodeActionKind("source.fixAll")
 _SEVERITY = {"error": lsp.DiagnosticSeverity.Error, "warning": lsp.DiagnosticSeverity.Warning}
-_KINDS = {
-    "key": lsp.CompletionItemKind.Property,
-    "type": lsp.CompletionItemKind.Class,
-    "actor": lsp.CompletionItemKind.Module,
-    "port": lsp.CompletionItemKind.Interface,
-    "path": lsp.CompletionItemKind.Interface,
-    "parameter": lsp.CompletionItemKind.Variable,
-    "value": lsp.CompletionItemKind.EnumMember,
-    "unit": lsp.CompletionItemKind.Unit,
-    "function": lsp.CompletionItemKind.Function,
-    "file": lsp.CompletionItemKind.File,
+_ITEM, _SYMBOL = lsp.CompletionItemKind, lsp.SymbolKind
+# What stands somewhere, as a completion, in an outline, and as a token, of which editors know how to colour the type.
+_LOOKS = {
+    "parameter": (_ITEM.Variable, _SYMBOL.Variable, "parameter"),
+    "port": (_ITEM.Interface, _SYMBOL.Interface, "property"),
+    "actor": (_ITEM.Module, _SYMBOL.Object, "variable"),
+    "aspect": (_ITEM.Event, _SYMBOL.Event, "decorator"),
+    "composite": (_ITEM.Class, _SYMBOL.Class, "class"),
+    "metric": (_ITEM.Field, _SYMBOL.Field, "enumMember"),
+    "monitor": (_ITEM.Field, _SYMBOL.Field, "event"),
+    "figure": (_ITEM.Field, _SYMBOL.Field, "function"),
+    "section": (_ITEM.Field, _SYMBOL.Namespace, ""),
+    "key": (_ITEM.Property, _SYMBOL.Field, ""),
+    "type": (_ITEM.Class, _SYMBOL.Field, ""),
+    "path": (_ITEM.Interface, _SYMBOL.Field, ""),
+    "value": (_ITEM.EnumMember, _SYMBOL.Field, ""),
+    "unit": (_ITEM.Unit, _SYMBOL.Field, ""),
+    "function": (_ITEM.Function, _SYMBOL.Field, ""),
+    "file": (_ITEM.File, _SYMBOL.Field, ""),
 }
-_SYMBOLS = {
-    "section": lsp.SymbolKind.Namespace,
-    "actor": lsp.SymbolKind.Object,
-    "composite": lsp.SymbolKind.Class,
-    "port": lsp.SymbolKind.Interface,
-    "parameter": lsp.SymbolKind.Variable,
-    "aspect": lsp.SymbolKind.Event,
-}
-# What names are; editors know how to colour these types of tokens.
-_TOKENS = {
-    "parameter": "parameter",
-    "port": "property",
-    "actor": "variable",
-    "aspect": "decorator",
-    "composite": "class",
-    "metric": "enumMember",
-    "monitor": "event",
-    "figure": "function",
-}
-LEGEND = lsp.SemanticTokensLegend([*_TOKENS.values()], [])
+LEGEND = lsp.SemanticTokensLegend([token for *_, token in _LOOKS.values() if token], [])
 
 
 class Answers:
@@ -140,7 +129,7 @@ class Answers:
         before = session.readings.get(known.path)
         for each in completion.complete(known.path, line, column, session.texts, session.types, before):
             start = at.offset(line, max(column - each.replaces, 0))
-            item = lsp.CompletionItem(each.text.strip().removesuffix(":"), kind=_KINDS[each.kind])
+            item = lsp.CompletionItem(each.text.strip().removesuffix(":"), kind=_LOOKS[each.kind][0])
             item.detail, item.documentation, item.filter_text = each.what or None, each.doc or None, each.text
             item.text_edit = lsp.TextEdit(self._range(text, start, at.offset(line, column)), each.text)
             found.append(item)
@@ -168,7 +157,7 @@ class Answers:
 
     def symbols(self, known: Knowledge, params: Any) -> list[lsp.DocumentSymbol]:
         def symbol(each: meaning.Symbol) -> lsp.DocumentSymbol:
-            where, kind = self.range_of(known, each.position), _SYMBOLS.get(each.kind, lsp.SymbolKind.Field)
+            where, kind = self.range_of(known, each.position), _LOOKS[each.kind][1]
             inside = [symbol(inner) for inner in each.inside]
             return lsp.DocumentSymbol(each.name or " ", kind, where, where, each.kind, children=inside)
 
@@ -179,7 +168,7 @@ class Answers:
 
     def tokens(self, known: Knowledge, params: Any) -> lsp.SemanticTokens:
         """The names in a text with what they are, each by its distance from the one before."""
-        kinds, found = list(_TOKENS), set[tuple[int, int, int, int]]()
+        kinds, found = list(_LOOKS), set[tuple[int, int, int, int]]()
         for use in known.names.uses:
             if use.position.file == known.file:
                 where, kind = self.range_of(known, use.position), min(each.kind for each in use.names)

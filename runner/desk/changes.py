@@ -14,12 +14,12 @@ from epicycle.actors import EpicycleError, Parameter, UnitError
 
 from ..model.language.ports import ParameterText
 from ..model.text.document import Mapping as MappingNode
-from ..model.text.document import Node
 from ..model.text.problems import Position, Problem
 from ..model.text.reading import NAME, NAMES_HAVE
 from .again import alike
-from .knowledge import Knowledge
-from .names import MODEL, Name
+from .knowledge import Knowledge, owner_of
+from .names import Name
+from .places import value_of, walk
 from .reading import NO_TEXTS, Reading, Texts, read
 
 _PLAIN = re.compile(r"[A-Za-z0-9_.+*/^%° -]+\Z")
@@ -86,35 +86,21 @@ def fix_all(knowledge: Knowledge) -> list[Edit]:
 
 
 def _missing(knowledge: Knowledge, at: Position, key: str) -> Edit | None:
-    """A value for a parameter that has none, after the type of the part."""
-    found = _part_at(knowledge.reading.nodes.get(at.file), at)
-    if found is None:
-        return None
-    keys, part = found
-    value = sample(knowledge.parameter(keys[0], (*keys[1:], key)))
-    if value is None or "type" not in part.entries:
-        return None
-    said = part.entries["type"]
-    start = part.position
-    path, _, end = knowledge.stretch(said.value.position)
-    is_flow = start.source[start.column - 1 : start.column] == "{"
-    indent = " " * (said.key.position.column - 1)
-    return Edit(path, end, end, f", {key}: {value}" if is_flow else f"\n{indent}{key}: {value}")
-
-
-def _part_at(root: Node | None, at: Position) -> tuple[tuple[str, ...], MappingNode] | None:
-    """The mapping of an actor or aspect whose name is at a position, its class, its section and name."""
-    if not isinstance(root, MappingNode):
-        return None
-    owners = {MODEL: root}
-    if "composites" in root.entries and isinstance(inner := root.entries["composites"].value, MappingNode):
-        owners |= {name: e.value for name, e in inner.entries.items() if isinstance(e.value, MappingNode)}
-    for owner, mapping in owners.items():
-        for section in ("actors", "aspects"):
-            parts = mapping.entries[section].value if section in mapping.entries else None
-            for name, entry in parts.entries.items() if isinstance(parts, MappingNode) else ():
-                if entry.key.position == at and isinstance(entry.value, MappingNode):
-                    return (owner, section, name), entry.value
+    """A value for a parameter that has none, after the type of the part whose name is at a position."""
+    root = knowledge.reading.nodes.get(at.file)
+    for each in walk(root) if root is not None else ():
+        owner, keys = owner_of((*each.keys, each.node.text))
+        if not each.is_key or each.node.position != at or keys[:-1] not in (("actors",), ("aspects",)):
+            continue
+        part = value_of(each.around[-1], each.node.text)
+        value = sample(knowledge.parameter(owner, (*keys, key)))
+        if value is None or not isinstance(part, MappingNode) or "type" not in part.entries:
+            return None
+        said, start = part.entries["type"], part.position
+        path, _, end = knowledge.stretch(said.value.position)
+        is_flow = start.source[start.column - 1 : start.column] == "{"
+        indent = " " * (said.key.position.column - 1)
+        return Edit(path, end, end, f", {key}: {value}" if is_flow else f"\n{indent}{key}: {value}")
     return None
 
 

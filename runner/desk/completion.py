@@ -13,13 +13,12 @@ from epicycle.actors.expression import FUNCTIONS
 
 from ..model.catalogue.packaged import packaged_models
 from ..model.text.document import Mapping
-from .knowledge import Keys, Knowledge, Known, owner_of
+from .knowledge import Knowledge, Known, owner_of
 from .names import MODEL
-from .places import Place, lines_of, place_at
+from .places import Keys, Place, lines_of, place_at, value_of
 from .reading import NO_TEXTS, Reading, Texts, read
 from .schema import allowed, applying, language
 
-_WORD = re.compile(r"[\w*]*(?:\[[^\]]*\]?)?\Z")
 _PATH = re.compile(r"!?\s*((?:[\w*]+(?:\[[^\]\s]*\])?\.)*)[\w*\[\]]*\Z")
 _QUANTITY = re.compile(r"\s*[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?(\s*)([^\s\d]*)\Z")
 _ENDS = re.compile(r"->|=>|,|\[(?![\d*.])")
@@ -69,8 +68,8 @@ def complete(
 
 
 def _keys(place: Place, knowledge: Knowledge, follows: str) -> Iterator[Suggestion]:
-    root, mapping = language(knowledge.reading.types), place.mapping() if place.is_key else None
-    there = set(mapping.entries) if mapping is not None else set()
+    root, here = language(knowledge.reading.types), place.around[-1]
+    there = here.entries if place.is_key and isinstance(here, Mapping) else {}
     ending = "" if re.match(r"\w*\s*:", follows) else ": "
     found: dict[str, tuple[str, str]] = {}
     for each in allowed(root, place.around[0], place.keys):
@@ -100,10 +99,10 @@ def _values(place: Place, knowledge: Knowledge) -> Iterator[Suggestion]:
     named = [key for key in keys if isinstance(key, str)]
     if before.rfind("${") > before.rfind("}"):
         yield from _names(owner, before, knowledge)
-    elif keys[:1] == ("connections",):
-        yield from _ends(owner, keys, before, knowledge, place)
+    elif keys[:1] == ("connections",) and named[-1] in ("connections", "from", "to"):
+        yield from _ends(owner, named, before, knowledge)
     elif named[-1:] == ["type"]:
-        yield from _types(owner, keys, before, knowledge, place)
+        yield from _types(keys, before, knowledge, place)
     elif named[-1:] in (["extends"], ["include"]):
         yield from _files(owner, named[-1], before, knowledge)
     elif named[-1:] == ["inherit"]:
@@ -126,16 +125,9 @@ def _names(owner: str, before: str, knowledge: Knowledge) -> Iterator[Suggestion
     yield from (Suggestion(name, "function", replaces=length) for name in sorted(FUNCTIONS))
 
 
-def _ends(owner: str, keys: Keys, before: str, knowledge: Knowledge, place: Place) -> Iterator[Suggestion]:
+def _ends(owner: str, keys: list[str], before: str, knowledge: Knowledge) -> Iterator[Suggestion]:
     """The ends of a connection."""
-    named = [key for key in keys if isinstance(key, str)]
-    if named[-1:] == ["delay"]:
-        yield from _units("s", before)
-        return
-    if named[-1:] in (["all"], ["shared"]):
-        yield from (Suggestion(each, "value", replaces=len(before)) for each in ("true", "false"))
-        return
-    is_source = named[-1] == "from" if named[-1] in ("from", "to") else not re.search("->|=>", before)
+    is_source = not re.search("->|=>", before) if keys[-1] not in ("from", "to") else keys[-1] == "from"
     direction = "output" if is_source else "input"
     part = _ENDS.split(before)[-1].lstrip()
     actor, dot, port = part.rpartition(".")
@@ -146,7 +138,7 @@ def _ends(owner: str, keys: Keys, before: str, knowledge: Knowledge, place: Plac
     for name, entry in knowledge.names.declared(owner, "actor").items():
         if not any(knowledge.ports_of(owner, name, direction)) and knowledge.names.types_of(owner, name):
             continue
-        is_array = isinstance(entry.value, Mapping) and "count" in entry.value.entries
+        is_array = value_of(entry.value, "count") is not None
         kind = ", ".join(knowledge.names.types_of(owner, name))
         yield Suggestion(f"{name}[*]" if is_array else name, "actor", kind, "", len(part))
     # Seen from inside, tokens come from an own input.
@@ -154,7 +146,7 @@ def _ends(owner: str, keys: Keys, before: str, knowledge: Knowledge, place: Plac
     yield from _known(own, "port", len(part))
 
 
-def _types(owner: str, keys: Keys, before: str, knowledge: Knowledge, place: Place) -> Iterator[Suggestion]:
+def _types(keys: Keys, before: str, knowledge: Knowledge, place: Place) -> Iterator[Suggestion]:
     section = str(keys[0])
     if len(keys) == 3 and section in ("actors", "aspects"):
         for name in knowledge.names.classes:

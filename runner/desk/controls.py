@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator
 from typing import Any
 
 from epicycle.actors import Parameter, declared_parameters
 
 from ..model.catalogue.reference import as_written, doc_of, first_sentence, shown
 from ..model.language.ports import ParameterText
+from ..model.text.document import Mapping as MappingNode
 from ..model.text.document import Node, Scalar, plain
 from . import parts
 from .changes import limits, sample
 from .knowledge import Knowledge
 from .names import MODEL
 from .parts import EditError
-from .places import lines_of
+from .places import lines_of, value_of
 from .reading import NO_TEXTS, Reading, Texts, read
 
 _ATTEMPTS = 3
@@ -46,27 +47,20 @@ def parameters(knowledge: Knowledge) -> list[dict[str, Any]]:
         if entry.key.position.file != knowledge.file:
             continue
         declared = None if model is None else model.declared.get(name)
-        said: Node | None = entry.value
-        if hasattr(entry.value, "entries"):
-            said = entry.value.entries["value"].value if "value" in entry.value.entries else None
-        value = None if model is None else model.parameters.get(name)
-        found.append(_field(name, declared, said, value))
+        said = value_of(entry.value, "value") if isinstance(entry.value, MappingNode) else entry.value
+        found.append(_field(name, declared, said, None if model is None else model.parameters.get(name)))
     return found
 
 
 def fields(knowledge: Knowledge, owner: str, section: str, name: str) -> list[dict[str, Any]]:
     """The parameters of an actor or aspect, as fields."""
-    names = knowledge.names
-    entry = names.declared(owner, section.removesuffix("s")).get(name)
-    entries = getattr(entry.value, "entries", {}) if entry is not None else {}
+    entry = knowledge.names.entry(owner, section.removesuffix("s"), name)
     made = knowledge.made(owner, section, name)
     made = made.aspect if section == "aspects" and made is not None else made
     found: dict[str, dict[str, Any]] = {}
-    for kind in names.types_of(owner, name):
-        cls = None if kind in names.classes else knowledge.type_called(kind, section)
-        declared: Mapping[str, Any] = knowledge.composite_parameters(kind) if cls is None else declared_parameters(cls)
-        for each, parameter in declared.items():
-            said = entries[each].value if each in entries else None
+    for kind in knowledge.names.types_of(owner, name):
+        for each, parameter in knowledge.parameters_of(kind, section).items():
+            said = value_of(entry.value, each) if entry is not None else None
             value = parameter.value_in(made) if isinstance(parameter, Parameter) and made is not None else None
             found[each] = _field(each, parameter, said, value)
     return list(found.values())
@@ -104,8 +98,7 @@ def _finite(value: Any) -> float | None:
 def aspects(knowledge: Knowledge) -> Iterator[dict[str, Any]]:
     """The aspects that the model attaches in this text, with their fields."""
     for name, entry in knowledge.names.declared(MODEL, "aspect").items():
-        entries = getattr(entry.value, "entries", {})
-        if entry.key.position.file != knowledge.file or "type" not in entries:
+        if entry.key.position.file != knowledge.file or value_of(entry.value, "type") is None:
             continue
         data: Any = plain(entry.value)
         yield {
@@ -163,8 +156,7 @@ def local_ends(knowledge: Knowledge, source: str, target: str) -> tuple[str, str
         raise EditError(f"{source} and {target} are not in one composite")
     scope = scopes[0]
     kind = graph.components[scope].kind if scope else MODEL
-    names = knowledge.names
-    entry = names.declared(MODEL, "composite").get(kind)
+    entry = knowledge.names.entry(MODEL, "composite", kind)
     if scope and (entry is None or entry.key.position.file != knowledge.file):
         raise EditError(f"{kind} is declared in another file: change it there")
     ends = [path[len(scope) + 1 :] if scope else path for path in (source, target)]

@@ -1,84 +1,95 @@
 """Changes of a model as changes of its text: connections, parts, values, aspects; comments and order stay.
 
-Each function takes a text that can be read and gives another one.  It is read again: what it holds must be what was
-there, with the one thing changed that was meant, so no name and no value can bring in anything else.
+Each function takes a text that can be read and gives another one.  It changes what the text holds, as data, which are
+then written into the text; so no name and no value can bring in anything else.
 """
 
 from __future__ import annotations
 
-import copy
 import re
 from collections.abc import Callable, Iterator, Mapping
-from typing import Any
+from functools import wraps
+from typing import Any, Concatenate, ParamSpec
 
-from epicycle.actors import declared_parameters
-
-from ..model.language.models import COMPOSITE, MODEL
 from ..model.language.parts import BESIDE
 from ..model.language.places import PORT_SCHEMA, connection
 from ..model.text.document import parse
 from ..model.text.problems import Problems
 from ..model.text.reading import NAME, NAMES_HAVE, NodeReader
-from . import parts
 from .knowledge import Knowledge
-from .names import MODEL as OF_MODEL
-from .parts import EditError, Keys
+from .names import MODEL
+from .parts import EditError, Keys, data_of, path, rendered, typed, written
 
 _ENDS = re.compile(PORT_SCHEMA["pattern"])
 _TYPE = re.compile(r"[A-Za-z_]\w*(?:[.:][A-Za-z_]\w*)*\Z")
-_ORDER = tuple(dict.fromkeys((*("model", "doc", "extends", "include", "composites"), *MODEL.keys, *COMPOSITE.keys)))
+_P = ParamSpec("_P")
+
+
+def _of_text(act: Callable[Concatenate[Any, _P], None]) -> Callable[Concatenate[str, _P], str]:
+    """A change of a text, by what changes the data that it holds."""
+
+    @wraps(act)
+    def change(text: str, /, *given: _P.args, **named: _P.kwargs) -> str:
+        data = data_of(text)
+        data = {} if data is None else data
+        act(data, *given, **named)
+        return rendered(text, data)
+
+    return change
 
 
 # -- what can be done -------------------------------------------------------------------------------------------------
 
 
-def connect(text: str, owner: str, source: str, target: str, delay: str = "") -> str:
+@_of_text
+def connect(data: Any, owner: str, source: str, target: str, delay: str = "") -> None:
     """Connect two ports of a class."""
     _check_ends(source, target)
-    item: Any = f"{source} -> {target}"
-    if delay:
-        item = {"from": source, "to": target, "delay": _value_of(delay)}
-    return _added(text, (*_keys(owner), "connections"), None, item)
+    item = {"from": source, "to": target, "delay": typed(delay)} if delay else f"{source} -> {target}"
+    _section(data, owner, "connections", []).append(item)
 
 
-def disconnect(text: str, owner: str, source: str, target: str) -> str:
+@_of_text
+def disconnect(data: Any, owner: str, source: str, target: str) -> None:
     """Remove the connection of two ports of a class, which may be one of several that an item makes."""
     _check_ends(source, target)
-    for number, (item, pairs) in enumerate(_connections(text, owner)):
+    _disconnect(_section(data, owner, "connections", []), source, target)
+
+
+def _disconnect(items: list[Any], source: str, target: str) -> None:
+    for number, (item, pairs) in enumerate(_connections(items)):
         if (source, target) not in pairs:
             continue
-        keys: Keys = (*_keys(owner), "connections", number)
         if len(pairs) == 1:
-            return _without(text, keys)
+            del items[number]
+            return
         sources, targets = (list(dict.fromkeys(each)) for each in zip(*pairs, strict=True))
         if isinstance(item, str) and 1 in (len(sources), len(targets)):
             left = ", ".join(each for each in sources if len(sources) == 1 or each != source)
             right = ", ".join(each for each in targets if len(targets) == 1 or each != target)
-            return set_value(text, keys, f"{left} {'=>' if '=>' in item else '->'} {right}", is_text=True)
+            items[number] = f"{left} {'=>' if '=>' in item else '->'} {right}"
+            return
         raise EditError(f"{item} connects more than {source} and {target}: change it by hand")
     raise EditError(f"there is no connection {source} -> {target} in this text")
 
 
-def _connections(text: str, owner: str) -> Iterator[tuple[Any, list[tuple[str, str]]]]:
+def _connections(items: list[Any]) -> Iterator[tuple[Any, list[tuple[str, str]]]]:
     """The items of a class's connections, each with the pairs of ends that it may connect."""
-    for item in _found(parts.data_of(text), (*_keys(owner), "connections")) or ():
+    for item in items:
         problems = Problems()
-        node = parse(parts.written(item), "", problems)
+        node = parse(written(item), "", problems)
         read = None if node is None else connection(NodeReader(problems), node)
         ends = (read.sources, read.destinations) if read and not problems.found and not read.removes else ((), ())
         yield item, [(source.text, target.text) for source in ends[0] for target in ends[1]]
 
 
-def add_part(text: str, owner: str, section: str, name: str, kind: str, values: Mapping[str, str]) -> str:
+@_of_text
+def add_part(data: Any, owner: str, section: str, name: str, kind: str, values: Mapping[str, str]) -> None:
     """Add an actor or an aspect of a type, with values as somebody types them."""
-    _check_name(name)
     _check_type(kind)
+    _add(data, owner, section, name, {"type": kind, **{key: typed(each) for key, each in values.items()}})
     for key in values:
         _check_name(key)
-    keys = (*_keys(owner), section)
-    if name in (_found(parts.data_of(text), keys) or {}):
-        raise EditError(f"there is already {name!r} among the {section}")
-    return _added(text, keys, name, {"type": kind, **{key: _value_of(each) for key, each in values.items()}})
 
 
 def attach(text: str, owner: str, name: str, kind: str, at: str, values: Mapping[str, str] | None = None) -> str:
@@ -86,172 +97,121 @@ def attach(text: str, owner: str, name: str, kind: str, at: str, values: Mapping
     return add_part(text, owner, "aspects", name, kind, {**(values or {}), "at": at})
 
 
-def remove(text: str, owner: str, section: str, name: str) -> str:
+@_of_text
+def remove(data: Any, owner: str, section: str, name: str) -> None:
     """Remove an actor, with its connections, or an aspect."""
-    keys = (*_keys(owner), section)
-    changed = _without(text, (*keys, name))
-    if section != "actors":
-        return changed
+    keys, parts = _keys(owner), _found(data, (*_keys(owner), section))
+    if not isinstance(parts, dict) or name not in parts:
+        raise EditError(f"there is no {path((*keys, section, name))} in this text")
+    del parts[name]
+    items = _found(data, (*keys, "connections")) or []
     is_end = re.compile(rf"\A{re.escape(name)}(?:\[.*\])?\.")
     # One at a time, because an item may make several.
-    while ends := [pair for _, pairs in _connections(changed, owner) for pair in pairs if any(map(is_end.match, pair))]:
-        changed = disconnect(changed, owner, *ends[0])
-    return changed
+    while section == "actors" and (
+        ends := [pair for _, pairs in _connections(items) for pair in pairs if any(map(is_end.match, pair))]
+    ):
+        _disconnect(items, *ends[0])
 
 
-def set_parameter(text: str, owner: str, section: str, name: str, parameter: str, said: str) -> str:
+@_of_text
+def set_parameter(data: Any, owner: str, section: str, name: str, parameter: str, said: str) -> None:
     """Give a parameter of a part, or one that the class declares (``section`` is parameters), a value, as typed."""
-    keys: Keys = (*_keys(owner), section, name)
+    keys = (*_keys(owner), section, name)
     if section == "parameters":
-        is_mapping = isinstance(_found(parts.data_of(text), keys), dict)
-        return set_value(text, (*keys, "value") if is_mapping else keys, said)
-    _check_name(parameter)
-    return set_value(text, (*keys, parameter), said)
+        _set_declared(data, keys, typed(said))
+    else:
+        _check_name(parameter)
+        _set(data, (*keys, parameter), typed(said))
 
 
-def switch(text: str, owner: str, name: str, on: bool) -> str:
+@_of_text
+def switch(data: Any, owner: str, name: str, on: bool) -> None:
     """Switch an aspect of the text on or off; what it says stays."""
     keys = (*_keys(owner), "aspects", name)
-    if not on:
-        return set_value(text, (*keys, "enabled"), "false")
-    if "enabled" not in (_found(parts.data_of(text), keys) or {}):
-        return text
-    return _without(text, (*keys, "enabled"))
+    if on:
+        (_found(data, keys) or {}).pop("enabled", None)
+    else:
+        _set(data, (*keys, "enabled"), False)
 
 
-def swap(text: str, knowledge: Knowledge, owner: str, name: str, kind: str) -> str:
+@_of_text
+def swap(data: Any, knowledge: Knowledge, owner: str, name: str, kind: str) -> None:
     """Put an aspect of another type in the place of one; of its values, those remain that the other type takes."""
     _check_type(kind)
-    keys = (*_keys(owner), "aspects", name)
-    cls = knowledge.type_called(kind, "aspects")
-    known = knowledge.composite_parameters(kind) if cls is None else declared_parameters(cls)
-    changed = set_value(text, (*keys, "type"), kind)
-    for key in _found(parts.data_of(changed), keys) or {}:
-        if key not in known and key not in ("type", *BESIDE.keys):
-            changed = _without(changed, (*keys, key))
-    return changed
+    known = knowledge.parameters_of(kind, "aspects")
+    part = _set(data, (*_keys(owner), "aspects", name, "type"), kind)
+    for key in [each for each in part if each not in known and each not in ("type", *BESIDE.keys)]:
+        del part[key]
 
 
-def drop_in(text: str, disturbance: str) -> str:
+@_of_text
+def drop_in(data: Any, disturbance: str) -> None:
     """Write what a disturbance, which is the text of a file, adds and sets."""
-    data = parts.data_of(disturbance)
-    if _found(data, ("disturbance",)) is None or _found(data, ("composites",)):
+    given = data_of(disturbance)
+    if _found(given, ("disturbance",)) is None or _found(given, ("composites",)):
         raise EditError("this is not a disturbance that consists of parameters, values and aspects only")
     for section in ("parameters", "aspects"):
-        for name, value in (_found(data, (section,)) or {}).items():
-            _check_name(name)
-            if name in (_found(parts.data_of(text), (section,)) or {}):
-                raise EditError(f"there is already {name!r} among the {section}")
-            text = _added(text, (section,), name, value)
-    for name, value in (_found(data, ("set",)) or {}).items():
+        for name, value in (_found(given, (section,)) or {}).items():
+            _add(data, MODEL, section, name, value)
+    for name, value in (_found(given, ("set",)) or {}).items():
         if not NAME.match(name):
             raise EditError(f"the disturbance sets {name}: write that by hand")
-        text = set_parameter(text, OF_MODEL, "parameters", name, "", parts.written(value))
-    return text
+        _set_declared(data, ("parameters", name), value)
 
 
-def set_value(text: str, keys: Keys, said: str, *, is_text: bool = False) -> str:
+@_of_text
+def set_value(data: Any, keys: Keys, said: str) -> None:
     """Write a value, as somebody types it, in the place of another, or behind the others if there is none."""
-    before = parts.data_of(text)
-    holder = _found({} if before is None else before, keys[:-1])
-    if not isinstance(holder, (dict, list)):
-        raise EditError(f"there is no {parts.path(keys[:-1])} in this text")
-    if isinstance(holder, dict) and keys[-1] not in holder:
-        return _added(text, keys[:-1], str(keys[-1]), _value_of(said))
-    data, error = said if is_text else _value_of(said), EditError("")
-
-    def act(items: Any) -> None:
-        items[keys[-1]] = data
-
-    # Without quotes, if that means the same at this place.
-    for value in (
-        (said, parts.written(said), parts.quoted(said)) if is_text else (parts.typed(said), parts.quoted(said))
-    ):
-        try:
-            return _checked(text, parts.put(text, keys, value), keys[:-1], act)
-        except EditError as refused:
-            error = refused
-    raise error
+    _set(data, keys, typed(said))
 
 
-# -- checks -----------------------------------------------------------------------------------------------------------
+# -- data -------------------------------------------------------------------------------------------------------------
 
 
-def _added(text: str, keys: Keys, key: str | None, value: Any) -> str:
-    """The text with an entry or item behind the others."""
-
-    def act(items: Any) -> None:
-        if key is None:
-            items.append(value)
-        else:
-            items[key] = value
-
-    data = parts.data_of(text)
-    for number in range(len(keys)):
-        if number and not isinstance(_found(data, keys[:number]), dict):
-            raise EditError(f"there is no {parts.path(keys[:number])} in this text")
-    return _checked(text, parts.add(text, keys, key, value, _ORDER), keys, act, makes=[] if key is None else {})
+def _set(data: Any, keys: Keys, value: Any) -> Any:
+    """Set a value at the end of some keys; what it is in is the answer."""
+    holder = _found(data, keys[:-1])
+    if not isinstance(holder, dict):
+        raise EditError(f"there is no {path(keys[:-1])} in this text")
+    holder[keys[-1]] = value
+    return holder
 
 
-def _checked(
-    text: str, changed: str, keys: Keys, act: Callable[[Any], object], missing: str = "", makes: Any = None
-) -> str:
-    """The changed text, if it holds what the other one holds after an act at the end of some keys."""
-    expected = copy.deepcopy(parts.data_of(text))
-    expected = {} if expected is None else expected
-    holder = expected
-    for number, key in enumerate(keys):
-        inner = _found(holder, (key,))
-        if inner is None and makes is not None:
-            inner = makes if number == len(keys) - 1 else {}
-            holder[key] = inner
-        holder = inner
-    try:
-        act(holder)
-    except (KeyError, IndexError, TypeError, AttributeError):
-        raise EditError(f"there is {missing or f'no {parts.path(keys)}'} in this text") from None
-    if _canonical(expected) != _canonical(parts.data_of(changed)):
-        raise EditError("this text is written in a way that no program can change here: change it by hand")
-    return changed
+def _set_declared(data: Any, keys: Keys, value: Any) -> None:
+    """Give a parameter that a class declares a value."""
+    _set(data, (*keys, "value") if isinstance(_found(data, keys), dict) else keys, value)
 
 
-def _canonical(data: Any) -> str:
-    """Data as text: true is not 1, entries have no order, and an empty section is none."""
-    if isinstance(data, dict):
-        kept = (each for each in data.items() if each[0] not in parts.SECTIONS or each[1] not in (None, {}, []))
-        return "{" + ", ".join(sorted(f"{key!r}: {_canonical(value)}" for key, value in kept)) + "}"
-    return f"[{', '.join(map(_canonical, data))}]" if isinstance(data, list) else repr(data)
+def _section(data: Any, owner: str, section: str, empty: Any) -> Any:
+    """A section of a class, which is made if it is missing."""
+    keys = _keys(owner)
+    for number in range(len(keys) + 1):
+        if not isinstance(_found(data, keys[:number]), dict):
+            raise EditError(f"there is no {path(keys[:number])} in this text")
+    holder = _found(data, keys)
+    if holder.get(section) is None:
+        holder[section] = empty
+    if not isinstance(holder[section], type(empty)):
+        kind = "list" if isinstance(empty, list) else "mapping"
+        raise EditError(f"{path((*keys, section))} is no {kind}: change it by hand")
+    return holder[section]
 
 
-def _without(text: str, keys: Keys) -> str:
-    """The text without an entry or item."""
-    parts.data_of(text)  # says so if it cannot be read
-    return _checked(
-        text, parts.delete(text, keys), keys[:-1], lambda items: items.pop(keys[-1]), f"no {parts.path(keys)}"
-    )
+def _add(data: Any, owner: str, section: str, name: str, value: Any) -> None:
+    _check_name(name)
+    if name in (parts := _section(data, owner, section, {})):
+        raise EditError(f"there is already {name!r} among the {section}")
+    parts[name] = value
 
 
 def _found(data: Any, keys: Keys) -> Any:
     for key in keys:
-        if isinstance(data, dict):
-            data = data.get(key)
-        elif isinstance(data, list) and isinstance(key, int) and key < len(data):
-            data = data[key]
-        else:
-            return None
+        data = data.get(key) if isinstance(data, dict) else None
     return data
 
 
 def _keys(owner: str) -> Keys:
-    return () if owner == OF_MODEL else ("composites", owner)
-
-
-def _read_value(value: str) -> Any:
-    return parts.data_of(f"[{value}]")[0]
-
-
-def _value_of(said: str) -> Any:
-    return _read_value(parts.typed(said))
+    return () if owner == MODEL else ("composites", owner)
 
 
 def _check_name(name: str) -> None:

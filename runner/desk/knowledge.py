@@ -16,13 +16,14 @@ from ..model.catalogue.types import Catalogue, CatalogueError, figure_types, ins
 from ..model.graph.model_graph import ModelGraph
 from ..model.language.ports import ParameterText
 from ..model.temporal import Requirement
+from ..model.text.document import Scalar
 from ..model.text.patterns import PatternError, in_general, select
 from ..model.text.problems import Position
 from .names import MODEL, Names
+from .places import Keys, text_of
 from .positions import positions
 from .reading import Reading
 
-Keys = tuple[str | int, ...]
 _OF_KEYS: dict[Keys, str] = {("run", "stop"): "s"}  # units of what is no parameter
 
 
@@ -82,6 +83,13 @@ class Knowledge:
         found = None if known is None else known.composites.get(name)
         return found.parameters if found else {}
 
+    def parameters_of(self, kind: str, section: str) -> Mapping[str, Parameter[Any] | ParameterText]:
+        """The parameters of a type, which may be a composite class."""
+        if section in ("actors", "aspects") and kind in self.names.classes:
+            return self.composite_parameters(kind)
+        cls = self.type_called(kind, section)
+        return {} if cls is None else declared_parameters(cls)
+
     def parameter(self, owner: str, keys: Keys) -> Parameter[Any] | ParameterText | None:
         """The parameter of which the value is at the end of some keys of a class."""
         if len(keys) < 3 or not isinstance(name := keys[2], str):
@@ -89,22 +97,9 @@ class Knowledge:
         section, part = str(keys[0]), str(keys[1])
         if section in ("metrics", "monitors"):
             return declared_parameters(MetricSpec if section == "metrics" else Requirement).get(name)
-        for kind in self._types(owner, section, part):
-            if section in ("actors", "aspects") and kind in self.names.classes:
-                found: Parameter[Any] | ParameterText | None = self.composite_parameters(kind).get(name)
-            else:
-                cls = self.type_called(kind, section)
-                found = None if cls is None else declared_parameters(cls).get(name)
-            if found is not None:
-                return found
-        return None
-
-    def _types(self, owner: str, section: str, part: str) -> list[str]:
-        if section in ("actors", "aspects"):
-            return self.names.types_of(owner, part)
-        entry = self.names.declared(owner, section.removesuffix("s")).get(part)
-        entries = getattr(entry.value, "entries", {}) if entry is not None else {}
-        return [entries["type"].value.text] if "type" in entries and hasattr(entries["type"].value, "text") else []
+        kinds = ("actor", "aspect") if section in ("actors", "aspects") else (section.removesuffix("s"),)
+        types = self.names.types_of(owner, part, *kinds)
+        return next((each[name] for kind in types if name in (each := self.parameters_of(kind, section))), None)
 
     def unit_of(self, owner: str, keys: Keys) -> str:
         """The unit of a value; empty if it is no number."""
@@ -132,12 +127,9 @@ class Knowledge:
 
     def own_ports(self, owner: str, direction: str) -> Iterator[Known]:
         """The ports of a class."""
-        for name in self.names.ports(owner, direction):
-            entry = self.names.declared(owner, "port").get(name)
-            said = getattr(entry.value, "text", "") if entry is not None and entry.key is not entry.value else ""
-            inner = getattr(entry.value, "entries", {}) if entry is not None else {}
-            texts = {key: getattr(each.value, "text", "") for key, each in inner.items()}
-            yield Known(name, texts.get("type", said), texts.get("doc", ""))
+        for name, entry in self.names.declared(owner, f"{direction}s").items():
+            said = entry.value.text if isinstance(entry.value, Scalar) and entry.key is not entry.value else ""
+            yield Known(name, text_of(entry.value, "type") or said, text_of(entry.value, "doc"))
 
     # -- paths ----------------------------------------------------------------------------------------------------
 
@@ -191,8 +183,7 @@ class Knowledge:
     def of_type(self, name: str, section: str) -> str:
         """What a type is, in a sentence."""
         if name in self.names.classes and name:
-            texts = (each.entries["doc"].value for each in self.names.classes[name].mappings if "doc" in each.entries)
-            return first_sentence(next((getattr(each, "text", "") for each in texts), ""))
+            return first_sentence(self.names.said(name, "doc"))
         cls = self.type_called(name, section)
         return "" if cls is None else first_sentence(doc_of(cls))
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
 from pathlib import Path
 
 from epicycle.actors import declared_ports, type_name
@@ -12,14 +12,14 @@ from epicycle.actors import declared_ports, type_name
 from ..model.catalogue.packaged import packaged_models
 from ..model.catalogue.reference import as_written, shown
 from ..model.language.files import named_file
-from ..model.text.document import Mapping, Node, Scalar, Sequence
+from ..model.text.document import Mapping, Node
 from ..model.text.patterns import in_general
 from ..model.text.problems import Position, Problems
 from ..model.text.reading import Text
 from ..support.shown import short
-from .knowledge import Keys, Knowledge, owner_of
-from .names import MODEL, SECTIONS, Name, Use
-from .places import Place, place_at
+from .knowledge import Knowledge, Known, owner_of
+from .names import MODEL, SECTIONS, Name, Use, declared_in
+from .places import Keys, Place, place_at, scalars, value_of
 from .schema import allowed, language
 
 # The keys of a file that name others, and of which kind those are that may be packaged; a study names a model, too.
@@ -50,18 +50,16 @@ def definition(knowledge: Knowledge, line: int, column: int) -> list[Position]:
 def links(knowledge: Knowledge) -> Iterator[tuple[Position, Path]]:
     """Where the file names another one, which it includes, extends or runs, and that file's path."""
     root, folder = knowledge.reading.nodes.get(knowledge.file), Path(knowledge.file).parent
-    entries = root.entries if isinstance(root, Mapping) else {}
     known = packaged_models().values()  # of all others, a model takes only what is in its folder
-    for key, kind in {**_FILES, **({"model": "model"} if "study" in entries else {})}.items():
-        node = entries[key].value if key in entries else None
-        for each in node.items if isinstance(node, Sequence) else (node,):
-            if isinstance(each, Scalar):
-                said = Text(each.text, each.position)
-                path = named_file(said, folder, kind, Problems()) if kind else folder / each.text
-                if path is None or not path.is_file():
-                    continue
-                if key == "model" or path in known or folder.resolve() in path.resolve().parents:
-                    yield each.position, path
+    is_study = value_of(root, "study") is not None
+    for key, kind in {**_FILES, **({"model": "model"} if is_study else {})}.items():
+        for each in scalars(value_of(root, key)):
+            said = Text(each.text, each.position)
+            path = named_file(said, folder, kind, Problems()) if kind else folder / each.text
+            if path is None or not path.is_file():
+                continue
+            if key == "model" or path in known or folder.resolve() in path.resolve().parents:
+                yield each.position, path
 
 
 def references(knowledge: Knowledge, line: int, column: int) -> list[Position]:
@@ -100,14 +98,12 @@ def _of_name(knowledge: Knowledge, name: Name) -> str:
             said.append("at " + ", ".join(dict.fromkeys(f"`{in_general(place)}`" for place in made.places)))
         return "\n\n".join(said)
     if name.kind == "port":
-        direction = "input" if name.name in names.ports(name.owner, "input") else "output"
-        found = next((each for each in knowledge.own_ports(name.owner, direction) if each.name == name.name), None)
-        words = [each for each in (found.what, found.doc) if each] if found is not None else []
-        return ": ".join([f"**{name.name}**: {direction}{inside}", *words])
+        direction = "input" if name.name in names.declared(name.owner, "inputs") else "output"
+        return next(_ports(knowledge.own_ports(name.owner, direction), name.name, f"{direction}{inside}"), "")
     if name.kind == "parameter":
         return _of_parameter(knowledge, name)
     if name.kind == "composite":
-        ports = ", ".join((*names.ports(name.name, "input"), "→", *names.ports(name.name, "output")))
+        ports = ", ".join((*names.declared(name.name, "inputs"), "→", *names.declared(name.name, "outputs")))
         return f"**{name.name}**: composite, {ports}\n\n{knowledge.of_type(name.name, 'actors')}".rstrip()
     model = knowledge.reading.loading.model
     metrics = model.output.metrics if model is not None else []
@@ -143,9 +139,15 @@ def _of_port(knowledge: Knowledge, place: Place) -> Iterator[str]:
     if start is None or rest is None:
         return
     for direction in ("input", "output"):
-        for each in knowledge.ports_of(owner_of(place.keys)[0], start["actor"], direction):
-            if each.name == start["port"] + rest[0]:
-                yield f"**{each.name}**: {direction} of {start['actor']}, {each.what}: {each.doc}".removesuffix(": ")
+        ports = knowledge.ports_of(owner_of(place.keys)[0], start["actor"], direction)
+        yield from _ports(ports, start["port"] + rest[0], f"{direction} of {start['actor']}")
+
+
+def _ports(ports: Iterable[Known], name: str, what: str) -> Iterator[str]:
+    """The ports that have a name, in words."""
+    for each in ports:
+        if each.name == name:
+            yield f"**{name}**: {', '.join(filter(None, (what, each.what)))}: {each.doc}".removesuffix(": ")
 
 
 def _of_place(knowledge: Knowledge, place: Place) -> Iterator[str]:
@@ -182,13 +184,9 @@ def symbols(node: Node | None) -> list[Symbol]:
         return []
     found = []
     for key, entry in node.entries.items():
-        inside: list[Symbol] = []
-        if key in SECTIONS and isinstance(entry.value, Mapping):
-            for name, each in entry.value.entries.items():
-                inner = tuple(symbols(each.value)) if key == "composites" else ()
-                inside.append(Symbol(name, SECTIONS[key], each.key.position, inner))
-        elif key in SECTIONS and isinstance(entry.value, Sequence):
-            ports = (each for each in entry.value.items if isinstance(each, Scalar))
-            inside += (Symbol(each.text, SECTIONS[key], each.position) for each in ports)
-        found.append(Symbol(key, "section", replace(entry.key.position), tuple(inside)))
+        inside = tuple(
+            Symbol(name, SECTIONS[key], each.key.position, tuple(symbols(each.value)) if key == "composites" else ())
+            for name, each in (declared_in(node, key, SECTIONS).items() if key in SECTIONS else ())
+        )
+        found.append(Symbol(key, "section", entry.key.position, inside))
     return found

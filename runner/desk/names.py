@@ -5,15 +5,16 @@ from __future__ import annotations
 import re
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 from epicycle.actors.expression import ExpressionError, names_in
 
-from ..model.text.document import Entry, Node, Scalar, Sequence
+from ..model.text.document import Entry, Scalar
 from ..model.text.document import Mapping as MappingNode
 from ..model.text.problems import Position
 from ..model.text.reading import inside
+from .places import Keys, scalars, text_of, value_of, walk
 from .reading import Reading
 
 MODEL = ""  # the class of what the model itself declares
@@ -33,6 +34,7 @@ _SEGMENT = r"(?:\*\*|(?:\*|[A-Za-z_]\w*)(?:\[[^\]\s]*\])?)"
 _DOTTED = re.compile(rf"(?<![\w.\]$])({_SEGMENT}(?:\.{_SEGMENT})+)", re.ASCII)
 _WORD = re.compile(r"(?<![\w.])([A-Za-z_]\w*)(?![\w.(\[])", re.ASCII)
 _HEAD = re.compile(r"(?<![\w.])([A-Za-z_]\w*)(?:\[[^\]\s]*\])?(?![\w.])", re.ASCII)
+_NO_NAMES = ("composites", "doc", "model", "include", "extends")  # keys of a class, without paths and expressions
 _OWN_RULES = ("at", "from", "type", "port")  # keys whose values are more than patterns
 _EXPRESSION = re.compile(r"\$\{[^}]*\}")
 
@@ -46,6 +48,9 @@ class Name:
     name: str
 
 
+_Used = tuple[Iterable[Name | None], Position | None, bool]
+
+
 @dataclass(frozen=True)
 class Use:
     """A place where a name stands; it may stand for several, if a pattern selects in several classes."""
@@ -55,81 +60,56 @@ class Use:
     declares: bool = False
 
 
-@dataclass
-class _Class:
-    """The mappings that declare a class: one, and those of the models that a model extends."""
-
-    mappings: list[MappingNode] = field(default_factory=list)
-
-    def entries(self, section: str) -> Iterator[tuple[str, Entry, Position]]:
-        """What a section declares, by name."""
-        for mapping in self.mappings:
-            node = mapping.entries[section].value if section in mapping.entries else None
-            if isinstance(node, MappingNode):
-                yield from ((name, entry, entry.key.position) for name, entry in node.entries.items())
-            elif section in ("inputs", "outputs") and node is not None:
-                for item in node.items if isinstance(node, Sequence) else (node,):
-                    if isinstance(item, Scalar):
-                        yield item.text, Entry(item, item), item.position
-
-
 class Names:
     """All names in the files of a model."""
 
     def __init__(self, reading: Reading) -> None:
-        self.classes: dict[str, _Class] = defaultdict(_Class)
+        self.classes: dict[str, list[MappingNode]] = defaultdict(list)  # what declares each, in one file or several
         for node in reading.nodes.values():
             if isinstance(node, MappingNode):
-                self._add(node)
+                for name, entry in declared_in(node, "composites").items():
+                    if isinstance(entry.value, MappingNode):
+                        self.classes[name].append(entry.value)
+                self.classes[MODEL].append(node)
+        # By class, and by section as well as by kind.
         self._declared: dict[str, dict[str, dict[str, Entry]]] = {}
-        for name, each in self.classes.items():
-            sections: dict[str, dict[str, Entry]] = defaultdict(dict)
+        for owner, mappings in self.classes.items():
+            found = self._declared[owner] = defaultdict(dict)
             for section, kind in SECTIONS.items():
-                for declared, entry, _ in each.entries(section):
-                    sections[kind].setdefault(declared, entry)
-            self._declared[name] = sections
+                for name, entry in [each for mapping in mappings for each in declared_in(mapping, section).items()]:
+                    found[section].setdefault(name, entry)
+                    found[kind].setdefault(name, entry)
 
     @cached_property
     def uses(self) -> list[Use]:
         """Where names stand; found when somebody asks, which takes longer than to read what is declared."""
-        self._found: list[Use] = []
-        for name in self.classes:
-            self._collect(name)
-        return self._found
-
-    def _add(self, node: MappingNode) -> None:
-        if "composites" in node.entries and isinstance(found := node.entries["composites"].value, MappingNode):
-            for name, entry in found.entries.items():
-                if isinstance(entry.value, MappingNode):
-                    self.classes[name].mappings.append(entry.value)
-        self.classes[MODEL].mappings.append(node)
+        found = []
+        for owner, mappings in self.classes.items():
+            for names, at, declares in [each for mapping in mappings for each in self._used(owner, mapping)]:
+                known = frozenset(each for each in names if each is not None)
+                if known and at is not None:
+                    found.append(Use(known, at, declares))
+        return found
 
     # -- what is declared -----------------------------------------------------------------------------------------
 
     def bases(self, owner: str) -> list[str]:
         """A class and those that it extends, the first one last."""
         found = [owner]
-        while owner and (base := self._text(owner, "extends")) and base in self.classes and base not in found:
+        while owner and (base := self.said(owner, "extends")) and base in self.classes and base not in found:
             found.append(owner := base)
         return found
 
-    def _text(self, owner: str, key: str) -> str:
-        entries = (each.entries[key].value for each in self.classes[owner].mappings if key in each.entries)
-        return next((each.text for each in entries if isinstance(each, Scalar)), "")
+    def said(self, owner: str, key: str) -> str:
+        """The text that a class has under a key."""
+        return next((said for each in self.classes[owner] if (said := text_of(each, key))), "")
 
-    def declared(self, owner: str, kind: str) -> Mapping[str, Entry]:
-        """What a class and its bases declare of a kind, by name."""
+    def declared(self, owner: str, what: str) -> Mapping[str, Entry]:
+        """What a class and its bases declare of a kind, or in a section, by name."""
         found: dict[str, Entry] = {}
         for each in reversed(self.bases(owner)):
-            found |= self._declared.get(each, {}).get(kind, {})
+            found |= self._declared.get(each, {}).get(what, {})
         return found
-
-    def ports(self, owner: str, direction: str) -> list[str]:
-        """The names of the ports of a class."""
-        found: dict[str, None] = {}
-        for each in reversed(self.bases(owner)):
-            found |= dict.fromkeys(name for name, _, _ in self.classes[each].entries(f"{direction}s"))
-        return list(found)
 
     def name_of(self, owner: str, kind: str, name: str) -> Name | None:
         """What a name means in a class."""
@@ -138,21 +118,23 @@ class Names:
                 return Name(kind, each, name)
         return None
 
-    def types_of(self, owner: str, actor: str) -> list[str]:
-        """The types that an actor, or an aspect, of a class may have; a parameter may choose one."""
-        for kind in ("actor", "aspect"):
-            for each in self.bases(owner):
-                node = self._declared.get(each, {}).get(kind, {}).get(actor)
-                said = _entry(node.value, "type") if node is not None else None
-                if said is None or not isinstance(said.value, Scalar):
-                    continue
-                chooser = said.value.text.strip()
-                if not chooser.startswith("${"):
-                    return [chooser]
-                choices = self.declared(owner, "parameter").get(chooser.strip("${ }"))
-                node_of_choices = _entry(choices.value, "choices") if choices is not None else None
-                return [each.text for each in _scalars(node_of_choices.value)] if node_of_choices is not None else []
-        return []
+    def entries(self, owner: str, kind: str, name: str) -> Iterator[Entry]:
+        """Where a class and its bases declare a name; its own declaration comes first."""
+        found = (self._declared.get(each, {}).get(kind, {}).get(name) for each in self.bases(owner))
+        return (each for each in found if each is not None)
+
+    def entry(self, owner: str, kind: str, name: str) -> Entry | None:
+        return next(self.entries(owner, kind, name), None)
+
+    def types_of(self, owner: str, part: str, *kinds: str) -> list[str]:
+        """The types that an actor, an aspect, or a part of other kinds may have; a parameter may choose one."""
+        entries = (each for kind in kinds or ("actor", "aspect") for each in self.entries(owner, kind, part))
+        said = next((said for each in entries if (said := text_of(each.value, "type").strip())), "")
+        if not said.startswith("${"):
+            return [said] if said else []
+        chooser = self.entry(owner, "parameter", said.strip("${ }"))
+        choices = value_of(chooser.value, "choices") if chooser is not None else None
+        return [each.text for each in scalars(choices)]
 
     def inner(self, owner: str, actor: str) -> list[str]:
         """The composite classes that an actor of a class may be."""
@@ -172,65 +154,36 @@ class Names:
         """Where a name stands."""
         return [use for use in self.uses if name in use.names]
 
-    def _use(self, names: Iterable[Name | None], position: Position | None, declares: bool = False) -> None:
-        found = frozenset(each for each in names if each is not None)
-        if found and position is not None:
-            self._found.append(Use(found, position, declares))
+    def _used(self, owner: str, mapping: MappingNode) -> Iterator[_Used]:
+        """The names in a mapping that declares a class."""
+        for keys, is_key, node, around in walk(mapping):
+            match (is_key, *keys):
+                case (True, section) if section in SECTIONS and (owner == MODEL or section != "composites"):
+                    yield [self.name_of(owner, SECTIONS[str(section)], node.text)], node.position, True
+                case (False, "inputs" | "outputs") | (False, "inputs" | "outputs", int()):
+                    yield [self.name_of(owner, "port", node.text)], node.position, True
+                case (True, "actors" | "aspects", name):
+                    inner = self.inner(owner, str(name))
+                    yield [self.name_of(each, "parameter", node.text) for each in inner], node.position, False
+                case (False, "actors" | "aspects", name, "inherit", *_):
+                    inner = [owner, *self.inner(owner, str(name))]
+                    yield [self.name_of(each, "parameter", node.text) for each in inner], _whole(node), False
+                case (
+                    (False, "actors" | "aspects", _, "type")
+                    | (False, "aspects", _, "at", *_, "type")
+                    | (False, "parameters", _, "choices", *_)
+                ):
+                    yield [self.name_of(MODEL, "composite", node.text)], _whole(node), False
+                case (False, "aspects", _, "at", *_, "port"):
+                    yield [self.name_of(text_of(around[-1], "type"), "port", node.text)], _whole(node), False
+                case (False, "extends") if owner != MODEL:
+                    yield [self.name_of(MODEL, "composite", node.text)], _whole(node), False
+            if not is_key and keys and keys[0] not in _NO_NAMES:
+                yield from self._used_in_text(owner, node, keys)
 
-    def _collect(self, owner: str) -> None:
-        for section, kind in SECTIONS.items():
-            if kind == "composite" and owner != MODEL:
-                continue
-            for name, entry, at in self.classes[owner].entries(section):
-                self._use([self.name_of(owner, kind, name)], at, True)
-                if kind in ("actor", "aspect"):
-                    self._part(owner, name, entry.value)
-                elif kind == "parameter" and (choices := _entry(entry.value, "choices")) is not None:
-                    for each in _scalars(choices.value):
-                        self._use([self._class(each.text)], _whole(each))
-        for mapping in self.classes[owner].mappings:
-            for key, entry in mapping.entries.items():
-                if key == "extends" and owner != MODEL and isinstance(entry.value, Scalar):
-                    self._use([self._class(entry.value.text)], _whole(entry.value))
-                elif key not in ("composites", "doc", "model", "include", "extends"):
-                    self._scan(owner, entry.value, key)
-
-    def _class(self, name: str) -> Name | None:
-        return Name("composite", MODEL, name) if name and name in self.classes else None
-
-    def _part(self, owner: str, name: str, node: Node) -> None:
-        """The type of an actor or aspect, and the parameters of its class that it sets or inherits."""
-        if not isinstance(node, MappingNode):
-            return
-        classes = self.inner(owner, name)
-        for key, entry in node.entries.items():
-            if key == "type" and isinstance(entry.value, Scalar):
-                self._use([self._class(entry.value.text)], _whole(entry.value))
-            self._use([self.name_of(each, "parameter", key) for each in classes], entry.key.position)
-            if key == "inherit":
-                for each in _scalars(entry.value):
-                    named = [self.name_of(holder, "parameter", each.text) for holder in (owner, *classes)]
-                    self._use(named, _whole(each))
-
-    def _scan(self, owner: str, node: Node, key: str) -> None:
-        """The names in the values under a key of a class."""
-        if isinstance(node, Scalar):
-            self._scan_text(owner, node, key)
-        elif isinstance(node, Sequence):
-            for item in node.items:
-                self._scan(owner, item, key)
-        else:
-            kind = _entry(node, "type")
-            for name, entry in node.entries.items():
-                inner = f"{key}.{name}" if name in _OWN_RULES else key
-                if key.endswith(".at") and kind is not None and isinstance(entry.value, Scalar):
-                    chosen = kind.value.text if isinstance(kind.value, Scalar) else ""
-                    named = self._class(chosen) if name == "type" else self.name_of(chosen, "port", entry.value.text)
-                    self._use([named] if name in ("type", "port") else (), _whole(entry.value))
-                self._scan(owner, entry.value, inner)
-
-    def _scan_text(self, owner: str, node: Scalar, key: str) -> None:
-        text = node.text
+    def _used_in_text(self, owner: str, node: Scalar, keys: Keys) -> Iterator[_Used]:
+        text, section = node.text, keys[0]
+        rule = next((key for key in reversed(keys) if key in _OWN_RULES), "")
         for found in _EXPRESSION.finditer(text):
             try:
                 asked = names_in(found[0])
@@ -239,30 +192,30 @@ class Names:
             for word in re.finditer(r"(?<![\w.])[A-Za-z_]\w*", found[0]):
                 if word[0] in asked:
                     at = _part_of(node, found.start() + word.start(), word[0])
-                    self._use([self.name_of(owner, "parameter", word[0])], at)
+                    yield [self.name_of(owner, "parameter", word[0])], at, False
         # Names in expressions have been found; the rest keeps its offsets.
         text = _EXPRESSION.sub(lambda each: "0" * len(each[0]), text)
         for dotted in _DOTTED.finditer(text):
-            self._path(owner, node, dotted.start(), dotted[0])
-        section = key.partition(".")[0]
-        if section == "connections" or (section == "aspects" and key.endswith(".at")):
-            for word in _HEAD.finditer(text):
-                kind = "port" if section == "connections" else "actor"
-                self._use([self.name_of(owner, kind, word[1])], _part_of(node, word.start(1), word[1]))
-        elif key == "metrics.from":
-            for word in _WORD.finditer(text):
-                self._use([self.name_of(owner, "metric", word[1])], _part_of(node, word.start(1), word[1]))
+            yield from self._path(owner, node, dotted.start(), dotted[0])
+        words, kind = _HEAD, "port" if section == "connections" else "actor"
+        if section == "metrics" and rule == "from":
+            words, kind = _WORD, "metric"
+        elif section != "connections" and (section, rule) != ("aspects", "at"):
+            return
+        for word in words.finditer(text):
+            yield [self.name_of(owner, kind, word[1])], _part_of(node, word.start(1), word[1]), False
 
-    def _path(self, owner: str, node: Scalar, start: int, path: str) -> None:
+    def _path(self, owner: str, node: Scalar, start: int, path: str) -> Iterator[_Used]:
         """The names along a dotted path or pattern, as far as it is one."""
         classes, offset, found = {owner}, start, list[tuple[set[Name | None], int, str]]()
         segments = path.split(".")
         for number, segment in enumerate(segments):
             name = segment.partition("[")[0]
             if name == "**":
-                classes = self._all_inside(classes)
+                while not (inside := self._insides(classes)) <= classes:
+                    classes = classes | inside
             elif name == "*":
-                classes = {inner for each in classes for inner in self._insides(each)}
+                classes = self._insides(classes)
             else:
                 is_last = number == len(segments) - 1
                 kinds = ("port", "parameter", "actor") if is_last and number else ("actor", "aspect")
@@ -272,37 +225,21 @@ class Names:
                 found.append((named, offset, name))
                 classes = {inner for each in classes for inner in self.inner(each, name)}
             offset += len(segment) + 1
-        for named, at, name in found:
-            self._use(named, _part_of(node, at, name))
+        yield from ((named, _part_of(node, at, name), False) for named, at, name in found)
 
-    def actors(self, owner: str) -> list[str]:
-        """The names of the actors of a class, with those of its bases."""
-        return list(self.declared(owner, "actor"))
-
-    def _insides(self, owner: str) -> set[str]:
-        """The composite classes of all actors of a class."""
-        return {inner for actor in self.actors(owner) for inner in self.inner(owner, actor)}
-
-    def _all_inside(self, classes: set[str]) -> set[str]:
-        found, waiting = set(classes), list(classes)
-        while waiting:
-            owner = waiting.pop()
-            new = self._insides(owner) - found
-            found |= new
-            waiting += new
-        return found
+    def _insides(self, classes: Iterable[str]) -> set[str]:
+        """The composite classes of all actors of some classes."""
+        return {kind for each in classes for actor in self.declared(each, "actor") for kind in self.inner(each, actor)}
 
 
-def _entry(node: Node, key: str) -> Entry | None:
-    return node.entries.get(key) if isinstance(node, MappingNode) else None
-
-
-def _scalars(node: Node) -> list[Scalar]:
-    """The texts of a list, a mapping, or a single one."""
-    if isinstance(node, Scalar):
-        return [node]
-    items = node.items if isinstance(node, Sequence) else [each.value for each in node.entries.values()]
-    return [each for each in items if isinstance(each, Scalar)]
+def declared_in(
+    mapping: MappingNode, section: str, listed: Iterable[str] = ("inputs", "outputs")
+) -> Mapping[str, Entry]:
+    """What a section declares, by name; some may be a list of names."""
+    node = value_of(mapping, section)
+    if isinstance(node, MappingNode):
+        return node.entries
+    return {each.text: Entry(each, each) for each in scalars(node) if each.text and section in listed}
 
 
 def _whole(node: Scalar) -> Position | None:

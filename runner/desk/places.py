@@ -9,16 +9,30 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import yaml
 
 from ..model.text.document import LINE_BREAK, Mapping, Node, Scalar, Sequence, parse
 from ..model.text.problems import Problems
 
+Keys = tuple[str | int, ...]
 MARK = "epicycle_mark_here"
 _LOADER: type[yaml.CSafeLoader] | type[yaml.SafeLoader] = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 _CLOSING = {"{": "}", "[": "]"}
 _QUOTED = re.compile(r"'(?:[^']|'')*'|\"(?:[^\"\\]|\\.)*\"|(?<![^\s])#.*")
+
+
+class Stands(NamedTuple):
+    """A key or value in a text, and the nodes around it, outermost first.
+
+    ``keys`` lead to the value, or to the mapping of the key.
+    """
+
+    keys: Keys
+    is_key: bool
+    node: Scalar
+    around: tuple[Node, ...]
 
 
 @dataclass(frozen=True)
@@ -29,17 +43,12 @@ class Place:
     value or key has before the place, ``whole`` all of it.  ``around`` are the nodes along the keys, outermost first.
     """
 
-    keys: tuple[str | int, ...]
+    keys: Keys
     is_key: bool
     before: str
     whole: str
     around: tuple[Node, ...]
     text: str  # as it was parsed, with the mark
-
-    def mapping(self, depth: int = 1) -> Mapping | None:
-        """The mapping that is so many levels around, if it is one."""
-        node = self.around[-depth] if len(self.around) >= depth else None
-        return node if isinstance(node, Mapping) else None
 
 
 def lines_of(text: str) -> list[str]:
@@ -114,25 +123,40 @@ def _closing(text: str) -> str:
     return quote + "".join(reversed(open_ones))
 
 
+def walk(node: Node, keys: Keys = (), around: tuple[Node, ...] = ()) -> Iterator[Stands]:
+    """All that stands in a node."""
+    if isinstance(node, Scalar):
+        yield Stands(keys, False, node, around)
+    elif isinstance(node, Sequence):
+        for number, item in enumerate(node.items):
+            yield from walk(item, (*keys, number), (*around, node))
+    else:
+        for key, entry in node.entries.items():
+            yield Stands(keys, True, entry.key, (*around, node))
+            yield from walk(entry.value, (*keys, key), (*around, node))
+
+
+def scalars(node: Node | None) -> list[Scalar]:
+    """The values in a node."""
+    return [each.node for each in walk(node) if not each.is_key] if node is not None else []
+
+
+def value_of(node: Node | None, key: str) -> Node | None:
+    """What a mapping has under a key."""
+    return node.entries[key].value if isinstance(node, Mapping) and key in node.entries else None
+
+
+def text_of(node: Node | None, key: str) -> str:
+    """The text that a mapping has under a key; empty if there is none."""
+    found = value_of(node, key)
+    return found.text if isinstance(found, Scalar) else ""
+
+
 def _marked(root: Node, text: str) -> Place | None:
-    waiting: list[tuple[Node, tuple[str | int, ...], tuple[Node, ...]]] = [(root, (), ())]
-    while waiting:
-        node, keys, around = waiting.pop()
-        if isinstance(node, Scalar):
-            if MARK in node.text and not around:  # all of the text: it may become the first key
-                return _place(keys, True, node.text, (Mapping({}, node.position),), text)
-            if MARK in node.text:
-                return _place(keys, False, node.text, around, text)
-        elif isinstance(node, Sequence):
-            waiting += ((item, (*keys, number), (*around, node)) for number, item in enumerate(node.items))
-        else:
-            for key, entry in node.entries.items():
-                if MARK in key:
-                    return _place(keys, True, key, (*around, node), text)
-                waiting.append((entry.value, (*keys, key), (*around, node)))
+    for keys, is_key, node, around in walk(root):
+        if MARK in node.text:
+            before, _, after = node.text.partition(MARK)
+            if not around:  # all of the text: it may become the first key
+                is_key, around = True, (Mapping({}, node.position),)
+            return Place(keys, is_key, before, before + after, around, text)
     return None
-
-
-def _place(keys: tuple[str | int, ...], is_key: bool, marked: str, around: tuple[Node, ...], text: str) -> Place:
-    before, _, after = marked.partition(MARK)
-    return Place(keys, is_key, before, before + after, around, text)

@@ -9,14 +9,12 @@ from ..model.text.problems import Problem
 from .changes import fix
 from .knowledge import Knowledge
 from .positions import positions
-from .reading import Reading
 
 
-def report(reading: Reading) -> dict[str, Any]:
-    """Whether a file is valid, and everything that is wrong with it."""
-    knowledge = Knowledge(reading)
-    problems = [as_data(each) | _fix(knowledge, each) for each in reading.problems]
-    return {"valid": reading.is_valid, "problems": problems, "more": reading.more}
+def report(problems: Iterable[Problem] = (), more: bool = False, knowledge: Knowledge | None = None) -> dict[str, Any]:
+    """Whether something is valid, and all that is wrong with it; by what is known of a text, with what removes it."""
+    found = [as_data(each) | (_fix(knowledge, each) if knowledge else {}) for each in problems]
+    return {"valid": all(each["severity"] != "error" for each in found), "problems": found, "more": more}
 
 
 def _fix(knowledge: Knowledge, problem: Problem) -> dict[str, Any]:
@@ -41,9 +39,3 @@ def as_data(problem: Problem) -> dict[str, Any]:
         found |= {"file": at.file, "line": at.line, "column": at.column, "length": at.length}
     found["help"] = list(problem.help)
     return found
-
-
-def of_problems(problems: Iterable[Problem], more: bool = False) -> dict[str, Any]:
-    """The same for problems of what no desk has read, such as a study with its plan."""
-    found = [as_data(each) for each in problems]
-    return {"valid": all(each["severity"] != "error" for each in found), "problems": found, "more": more}

@@ -40,17 +40,14 @@ def applying(root: Schema, schemas: Iterable[Schema], node: Node) -> Iterator[Sc
     while waiting:
         each = waiting.pop(0)
         if "$ref" in each:
-            waiting.append({**root["$defs"][each["$ref"].rpartition("/")[2]], **_described(each)})
+            own = {key: each[key] for key in ("description",) if key in each}
+            waiting.append({**root["$defs"][each["$ref"].rpartition("/")[2]], **own})
             continue
         yield each
         waiting += [*each.get("allOf", ()), *each.get("anyOf", ())]
         if "if" in each:
             branch = each.get("then" if _holds(root, each["if"], node) else "else")
             waiting += [branch] if isinstance(branch, dict) else []
-
-
-def _described(schema: Schema) -> Schema:
-    return {"description": schema["description"]} if "description" in schema else {}
 
 
 def _below(schema: Schema, key: str | int) -> Iterator[Schema]:

@@ -2,26 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar
 
-from epicycle.actors import EpicycleError, Tag, counted
+from epicycle.actors import Tag, counted
 
-from ..execution.engine import Interventions
 from ..execution.results import Results, plain
-from ..model.build.model import Model
 from ..support.shown import short
 from ..support.tables import Table
 from .answer import Answer, listed
 
 if TYPE_CHECKING:
-    from ..show.view.pages import Page, Watch
+    from ..show.view.pages import Page
 
 AS_IT_WAS, INSTEAD = "as it was", "what if"
 _FEW = 8  # actors in a sentence
-_FAILED = "failed"  # what ended a run in an error
 
 
 @dataclass(frozen=True)
@@ -114,6 +110,7 @@ class WhatIf(Answer):
     def page(self) -> Page:
         """A page with both futures; the first firing that changes is marked."""
         assert self._page is not None
+        self._page.story = self._sentences()
         return self._page
 
     def save(self, folder: str | Path | None = None, *, page: bool = True) -> list[Path]:
@@ -147,62 +144,3 @@ def _verdict(verdict: Any) -> str:
     if verdict.holds:
         return "holds"
     return "broken" if verdict.time is None else f"broken at {verdict.time:.9g} s"
-
-
-def future_of(
-    model: Model,
-    other: Model,
-    rules: Interventions,
-    at: Tag,
-    words: Sequence[str],
-    *,
-    seed: int | None,
-    until: float | None,
-    progress: bool,
-    watch: Watch | None = None,
-) -> WhatIf:
-    """Run a model as it is, and ``other`` by the rules; both must be the same before the tag."""
-    from ..show.view.differing import affected, difference, fired, first_firing
-    from ..show.view.pages import recorded
-
-    page = recorded(
-        [model, other],
-        seed=seed,
-        until=until,
-        names=[AS_IT_WAS, INSTEAD],
-        acts=[None, rules],
-        progress=progress,
-        watch=watch,
-    )
-    if any(isinstance(each, KeyboardInterrupt) for each in page.errors):
-        raise KeyboardInterrupt
-    recordings = page.recordings
-    before, after = (each.results for each in recordings)
-    assert before is not None
-    assert after is not None
-    if before.stopped == _FAILED:
-        raise page.errors[0]
-    firing, record = first_firing(recordings), difference(recordings)
-    if firing is not None and firing.tag < at:
-        raise EpicycleError(
-            f"two runs of {model.name} differ at {firing.tag}, before {at}: "
-            "something depends on more than model and seed"
-        )
-    found = WhatIf(
-        model.name,
-        before.seed,
-        at,
-        [*words],
-        before,
-        after,
-        None
-        if firing is None
-        else First(firing.actor, firing.tag.seconds, firing.tag.microstep, tuple(fired(recordings, firing))),
-        [] if record is None else record["texts"],
-        {actor: tag.seconds for actor, tag in affected(recordings).items()},
-        len(model.graph.actors),
-        str(page.errors[0]) if page.errors else "",
-        page,
-    )
-    page.story = found._sentences()
-    return found

@@ -22,12 +22,13 @@ from ..model.text.patterns import PatternError, select
 from ..model.text.problems import Problems
 from ..study.run_spec import opened, seconds, spec_of
 from ..support.shown import short
-from .future import WhatIf, future_of
+from .future import AS_IT_WAS, INSTEAD, First, WhatIf
 from .monitored import aspect_named
 
 if TYPE_CHECKING:
     from ..show.view.pages import Watch
 
+_FAILED = "failed"  # what ended a run in an error
 _LET_THROUGH = re.compile(r"(?P<aspect>[^@#]+)(?:@(?P<place>[^#]+))?(?:#(?P<number>[1-9]\d{0,8}))?")
 _TAG = re.compile(r"\(?\s*(?P<time>[^,()]+?)\s*(?:,\s*(?:microstep\s+)?(?P<microstep>\d{1,9})\s*)?\)?")
 
@@ -60,9 +61,48 @@ def what_if(
 
     ``watch`` gives what is called with the time of each run now and then, in place of a bar.
     """
+    from ..show.view.differing import affected, difference, fired, first_firing
+    from ..show.view.pages import recorded
+
     fork = forked(model, at, changes, seed=seed, until=until, watch=watch)
-    return future_of(
-        model, fork.model, fork.acts, at, fork.words, seed=seed, until=until, progress=progress, watch=watch
+    page = recorded(
+        [model, fork.model],
+        seed=seed,
+        until=until,
+        names=[AS_IT_WAS, INSTEAD],
+        acts=[None, fork.acts],
+        progress=progress,
+        watch=watch,
+    )
+    if any(isinstance(each, KeyboardInterrupt) for each in page.errors):
+        raise KeyboardInterrupt
+    recordings = page.recordings
+    before, after = (each.results for each in recordings)
+    assert before is not None
+    assert after is not None
+    if before.stopped == _FAILED:
+        raise page.errors[0]
+    first, record = None, difference(recordings)
+    if (firing := first_firing(recordings)) is not None:
+        first = First(firing.actor, firing.tag.seconds, firing.tag.microstep, tuple(fired(recordings, firing)))
+        if firing.tag < at:
+            raise EpicycleError(
+                f"two runs of {model.name} differ at {firing.tag}, before {at}: "
+                "something depends on more than model and seed"
+            )
+    return WhatIf(
+        model.name,
+        before.seed,
+        at,
+        fork.words,
+        before,
+        after,
+        first,
+        [] if record is None else record["texts"],
+        {actor: tag.seconds for actor, tag in affected(recordings).items()},
+        len(model.graph.actors),
+        str(page.errors[0]) if page.errors else "",
+        page,
     )
 
 
@@ -95,13 +135,16 @@ def forked(
         other.enlist([WovenAspect(name, aspect, **{"ports": [], **places})])
 
     for path, value in _parameters(model, changes.change).items():
-        weave(_Changed.to(value), {"parameters": [path]})
+        changed = _Changed()
+        changed.value = value
+        weave(changed, {"parameters": [path]})
         words.append(f"{path} is {short(value)}")
     for name in changes.remove:
         _check_removable(model, name)
         words.append(f"{name} is removed")
     for port in changes.lose:
-        weave(_Lost(), {"ports": _ports(model, port)})
+        ports = _selected("lose", port, list(model.graph.ports), f"{model.name} has no port")
+        weave(_Lost(), {"ports": ports})
         words.append(f"the next token at {port} is lost")
     acts = _next_acts(model, at, changes.let_through, seed, until, watch)
     words += [f"{act.name.aspect} lets token {act.name.token} at {act.name.place} through" for act in acts]
@@ -207,10 +250,6 @@ def _check_removable(model: Model, name: str) -> None:
         )
 
 
-def _ports(model: Model, pattern: str) -> list[str]:
-    return _selected("lose", pattern, list(model.graph.ports), f"{model.name} has no port")
-
-
 def _next_acts(
     model: Model, at: Tag, names: Sequence[str], seed: int | None, until: float | None, watch: Watch | None
 ) -> list[Act]:
@@ -269,12 +308,6 @@ class _Changed(_Then):
     """Gives a parameter another value."""
 
     value: Any
-
-    @classmethod
-    def to(cls, value: Any) -> _Changed:
-        made = cls()
-        made.value = value
-        return made
 
     def act(self, token: Any, point: JoinPoint) -> None:
         point.forward(self.value)

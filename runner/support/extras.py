@@ -5,26 +5,36 @@ from __future__ import annotations
 from importlib import import_module
 from typing import Any
 
-from epicycle.actors import EpicycleError
-
 EXTRAS = {  # by which extra each is installed
+    "anyio": "studio",
     "control": "control",
     "fmpy": "fmi",
     "gymnasium": "rl",
+    "lsprotocol": "editor",
     "mcap": "ros",
+    "mcp": "agents",
+    "mcp_types": "agents",
     "pettingzoo": "rl",
+    "pydantic": "agents",
+    "pygls": "editor",
     "rosbags": "ros",
+    "starlette": "studio",
+    "uvicorn": "studio",
+    "websockets": "studio",
 }
 
 
-def needed(module: str, who: str) -> Any:
-    """A module; raises ``EpicycleError`` if a package that it needs is missing."""
+def needed(module: str, who: str, extra: str = "") -> Any:
+    """A module; raises ``EpicycleError`` if a package that it needs is missing, which may come with an ``extra``."""
     try:
         return import_module(module)
     except ModuleNotFoundError as error:
         package = (error.name or "").partition(".")[0]
         if package not in EXTRAS:
             raise
+        from epicycle.actors import EpicycleError  # here, because help needs nothing heavy
+
         raise EpicycleError(
-            f"{who} needs the package {package}, which is not installed: pip install 'epicycle[{EXTRAS[package]}]'"
+            f"{who} needs the package {package}, which is not installed: "
+            f"pip install 'epicycle[{extra or EXTRAS[package]}]'"
         ) from None

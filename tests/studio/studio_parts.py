@@ -128,6 +128,7 @@ class Writer:
 
     def drag(self, source: str, target: str) -> None:
         """Draw a line from port to port."""
+        self.until("() => epicycle.studio.diagram.camera.scale")  # a new graph is painted first
         places = self.tab.evaluate(
             "(ports) => ports.map((name) => { const { diagram } = epicycle.studio, { camera } = diagram,"
             " port = diagram.ports.get(name), box = diagram.canvas.getBoundingClientRect();"

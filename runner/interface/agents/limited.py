@@ -44,8 +44,7 @@ class LimitedCall:
     def json(self, command: str, names: Sequence[str], *options: str, good: Sequence[int] = (0,)) -> str:
         """What a command prints as JSON."""
         with tempfile.TemporaryDirectory(prefix="epicycle-") as out:
-            words = [each.replace("{out}", f"{out}/found") for each in options]
-            text = self._answer(out, command, names, [*words, "--json", *self.types], good)
+            text = self._answer(out, command, names, [*options, "--json"], good)
         if len(text) > self.limits.answer:
             raise ToolError(
                 f"the answer has {len(text):,} characters, more than {self.limits.answer:,}: "
@@ -56,21 +55,20 @@ class LimitedCall:
     def file(self, command: str, names: Sequence[str], *options: str, name: str) -> bytes:
         """A file that a command writes with ``-o``."""
         with tempfile.TemporaryDirectory(prefix="epicycle-") as out:
-            path = Path(out, name)
-            self._answer(out, command, names, [*options, f"-o={path}", *self.types], (0,))
-            return path.read_bytes()
+            self._answer(out, command, names, [*options, f"-o={out}/{name}"], (0,))
+            return Path(out, name).read_bytes()
 
     def _answer(self, out: str, command: str, names: Sequence[str], options: Sequence[str], good: Sequence[int]) -> str:
         named = [self._named(each, out, number) for number, each in enumerate(names)]
-        words = [sys.executable, "-P", "-m", "epicycle", command, *options, "--", *named]
-        is_text = all(map(_is_text, words))
-        if sum(map(len, words)) > self.limits.argument or not is_text:
+        options = [each.replace("{out}", f"{out}/found") for each in options]
+        words = [sys.executable, "-P", "-m", "epicycle", command, *options, *self.types, "--", *named]
+        if sum(map(len, words)) > self.limits.argument or not all(map(_is_text, words)):
             raise ToolError(f"the arguments have more than {self.limits.argument:,} characters, or are no text")
         code, told, complained = self._run(words, out)
+        told, complained = (each.replace(f"{out}/", "").strip() for each in (told, complained))
         if code not in good or not told:
-            said = self._shown(complained or told, out)
-            raise ToolError(said[: self.limits.answer] or f"the command ended with {code}")
-        return self._shown(told, out)
+            raise ToolError((complained or told)[: self.limits.answer] or f"the command ended with {code}")
+        return told
 
     def _named(self, name: str, out: str, number: int) -> str:
         """A model as the command line names it: a packaged one or type, a file in the folder, or a text."""
@@ -137,9 +135,6 @@ class LimitedCall:
 
             for what, most in ((resource.RLIMIT_AS, self.limits.memory), (resource.RLIMIT_FSIZE, self.limits.file)):
                 resource.prlimit(process, what, (most, most))
-
-    def _shown(self, text: str, out: str) -> str:
-        return text.replace(f"{out}/", "").strip()
 
 
 def _is_text(word: str) -> bool:

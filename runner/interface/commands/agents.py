@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from ...support.extras import needed
 from .options import DONE, TYPES, command, option
 
 
@@ -30,17 +31,11 @@ def mcp(options: argparse.Namespace) -> int:
         raise EpicycleError(f"there is no folder {options.folder}")
     if not 0 < options.seconds <= 3600:
         raise EpicycleError(f"--seconds {options.seconds:g}: expected a number of seconds from 0 to 3600")
-    try:
-        from ..agents.server import make_server
-    except ImportError as error:
-        if str(error.name).partition(".")[0] not in ("mcp", "mcp_types", "pydantic", "anyio"):
-            raise
-        message = "'epicycle mcp' needs the package mcp, which is not installed: pip install 'epicycle[agents]'"
-        raise EpicycleError(message) from None
+    server = needed("epicycle.runner.interface.agents.server", "'epicycle mcp'", "agents")
     from ..agents import LimitedCall, Limits
 
     call = LimitedCall(options.folder, getattr(options, "types", ()), Limits(seconds=options.seconds))
-    make_server(call, version_of("epicycle") or "", _parsers()).run()
+    server.make_server(call, version_of("epicycle") or "", _parsers()).run()
     return DONE
 
 

@@ -51,19 +51,19 @@ def validate(options: argparse.Namespace) -> int:
 
 def _validate_for_programs(options: argparse.Namespace) -> int:
     """Print what is wrong as JSON."""
-    from ...desk import of_problems, read, report
+    from ...desk import Knowledge, read, report
     from ...model.text.problems import ModelError
 
     if _is_study(options.model):
         try:
             _plan(options)
-            found = of_problems(())
+            found = report()
         except ModelError as error:
-            found = of_problems(error.problems, error.more)
+            found = report(error.problems, error.more)
     else:
         given = arguments(running.load, options)
-        types = own_types(options)
-        found = report(read(given.pop("model"), **{**given, "types": types}))
+        reading = read(given.pop("model"), **{**given, "types": own_types(options)})
+        found = report(reading.problems, reading.more, Knowledge(reading))
     is_good = found["valid"] and not (options.strict and found["problems"])
     tell_json({**found, "valid": is_good}, indent=2)
     return DONE if is_good else BAD_INPUT

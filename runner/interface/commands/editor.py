@@ -5,10 +5,9 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
+from ...support.extras import needed
 from ...support.printing import tell
 from .options import DONE, TYPES, command, option, own_types
-
-_INSTALL = "pip install 'epicycle[studio]'"
 
 
 @command(
@@ -22,18 +21,10 @@ def lsp(options: argparse.Namespace) -> int:
     docs/editors.md says how to set up VS Code, Neovim, Emacs, Helix and JetBrains' editors. It needs the extra
     'editor': pip install 'epicycle[editor]'.
     """
-    from epicycle.actors import EpicycleError
-
     from ...study.provenance import version_of
 
-    try:
-        from ...desk.server import make_server
-    except ImportError as error:
-        if not str(error.name).startswith(("pygls", "lsprotocol")):
-            raise
-        message = "'epicycle lsp' needs the package pygls, which is not installed: pip install 'epicycle[editor]'"
-        raise EpicycleError(message) from None
-    make_server(version_of("epicycle") or "", tuple(own_types(options))).start_io()
+    server = needed("epicycle.runner.desk.server", "'epicycle lsp'", "editor")
+    server.make_server(version_of("epicycle") or "", tuple(own_types(options))).start_io()
     return DONE
 
 
@@ -66,25 +57,13 @@ def studio(options: argparse.Namespace) -> int:
     if options.seconds <= 0 or options.events <= 0:
         raise EpicycleError("a run has more than 0 seconds and events")
     own_types(options)  # what is wrong with them is said here
-    try:
-        from ..studio.server import Document, Studio, serve
-    except ImportError as error:
-        if str(error.name).partition(".")[0] not in (
-            "starlette",
-            "uvicorn",
-            "websockets",
-            "anyio",
-            "pygls",
-            "lsprotocol",
-        ):
-            raise
-        message = f"'epicycle studio' needs the package {error.name}, which is not installed: {_INSTALL}"
-        raise EpicycleError(message) from None
+    server = needed("epicycle.runner.interface.studio.server", "'epicycle studio'", "studio")
 
     def opened(address: str) -> None:
         tell(f"{path} is open at {address}\nCtrl-C ends it")
         if not options.no_browser:
             webbrowser.open(address)
 
-    serve(Studio(Document(path), options.seconds, options.events, getattr(options, "types", ())), options.port, opened)
+    document, types = server.Document(path), getattr(options, "types", ())
+    server.serve(server.Studio(document, options.seconds, options.events, types), options.port, opened)
     return DONE

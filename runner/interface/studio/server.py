@@ -77,9 +77,10 @@ class Studio:
     def __init__(self, document: Document, seconds: float, events: int, types: Sequence[Path]) -> None:
         self.document = document
         given = [str(document.path), str(seconds), str(events), *map(str, types)]
-        self.reader = Workers("reading of the text", given, READING)
-        self.runner = Workers("run", given, seconds + GRACE, stops=True)
-        self.forker = Workers("what if", given, 3 * seconds + GRACE, stops=True)
+        self.workers = dict.fromkeys(OF_READING, Workers("reading of the text", given, READING)) | {
+            "run": Workers("run", given, seconds + GRACE, stops=True),
+            "what_if": Workers("what if", given, 3 * seconds + GRACE, stops=True),
+        }
         self.token = secrets.token_urlsafe(32)
         self.nonce = secrets.token_urlsafe(16)
         self.hosts: frozenset[str] = frozenset()
@@ -96,21 +97,18 @@ class Studio:
             Route("/{token}/{name}", self.file),
             WebSocketRoute("/{token}/socket", self.socket),
         ]
-        return self.guarded(Starlette(routes=routes))
+        app = Starlette(routes=routes)
 
-    def guarded(self, app: Starlette) -> App:
-        """The application, for requests that come from its own page or from the address line only."""
+        async def guarded(scope: Scope, receive: Any, send: Any) -> None:
+            """Answers requests that come from its own page or from the address line only."""
+            if scope["type"] not in ("http", "websocket") or self.is_welcome(scope):
+                await app(scope, receive, send)
+            elif scope["type"] == "websocket":
+                await send({"type": "websocket.close", "code": 1008})
+            else:
+                await PlainTextResponse("Not found", 404)(scope, receive, send)
 
-        async def guard(scope: Scope, receive: Any, send: Any) -> None:
-            if scope["type"] in ("http", "websocket") and not self.is_welcome(scope):
-                if scope["type"] == "websocket":
-                    await send({"type": "websocket.close", "code": 1008})
-                else:
-                    await PlainTextResponse("Not found", 404)(scope, receive, send)
-                return
-            await app(scope, receive, send)
-
-        return guard
+        return guarded
 
     def is_welcome(self, scope: Scope) -> bool:
         """Whether a request has the secret, and comes from where it must."""
@@ -189,24 +187,17 @@ class Studio:
 
     async def answer(self, browser: WebSocket, message: Message) -> None:
         number, ask = message["id"], str(message.get("ask"))
-        loop = asyncio.get_running_loop()
-        sending = set[asyncio.Task[None]]()
 
-        def tell(said: Message) -> None:
-            task = loop.create_task(_send(browser, {"id": number, **said}))
-            sending.add(task)
-            task.add_done_callback(sending.discard)
+        async def tell(said: Message) -> None:
+            await _send(browser, {**said, "id": number})
 
         if ask == "save":
             found = self.save(message)
-        elif ask in OF_READING:
-            found = await self.reader.ask(message, tell)
-        elif ask in ("run", "what_if"):
-            found = await (self.runner if ask == "run" else self.forker).ask(message, tell)
+        elif ask in self.workers:
+            found = await self.workers[ask].ask(message, tell)
         else:
             found = {"error": "there is no such question"}
-        await asyncio.gather(*sending)
-        await _send(browser, {**found, "id": number, "done": True})
+        await tell({**found, "done": True})
 
     def save(self, message: Message) -> Message:
         text = message.get("text")
@@ -218,9 +209,8 @@ class Studio:
             return {"error": str(error)}
 
     def close(self) -> None:
-        self.reader.stop()
-        self.runner.stop()
-        self.forker.stop()
+        for each in self.workers.values():
+            each.stop()
 
 
 def _response(text: str, kind: str, more: dict[str, str] | None = None) -> Response:

@@ -15,6 +15,7 @@ import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
+from functools import partial
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -26,19 +27,16 @@ from epicycle.actors import EpicycleError, Tag
 
 from ...desk import EditError, Knowledge, Session, controls, editing, edits_between
 from ...desk.answers import ANSWERS, Answers, uri_of
-from ...execution.engine import ActorError, LoopError
-from ...model.build.figures import figures_of
 from ...model.build.model import Model
 from ...model.text.document import MAX_BYTES
 from ...model.text.files import opened
-from ...model.text.problems import Problems
 from ...search.what_if import Changes, what_if
 from ...show.view.drawing import drawn
-from ...show.view.page import data_of
+from ...show.view.page import data_of, metrics
+from ...show.view.pages import recorded
 from ...show.view.recording import Recording
 from ...study.run_spec import RunSpec, named
 from ...support.collection import keep_for_good, seldom_collecting
-from ...support.shown import in_words
 from ..calls.changes import classes
 
 MEMORY = 4 << 30  # bytes that a worker may take
@@ -182,33 +180,14 @@ class Worker:
 
     def run(self, asked: Message) -> Message:
         """Run the model, if it is valid, within the limits; metrics are sent on the way."""
-        model = self.model
-        problems = Problems()
-        recording = Recording(model, figures_of(model, problems), most=MOST)
-        problems.raise_if_any()
-        started = last = time.monotonic()
-        error, within = "", self._within(recording)
-
-        def progress(now: float) -> None:
-            nonlocal last
-            within(now)
-            if (moment := time.monotonic()) - last > BEAT:
-                last = moment
-                share = None if model.stop is None else now / model.stop
-                self.say({"share": share, "metrics": _metrics(recording), "records": recording.records})
-
-        self.ended = ""
-        try:
-            recording.run(progress=progress)
-        except KeyboardInterrupt:
-            pass
-        except (ActorError, LoopError) as failure:
-            error = str(failure)
+        started = time.monotonic()
+        page = recorded([self.model], most=MOST, progress=False, watch=partial(self._watch, tells=True))
+        [recording] = page.recordings
         results = recording.results
         assert results is not None
         return {
             "digest": results.digest,
-            "metrics": _metrics(recording),
+            "metrics": metrics(recording),
             "monitors": [
                 [name, each.holds and not each.missing, each.missing or each.remark or ("" if each.holds else "broken")]
                 for name, each in results.monitors.items()
@@ -216,25 +195,30 @@ class Worker:
             "records": recording.records,
             "seconds": time.monotonic() - started,
             "stopped": results.stopped,
-            "failed": error,
+            "failed": "".join(str(each) for each in page.errors if isinstance(each, EpicycleError)),
             "ended": self.ended,
             "view": data_of([recording]),
         }
 
-    def _within(self, recording: Recording | None) -> Callable[[float], None]:
-        """What ends a run that has reached the limits, or for which nobody waits."""
-        started = time.monotonic()
+    def _watch(self, recording: Recording | None, *, tells: bool = False) -> Callable[[float], None]:
+        """What ends a run at the limits, or if nobody waits for it; it may tell how far the run has come."""
+        started = last = time.monotonic()
+        self.ended = ""
 
         def look(now: float) -> None:
+            nonlocal last
             if not self.waiting.empty():
                 raise StaleError
-            if time.monotonic() - started > self.seconds:
+            if (moment := time.monotonic()) - started > self.seconds:
                 self.ended = f"ended after {self.seconds:g} s: a run in the studio takes no longer (--seconds)"
             elif recording is not None and recording.records > self.events:
                 self.ended = f"ended after {self.events:,} events: a run in the studio has no more (--events)"
-            else:
-                return
-            raise KeyboardInterrupt
+            elif recording is not None and tells and moment - last > BEAT:
+                last, stop = moment, recording.model.stop
+                share = None if stop is None else now / stop
+                self.say({"share": share, "metrics": metrics(recording), "records": recording.records})
+            if self.ended:
+                raise KeyboardInterrupt
 
         return look
 
@@ -253,7 +237,7 @@ class Worker:
                     seed=None,
                     until=None if until is None else float(until),
                     progress=False,
-                    watch=self._within,
+                    watch=self._watch,
                 )
         except KeyboardInterrupt:
             return {"error": self.ended}
@@ -266,19 +250,6 @@ def _texts(given: Any) -> list[str]:
     if not isinstance(given, list) or not all(isinstance(each, str) for each in given):
         raise EpicycleError("this change cannot be read")
     return given
-
-
-def _metrics(recording: Recording) -> list[list[Any]]:
-    """Metrics as they are now: name, value in words, unit, what it is, and the number."""
-    results = recording.results or recording.so_far()
-    found: list[list[Any]] = []
-    for each in recording.model.output.metrics:
-        outcome = results.outcomes[each.name]
-        value = outcome.value
-        words = outcome.shown(lambda number: in_words(number, digits=4, nothing="–"))
-        number = float(value) if isinstance(value, (int, float)) and abs(value) < 1e300 else None
-        found.append([each.name, words, "" if each.unit == "1" else each.unit, each.measure.doc, number])
-    return found
 
 
 ASKED: Mapping[str, Callable[[Worker, Message], Message]] = {

@@ -6,11 +6,12 @@ import asyncio
 import itertools
 import json
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Awaitable, Callable, Sequence
 from contextlib import suppress
 from typing import Any
 
 Message = dict[str, Any]
+Tell = Callable[[Message], Awaitable[None]]
 LONGEST = 64 << 20  # bytes of an answer
 START = 60.0  # s that a process may take until it listens
 
@@ -31,7 +32,7 @@ class Workers:
         self._turn = asyncio.Lock()
         self._latest: dict[str, int] = {}
 
-    async def ask(self, question: Message, tell: Callable[[Message], None]) -> Message:
+    async def ask(self, question: Message, tell: Tell) -> Message:
         """The answer; what comes before it goes to ``tell``.  A process that fails gives an answer that says so."""
         number = next(self._numbers)
         kind = str(question["ask"])
@@ -51,7 +52,7 @@ class Workers:
                 self.stop()
                 return {"error": f"the {self.name} has died; it starts again with the next change"}
 
-    async def _answer(self, number: int, question: Message, tell: Callable[[Message], None]) -> Message:
+    async def _answer(self, number: int, question: Message, tell: Tell) -> Message:
         await self._send({**question, "id": number})
         assert self._process is not None
         assert self._process.stdout is not None
@@ -61,7 +62,7 @@ class Workers:
                 continue  # of a question that nobody waits for
             if said.pop("done", False):
                 return said
-            tell(said)
+            await tell(said)
         raise EOFError
 
     async def _start(self) -> None:

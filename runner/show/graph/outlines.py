@@ -5,6 +5,7 @@ A replicated array with identical instances becomes one box; a composite below t
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -52,8 +53,9 @@ class Box:
 
     ``kind`` is its type and, if it has a local clock, the settings of that; ``has_director``: it fires as one actor.
     A mode has a ``shape`` instead, and its ``kind`` are lines of what it does.
-    ``count`` is the number of instances of an array that it represents.  ``is_closed``: a composite whose inside is not
-    shown.  ``aspects`` are attached to the actor itself, or inside the closed composite.
+    ``count`` is the number of instances of an array that it represents, or of ``members`` that are no array.
+    ``is_closed``: a composite whose inside is not shown.  ``aspects`` are attached to the actor itself, or inside the
+    closed composite.
     """
 
     path: str
@@ -64,6 +66,7 @@ class Box:
     children: list[Box] = field(default_factory=list)
     links: list[Link] = field(default_factory=list)
     count: int = 1
+    members: tuple[str, ...] = ()
     is_composite: bool = False
     has_director: bool = False
     is_closed: bool = False
@@ -106,11 +109,20 @@ class Outline:
         return f"{counted(closed, 'composite')} {are} drawn closed; --depth {self.levels} opens everything"
 
 
-def outline(model: Model, depth: int | None = None, expand: bool = False, *, most: int = MANY, few: int = 1) -> Outline:
+def outline(
+    model: Model,
+    depth: int | None = None,
+    expand: bool = False,
+    *,
+    most: int = MANY,
+    few: int = 1,
+    limit: int = sys.maxsize,
+) -> Outline:
     """The boxes and links of a model.
 
     Composites down to ``depth`` levels are opened, by default as long as there are at most ``most`` boxes.  Without
-    ``expand``, arrays with more than a ``few`` instances are one box if these are identical.
+    ``expand``, arrays with more than a ``few`` instances are one box if these are identical.  If there are more than
+    ``limit`` boxes nevertheless, what is of one type is one box.
     """
     outliner = _Outliner(model, sys.maxsize if expand else few)
     root = outliner.box("")
@@ -121,9 +133,15 @@ def outline(model: Model, depth: int | None = None, expand: bool = False, *, mos
     if depth is None:
         sizes = accumulate(map(len, rows[1:]))
         depth = max((deep for deep, size in enumerate(sizes) if deep <= levels and size <= most), default=0)
-    for box in (box for row in rows[depth + 1 : depth + 2] for box in row if box.is_composite):
-        box.is_closed, box.children, box.links = True, [], []
-        box.aspects = outliner.aspects_within(box.path)
+    lowest = [box for row in rows[depth + 1 : depth + 2] for box in row]
+    if sum(map(len, rows[1 : depth + 2])) > limit:
+        outliner.fold(limit)
+        root, depth = outliner.box(""), 0
+        lowest = root.children
+    for box in lowest:
+        if box.is_composite:
+            box.is_closed, box.children, box.links = True, [], []
+            box.aspects = outliner.aspects_within(box.path)
     return Outline(model, root, depth, levels)
 
 
@@ -150,11 +168,28 @@ class _Outliner:
         # the search continues until nothing changes.
         composites = ("", *self.graph.composites)
         arrays = [array for each in composites for array in self.graph.parts(each).values() if len(array) > few]
+        self.places: dict[str, int] = {}  # of instances in their array
         before = -1
         while len(arrays) != before:
             before = len(arrays)
             self.alike = {path: array for array in arrays for path in array}
             arrays = [array for array in arrays if len(set(map(self._look, array))) == 1]
+
+    def fold(self, most: int) -> None:
+        """Make one box of the outermost parts of a type whose names differ in digits only, or of all of a type."""
+        for digits in (r"\d+", ".*"):
+            groups: dict[object, list[str]] = {}
+            for path in self._children(""):
+                ports = tuple(port.rpartition(".")[2] for port in chain(*self._ports(path)))
+                groups.setdefault((re.sub(digits, "#", path), self._kind(path), ports), []).append(path)
+            if len(groups) <= most:
+                break
+        self.alike = {path: group for group in groups.values() for path in group}
+        for path, (first, *_) in self.alike.items():
+            for place in (path, *chain(*self._ports(path))):  # the box has the aspects of all
+                for name in self.standing.get(place, ()):
+                    if name not in (shown := self.standing.setdefault(first + place[len(path) :], [])):
+                        shown.append(name)
 
     def _look(self, instance: str) -> frozenset[object]:
         """What a drawing shows of an instance, without its index: its inside, aspects, and connections."""
@@ -209,9 +244,11 @@ class _Outliner:
 
     def box(self, path: str) -> Box:
         name, count = path.rpartition(".")[2], len(self._instances(path))
-        if count > 1:
-            name = f"{name.partition('[')[0]}[0..{count - 1}]"
         box = Box(path, name, self._kind(path), count=count, is_composite=path not in self.graph.actors)
+        if count > 1 and len({each.partition("[")[0] for each in self._instances(path)}) == 1:
+            box.name = f"{name.partition('[')[0]}[0..{count - 1}]"
+        elif count > 1:
+            box.name, box.members = f"{name} and {count - 1:,} more", tuple(self._instances(path))
         if path in self.graph.domains:
             box.has_director = bool(path)
             box.kind += _clock(self.graph.domains[path].clock)
@@ -274,7 +311,9 @@ class _Outliner:
     def _index(self, port: str) -> int:
         """The index of a port's owner in its array."""
         owner = _owner(port)
-        return self._instances(owner).index(owner)
+        if owner not in self.places:
+            self.places |= {path: number for number, path in enumerate(self._instances(owner))}
+        return self.places[owner]
 
     def _instances(self, path: str) -> list[str]:
         """The instances that the box of an actor or composite represents."""

@@ -26,7 +26,7 @@ class FirstFiring(NamedTuple):
 
 def difference(recordings: Sequence[Recording]) -> dict[str, Any] | None:
     """The first record in which the logs differ, and the first firing: numbers among the kept ones, and words."""
-    if (record := first_record(recordings)) is None:
+    if (record := _first(*(each.hashes for each in recordings[:2]))) is None:
         return None
     firing = first_firing(recordings)
     numbers: Sequence[int | None] = (None, None) if firing is None else firing.numbers
@@ -38,11 +38,6 @@ def difference(recordings: Sequence[Recording]) -> dict[str, Any] | None:
         if firing is None
         else [f"{firing.tag} {firing.actor} {each}" for each in fired(recordings, firing)],
     }
-
-
-def first_record(recordings: Sequence[Recording]) -> int | None:
-    """The number of the first record in which the logs differ."""
-    return _first(*(each.hashes for each in recordings[:2]))
 
 
 def first_firing(recordings: Sequence[Recording]) -> FirstFiring | None:

@@ -30,6 +30,7 @@ def drawn(model: Model) -> dict[str, Any]:
                 "composite": placed.box.is_composite,
                 "director": placed.box.has_director,
                 "count": placed.box.count,
+                "members": placed.box.members,
                 "ports": [
                     [each.port.path, each.port.name, each.side, *_rounded(each.x, each.y), each.port.is_multi]
                     for each in placed.ports
@@ -55,14 +56,17 @@ def drawn(model: Model) -> dict[str, Any]:
 
 
 def _drawing(model: Model) -> tuple[Drawing, str]:
-    """The drawing that a page has room for, and what it leaves out: identical instances first, then what is inside."""
+    """The drawing that a page has room for, and what it leaves out: identical instances first, then what is inside, at
+    last all but one of a type."""
     everything = len(model.graph.actors) + len(model.graph.composites)
-    found = outline(model, most=MOST_BOXES, few=FEW)
+    found = outline(model, most=MOST_BOXES, few=FEW, limit=MOST_BOXES)
     note = (
         "" if found.depth >= found.levels else f"{everything:,} boxes are too many to draw: composites are drawn closed"
     )
+    if any(box.members for box in found.root.children):
+        note = f"{everything:,} boxes are too many to draw: what is of one type, with names that are alike, is one box"
     if found.size > MOST_BOXES:
-        found.root.children, found.root.links, note = [], [], f"{found.size:,} boxes are too many to draw"
+        found.root.children, found.root.links, note = [], [], f"{everything:,} boxes are too many to draw"
     return _laid_out(found), note
 
 

@@ -112,7 +112,7 @@ def _run(recording: Recording, name: str, pack: Pack) -> dict[str, Any]:
         "stopped": results.stopped,
         "digest": results.digest,
         "settings": [_setting(model, *each) for each in results.parameters.items()][:40],
-        "metrics": _metrics(recording),
+        "metrics": metrics(recording),
         "monitors": [_monitor(recording, name, each) for name, each in results.monitors.items()],
         "firings": recording.firings,
         "records": recording.records,
@@ -147,13 +147,14 @@ def _setting(model: Model, name: str, value: object) -> str:
     return f"{name} = {short(value)}" + ("" if unit in ("", "1") else f" {unit}")
 
 
-def _metrics(recording: Recording) -> list[list[str]]:
-    results, model = recording.results, recording.model
-    assert results is not None
-    return [
-        [each.name, results.outcomes[each.name].shown(four), "" if each.unit == "1" else each.unit, each.measure.doc]
-        for each in model.output.metrics
-    ]
+def metrics(recording: Recording) -> list[list[Any]]:
+    """Metrics as they are now: name, value in words, unit, what it is, and the number."""
+    outcomes, found = (recording.results or recording.so_far()).outcomes, list[list[Any]]()
+    for each in recording.model.output.metrics:
+        value, unit = outcomes[each.name].value, "" if each.unit == "1" else each.unit
+        number = float(value) if isinstance(value, (int, float)) and abs(value) < 1e300 else None
+        found.append([each.name, outcomes[each.name].shown(four), unit, each.measure.doc, number])
+    return found
 
 
 def _monitor(recording: Recording, name: str, verdict: Verdict) -> dict[str, Any]:

@@ -19,7 +19,7 @@ from ...support.bars import SOON
 from ...support.printing import complain
 from ..watching import watched
 from .page import page_of, write_page
-from .recording import Recording
+from .recording import MOST, Recording
 
 Watch = Callable[[Recording | None], Callable[[float], None]]  # for a run that is recorded, or for one that is not
 
@@ -69,13 +69,14 @@ def recorded(
     until: float | Sequence[float | None] | None = None,
     names: Sequence[str] = (),
     acts: Sequence[Interventions | None] = (),
+    most: int = MOST,
     progress: bool = True,
     watch: Watch | None = None,
 ) -> Page:
     """The page of these models' runs; seeds and stop times apply to all, or are given for each.
 
-    ``acts`` say which acts of aspects happen in each; ``watch`` gives what is called with the time of a run now and
-    then, in place of a bar.
+    ``acts`` say which acts of aspects happen in each, ``most`` how many firings are kept of it; ``watch`` gives what is
+    called with the time of a run now and then, in place of a bar.
     """
     recordings, errors = [], list[EpicycleError | KeyboardInterrupt]()
     for number, model in enumerate(models):
@@ -93,6 +94,7 @@ def recorded(
                 model,
                 figures,
                 seed=own_seed,
+                most=most,
                 is_compared=len(models) > 1,
                 acts=acts[number] if acts else None,
             )

@@ -224,6 +224,34 @@ def test_wires_that_could_not_be_followed_are_names(tmp_path: Path, monkeypatch:
     write_graph(drawn, tmp_path / "long.svg")
 
 
+def test_what_is_of_one_type_is_one_box_if_there_is_no_room(tmp_path: Path) -> None:
+    count = 700
+    lines = ["model: flat", "actors:"]
+    for n in range(count):
+        lines += [f"  clock{n}: {{type: Clock, period: 1 s}}", f"  gain{n}: {{type: Scale, factor: {n}}}"]
+        lines += [f"  heard{'abc'[n % 3]}: {{type: Recorder}}"] if n < 3 else []
+    lines += ["connections:", *(f"  - clock{n}.output -> gain{n}.input" for n in range(count))]
+    lines += [f"  - gain{n}.output -> heard{'abc'[n % 3]}.input" for n in range(count)]
+    lines += ["aspects: {loss: {type: PacketLoss, probability: 0.1, at: gain7.input}}", "run: {stop: 1 s}"]
+    (tmp_path / "flat.yaml").write_text("\n".join(lines), encoding="utf-8")
+    model = load_model(tmp_path / "flat.yaml")
+
+    def boxes(limit: int) -> list[tuple[str, int, int]]:
+        return [(each.name, each.count, len(each.members)) for each in outline(model, limit=limit).root.children]
+
+    assert len(boxes(2 * count + 3)) == 2 * count + 3
+    clocks, gains = ("clock0 and 699 more", count, count), ("gain0 and 699 more", count, count)
+    assert boxes(1_000) == [clocks, gains, ("hearda", 1, 0), ("heardb", 1, 0), ("heardc", 1, 0)]
+    assert boxes(4) == [clocks, gains, ("hearda and 2 more", 3, 3)]
+    root = outline(model, limit=4).root
+    assert [(each.source, each.target, each.words) for each in root.links] == [
+        ("clock0.output", "gain0.input", "in pairs"),
+        ("gain0.output", "hearda.input", "×700"),
+    ]
+    assert root.children[1].inputs[0].aspects == ("loss",)  # of one of them
+    check(draw(outline(model, limit=4)))
+
+
 def test_what_nobody_could_read_is_not_drawn(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -306,7 +306,8 @@ run: {stop: 2 s}
     [
         (8, "", ["first", "first.clock", "first.scale", "first.sink"]),  # alike: the second is folded into it
         (7, "8 boxes are too many to draw: composites are drawn closed", ["first"]),
-        (1, "2 boxes are too many to draw", []),
+        (1, "8 boxes are too many to draw: what is of one type, with names that are alike, is one box", ["first"]),
+        (0, "8 boxes are too many to draw", []),
     ],
 )
 def test_what_is_too_much_to_draw_is_told(

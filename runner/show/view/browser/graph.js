@@ -13,7 +13,7 @@ class Graph extends View {
     this.canvas.dataset.view = "graph";
     this.camera = { scale: 0, x: 0, y: 0 };
     this.shut = new Map(); // composites that were closed (true) or opened (false) by hand
-    this.boxes = new Map(this.drawing.boxes.map((box) => [box.path, box]));
+    this.boxes = new Map(this.drawing.boxes.flatMap((box) => [box.path, ...box.members].map((path) => [path, box])));
     /** @type {Map<Path, Placed>} */
     this.ports = new Map();
     for (const box of this.drawing.boxes)

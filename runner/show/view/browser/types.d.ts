@@ -47,6 +47,7 @@ interface Box {
   composite: boolean;
   director: boolean;
   count: number;
+  members: Path[]; // of a box that is no array, if it stands for several
   ports: [path: Path, name: string, side: "left" | "right", x: number, y: number, isMulti: boolean][];
 }
 
@@ -96,7 +97,7 @@ interface RunHead {
   stopped: string;
   digest: string;
   settings: string[];
-  metrics: [name: string, value: string, unit: string, doc: string][];
+  metrics: [name: string, value: string, unit: string, doc: string, number: number | null][];
   monitors: Monitor[];
   firings: number;
   records: number;
