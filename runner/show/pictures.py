@@ -55,7 +55,8 @@ class Picture:
         return f"<Picture {self.name}>"
 
     def _repr_html_(self) -> str:
-        return _image(self.name, self.svg())
+        data = base64.b64encode(self.svg()).decode()  # of an image, whose content cannot reach the page around it
+        return tag("img", src=f"data:image/svg+xml;base64,{data}", alt=self.name, style="max-width: 100%")
 
 
 class Pictures(Mapping[str, Picture]):
@@ -80,12 +81,6 @@ class Pictures(Mapping[str, Picture]):
 
     def _repr_html_(self) -> str:
         return tag("div", [Html(each._repr_html_()) for each in self.values()])
-
-
-def _image(name: str, svg: bytes) -> Html:
-    """An SVG as an image: its content cannot reach the page around it."""
-    data = base64.b64encode(svg).decode()
-    return tag("img", src=f"data:image/svg+xml;base64,{data}", alt=name, style="max-width: 100%")
 
 
 @overload

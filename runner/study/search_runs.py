@@ -89,12 +89,9 @@ def open_search_runs(plan: Plan, folder: Path, jobs: int, timeout: float | None)
     """
     with lock(folder):
         store = prepare(folder, manifest_of(plan))
-        known: dict[str, Row] = {}
-        for batch in store.rows():
-            for row in batch.to_pylist():
-                before = known.get(row["run"])
-                if before is None or BEST_FIRST.index(row["status"]) < BEST_FIRST.index(before["status"]):
-                    known[row["run"]] = row
+        rows: list[Row] = [row for batch in store.rows() for row in batch.to_pylist()]
+        rows.sort(key=lambda row: BEST_FIRST.index(row["status"]), reverse=True)  # the best of a run last
+        known = {row["run"]: row for row in rows}
         with recording(store, Backlog(plan, {}, ()), timeout) as recorder, Processes(_Worker) as processes:
             yield SearchRuns(recorder, processes, jobs, known)
         StudyResults(folder).write_table()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import queue
 from collections.abc import Callable, Iterator
 from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 
 from ...support.apart import DEAD, DONE, Outcome
@@ -79,7 +79,9 @@ def make_in(processes: Processes, recorder: Recorder, jobs: int, tell: Callable[
     """Make the runs in these processes."""
     backlog, tasks = recorder.backlog, dict[Future[Outcome], Task]()
     over: queue.SimpleQueue[Future[Outcome]] = queue.SimpleQueue()
-    with ThreadPoolExecutor(jobs) as threads, _ending(processes):
+    with ThreadPoolExecutor(jobs) as threads, ExitStack() as stack:
+        # If anything goes wrong, processes end: threads that wait for their runs could wait for ever.
+        stack.push(lambda kind, *_: None if kind is None else processes.end())
         while True:
             # More than there are processes: each starts its next run before the last one is written.
             while len(tasks) < 2 * jobs and (task := backlog.next()) is not None:
@@ -94,16 +96,6 @@ def make_in(processes: Processes, recorder: Recorder, jobs: int, tell: Callable[
             except queue.Empty:
                 pass
             tell()
-
-
-@contextmanager
-def _ending(processes: Processes) -> Iterator[None]:
-    """End processes if anything goes wrong: threads that wait for their runs could wait for ever."""
-    try:
-        yield
-    except BaseException:
-        processes.end()
-        raise
 
 
 def _make(processes: Processes, task: Task, timeout: float | None) -> Outcome:
