@@ -60,7 +60,8 @@ def _add_unused(
     actor_types: Mapping[str, type[Actor]],
     problems: Problems,
 ) -> None:
-    if POISON in used:  # perhaps by what is wrong
+    taken = (each.text for part in composite.actors.values() for each in part.inherit)  # by parts of unknown types
+    if POISON in used or ALL in taken:  # perhaps by what is wrong
         return
     unused = [name for name in parameters if name not in used]
     strange = sorted(each for each in used if each and each not in composite.parameters)[:_MAX_STRANGE]
