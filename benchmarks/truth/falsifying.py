@@ -126,7 +126,8 @@ def searches(
     published = case["published"]
     vary = "".join(f" --vary {name}={values}" for name, values in case["vary"].items())
     sets = "".join(f" --set {shlex.quote(f'{name}={value}')}" for name, value in case.get("set", {}).items())
-    command = f" --break {case['monitor']}{vary}{sets}{f' --until {shlex.quote(until)}' if until else ''} --runs {MOST}"
+    ends = f" --until {shlex.quote(until)}" if until else ""
+    command = f" --break {case['monitor']}{vary}{sets}{ends} --runs {MOST} --seed {FIRST}"  # the first search
     yield (
         f"{case['monitor']} falsified",
         f"{published['found']} of {OF} searches",
