@@ -31,9 +31,7 @@ class Evaluator:
     def __init__(
         self, worker: Worker, jobs: int, begin: Callable[..., Worker], *arguments: object, patience: float = PATIENCE
     ) -> None:
-        self._patience = patience
-        self._worker = worker
-        self._jobs = jobs
+        self._worker, self._jobs, self._patience = worker, jobs, patience
         self._begin, self._arguments = begin, arguments
         self._open = ExitStack()
         self._processes: Processes | None = None
@@ -41,6 +39,7 @@ class Evaluator:
         self._spent = 0.0
         self._expected: Iterator[tuple[Hashable, object]] = iter(())
         self._begun: dict[Hashable, Future[Outcome]] = {}
+        self._made: set[Hashable] = set()  # of what is expected, here
 
     def __enter__(self) -> Evaluator:
         return self
@@ -51,6 +50,9 @@ class Evaluator:
     def expect(self, requests: Iterable[tuple[Hashable, object]]) -> None:
         """Say what will probably be asked for next, in this order, in place of what was said before."""
         self._expected = iter(requests)
+        self._made.clear()
+        for key in [key for key, future in self._begun.items() if future.cancel()]:  # what no process has begun
+            del self._begun[key]
         self._go_ahead()
 
     def make(self, key: Hashable, request: object) -> Any:
@@ -60,6 +62,7 @@ class Evaluator:
             self._worker.prepare(request)
             made = self._worker.make(request)
             self._spent += time.monotonic() - since
+            self._made.add(key)
             return made
         if self._threads is None:
             # Threads are left before processes are ended: none of them waits for one that nobody ends.
@@ -84,10 +87,12 @@ class Evaluator:
     def _go_ahead(self) -> None:
         if self._threads is None:
             return
-        while len([each for each in self._begun.values() if not each.done()]) < self._jobs:
+        # More than there are processes: each goes on at once, before anybody asks for the next.
+        while len([each for each in self._begun.values() if not each.done()]) < 2 * self._jobs:
             if (following := next(self._expected, None)) is None:
                 return
-            self._begin_with(*following)
+            if following[0] not in self._made:
+                self._begin_with(*following)
 
 
 @dataclass(frozen=True)

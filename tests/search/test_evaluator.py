@@ -55,6 +55,41 @@ def test_several_work_ahead_and_answer_in_order() -> None:
             evaluator.make(13, 13)
 
 
+class Noted(Squares):
+    """Notes each request in a file of its own."""
+
+    def __init__(self, folder: str) -> None:
+        super().__init__(0.1)
+        self._folder = folder
+
+    def make(self, request: int) -> tuple[int, int]:
+        """The square and the process."""
+        Path(self._folder, f"{request}-{os.getpid()}-{time.monotonic_ns()}").touch()
+        return super().make(request)
+
+
+def test_nothing_that_is_expected_is_made_twice(tmp_path: Path) -> None:
+    """Neither what was made here before there were processes, nor what is asked for once it is there."""
+    with Evaluator(Noted(str(tmp_path)), 2, Noted, str(tmp_path), patience=0.12) as evaluator:
+        evaluator.expect((each, each) for each in range(12))
+        assert [evaluator.make(each, each)[0] for each in range(12)] == [each * each for each in range(12)]
+    requests, processes, _ = zip(*(path.name.split("-") for path in tmp_path.iterdir()), strict=True)
+    assert sorted(map(int, requests)) == [*range(12)]
+    assert len(set(processes)) == 3  # this one, and two more
+
+
+def test_what_is_no_longer_expected_is_not_begun(tmp_path: Path) -> None:
+    with Evaluator(Noted(str(tmp_path)), 2, Noted, str(tmp_path), patience=0.0) as evaluator:
+        evaluator.expect((each, each) for each in range(12))
+        evaluator.make(0, 0)
+        evaluator.make(1, 1)  # while two processes make the next two, and the two after these wait
+        evaluator.expect((each, each) for each in range(20, 30))
+        evaluator.make(20, 20)
+    made = {int(path.name.partition("-")[0]) for path in tmp_path.iterdir()}
+    assert made >= {0, 1, 20}
+    assert not made & {*range(4, 20)}
+
+
 def test_a_process_that_dies_is_reported() -> None:
     with (
         Evaluator(Squares(), 2, Squares, patience=0.0) as evaluator,
