@@ -28,7 +28,7 @@ class Row:
     reason: str = ""
 
 
-AT_BEST = 0.155  # s of CPU that the loop of ``pace`` takes on the machine of RESULTS.md while its host is idle
+AT_BEST = 0.11  # s of CPU that the loop of ``pace`` takes on the machine of RESULTS.md while its host is idle
 
 
 def pace() -> float:
