@@ -111,8 +111,10 @@ class Instant(Moment):
         if other.activations is not None and other.wakes is not None:
             for place in range(len(other.activations)):
                 self.add(other.activations[place], other.wakes[place])
-        if other.pending is not None:
-            self.pending = [*(self.pending or ()), *other.pending]
+        if self.pending is None:
+            self.pending = other.pending
+        elif other.pending is not None:
+            self.pending.extend(other.pending)
 
 
 def new_instant(time: int, microstep: int, past: Instant | None = None) -> Instant:
