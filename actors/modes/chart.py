@@ -65,6 +65,8 @@ class Chart:
             raise ParameterError.several(faults)
         self.immediate = self._those(lambda rule: rule.immediate)
         self.racing = self._those(lambda rule: rule.rate is not None)
+        self.delayed = self._those(lambda rule: rule.delay is not None)
+        self.alone = self._those(lambda rule: not (rule.otherwise or rule.on or rule.error or rule.rate is not None))
         unhurried = self._those(lambda rule: not rule.preemptive and rule.rate is None)
         self.phases = self._those(lambda rule: rule.preemptive), unhurried
         self._check_reach()

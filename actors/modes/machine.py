@@ -183,6 +183,7 @@ class StateMachine(ModalActor):
         read = [each for rule in rules for each in (rule.guard, rule.delay, rule.probability, rule.rate) if each]
         read += [formula for each in self.transitions for _, formula in each.do]
         read += [formula for _, formula in self._at_borders()]
+        self._asks_time = any(name in TIMES for formula in read for name in formula.names)
         self._asked_of = tuple(
             (name, name.removesuffix(_PRESENT))
             for name in dict.fromkeys(name for formula in read for name in formula.names)
@@ -198,7 +199,7 @@ class StateMachine(ModalActor):
             self.refinements.begin(self._current)
         self._known: dict[str, Any] = dict(self.variables)
         self._known |= {name: value for name, value in self.held.items() if value is not None}
-        self._queues: dict[str, deque[Any]] = {name: deque() for name in self._inputs}
+        self._queues = [(name, self.inputs[name], deque[Any]()) for name in self._inputs]
         self._tokens: dict[str, Any] = {}  # of the present reaction
         self._scope: dict[str, Any] = {}  # what names mean in it
         self._entered = self.context.time
@@ -238,16 +239,14 @@ class StateMachine(ModalActor):
     def _look(self) -> None:
         """Gather what names mean: a token, a variable or held input, a comparison, or a time."""
         tokens = self._tokens
-        self._scope = {
-            "mode_time": to_seconds(self.context.time - self._entered),
-            "time": self.now,
-            **{name: port in tokens for name, port in self._asked_of},
-            **self._borders.truths,
-            **self._known,
-            **tokens,
-        }
+        self._scope = scope = {**self._borders.truths, **self._known, **tokens}
+        if self._asks_time:
+            time = self.context.time
+            scope["time"], scope["mode_time"] = to_seconds(time), to_seconds(time - self._entered)
+        for name, port in self._asked_of:
+            scope[name] = port in tokens
         if self._catches:
-            self._scope.setdefault("error", self.error or "")
+            scope["error"] = self.error or ""
 
     def fire(self) -> None:
         self._prepare()
@@ -278,8 +277,10 @@ class StateMachine(ModalActor):
 
     def rests(self) -> None:
         """Called when a reaction is over: ask for another one if tokens are left."""
-        if any(self._queues.values()):
-            self.wake_in(0)
+        for _, _, queue in self._queues:
+            if queue:
+                self.wake_in(0)
+                return
 
     @property
     def next_time(self) -> int | None:
@@ -290,9 +291,9 @@ class StateMachine(ModalActor):
     def take_tokens(self) -> None:
         """Take the first waiting token of each input, unless that was done before the refinement fired."""
         tokens = self._tokens
-        for name, queue in self._queues.items():
+        for name, port, queue in self._queues:
             if name not in tokens:
-                if (port := self.inputs[name]).present:
+                if port.present:
                     queue.extend(port.tokens)
                 if queue:
                     tokens[name] = queue.popleft()
@@ -320,14 +321,15 @@ class StateMachine(ModalActor):
             self.refinements.change(rule.target, history=rule.history)
 
     def enters(self, mode: str) -> None:
-        declared = self.modes[mode]
-        if declared.entry:
-            if self._catches:  # a transition has handled it
-                self._scope["error"] = ""
-            self._act(declared.entry)
-        self._entered = self.context.time
+        if self._catches:  # a transition has handled it
+            self._scope["error"] = ""
+        self._act(self.modes[mode].entry)
+        self._entered, had = self.context.time, self._borders.truths
         self._enter_borders(mode)
-        self._look()
+        if had or self._borders.truths:
+            self._look()
+        elif self._asks_time:
+            self._scope["mode_time"] = 0.0
 
     def _enter_borders(self, mode: str) -> None:
         self._borders.enter(mode, self.modes[mode].flow, self._comparisons[mode], self._entered)
@@ -371,12 +373,18 @@ class StateMachine(ModalActor):
             return True
         condition = self._conditions[self._current][rule].formula
         try:
+            found = condition.of(self._scope)
+        except UNDECIDED:
+            found = None
+        if found is True or found is False:
+            return found
+        try:
             return is_true(condition, self._scope)
         except EpicycleError:
             return is_true(rule.guard, self._scope)  # which reports the error in the model's terms
 
     def goes_on(self) -> bool:
-        if self._tokens:
+        if self._tokens and self._chart.alone[self._current]:
             self._look_ahead()
         return super().goes_on()
 

@@ -123,7 +123,7 @@ class ModalActor(Actor):
 
     def goes_on(self) -> bool:
         """Whether it must react again at the next microstep without a token."""
-        return any(self.holds_alone(each) for each in self._chart.leaving[self._current])
+        return any(self._is_open(rule) and self.holds(rule) for rule in self._chart.alone[self._current])
 
     def _call(self, mark: str, mode: str) -> None:
         for name, method in _methods(type(self)).items():
@@ -187,7 +187,7 @@ class ModalActor(Actor):
 
     def follow(self, rule: Rule | None) -> None:
         """Take a transition, if there is one, and immediate ones after it."""
-        taken = list[Rule]()
+        taken: list[Rule] = []
         while rule is not None:
             taken.append(rule)
             if len(taken) > MOST_IMMEDIATE:
@@ -235,11 +235,6 @@ class ModalActor(Actor):
                 return rule
         return max(self._rates, key=self._rates.__getitem__)  # where rounding has left something over
 
-    def holds_alone(self, rule: Rule) -> bool:
-        """Whether a transition would be enabled at the next microstep, if no token came."""
-        waits = rule.otherwise or rule.on or rule.error or rule.rate is not None
-        return not waits and self._is_open(rule) and self.holds(rule)
-
     def _is_open(self, rule: Rule) -> bool:
         """Whether the delay of a transition is over."""
         if rule.delay is None or rule not in self._timers:
@@ -250,8 +245,12 @@ class ModalActor(Actor):
     def _is_enabled(self, rule: Rule) -> bool:
         if rule.error != (self.error is not None) or (rule.delay is not None and not self._is_open(rule)):
             return False
-        if rule.on and not any(map(self.is_present, rule.on)):
-            return False
+        for name in rule.on:
+            if self.is_present(name):
+                break
+        else:
+            if rule.on:
+                return False
         return (rule.guard is None or self.holds(rule)) and (rule.probability is None or self._is_drawn(rule))
 
     def _is_drawn(self, rule: Rule) -> bool:
@@ -272,10 +271,14 @@ class ModalActor(Actor):
         return self._drawn[rule]
 
     def _choose(self, rules: Sequence[Rule]) -> Rule | None:
-        if not rules:
-            return None
-        enabled = [rule for rule in rules if not rule.otherwise and self._is_enabled(rule)]
-        enabled = enabled or [rule for rule in rules if rule.otherwise and self._is_enabled(rule)]
+        enabled: list[Rule] = []
+        for rule in rules:
+            if not rule.otherwise and self._is_enabled(rule):
+                enabled.append(rule)
+        if not enabled:
+            for rule in rules:
+                if rule.otherwise and self._is_enabled(rule):
+                    enabled.append(rule)
         if len(enabled) < 2:
             return enabled[0] if enabled else None
         first = min(rule.priority for rule in enabled)
@@ -308,8 +311,8 @@ class ModalActor(Actor):
         self.enters(mode)
 
     def _begin_delays(self) -> None:
-        leaving = self._chart.leaving[self._current]
-        self._timers = {rule: self.wake_in(self.delay_of(rule)) for rule in leaving if rule.delay is not None}
+        if delayed := self._chart.delayed[self._current]:
+            self._timers = {rule: self.wake_in(self.delay_of(rule)) for rule in delayed}
 
 
 # -- transitions as methods ---------------------------------------------------------------------------------------
