@@ -4,8 +4,8 @@
   ``within`` so much of what is published there; the robustness of the monitor is that of rtamt.  Where no inputs are
   published, they are ours; ``least`` is the least robustness that is published, and ours is ``within`` so much of it.
 - ``search: NAME`` with ``monitor`` and ``vary``: searches with several seeds, each of at most as many runs as were
-  published, so many ``searches``; ``published`` has in how many of 50 something was ``found``, and the ``mean``
-  number of runs of these.
+  published; ``published`` has in how many of 50 something was ``found``, and the ``mean`` number of runs of these.
+  ``psy_taliro`` has the same, of so many ``searches``, as ``psy_taliro.py`` has counted it.
 """
 
 from __future__ import annotations
@@ -30,7 +30,7 @@ OUTCOMES = ("sent", "rtamt")  # of an example; all else in it are inputs
 EQUAL = 1e-9  # the most by which margins differ that are the same
 FIRST, APART = 50_000, 1_000  # the seed of the first search, of which none was looked at before; between seeds
 MOST = 300  # runs of a search
-OF = 50  # published searches of each property
+OF = 50  # searches of each property, published and ours
 
 
 @cache
@@ -111,35 +111,37 @@ def searches(
     file: Path, case: Mapping[str, Any], folder: Path, jobs: int | None
 ) -> Iterator[tuple[str, str, str, bool, str]]:
     """How often searches find something, and after how many runs: asked, published, found, whether it is met."""
-    until, searches = case.get("until"), case["searches"]
+    until = case.get("until")
 
-    def search(number: int) -> int | None:
-        """The number of the first run that breaks the requirement."""
+    def search(number: int) -> tuple[int | None, int]:
+        """The number of the first run that breaks the requirement, and how many runs failed."""
         found = epicycle.search(
             file, epicycle.Break(case["monitor"], runs=MOST), vary=case["vary"], set=case.get("set", {}), until=until,
             seed=FIRST + number * APART, out=folder / f"{case['monitor']}_{number}", jobs=1, progress=False,
         )  # fmt: skip
-        return None if found.broken is None else found.broken.number
+        return None if found.broken is None else found.broken.number, len(found.failed)
 
     with ThreadPoolExecutor(jobs or available_cores()) as threads:  # each search makes its runs in another process
-        made = [each for each in threads.map(search, range(searches)) if each is not None]
-    published = case["published"]
+        ended = list(threads.map(search, range(OF)))
+    made, failed = [number for number, _ in ended if number is not None], sum(failed for _, failed in ended)
+    published, theirs = case["published"], case.get("psy_taliro", {})
     vary = "".join(f" --vary {name}={values}" for name, values in case["vary"].items())
     sets = "".join(f" --set {shlex.quote(f'{name}={value}')}" for name, value in case.get("set", {}).items())
     ends = f" --until {shlex.quote(until)}" if until else ""
     command = f" --break {case['monitor']}{vary}{sets}{ends} --runs {MOST} --seed {FIRST}"  # the first search
     yield (
         f"{case['monitor']} falsified",
-        f"{published['found']} of {OF} searches",
-        f"{len(made)} of {searches} searches",
-        len(made) / searches >= published["found"] / OF,
+        f"{published['found']} of {OF} searches"
+        + ("; psy-taliro {found} of {searches}".format(**theirs) if theirs else ""),
+        f"{len(made)} of {OF} searches{f'; {failed} runs failed' if failed else ''}",
+        len(made) >= published["found"],
         command,
     )
-    mean = sum(made) / len(made) if made else None
+    ours = sum(made) / len(made) if made else None
     yield (
         f"mean number of runs until {case['monitor']} is broken",
-        f"{published['mean']:.3g}",
-        "none" if mean is None else f"{mean:.3g}",
-        mean is not None and mean <= published["mean"],
+        f"{published['mean']:.3g}{f'; psy-taliro {mean:.3g}' if (mean := theirs.get('mean')) else ''}",
+        "none" if ours is None else f"{ours:.3g}",
+        ours is not None and ours <= published["mean"],
         command,
     )

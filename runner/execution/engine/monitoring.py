@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from .director import Director
 
 _KEPT = 1_000  # samples, or up to twice as many, of which it is known what the ports had sent
+_AT_ONCE = 50  # samples that are judged together, where nobody asks before
 
 
 class _Margin:
@@ -153,11 +154,13 @@ class PartMonitoring:
     @property
     def is_broken(self) -> bool:
         """Whether it is certain that the run does not have the property."""
+        self._find(over=False)
         return self._verdict.holds is False
 
     @property
     def most(self) -> float:
         """What its robustness is at most, by all that is settled; infinity if nothing is certain yet."""
+        self._find(over=False)
         return self.monitor.in_unit(self._monitor.most)
 
     def add(self, port: str, tag: Moment, token: Any) -> None:
@@ -202,12 +205,14 @@ class PartMonitoring:
             self._past.append((now, dict(self._latest)))
             if len(self._past) > 2 * _KEPT:
                 del self._past[:_KEPT]
+            if len(self._past) % _AT_ONCE:
+                return
         self._find(over=False)
 
     def _find(self, over: bool) -> None:
-        was_broken = self.is_broken
+        was_broken = self._verdict.holds is False
         self._verdict = self._monitor.verdict(over)
-        if self.is_broken and not was_broken and self._verdict.moment is not None:
+        if self._verdict.holds is False and not was_broken and self._verdict.moment is not None:
             self._values = self._at(self._verdict.moment)
 
     def _at(self, moment: int) -> dict[str, Any]:
