@@ -10,6 +10,7 @@ import copy
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from functools import lru_cache
 from typing import Any, TypeVar
 
 from ..core import REQUIRED, EpicycleError, Parameter, ParameterError, counted_in_si
@@ -91,8 +92,7 @@ class Formula:
         """The formula with others in the place of their names; raises ``ExpressionError`` if that is too long."""
         if defined.keys().isdisjoint(self.names):
             return self
-        tree = _Replacing(defined).visit(copy.deepcopy(parse(self.source)))
-        return Formula(ast.unparse(tree))
+        return _replaced(self, tuple(defined.items()))
 
     def __reduce__(self) -> tuple[type[Formula], tuple[str]]:
         return Formula, (self.source,)
@@ -105,6 +105,11 @@ class Formula:
 
     def __hash__(self) -> int:
         return hash(self.source)
+
+
+@lru_cache(maxsize=256)  # a search loads a model again and again
+def _replaced(formula: Formula, defined: tuple[tuple[str, Formula], ...]) -> Formula:
+    return Formula(ast.unparse(_Replacing(dict(defined)).visit(copy.deepcopy(parse(formula.source)))))
 
 
 class _Replacing(ast.NodeTransformer):
