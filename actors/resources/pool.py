@@ -108,7 +108,7 @@ class _Pools(WaitingActor):
         return int(amount)
 
     def _return(self, token: Any, channel: int) -> None:
-        wanted = None if self.key is None else self.key(token)
+        wanted = None if self.key is None else self.key.call(token)
 
         def is_meant(request: Waiter) -> bool:
             if self.release.width == self.acquire.width and request.channel != channel:
@@ -116,7 +116,7 @@ class _Pools(WaitingActor):
             if self.key is None:
                 return True
             if request.mark is None:
-                request.mark = (self.key(request.token),)
+                request.mark = (self.key.call(request.token),)
             return bool(request.mark[0] == wanted)
 
         held = next(filter(is_meant, self._held), None)
