@@ -285,7 +285,7 @@ class ArqSender(Actor):
             self._wake = self.context.wake(self, time)
 
     def _find_late(self) -> None:
-        late = [number for number, wake in self._late.items() if wake.due]
+        late = [number for number, wake in self._late.items() if wake.due] if self._late else []
         for number in late:
             if self.repeat == "one" or number == self._oldest:
                 self._out[number].timeouts += 1
@@ -300,6 +300,8 @@ class ArqSender(Actor):
 
     def _abandon(self) -> bool:
         """Give up the tokens that have reached a limit; returns whether there are any."""
+        if self.tries is None and self.lifetime is None:
+            return False
         over = [number for number, each in self._out.items() if each.is_dead or each.timeouts == self.tries]
         for number in over:
             self.abandoned.send(self._taken_out(number))
@@ -311,9 +313,10 @@ class ArqSender(Actor):
 
     def _acknowledge(self) -> None:
         for number in self._acks:
-            is_meant = number.__ge__ if self.repeat == "all" else number.__eq__
-            for each in [each for each in self._out if is_meant(each)]:
-                self.acknowledged.send(self._taken_out(each))
+            meant = [each for each in self._out if each <= number] if self.repeat == "all" else [number]
+            for each in meant:
+                if each in self._out:
+                    self.acknowledged.send(self._taken_out(each))
         self._acks = []
 
     def _taken_out(self, number: int) -> Any:

@@ -112,8 +112,8 @@ class TokenFormulaParameter(ExpressionParameter[TokenFormula]):
 
 def field_of(token: Any, name: str) -> Any:
     """A field of a token, unchanged; raises ``EpicycleError`` if there is none with this name."""
-    known = token if isinstance(token, Mapping) else operand(token)
-    if isinstance(known, Mapping) and name in known:
+    known = token if isinstance(token, (dict, Mapping)) else operand(token)  # dict, which is found sooner
+    if isinstance(known, (dict, Mapping)) and name in known:
         return known[name]
     names = list(known) if isinstance(known, Mapping) else []
     near = did_you_mean(name, names) or ";"
