@@ -53,11 +53,11 @@ class SetFields(Actor):
         now = self.now
         for token in self.input.tokens:
             seen = operand(token)
-            fields = dict(seen) if isinstance(seen, Mapping) else {}
+            fields = seen.copy() if type(seen) is dict else {}
             for name, draw, stream in self._draws:
                 fields[name] = draw(stream)
             for name, formula in self.set.items():
-                fields[name] = formula(fields, seen, now)
+                fields[name] = formula.call(fields, seen, now)
             for name in self.remove:
                 fields.pop(name, None)
             self.output.send(fields)
@@ -176,7 +176,7 @@ class Batch(Actor):
         self._count.tell(sum(len(batch.tokens) for batch in self._batches.values()))
 
     def _collect(self, token: Any) -> None:
-        key = _hashable(None if self.key is None else self.key(token))
+        key = _hashable(None if self.key is None else self.key.call(token))
         weight = 0.0
         if self.size is not None:
             weight = self.weight.number("a weight", token, self.now)
@@ -290,7 +290,7 @@ class Match(Actor):
         count = self._count.number
         for channel, tokens in enumerate(self.input.by_channel()):
             for token in tokens:
-                key = _hashable(None if self.key is None else self.key(token))
+                key = _hashable(None if self.key is None else self.key.call(token))
                 if key not in self._parts:
                     self._parts[key] = [deque() for _ in range(self.input.width)]
                 parts = self._parts[key]

@@ -143,7 +143,7 @@ class Router(Actor):
 
 def channel_of(token: Any, formula: TokenFormula, output: OutputPort[Any], *given: float) -> int:
     """The channel of an output that an expression gives for a token; raises ``EpicycleError`` if there is none."""
-    number = formula(token, *given)
+    number = formula.call(token, *given)
     if isinstance(number, bool) or not isinstance(number, int) or not 0 <= number < max(output.width, 1):
         raise EpicycleError(
             f"{formula} gives {number!r} for {brief(token)}, but {output.path} has {counted(output.width, 'channel')}, "

@@ -6,6 +6,7 @@ import math
 from bisect import insort
 from collections import deque
 from dataclasses import dataclass
+from operator import itemgetter
 from typing import Any
 
 from .core import (
@@ -28,12 +29,11 @@ from .resources import Waiter, Waiters
 
 
 class _Transmitter:
-    """The sending end of a wire: frames that wait, in order, and the one that is being sent."""
+    """The sending end of a wire: frames that wait, in order, and whether one is being sent."""
 
     def __init__(self) -> None:
         self.waiting = Waiters()
-        self.sent: Any = None
-        self.wake: Wake | None = None  # when it has been sent; None if nothing is being sent
+        self.is_busy = False
         self.rest = 0.0  # rounding to whole nanoseconds, in s, added up while it was busy
 
 
@@ -57,52 +57,54 @@ class _Transmitting(Actor):
 
     def initialize(self) -> None:
         self._transmitters = [_Transmitter() for _ in range(max(self.outputs["output"].width, 1))]
+        self._sent: Pending[tuple[int, Any]] = Pending(self)  # frames, with their channels, until they have been sent
         self._came = self._waits = 0  # frames
         self._count = Tally(self.outputs["waiting"])
 
     def _finish(self) -> list[tuple[int, Any]]:
         """The frames that have been sent, each with its channel."""
-        found = []
-        for channel, transmitter in enumerate(self._transmitters):
-            if transmitter.wake is not None and transmitter.wake.due:
-                found.append((channel, transmitter.sent))
-                transmitter.sent = transmitter.wake = None
+        found = self._sent.due()
+        if len(found) > 1:
+            found.sort(key=itemgetter(0))
+        for channel, _ in found:
+            self._transmitters[channel].is_busy = False
         return found
 
     def _enqueue(self, token: Any, channel: int) -> bool:
         """Let a frame wait for its channel; returns whether there is room for it."""
         transmitter = self._transmitters[channel]
-        size = self.size.number("a size", token, self.now)
+        now = self.now
+        size = self.size.number("a size", token, now)
         if size < 0:
             raise EpicycleError(f"{self.size} gives {size:g} for {brief(token)}, but a size must be >= 0")
-        order = self.order.number("an order", token, self.now)
+        order = self.order.number("an order", token, now)
         frame = Waiter(token, channel, order, float(self._came), size, self._came)
         self._came += 1
         self._waits += 1
         transmitter.waiting.add(frame)
         if self.buffer is not None:
             sizes = [each.size for each in transmitter.waiting]
-            if math.fsum(sizes if transmitter.wake is not None else sizes[1:]) > self.buffer:
+            if math.fsum(sizes if transmitter.is_busy else sizes[1:]) > self.buffer:
                 transmitter.waiting.remove(frame)
                 self._waits -= 1
                 return False
         return True
 
-    def _begin(self) -> None:
-        """Let free transmitters continue."""
-        for transmitter in self._transmitters:
-            if transmitter.wake is not None:
-                continue
-            if not len(transmitter.waiting):
-                transmitter.rest = 0.0
-                continue
-            frame = transmitter.waiting.first
-            transmitter.waiting.remove(frame)
-            self._waits -= 1
-            assert self.rate is not None
-            time = frame.size / self.rate + transmitter.rest
-            transmitter.rest = below_nanoseconds(time)
-            transmitter.sent, transmitter.wake = frame.token, self.wake_in(time)
+    def _begin(self, channel: int) -> None:
+        """Let a transmitter continue, unless it is busy."""
+        transmitter = self._transmitters[channel]
+        if transmitter.is_busy:
+            return
+        if not transmitter.waiting:
+            transmitter.rest = 0.0
+            return
+        frame = transmitter.waiting.pop(0)
+        self._waits -= 1
+        assert self.rate is not None
+        time = frame.size / self.rate + transmitter.rest
+        transmitter.rest = below_nanoseconds(time)
+        transmitter.is_busy = True
+        self._sent.put((channel, frame.token), time)
 
 
 class Link(_Transmitting):
@@ -138,7 +140,7 @@ class Link(_Transmitting):
                 self._travel(token)
             elif not self._enqueue(token, 0):
                 self.rejected.send(token)
-        self._begin()
+        self._begin(0)
         self._count.tell(self._waits)
 
     def _travel(self, token: Any) -> None:
@@ -171,15 +173,20 @@ class NetworkSwitch(_Transmitting):
 
     def fire(self) -> None:
         width = self.output.width
+        free = []  # channels that may continue
         for channel, token in self._finish():
             self.output.send(token, channel if width > 1 else None)
+            free.append(channel)
         for token in self._looked_at.due():
             channel = channel_of(token, self.port, self.output, self.now)
             if self.rate is None:
                 self.output.send(token, channel if width > 1 else None)
-            elif not self._enqueue(token, channel):
+            elif self._enqueue(token, channel):
+                free.append(channel)
+            else:
                 self.rejected.send(token)
-        self._begin()
+        for channel in free:
+            self._begin(channel)
         for token in self.input.tokens:
             self._looked_at.put(token, self.latency)
         self._count.tell(self._waits)
@@ -278,7 +285,7 @@ class ArqSender(Actor):
             self._wake = self.context.wake(self, time)
 
     def _find_late(self) -> None:
-        late = [number for number, wake in self._late.items() if wake.due]
+        late = [number for number, wake in self._late.items() if wake.due] if self._late else []
         for number in late:
             if self.repeat == "one" or number == self._oldest:
                 self._out[number].timeouts += 1
@@ -293,6 +300,8 @@ class ArqSender(Actor):
 
     def _abandon(self) -> bool:
         """Give up the tokens that have reached a limit; returns whether there are any."""
+        if self.tries is None and self.lifetime is None:
+            return False
         over = [number for number, each in self._out.items() if each.is_dead or each.timeouts == self.tries]
         for number in over:
             self.abandoned.send(self._taken_out(number))
@@ -304,9 +313,10 @@ class ArqSender(Actor):
 
     def _acknowledge(self) -> None:
         for number in self._acks:
-            is_meant = number.__ge__ if self.repeat == "all" else number.__eq__
-            for each in [each for each in self._out if is_meant(each)]:
-                self.acknowledged.send(self._taken_out(each))
+            meant = [each for each in self._out if each <= number] if self.repeat == "all" else [number]
+            for each in meant:
+                if each in self._out:
+                    self.acknowledged.send(self._taken_out(each))
         self._acks = []
 
     def _taken_out(self, number: int) -> Any:

@@ -36,7 +36,7 @@ class Filter(ByChannel):
     def fire(self) -> None:
         for channel, tokens in enumerate(self.input.by_channel()):
             for token in tokens:
-                passes = self.condition(token, self.now)
+                passes = self.condition.call(token, self.now)
                 if not isinstance(passes, bool):
                     raise EpicycleError(f"{self.condition} gives {passes!r} for {brief(token)}, expected true or false")
                 if passes:

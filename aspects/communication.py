@@ -66,8 +66,9 @@ class Latency(CommunicationAspect):
     def pass_token(self, token: Any, point: JoinPoint) -> None:
         delay = max(0.0, self.delay + self.jitter * law(self.distribution, LAWS).draw(point.random))
         if not self.reordering:
-            delay = max(delay, point.memory.get("last", 0.0) - point.now)
-            point.memory["last"] = point.now + delay
+            now = point.now
+            delay = max(delay, point.memory.get("last", 0.0) - now)
+            point.memory["last"] = now + delay
         point.delay(token, delay)
 
 

@@ -14,6 +14,7 @@ from typing import Any, Generic, TypeVar
 from .actor import Actor
 from .order import TimedQueue
 from .ports import InputPort, OutputPort
+from .tag import to_nanoseconds
 
 T = TypeVar("T")
 ABSENT: Any = type("_Absent", (), {"__repr__": lambda self: "absent"})()
@@ -41,9 +42,10 @@ class Queues:
 
     def come(self) -> None:
         """Let the tokens of the present tag wait."""
-        arrived = (tokens for port in self._ports for tokens in port.by_channel())
-        for queue, tokens in zip(self.channels, arrived, strict=True):
-            queue.extend(tokens)
+        queues = iter(self.channels)
+        for port in self._ports:
+            for tokens in port.by_channel():
+                next(queues).extend(tokens)
 
     def rounds(self) -> Iterator[list[Any]]:
         """Let them wait, and take one from each channel as long as all have one."""
@@ -115,7 +117,9 @@ class Pending(Generic[T]):
 
     def put(self, value: T, delay: float) -> None:
         """Keep a value for ``delay`` seconds; 0 is the next microstep."""
-        self._line.push(self._actor.wake_in(delay), value)
+        actor = self._actor
+        context = actor.context
+        self._line.push(context.wake(actor, context.time + to_nanoseconds(delay)), value)
 
     def due(self) -> list[T]:
         """Take the values whose time is the present tag, in the order in which they were put."""

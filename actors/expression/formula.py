@@ -38,7 +38,7 @@ class Formula:
     expression.
     """
 
-    __slots__ = ("_function", "_of", "is_condition", "names", "source")
+    __slots__ = ("_function", "is_condition", "names", "of", "source")
 
     def __init__(self, source: str) -> None:
         tree = parse(source)
@@ -53,7 +53,8 @@ class Formula:
         self.is_condition = _is_condition(tree)
         self.names = tuple(sorted(free, key=places.__getitem__))
         self._function: Callable[..., Any] | None = None
-        self._of: Callable[[dict[str, Any]], Any] | None = None
+        # The value for tokens by name, of which more than the expression's may be there; raises as ``function``.
+        self.of: Callable[[dict[str, Any]], Any] = self._first_of
 
     @property
     def function(self) -> Callable[..., Any]:
@@ -65,11 +66,9 @@ class Formula:
             self._function = translated(self.source, self.names) or undecided_by
         return self._function
 
-    def of(self, tokens: dict[str, Any]) -> Any:
-        """The value for tokens by name, of which more than the expression's may be there; raises as ``function``."""
-        if self._of is None:
-            self._of = translated(self.source, ("",), self.names) or undecided_by
-        return self._of(tokens)
+    def _first_of(self, tokens: dict[str, Any]) -> Any:
+        self.of = translated(self.source, ("",), self.names) or undecided_by
+        return self.of(tokens)
 
     def __call__(self, values: Mapping[str, object]) -> Any:
         """The value of the expression, for tokens; raises an ``EpicycleError`` with the values of its names."""

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
+from types import FunctionType
 from typing import Any
 
 from ..core import REQUIRED, EpicycleError, brief, did_you_mean
 from .formula import ExpressionParameter, Formula, as_text
 from .tokens import operand
-from .translation import UNDECIDED, translated, undecided_by
+from .translation import translated_whole
 
 
 class TokenFormula:
@@ -19,36 +20,50 @@ class TokenFormula:
     ``ExpressionError`` if the text is not an expression.
     """
 
-    __slots__ = ("_formula", "_function", "known", "source")
+    __slots__ = ("_formula", "call", "known", "number", "source")
 
     def __init__(self, source: str, known: Sequence[str] = ()) -> None:
         self._formula = Formula(source)
         self.source = source
         self.known = tuple(known)
-        self._function: Callable[..., Any] | None = None
+        # The formula as a function, and as one of which the value must be a finite number; ``what`` names it.  They
+        # are translated by their first call, for most copies of a model are never run.
+        self.call: Callable[..., Any] = self._first_call
+        self.number: Callable[..., float] = self._first_number
 
     def __call__(self, token: Any, *known: Any) -> Any:
         """The value; raises ``EpicycleError``, also for a name that is neither known nor a field."""
-        try:
-            return (self._function or self._translated())(token, *known)
-        except UNDECIDED:
-            return self._decided(token, dict(zip(self.known, known, strict=True)))
+        return self.call(token, *known)
 
-    def _translated(self) -> Callable[..., Any]:
+    def _first_call(self, token: Any, *known: Any) -> Any:
+        self._translate()
+        return self.call(token, *known)
+
+    def _first_number(self, what: str, token: Any, *known: Any) -> float:
+        self._translate()
+        return self.number(what, token, *known)
+
+    def _translate(self) -> None:
         arguments = ("" if "token" in self.known else "token", *self.known)  # a nameless one is in the way of none
         fields = tuple(name for name in self._formula.names if name not in arguments)
-        self._function = translated(self.source, arguments, fields) or undecided_by
-        return self._function
+        self.call, self.number = self._decided, self._decided_number
+        if (found := translated_whole(self.source, arguments, fields)) is not None:
+            value, number = found
+            self.call = FunctionType(value.__code__, value.__globals__, self.source, (self._decided,))
+            rest = self._decided, self._refused
+            self.number = FunctionType(number.__code__, number.__globals__, self.source, rest)
 
-    def number(self, what: str, token: Any, *known: Any) -> float:
-        """The value, which must be a finite number; ``what`` names it."""
-        value = self(token, *known)
+    def _decided_number(self, what: str, token: Any, *known: Any) -> float:
+        return self._refused(what, self._decided(token, *known))
+
+    def _refused(self, what: str, value: Any) -> float:
         if isinstance(value, (int, float)) and math.isfinite(value):
             return value
         raise EpicycleError(f"{self} gives {value!r}, but {what} must be a finite number")
 
-    def _decided(self, token: Any, known: Mapping[str, Any]) -> Any:
+    def _decided(self, token: Any, *given: Any) -> Any:
         """The value by the evaluator."""
+        known = dict(zip(self.known, given, strict=True))
         seen = operand(token)
         fields: Mapping[str, Any] = seen if isinstance(seen, Mapping) else {}
         values = {}
@@ -97,8 +112,8 @@ class TokenFormulaParameter(ExpressionParameter[TokenFormula]):
 
 def field_of(token: Any, name: str) -> Any:
     """A field of a token, unchanged; raises ``EpicycleError`` if there is none with this name."""
-    known = token if isinstance(token, Mapping) else operand(token)
-    if isinstance(known, Mapping) and name in known:
+    known = token if isinstance(token, (dict, Mapping)) else operand(token)  # dict, which is found sooner
+    if isinstance(known, (dict, Mapping)) and name in known:
         return known[name]
     names = list(known) if isinstance(known, Mapping) else []
     near = did_you_mean(name, names) or ";"

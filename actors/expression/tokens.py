@@ -9,12 +9,15 @@ from typing import Any, Final
 import numpy as np
 
 _PLAIN: Final = frozenset({bool, int, float, str, type(None)})
+_TEXT: Final = frozenset({str})
 
 
 def operand(token: Any) -> Any:
     """A token as the expression language knows it: arrays become lists, dataclasses dicts of their fields."""
-    if type(token) in _PLAIN:
+    if (kind := type(token)) in _PLAIN:
         return token
+    if kind is dict and _TEXT.issuperset(map(type, token)) and _PLAIN.issuperset(map(type, token.values())):
+        return token.copy()
     if isinstance(token, (np.generic, np.ndarray)):  # one that is also a float divides by zero without an error
         return token.tolist()
     if isinstance(token, (bool, int, float, str)):

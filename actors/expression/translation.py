@@ -12,6 +12,7 @@ import ast
 import functools
 import math
 from collections.abc import Callable, Iterable
+from types import FunctionType
 from typing import Any, Final
 
 from ..core import Quantity, elementary
@@ -49,6 +50,10 @@ class _UntranslatableError(Exception):
     """What must be left to the evaluator."""
 
 
+# With what Python's compiler raises for what is nested too deeply.
+_NOT_TRANSLATED: Final = (_UntranslatableError, MemoryError, RecursionError, SyntaxError)
+
+
 @functools.lru_cache(maxsize=4096)
 def translated(source: str, arguments: tuple[str, ...], fields: tuple[str, ...] = ()) -> Callable[..., Any] | None:
     """A function of the values of names, in their order; None if the expression does not fit.
@@ -56,14 +61,53 @@ def translated(source: str, arguments: tuple[str, ...], fields: tuple[str, ...] 
     Those that are ``fields`` of the first argument, which is a token, are read there.  The function raises one of
     ``UNDECIDED`` for what the evaluator must decide.
     """
+    try:
+        known, text = _written(source, arguments, fields)
+        code = compile(f"lambda {', '.join(known)}: {text}", "<expression>", "eval")
+    except _NOT_TRANSLATED:
+        return None
+    return eval(code, KNOWN)  # type: ignore[no-any-return]
+
+
+@functools.lru_cache(maxsize=4096)
+def translated_whole(
+    source: str, arguments: tuple[str, ...], fields: tuple[str, ...]
+) -> tuple[FunctionType, FunctionType] | None:
+    """The function of ``translated`` that asks ``decide`` itself, and one that gives a finite number, or asks
+    ``refuse``.  These are their last parameters; the first one of the latter says what the number is.
+    """
+    try:
+        known, text = _written(source, arguments, fields)
+        code = compile(_WHOLE.format(known=", ".join(known), text=text), "<expression>", "exec")
+    except _NOT_TRANSLATED:
+        return None
+    made: dict[str, Any] = {}
+    exec(code, KNOWN, made)
+    return made["value"], made["number"]
+
+
+_WHOLE: Final = """
+def value({known}, decide):
+    try:
+        return {text}
+    except UNDECIDED:
+        return decide({known})
+def number(what, {known}, decide, refuse):
+    try:
+        found = {text}
+    except UNDECIDED:
+        found = decide({known})
+    return found if type(found) in NUMBERS and -1e999 < found < 1e999 else refuse(what, found)
+"""
+
+
+def _written(source: str, arguments: tuple[str, ...], fields: tuple[str, ...]) -> tuple[list[str], str]:
+    """The names of the arguments in a function, and the expression that is its value."""
     names = {name: f"v{place}" for place, name in enumerate((*fields, *arguments))}
     tree = parse(source)
-    try:
-        text = _Writer(source, names, _ANY).whole(tree)
-        if not fields:
-            text = _of_floats(source, tree, names) + text
-    except _UntranslatableError:
-        return None
+    text = _Writer(source, names, _ANY).whole(tree)
+    if not fields:
+        text = _of_floats(source, tree, names) + text
     known = [names[name] for name in arguments]
     if fields:
         token = known[0]
@@ -72,11 +116,7 @@ def translated(source: str, arguments: tuple[str, ...], fields: tuple[str, ...] 
             for each in fields
         ]
         text = f"{text} if ({''.join(found)}) else None"
-    try:
-        code = compile(f"lambda {', '.join(known)}: {text}", "<expression>", "eval")
-    except (MemoryError, RecursionError, SyntaxError):  # nested more deeply than Python's compiler allows
-        return None
-    return eval(code, KNOWN)  # type: ignore[no-any-return]
+    return known, text
 
 
 @functools.lru_cache(maxsize=256)
@@ -101,7 +141,7 @@ def all_translated(sources: tuple[str, ...], names: tuple[str, ...]) -> Callable
     code = f"lambda {', '.join(places.values())}: [{', '.join(parts)}]"
     try:
         return eval(compile(code, "<expressions>", "eval"), KNOWN)  # type: ignore[no-any-return]
-    except (MemoryError, RecursionError, SyntaxError):
+    except _NOT_TRANSLATED:
         return None
 
 
@@ -126,7 +166,8 @@ def _of_floats(source: str, tree: ast.expr, names: dict[str, str]) -> str:
 KNOWN: Final[dict[str, Any]] = {
     "__builtins__": {}, "type": type, "float": float, "dict": dict, "list": list, "str": str, "size": len,
     "NUMBERS": operations.NUMBERS, "LIGHT": operations.LIGHT, "power": BINARY[ast.Pow],
-    "undecided": operations.undecided, "handed": operations.handed, "weighed": operations.weighed,
+    "UNDECIDED": UNDECIDED, "undecided": operations.undecided,
+    "handed": operations.handed, "weighed": operations.weighed,
     "sin": elementary.sin, "cos": elementary.cos, "along": along, "across": across, "looked_up": looked_up,
     "plain": operations.plain, "part": operations.part, "cut": operations.cut, "turns": operations.turns,
     **{f"by_{kind.__name__}": function for kind, function in operations.OPERATORS.items()},
@@ -153,7 +194,7 @@ class _Writer:
         elif kind == _NUMBER:
             text = f"(r if -{_LARGEST} <= (r := {text}) <= {_LARGEST} else handed(r))"
         elif kind == _ANY:
-            text = f"handed({text})"
+            text = f"(r if type(r := {text}) in NUMBERS and -{_LARGEST} <= r <= {_LARGEST} else handed(r))"
         return f"({text} if (left := [{MAX_STEPS - _SPENT}]) else None)" if self.weighs else text
 
     # -- texts ----------------------------------------------------------------------------------------------------

@@ -49,13 +49,14 @@ class WaitingLine(WaitingActor):
     def fire(self) -> None:
         self._send()
         self._renege()
-        for channel, tokens in enumerate(self.trigger.by_channel()):
-            self._triggers.extend([channel] * len(tokens))
-        newcomers = [
-            self._waiter(token, channel, self._size(token, channel))
-            for channel, tokens in enumerate(self.input.by_channel())
-            for token in tokens
-        ]
+        if self.trigger.present:
+            for channel, tokens in enumerate(self.trigger.by_channel()):
+                self._triggers.extend([channel] * len(tokens))
+        newcomers = []
+        if self.input.present:
+            for channel, tokens in enumerate(self.input.by_channel()):
+                for token in tokens:
+                    newcomers.append(self._waiter(token, channel, self._size(token, channel)))
         self._join(newcomers, self._serve)
         if not self.persistent_trigger:
             self._credits = 0

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from operator import and_
 from typing import Any, ClassVar
 
 from ..core import (
@@ -67,14 +68,15 @@ class _Pools(WaitingActor):
         if not (has_lost or self.release.present or self.acquire.present or capacities != self._capacities_before):
             return  # it was only to send
         self._capacities_before = capacities
-        for channel, tokens in enumerate(self.release.by_channel()):
-            for token in tokens:
-                self._return(token, channel)
-        newcomers = [
-            self._request(token, channel)
-            for channel, tokens in enumerate(self.acquire.by_channel())
-            for token in tokens
-        ]
+        if self.release.present:
+            for channel, tokens in enumerate(self.release.by_channel()):
+                for token in tokens:
+                    self._return(token, channel)
+        newcomers = []
+        if self.acquire.present:
+            for channel, tokens in enumerate(self.acquire.by_channel()):
+                for token in tokens:
+                    newcomers.append(self._request(token, channel))
         self._join(newcomers, self._serve)
         self._tell_in_use()
         self._tell_count("waiting", len(self._waiting))
@@ -108,7 +110,7 @@ class _Pools(WaitingActor):
         return int(amount)
 
     def _return(self, token: Any, channel: int) -> None:
-        wanted = None if self.key is None else self.key(token)
+        wanted = None if self.key is None else self.key.call(token)
 
         def is_meant(request: Waiter) -> bool:
             if self.release.width == self.acquire.width and request.channel != channel:
@@ -116,7 +118,7 @@ class _Pools(WaitingActor):
             if self.key is None:
                 return True
             if request.mark is None:
-                request.mark = (self.key(request.token),)
+                request.mark = (self.key.call(request.token),)
             return bool(request.mark[0] == wanted)
 
         held = next(filter(is_meant, self._held), None)
@@ -142,7 +144,7 @@ class _Pools(WaitingActor):
         place = 0
         while place < len(self._waiting) and not (claimed and all(claimed)):
             request = self._waiting[place]
-            if not any(each and amount for each, amount in zip(claimed, request.amounts, strict=False)):
+            if not (claimed and any(map(and_, claimed, map(bool, request.amounts)))):
                 losers = self._losers_to(request, capacities)
                 if losers is not None:
                     self._take_back(losers)  # which wait behind it
@@ -191,12 +193,14 @@ class _Pools(WaitingActor):
 
     def _hold(self, request: Waiter) -> None:
         self._held.append(request)
-        self._in_use = [used + amount for used, amount in zip(self._in_use, request.amounts, strict=True)]
+        for kind, amount in enumerate(request.amounts):
+            self._in_use[kind] += amount
         self._tell_of("granted", request)
 
     def _give_back(self, request: Waiter) -> None:
         self._held.remove(request)
-        self._in_use = [used - amount for used, amount in zip(self._in_use, request.amounts, strict=True)]
+        for kind, amount in enumerate(request.amounts):
+            self._in_use[kind] -= amount
 
 
 class Pool(_Pools):

@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from bisect import bisect_left, insort
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
 from operator import attrgetter
 from typing import Any, ClassVar, Final
 
@@ -47,23 +46,24 @@ class PatienceParameter(Parameter[Distribution | TokenFormula | None]):
         return self._formula.convert(self._time.convert(value))
 
 
-@dataclass(eq=False)
 class Waiter:
-    """A token that waits, or that has got what it waited for."""
+    """A token that waits, or that has got what it waited for.
 
-    token: Any
-    channel: int
-    order: float
-    place: float  # among those of the same order
-    size: float
-    number: int  # unique
-    amounts: tuple[int, ...] = ()  # of requested units, by kind
-    patience: Wake | None = None
-    mark: tuple[Any] | None = None  # what it has in common with its release, once somebody has asked
-    key: tuple[float, float, int] = field(init=False)  # the lower one goes first
+    ``order``, then ``place`` among those of the same order, say who goes first; ``number`` is unique.
+    """
 
-    def __post_init__(self) -> None:
-        self.key = self.order, self.place, self.number
+    __slots__ = ("amounts", "channel", "key", "mark", "number", "order", "patience", "size", "token")
+
+    def __init__(self, token: Any, channel: int, order: float, place: float, size: float, number: int) -> None:
+        self.token = token
+        self.channel = channel
+        self.order = order
+        self.size = size
+        self.number = number
+        self.key = order, place, number  # the lower one goes first
+        self.amounts: tuple[int, ...] = ()  # of requested units, by kind
+        self.patience: Wake | None = None
+        self.mark: tuple[Any] | None = None  # what it has in common with its release, once somebody has asked
 
 
 class Waiters(list[Waiter]):
@@ -129,6 +129,8 @@ class WaitingActor(Actor):
         self._told: Pending[list[tuple[str, Any, int | None]]] = Pending(self)
         self._telling: list[tuple[str, Any, int | None]] | None = None  # by the present firing
         self._counts: dict[str, int] = {}  # the values sent last
+        width = self.inputs[self.entrance].width
+        self._answers = {name for name, output in self.outputs.items() if output.multi and output.width == width}
         self._came = 0
 
     def _tell(self, port: str, token: Any, channel: int | None = None) -> None:
@@ -139,9 +141,7 @@ class WaitingActor(Actor):
         self._telling.append((port, token, channel))
 
     def _tell_of(self, port: str, waiter: Waiter) -> None:
-        output = self.outputs[port]
-        is_answer = output.multi and output.width == self.inputs[self.entrance].width
-        self._tell(port, waiter.token, waiter.channel if is_answer else None)
+        self._tell(port, waiter.token, waiter.channel if port in self._answers else None)
 
     def _tell_count(self, port: str, count: int) -> None:
         if self._counts.get(port, 0) != count:
@@ -157,7 +157,7 @@ class WaitingActor(Actor):
 
     def _renege(self) -> bool:
         """Remove those whose patience has run out; returns whether there are any."""
-        if self.patience is None:
+        if self.patience is None or not self._waiting:
             return False
         over = [each for each in self._waiting if each.patience is not None and each.patience.due]
         for each in over:
@@ -178,7 +178,7 @@ class WaitingActor(Actor):
         for each in newcomers:
             self._waiting.add(each)
         serve()
-        if not newcomers:
+        if not newcomers or not self._waiting:
             return
         new = [each for each in sorted(newcomers, key=_KEY) if each in self._waiting]
         old = len(self._waiting) - len(new)

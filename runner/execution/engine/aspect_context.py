@@ -39,6 +39,7 @@ class EngineContext:
     signals: dict[str, Signal]
     enter: Deliver = lambda token: None  # into the composite that the aspect is
     handling: Handling | None = None
+    onward: Call | None = None  # the way of tokens that go forward later
 
     @property
     def tag(self) -> Tag:
@@ -53,7 +54,7 @@ class EngineContext:
     def during(self, handling: Handling) -> EngineContext:
         """The same for one token."""
         made = copy.copy(self)
-        made.handling, made.forward = handling, handling.forward
+        made.handling, made.forward, made.onward = handling, handling.forward, None
         if not handling.happens:
             made.enter = handling.forward
         return made
@@ -62,8 +63,13 @@ class EngineContext:
         """Call ``deliver(token)`` after ``delay`` ns; 0 is the next microstep."""
         if self.handling is not None and not self.handling.happens and deliver == self.forward:
             return
+        way = self.onward
+        if way is None or deliver is not self.forward:
+            way = Call(partial(self._deliver, deliver))
+            if deliver is self.forward:
+                self.onward = way
         try:
-            self.local.later(delay, Call(partial(self._deliver, deliver)), token)
+            self.local.later(delay, way, token)
         except CrowdError as error:
             raise error.of(f"aspect {self.aspect}") from None
 
@@ -85,11 +91,12 @@ class EngineContext:
 
     def note(self, place: Place, event: str, token: Any) -> None:
         """Write an act of the aspect at a place into the log."""
-        if self._happens:
-            if self.handling is not None:
-                self.handling.note(event)
-            writer = self.log.writer(event, place.owner, place.name, None, place.aspect)
-            writer.write(self.director.now(), token)
+        if self.handling is not None:
+            if not self.handling.happens:
+                return
+            self.handling.note(event)
+        writer = self.log.writer(event, place.owner, place.name, None, place.aspect)
+        writer.write(self.director.now(), token)
 
     def record(self, signal: str, token: Any) -> None:
         """Append a token to a signal of the results."""
