@@ -97,22 +97,15 @@ def _shifted_gamma(delays: Delays) -> Law | None:
 
 
 def _gamma_above(delays: Delays, shift: float) -> Law | None:
-    """The gamma law of what exceeds a shift; None if some delay does not."""
-    from scipy.optimize import brentq
-    from scipy.special import digamma
+    """The gamma law of what exceeds a shift; None if some delay does not, or they hardly differ."""
+    from scipy.stats import gamma
 
-    rest = delays - shift
-    if not rest.min() > 0.0:
-        return None
-    mean = float(np.mean(rest))
-    gap = math.log(mean) - float(np.mean(np.log(rest)))  # = log(shape) - digamma(shape), which falls
-    if not gap > 1e-12:
-        return None
-
-    def cost(shape: float) -> float:
-        return math.log(shape) - float(digamma(shape)) - gap
-
-    return shift, mean, float(brentq(cost, 0.1 / gap, 2.0 / gap, xtol=1e-12, rtol=1e-10))
+    with np.errstate(all="ignore"):
+        try:
+            shape, _, scale = map(float, gamma.fit(delays, floc=shift))
+        except ValueError:
+            return None
+    return shift, shape * scale, shape
 
 
 def _highest_shift(delays: Delays) -> float:
@@ -128,26 +121,23 @@ _LAWS: tuple[tuple[str, int, Callable[[Delays], Law | None]], ...] = (
 )
 
 
-def _likelihood(delays: Delays, law: Law) -> float:
-    from scipy.special import gammaln
+def _distribution(law: Law) -> Any:
+    from scipy.stats import gamma
 
     shift, mean, shape = law
-    rest = delays - shift
-    if rest.min() < 0.0 or mean <= 0.0:
-        return -math.inf
-    scale = mean / shape
-    power = (shape - 1.0) * np.log(rest) if shape != 1.0 else np.zeros(1)
-    whole = float(np.sum(power)) - float(np.sum(rest)) / scale
-    return whole - len(delays) * (float(gammaln(shape)) + shape * math.log(scale))
+    return gamma(shape, shift, mean / shape)
+
+
+def _likelihood(delays: Delays, law: Law) -> float:
+    return float(np.sum(_distribution(law).logpdf(delays)))
 
 
 def _tested(delays: Delays, fit: Callable[[Delays], Law | None]) -> Goodness | None:
-    from scipy.stats import gamma, kstest
+    from scipy.stats import kstest
 
     half, other = delays[0::2], delays[1::2]
     law = fit(half) if len(other) >= _ENOUGH and np.ptp(half) > 0.0 else None
     if law is None:
         return None
-    shift, mean, shape = law
-    found: Any = kstest(other, gamma(shape, shift, mean / shape).cdf)
+    found: Any = kstest(other, _distribution(law).cdf)
     return Goodness("Kolmogorov-Smirnov", float(found.statistic), None, float(found.pvalue))

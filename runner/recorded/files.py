@@ -17,6 +17,7 @@ from typing import IO, Any, BinaryIO, NamedTuple, Protocol
 
 from epicycle.actors import EpicycleError, did_you_mean, open_regular
 
+from ..support.extras import needed
 from ..support.files import replacing
 
 FOLDERS = "epicycle.recordings"  # entry points of what reads folders
@@ -218,12 +219,7 @@ class McapRecording(_InFile):
     """An MCAP file; messages with the encoding json are read, others are bytes."""
 
     def __init__(self, path: Path, file: BinaryIO) -> None:
-        try:
-            from mcap.reader import make_reader
-        except ImportError:
-            raise RecordingError(
-                "an MCAP file needs the package mcap, which is not installed: pip install 'epicycle[mcap]'"
-            ) from None
+        make_reader = needed("mcap.reader", "an MCAP file", "mcap").make_reader
         self.path = path
         self._file = file
         with self._checked():

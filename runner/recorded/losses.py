@@ -65,38 +65,26 @@ class LossModel:
 
 def loss_models(lost: NDArray[np.bool_]) -> list[LossModel]:
     """The models of increasing freedom: independent losses, Gilbert's bursts, Gilbert-Elliott's hidden states."""
+    from scipy.stats import chi2
+
     losses: Losses = lost.astype(np.uint8)
     count, number = int(np.count_nonzero(losses)), len(losses)
     share = count / number
-    found = [
-        _model(losses, "independent", "PacketLoss", {"probability": share}, Channel(1.0, 1.0, share, share), 1, None)
-    ]
+    channels = [("independent", "PacketLoss", {"probability": share}, Channel(1.0, 1.0, share, share))]
     if 0 < count < number:
-        bursts = gilbert(losses)
-        found.append(_model(losses, "Gilbert", "GilbertElliott", {"p": bursts.p, "r": bursts.r}, bursts, 2, found[-1]))
-        hidden = gilbert_elliott(losses)
-        found.append(_model(losses, "Gilbert-Elliott", "GilbertElliott", vars(hidden), hidden, 4, found[-1]))
+        bursts, hidden = gilbert(losses), gilbert_elliott(losses)
+        channels.append(("Gilbert", "GilbertElliott", {"p": bursts.p, "r": bursts.r}, bursts))
+        channels.append(("Gilbert-Elliott", "GilbertElliott", vars(hidden), hidden))
+    found: list[LossModel] = []
+    for name, aspect, parameters, channel in channels:
+        likelihood, free, gain = log_likelihood(losses, channel), len(parameters), None
+        if found:
+            statistic = max(0.0, 2.0 * (likelihood - found[-1].log_likelihood))
+            freedom = free - found[-1].free
+            gain = Goodness("likelihood ratio", statistic, freedom, float(chi2.sf(statistic, freedom)))
+        bic, runs = free * math.log(number) - 2.0 * likelihood, run_lengths(losses, channel, free)
+        found.append(LossModel(name, aspect, parameters, likelihood, free, bic, runs, gain))
     return found
-
-
-def _model(
-    losses: Losses,
-    name: str,
-    aspect: str,
-    parameters: dict[str, float],
-    channel: Channel,
-    free: int,
-    simpler: LossModel | None,
-) -> LossModel:
-    from scipy.stats import chi2
-
-    likelihood = log_likelihood(losses, channel)
-    gain = None
-    if simpler is not None:
-        statistic, freedom = max(0.0, 2.0 * (likelihood - simpler.log_likelihood)), free - simpler.free
-        gain = Goodness("likelihood ratio", statistic, freedom, float(chi2.sf(statistic, freedom)))
-    bic = free * math.log(len(losses)) - 2.0 * likelihood
-    return LossModel(name, aspect, parameters, likelihood, free, bic, run_lengths(losses, channel, free), gain)
 
 
 # -- estimates --------------------------------------------------------------------------------------------------------

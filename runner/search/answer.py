@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any, ClassVar
 
@@ -11,8 +11,10 @@ from epicycle.actors import EpicycleError
 
 from ..study.judge.study_results import StudyResults, open_study
 from ..study.provenance import version_of
-from ..support.shown import finite
+from ..support.shown import finite, listed
 from ..support.tables import Tabled
+
+__all__ = ["Answer", "StudyAnswer", "listed"]
 
 
 class Answer(Tabled):
@@ -66,10 +68,3 @@ class StudyAnswer(Answer):
     def save(self, folder: str | Path | None = None) -> list[Path]:
         """Write the facts as JSON; the table of the runs is there."""
         return [self.results.path, *super().save(folder)]
-
-
-def listed(texts: Sequence[str], last: str = "and", most: int = 1_000_000) -> str:
-    """Texts as a list in a sentence, of which as many are shown as ``most``."""
-    if len(texts) > most:
-        texts = [*texts[:most], f"{len(texts) - most:,} more"]
-    return f" {last} ".join([", ".join(texts[:-1]), texts[-1]] if len(texts) > 1 else texts)

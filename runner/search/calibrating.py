@@ -7,6 +7,7 @@ from bisect import bisect_right
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -75,25 +76,33 @@ def _fitted(runs: _Runs) -> Calibration:
         gaps = (one - other for one, other in zip(task.measured, runs.modelled(_point(shares)), strict=True))
         return np.array([gap / scale for gap, scale in zip(gaps, task.scales, strict=True)])
 
+    def tried(shares: NDArray[np.float64]) -> NDArray[np.float64]:
+        ahead([shares])
+        return residuals(shares)
+
     def jacobian(shares: NDArray[np.float64]) -> NDArray[np.float64]:
         """Derivatives of second order, which stay within the ranges."""
-        at = residuals(shares)
-        stencils = [_stencil(share) for share in shares.tolist()]
-        places = [[_moved(shares, axis, step) for step in steps] for axis, (steps, *_) in enumerate(stencils)]
-        runs.expect(_point(place) for each in places for place in each)
-        columns = []
-        for (_, own, (first, second)), (one, other) in zip(stencils, places, strict=True):
-            columns.append((own * at + first * residuals(one) + second * residuals(other)) / _STEP)
+        at, columns = residuals(shares), []
+        ahead(_around(shares))
+        for axis, share in enumerate(shares.tolist()):
+            steps, own, (first, second) = _stencil(share)
+            one, other = (residuals(_moved(shares, axis, step)) for step in steps)
+            columns.append((own * at + first * one + second * other) / _STEP)
         return np.array(columns).T
 
-    points = [point for number in range(SPREAD) for point in spread(count, task.seed, number)]
-    runs.expect(points)
-    costs = [math.fsum(each * each for each in residuals(np.array(point)).tolist()) for point in points]
+    def ahead(places: Iterable[NDArray[np.float64]]) -> None:
+        """Expect runs at some places, and then those that each further start begins with."""
+        runs.expect(map(_point, chain(places, *map(_around, starts))))
+
+    starts = list(map(np.array, (point for number in range(SPREAD) for point in spread(count, task.seed, number))))
+    runs.expect(map(_point, starts))
+    costs = [math.fsum(each * each for each in residuals(start).tolist()) for start in starts]
+    starts = [starts[at] for at in sorted(range(len(starts)), key=costs.__getitem__)[:STARTS]]
     ends = []
-    for at in sorted(range(len(points)), key=costs.__getitem__)[:STARTS]:
+    while starts:
         found = least_squares(
-            residuals,
-            np.array(points[at]),
+            tried,
+            starts.pop(0),
             jac=jacobian,
             bounds=(0.0, 1.0),
             xtol=1e-10,
@@ -149,6 +158,11 @@ def _moved(shares: NDArray[np.float64], axis: int, step: float) -> NDArray[np.fl
     moved = shares.copy()
     moved[axis] += step
     return moved
+
+
+def _around(shares: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+    """The places by which the derivatives at some shares are found."""
+    return [_moved(shares, axis, step) for axis, share in enumerate(shares.tolist()) for step in _stencil(share)[0]]
 
 
 def _stencil(share: float) -> tuple[tuple[float, float], float, tuple[float, float]]:
@@ -208,6 +222,10 @@ class _Task:
             for axis, share in zip(self.axes, point, strict=True)
         ]
 
+    def key(self, point: Point) -> str:
+        """The same in words."""
+        return ", ".join(f"{each.path}={getattr(each.node, 'text', '')}" for each in self.settings(point))
+
 
 class _Worker(Worker):
     """Makes runs with given parameters."""
@@ -215,9 +233,9 @@ class _Worker(Worker):
     def __init__(self, task: _Task) -> None:
         self._task = task
 
-    def make(self, request: tuple[Point, str]) -> list[float]:
+    def make(self, point: Point) -> list[float]:
         """What the model sends at the times of all measured values."""
-        task, (point, key) = self._task, request
+        task, key = self._task, self._task.key(point)
         try:
             results = task.results(task.spec.load(task.settings(point)))
         except EpicycleError as error:
@@ -242,23 +260,19 @@ class _Runs:
         self._evaluator, self._cache, self._tell = evaluator, cache, tell
         self._number = 0
 
-    def _key(self, point: Point) -> str:
-        settings = self.task.settings(point)
-        return ", ".join(f"{each.path}={getattr(each.node, 'text', '')}" for each in settings)
-
     def expect(self, points: Iterable[Point]) -> None:
         """Say which runs will be asked for next."""
-        keys = ((self._key(point), point) for point in points)
-        self._evaluator.expect((key, (point, key)) for key, point in keys if key not in self._cache)
+        keys = ((self.task.key(point), point) for point in points)
+        self._evaluator.expect(each for each in keys if each[0] not in self._cache)
 
     def modelled(self, point: Point) -> list[float]:
         """What the model sends at the times of all measured values."""
-        key = self._key(point)
+        key = self.task.key(point)
 
         def found() -> Any:
             self._number += 1
             self._tell(self._number)
-            return self._evaluator.make(key, (point, key))
+            return self._evaluator.make(key, point)
 
         values: list[float] = self._cache.outcome(key, found)
         return values

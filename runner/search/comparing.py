@@ -202,7 +202,7 @@ def compare(
         for name, model in models.items()
     }
     asked = [(name, number) for number in seeds for name in models]
-    with Evaluator(_Worker(models, until), jobs, _Away, recipes, until) as evaluator:
+    with Evaluator(_Worker(models, until), jobs, _Worker, recipes, until) as evaluator:
         evaluator.expect((each, each) for each in asked if str(each[1]) not in caches[each[0]])
         for done, (name, number) in enumerate(asked):
             tell(done, len(asked), f"seed {number}, {name}")
@@ -224,33 +224,21 @@ def _made(evaluator: Evaluator, run: tuple[str, int]) -> list[Any]:
 
 
 class _Worker(Worker):
-    """Makes runs of the variants."""
+    """Makes runs of the variants, which it loads where they are recipes."""
 
-    def __init__(self, models: Mapping[str, Model], until: float | None) -> None:
-        self._models = models
+    def __init__(self, models: Mapping[str, Model | Recipe | None], until: float | None) -> None:
+        self._models = dict(models)
         self._until = until
 
     def make(self, asked: tuple[str, int]) -> list[Any] | EpicycleError:
         """What is kept of a run of a variant with a seed, or the error that it ends with."""
         name, seed = asked
+        if isinstance(found := self._models[name], Recipe):
+            self._models[name] = found = found.model()
+            found.output.recorded = []
+        assert found is not None
         try:
-            results = Simulation(self._models[name], seed=seed).run(until=self._until)
+            results = Simulation(found, seed=seed).run(until=self._until)
         except (ActorError, LoopError) as error:
             return error
         return [results.metrics, results.aspects, results.events, results.digest]
-
-
-class _Away(_Worker):
-    """The same in another process."""
-
-    def __init__(self, recipes: Mapping[str, Recipe], until: float | None) -> None:
-        self._recipes = recipes
-        super().__init__({}, until)
-
-    def prepare(self, asked: tuple[str, int]) -> None:
-        """Load the variant, unless it is there."""
-        name, _ = asked
-        if name not in self._models:
-            model = self._recipes[name].model()
-            model.output.recorded = []
-            self._models = {**self._models, name: model}

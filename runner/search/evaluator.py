@@ -6,10 +6,9 @@ many processes there are.
 
 from __future__ import annotations
 
-import time
+import threading
 from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping
 from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import ExitStack
 from dataclasses import dataclass
 from typing import Any
 
@@ -22,7 +21,7 @@ from ..study.session import available_cores
 from ..support.apart import DONE, Outcome, WorkerError
 from .monitored import with_monitors
 
-PATIENCE = 1.0  # s of work before processes are started, which takes as long
+PATIENCE = 1.0  # s before processes are started, which takes as long; the work here goes on meanwhile
 
 
 class Evaluator:
@@ -32,67 +31,86 @@ class Evaluator:
         self, worker: Worker, jobs: int, begin: Callable[..., Worker], *arguments: object, patience: float = PATIENCE
     ) -> None:
         self._worker, self._jobs, self._patience = worker, jobs, patience
-        self._begin, self._arguments = begin, arguments
-        self._open = ExitStack()
-        self._processes: Processes | None = None
-        self._threads: ThreadPoolExecutor | None = None
-        self._spent = 0.0
+        self._processes = Processes(begin, *arguments)
+        self._threads: ThreadPoolExecutor | None = None  # which wait for the processes, once these are started
+        self._timer = threading.Timer(patience, self._start)
+        self._timer.daemon = True
+        self._guard = threading.RLock()
         self._expected: Iterator[tuple[Hashable, object]] = iter(())
         self._begun: dict[Hashable, Future[Outcome]] = {}
         self._made: set[Hashable] = set()  # of what is expected, here
 
+    @classmethod
+    def of_model(cls, kind: Callable[..., Worker], model: Model, *others: object, jobs: int | None) -> Evaluator:
+        """One whose workers are ``kind(model, *others)``, with the same model in each process."""
+        return cls(kind(model, *others), jobs_for(model, jobs), _worker_of, Recipe.of(model), kind, *others)
+
     def __enter__(self) -> Evaluator:
+        if self._jobs > 1 and self._patience > 0.0:
+            self._timer.start()
+        elif self._jobs > 1:
+            self._start()
         return self
 
     def __exit__(self, *_: object) -> None:
-        self._open.close()
+        self._timer.cancel()
+        with self._guard:
+            self._processes.end()  # first: no thread waits for one that nobody ends
+        if self._threads is not None:
+            self._threads.shutdown(cancel_futures=True)
 
     def expect(self, requests: Iterable[tuple[Hashable, object]]) -> None:
         """Say what will probably be asked for next, in this order, in place of what was said before."""
-        self._expected = iter(requests)
-        self._made.clear()
-        for key in [key for key, future in self._begun.items() if future.cancel()]:  # what no process has begun
-            del self._begun[key]
-        self._go_ahead()
+        with self._guard:
+            self._expected = iter(requests)
+            self._made.clear()
+            for key in [key for key, future in self._begun.items() if future.cancel()]:  # what no process has begun
+                del self._begun[key]
+            self._go_ahead()
 
     def make(self, key: Hashable, request: object) -> Any:
         """What the worker makes of a request; raises what it raises, and ``WorkerError``."""
-        if self._threads is None and (self._jobs == 1 or self._spent < self._patience):
-            since = time.monotonic()
-            self._worker.prepare(request)
-            made = self._worker.make(request)
-            self._spent += time.monotonic() - since
+        with self._guard:
             self._made.add(key)
-            return made
-        if self._threads is None:
-            # Threads are left before processes are ended: none of them waits for one that nobody ends.
-            self._processes = Processes(self._begin, *self._arguments)
-            self._threads = ThreadPoolExecutor(self._jobs)
-            self._open.callback(self._threads.shutdown, cancel_futures=True)
-            self._open.callback(self._processes.end)
-        self._begin_with(key, request)
-        self._go_ahead()
+            if (threads := self._threads) is not None:
+                self._begin_with(threads, key, request)
+                self._go_ahead()
+        if threads is None:
+            self._worker.prepare(request)
+            return self._worker.make(request)
         what, made = self._begun[key].result()
         del self._begun[key]
         if what != DONE:
             raise WorkerError("a process that was making runs died; is there enough memory?")
         return made
 
-    def _begin_with(self, key: Hashable, request: object) -> None:
+    def _start(self) -> None:
+        """Start the processes, even in the middle of what is made here."""
+        with self._guard:
+            if not self._timer.finished.is_set():  # as it is once nobody waits for anything
+                self._processes.start(self._jobs)
+                self._threads = ThreadPoolExecutor(self._jobs)
+                self._go_ahead()
+
+    def _begin_with(self, threads: ThreadPoolExecutor, key: Hashable, request: object) -> None:
         if key not in self._begun:
-            assert self._threads is not None
-            assert self._processes is not None
-            self._begun[key] = self._threads.submit(self._processes.make, request)
+            self._begun[key] = threads.submit(self._processes.make, request)
 
     def _go_ahead(self) -> None:
-        if self._threads is None:
-            return
         # More than there are processes: each goes on at once, before anybody asks for the next.
-        while len([each for each in self._begun.values() if not each.done()]) < 2 * self._jobs:
+        while (threads := self._threads) is not None and self._waiting() < 2 * self._jobs:
             if (following := next(self._expected, None)) is None:
                 return
             if following[0] not in self._made:
-                self._begin_with(*following)
+                self._begin_with(threads, *following)
+
+    def _waiting(self) -> int:
+        return len([each for each in self._begun.values() if not each.done()])
+
+
+def _worker_of(recipe: Recipe, kind: Callable[..., Worker], *others: object) -> Worker:
+    """The same in another process."""
+    return kind(recipe.model(), *others)
 
 
 @dataclass(frozen=True)

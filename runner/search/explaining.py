@@ -5,9 +5,9 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from itertools import islice
+from itertools import chain, islice, zip_longest
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from epicycle.actors import EpicycleError, to_seconds
 
@@ -18,54 +18,47 @@ from ..model.graph.acts import Act, ActName
 from ..model.graph.model_graph import ModelGraph
 from ..study.run.processes import Worker
 from .cache import NUMBER, EvaluationCache
-from .evaluator import Evaluator, Recipe, jobs_for
+from .evaluator import Evaluator
 from .explanation import INTERRUPT, LIMIT, RUNS, Effect, Explanation, Step
 from .minimal import minimal
 from .monitored import aspect_named, property_of
 
 _NONE = type(None)
+_ALIKE = (None, None)
 _SHAPE = [(bool, _NONE), (*NUMBER, _NONE), [(int,)]]  # of an outcome
+Acts = frozenset[ActName]
+Sends = dict[str, list[tuple[int, int, bytes, Any]]]  # by port: time (ns), microstep, and the token in both forms
 
 
 class _LimitError(Exception):
     """There are as many runs as a search may make."""
 
 
-class _Worker(Worker):
-    """Makes runs of a model in which some acts happen and, of those that are looked at, no others."""
+class _Run(NamedTuple):
+    """What is kept of a run: verdicts by monitor; its acts, if one is broken; and with its log, what ports sent."""
 
-    def __init__(
-        self,
-        model: Model,
-        monitor: str,
-        seed: int | None,
-        until: float | None,
-        order: Sequence[ActName] = (),  # of the acts that are looked at, to which the outcomes refer
-        others: frozenset[ActName] = frozenset(),  # which happen in all runs
-    ) -> None:
-        self._model, self._monitor, self._seed, self._until = model, monitor, seed, until
-        self._order, self._others = order, others
+    verdicts: dict[str, Verdict]
+    acts: list[Act]
+    sends: Sends
+
+
+class _Worker(Worker):
+    """Makes runs of a model in which some acts happen, and no others."""
+
+    def __init__(self, model: Model, seed: int | None, until: float | None) -> None:
+        self._model, self._seed, self._until = model, seed, until
 
     def results(self, exactly: Collection[ActName] | None, *, keep_log: bool = False) -> Results:
         """What comes of the run with these acts; with None, with all."""
-        acts = Interventions(None if exactly is None else self._others.union(exactly))
+        acts = Interventions(None if exactly is None else frozenset(exactly))
         return Simulation(self._model, seed=self._seed, acts=acts, keep_log=keep_log).run(until=self._until)
 
-    def make(self, request: tuple[frozenset[ActName], bool]) -> list[Any]:
-        """Whether the property holds, its robustness, and if it is broken the places of acts that are not to blame."""
-        names, looks_ahead = request
-        results = self.results(names)
-        verdict = results.monitors[self._monitor]
-        if verdict.holds is not False:
-            return [verdict.holds, verdict.robustness, []]
-        acting = {act.name for act in _up_to(verdict, results.acts, looks_ahead)}
-        idle = [place for place, name in enumerate(self._order) if name in names and name not in acting]
-        return [verdict.holds, verdict.robustness, idle]
-
-
-def _worker_of(recipe: Recipe, *others: Any) -> _Worker:
-    """The same in another process."""
-    return _Worker(recipe.model(), *others)
+    def make(self, request: tuple[Acts, bool]) -> _Run:
+        """The run with these acts, with its log or not."""
+        exactly, keep_log = request
+        results = self.results(exactly, keep_log=keep_log)
+        is_asked = keep_log or any(each.holds is False for each in results.monitors.values())
+        return _Run(results.monitors, results.acts if is_asked else [], _sends(results) if keep_log else {})
 
 
 def _up_to(verdict: Verdict, acts: Iterable[Act], looks_ahead: bool) -> list[Act]:
@@ -74,32 +67,62 @@ def _up_to(verdict: Verdict, acts: Iterable[Act], looks_ahead: bool) -> list[Act
 
 
 class _Sets:
-    """Sets of acts that a search asks about, each once and as many as its limit."""
+    """Sets of acts that a search asks about, each once and as many as its limit; the ``others`` happen in all runs."""
 
-    def __init__(self, evaluator: Evaluator, cache: EvaluationCache, order: Sequence[ActName], limit: int) -> None:
-        self._evaluator, self._cache, self._order, self._limit = evaluator, cache, order, limit
-        self._asked: dict[frozenset[ActName], list[Any]] = {}
-        self.best: frozenset[ActName] | None = None  # the smallest set so far
+    def __init__(
+        self,
+        evaluator: Evaluator,
+        cache: EvaluationCache,
+        monitor: str,
+        acts: Iterable[ActName],
+        others: Acts,
+        limit: int,
+    ) -> None:
+        self._evaluator, self._cache, self._monitor = evaluator, cache, monitor
+        self._order = sorted(acts)  # to which the outcomes refer
+        self._others, self._limit = others, limit
+        self._asked: dict[Acts, list[Any]] = {}
+        self._verdicts: dict[Acts, Verdict] = {}  # of the sets whose runs were made now
+        self.best: Acts | None = None  # the smallest set so far
         self.looks_ahead = False
         self.made = 0  # runs that were made now
 
-    def _outcome(self, names: frozenset[ActName]) -> list[Any]:
+    def run(self, names: Acts, keep_log: bool = False) -> _Run:
+        """The run with these acts."""
+        made: _Run = self._evaluator.make(*self._request(names, keep_log))
+        return made
+
+    def _request(self, names: Acts, keep_log: bool = False) -> tuple[object, object]:
+        return (names, keep_log), (self._others | names, keep_log)
+
+    def _outcome(self, names: Acts) -> list[Any]:
+        """Whether the property holds, its robustness, and if it is broken the places of acts that are not to blame."""
+
         def found() -> list[Any]:
             self.made += 1
-            made: list[Any] = self._evaluator.make(names, (names, self.looks_ahead))
-            return made
+            run = self.run(names)
+            verdict, idle = run.verdicts[self._monitor], list[int]()
+            self._verdicts[names] = verdict
+            if verdict.holds is False:
+                acting = {act.name for act in _up_to(verdict, run.acts, self.looks_ahead)}
+                idle = [place for place, each in enumerate(self._order) if each in names and each not in acting]
+            return [verdict.holds, verdict.robustness, idle]
 
         if names not in self._asked:
             self._asked[names] = self._cache.outcome(_key(names), found)
         return self._asked[names]
 
-    def expect(self, sets: Iterable[frozenset[ActName]]) -> None:
-        """Say what will probably be asked next."""
+    def expect(self, sets: Iterable[Acts], then: Iterable[tuple[Acts, bool]] = ()) -> None:
+        """Say what will probably be asked next, and then which runs."""
         new = (each for each in sets if each not in self._asked and _key(each) not in self._cache)
-        left = max(self._limit - len(self._asked), 0)
-        self._evaluator.expect((each, (each, self.looks_ahead)) for each in islice(new, left))
+        some = islice(new, max(self._limit - len(self._asked), 0))
+        self._evaluator.expect(chain(map(self._request, some), (self._request(*each) for each in then)))
 
-    def breaks(self, names: frozenset[ActName]) -> bool:
+    def verdict(self, names: Acts) -> Verdict:
+        """The whole verdict on a set."""
+        return self._verdicts.get(names) or self.run(names).verdicts[self._monitor]
+
+    def breaks(self, names: Acts) -> bool:
         """Whether the property is broken with these acts; raises ``_LimitError``."""
         # Runs that are known count too, so that a search that was killed comes to the same.
         if names not in self._asked and len(self._asked) >= self._limit:
@@ -109,11 +132,11 @@ class _Sets:
             self.best = names
         return is_broken
 
-    def active(self, names: frozenset[ActName]) -> frozenset[ActName]:
+    def active(self, names: Acts) -> Acts:
         """The acts of a set that breaks the property which happen, and before it is broken."""
         return names.difference(self._order[place] for place in self._outcome(names)[2])
 
-    def effect(self, names: frozenset[ActName], name: ActName) -> tuple[float | None, float | None]:
+    def effect(self, names: Acts, name: ActName) -> tuple[float | None, float | None]:
         """The robustness without an act of a set, and with it alone."""
         without, alone = (self._outcome(each)[1] for each in (names - {name}, frozenset([name])))
         return without, alone
@@ -151,35 +174,36 @@ def explain(
     """
     sources = {monitor: property_of(model, monitor) for monitor in monitors}
     chosen = frozenset(aspect_named(model, name).name for name in only)  # of which the acts are looked at; if none, all
-    whole = _Worker(model, "", seed, until).results(model.exactly)
-    monitor, *also = _broken(model.name, {each: whole.monitors[each] for each in monitors})
-    verdict, source = whole.monitors[monitor], sources[monitor]
-    about = {
-        "model": model.name,
-        "seed": whole.seed,
-        "until": until,
-        "property": source,
-        "digest": whole.digest,
-        "only": sorted(chosen),
-    }
-    acts = {act.name: act for act in whole.acts}
-    mine = [name for name in acts if not chosen or name.aspect in chosen]
-    order, others = sorted(mine), frozenset(acts).difference(mine)
-    given = (monitor, seed, until, order, others)
-    worker, cache = _Worker(model, *given), EvaluationCache(model, about, _SHAPE, folder)
-    none: frozenset[ActName] = frozenset()
-    before = [act.name for act in _up_to(verdict, whole.acts, False) if act.name not in others]
-    candidates, ended, effects = mine, "", dict[ActName, tuple[float | None, float | None]]()
-    with Evaluator(worker, jobs_for(model, jobs), _worker_of, Recipe.of(model), *given) as evaluator:
-        sets = _Sets(evaluator, cache, order, limit)
+    none, ended, effects, steps = Acts(), "", dict[ActName, tuple[float | None, float | None]](), list[Step]()
+    with Evaluator.of_model(_Worker, model, seed, until, jobs=jobs) as evaluator:
+        if not chosen:  # so that nothing happens in this run, which is asked for whatever comes of the whole one
+            evaluator.expect([((none, False), (none, False))])
+        whole = _Worker(model, seed, until).results(model.exactly)
+        monitor, *also = _broken(model.name, {each: whole.monitors[each] for each in monitors})
+        verdict, source = whole.monitors[monitor], sources[monitor]
+        about = {
+            "model": model.name,
+            "seed": whole.seed,
+            "until": until,
+            "property": source,
+            "digest": whole.digest,
+            "only": sorted(chosen),
+        }
+        acts = {act.name: act for act in whole.acts}
+        candidates = mine = [name for name in acts if not chosen or name.aspect in chosen]
+        others = frozenset(acts).difference(mine)
+        before = [act.name for act in _up_to(verdict, whole.acts, False) if act.name not in others]
+        cache = EvaluationCache(model, about, _SHAPE, folder)
+        sets = _Sets(evaluator, cache, monitor, mine, others, limit)
 
-        def breaks(names: frozenset[ActName]) -> bool:
+        def breaks(names: Acts) -> bool:
             found = sets.breaks(names)
             if tell is not None:
                 tell(sets.asked, len(mine) if sets.best is None else len(sets.best))
             return found
 
         try:
+            sets.expect([none, frozenset(before)])
             if not breaks(none):
                 candidates = before
                 if not breaks(frozenset(before)):
@@ -190,34 +214,36 @@ def explain(
                             "what broke it left nothing in the event log"
                         )
                 names = frozenset(minimal(candidates, breaks, sets.active, sets.expect))
-                sets.expect(each for name in names for each in (names - {name}, frozenset([name])))
+                first = next(name for name in acts if name in names)
+                last = [(names, True), (names - {first}, True)]
+                sets.expect((each for name in names for each in (names - {name}, frozenset([name]))), last)
                 effects = {name: sets.effect(names, name) for name in names}
         except (_LimitError, KeyboardInterrupt) as end:
             ended = LIMIT if isinstance(end, _LimitError) else INTERRUPT
-    best = frozenset(mine) if sets.best is None else sets.best
-    with_set, with_none = worker.results(best, keep_log=True), worker.results(none)
-    if ended:  # perhaps before the acts were left out that are not to blame
-        last = _up_to(with_set.monitors[monitor], with_set.acts, sets.looks_ahead)
-        acting = best.intersection(act.name for act in last)
-        fewer = worker.results(acting, keep_log=True)
-        if fewer.monitors[monitor].holds is False:
-            best, with_set = acting, fewer
-    there = {act.name: act for act in with_set.acts if act.name in best}
-    # An act that is not noted in the run of the set is reported as it was.
-    there |= {name: acts[name] for name in order if name in best and name not in there}
-    steps = []
-    if there and not ended:
-        ports = next(each.ports for each in model.output.monitors if each.name == monitor)
-        rest = worker.results(best - {next(iter(there))}, keep_log=True)
-        steps = _steps(model.graph, ports, with_set, rest)
+            sets.expect(())
+        best = frozenset(mine) if sets.best is None else sets.best
+        with_set, verdict_of_none = sets.run(best, keep_log=True), sets.verdict(none)
+        if ended:  # perhaps before the acts were left out that are not to blame
+            to_blame = _up_to(with_set.verdicts[monitor], with_set.acts, sets.looks_ahead)
+            acting = best.intersection(act.name for act in to_blame)
+            fewer = sets.run(acting, keep_log=True)
+            if fewer.verdicts[monitor].holds is False:
+                best, with_set = acting, fewer
+        there = {act.name: act for act in with_set.acts if act.name in best}
+        # An act that is not noted in the run of the set is reported as it was.
+        there |= {name: acts[name] for name in sorted(best) if name not in there}
+        if there and not ended:
+            ports = next(each.ports for each in model.output.monitors if each.name == monitor)
+            rest = sets.run(best - {next(iter(there))}, keep_log=True)
+            steps = _steps(model.graph, ports, with_set.sends, rest.sends)
     return Explanation(
         model.name,
         whole.seed,
         monitor,
         source,
         verdict,
-        with_set.monitors[monitor],
-        with_none.monitors[monitor],
+        with_set.verdicts[monitor],
+        verdict_of_none,
         len(candidates),
         [Effect(act, acts[name], *effects.get(name, ())) for name, act in there.items()],
         steps,
@@ -249,7 +275,7 @@ def _broken(model: str, verdicts: Mapping[str, Verdict]) -> list[str]:
     raise EpicycleError(f"{' and '.join(states)}: there is nothing to explain")
 
 
-def _steps(graph: ModelGraph, ports: Collection[str], ours: Results, theirs: Results) -> list[Step]:
+def _steps(graph: ModelGraph, ports: Collection[str], ours: Sends, theirs: Sends) -> list[Step]:
     """The way of a difference between two runs, backwards from a port by the sources that differed first."""
     differing = _differing(ours, theirs)
     found: list[Step] = []
@@ -268,27 +294,25 @@ def _ports(steps: Collection[Step]) -> set[str]:
     return {each.port for each in steps}
 
 
-def _differing(ours: Results, theirs: Results) -> dict[str, Step]:
+def _differing(ours: Sends, theirs: Sends) -> dict[str, Step]:
     """The first send of each port that is not the same in both runs."""
-    sends = [_sends(each) for each in (ours, theirs)]
     found = {}
-    for port in dict.fromkeys([*sends[0], *sends[1]]):
-        first, second = (each.get(port, []) for each in sends)
-        place = next((n for n, (a, b) in enumerate(zip(first, second, strict=False)) if a[:3] != b[:3]), None)
-        if place is None and len(first) == len(second):
+    for port in dict.fromkeys([*ours, *theirs]):
+        pairs = zip_longest(ours.get(port, []), theirs.get(port, []))
+        one, other = next((pair for pair in pairs if (pair[0] and pair[0][:3]) != (pair[1] and pair[1][:3])), _ALIKE)
+        if one is other:
             continue
-        place = min(len(first), len(second)) if place is None else place
-        one, other = (each[place] if place < len(each) else None for each in (first, second))
         time = min(each[0] for each in (one, other) if each is not None)
-        tokens = [None if each is None or each[0] > time else plain(each[3]) for each in (one, other)]
+        tokens = [None if each is None or each[0] > time else each[3] for each in (one, other)]
         found[port] = Step(port, to_seconds(time), *tokens)
     return found
 
 
-def _sends(results: Results) -> dict[str, list[tuple[int, int, bytes, Any]]]:
-    found: dict[str, list[tuple[int, int, bytes, Any]]] = {}
+def _sends(results: Results) -> Sends:
+    found: Sends = {}
     for record in results.log.records:
         if record.event == "send":
-            send = (record.tag.time, record.tag.microstep, canonical(record.value), record.value)
+            # Tokens as plain data, which every process can read.
+            send = (record.tag.time, record.tag.microstep, canonical(record.value), plain(record.value))
             found.setdefault(f"{record.actor}.{record.port}", []).append(send)
     return found

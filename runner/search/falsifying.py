@@ -15,11 +15,9 @@ from ..model.build.model import Model
 from ..model.language.study import study_of_text
 from ..model.text.problems import Problems
 from ..study.plan.plan import Search
-from ..study.search_runs import SearchRuns, open_search_runs
-from ..study.session import available_cores
 from .falsification import Falsification, Run
 from .faults import FaultSpace
-from .growing import Growing, place_of, text_of
+from .growing import Growing, text_of
 from .monitored import AD_HOC, monitors_named, property_of
 from .proposals import Point, is_guided, proposals
 from .space import read_space
@@ -47,14 +45,10 @@ def falsify(
     found, growing = searching.found, searching.growing
     found.folder = folder = out or results_folder(found.model, "falsification")
     points = searching.next()
-    growing.add(points)
-    with open_search_runs(growing.whole(), folder, jobs or available_cores(), timeout) as made:
-        try:
-            while points:
-                searching.make(points, made, lambda: tell(len(found.runs), found.least))
-                points = [] if found.broken else searching.next()
-        finally:
-            growing.tell(made, over=True)
+    with growing.opened(points, folder, jobs, timeout):
+        while points:
+            searching.make(points, lambda: tell(len(found.runs), found.least))
+            points = [] if found.broken else searching.next()
     return found
 
 
@@ -120,18 +114,15 @@ class _Searching:
             return []
         return points[:left]
 
-    def make(self, points: Sequence[Point], made: SearchRuns, tell: Callable[[], None]) -> None:
+    def make(self, points: Sequence[Point], tell: Callable[[], None]) -> None:
         """Make the runs of a batch."""
         found = self.found
-        levels, distinct = self.growing.add(points)
-        self.growing.tell(made)
-        order = list(distinct)
+        levels = self.growing.levels(points)
         start = len(found.runs)
         # Acts are those of one run, which has the first seed.
         step = 0 if self._goal.max_faults else 1
-        numbers = [(order.index(place_of(level)), step * (start + at)) for at, level in enumerate(levels)]
-        rows = made.made(self.growing.plan(list(distinct.values())), numbers, tell)
-        for at, (level, row) in enumerate(zip(levels, rows, strict=True), start=1):
+        rows = self.growing.runs(levels, lambda at: [step * (start + at)], tell)
+        for at, (level, [row]) in enumerate(zip(levels, rows, strict=True), start=1):
             states = [row[name] for name in found.monitors]
             margins = [row[f"{name}_robustness"] for name in found.monitors]
             broken = tuple(

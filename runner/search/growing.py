@@ -1,17 +1,27 @@
-"""A study that grows: it gets points as a search chooses them, and its results folder is told of them."""
+"""A study that grows: it gets points as a search chooses them, and its results folder has their runs."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import yaml
 
 from ..model.language.dimensions import Level
 from ..model.language.study import Study
+from ..study.judge.study_results import StudyResults
 from ..study.plan.plan import Plan, Search
-from ..study.search_runs import SearchRuns
+from ..study.run.backlog import Backlog, Task
+from ..study.run.locking import lock
+from ..study.run.making import Recorder, make_in, recording
+from ..study.run.manifest import manifest_text
+from ..study.run.processes import Processes
+from ..study.run.runner import Runner
+from ..study.run.store import BEST_FIRST, Row, prepare, write
+from ..study.session import available_cores, manifest_of
 from .faults import FaultSpace
 from .proposals import Point
 from .space import Space, said
@@ -21,13 +31,37 @@ _GROWTH = 1.1  # of the number of points, after which the folder is told of them
 Place = tuple[Any, ...]  # the values of a point, by which two points are the same
 
 
-def place_of(level: Level) -> Place:
-    """The values of a point."""
-    return tuple(level.values.values())
+@dataclass(kw_only=True)
+class _SearchTask(Task):
+    """A run of a plan that the process which makes it may not know yet."""
+
+    batch: int
+    plan: Plan
+
+
+class _Worker:
+    """Makes the runs of one plan after the other."""
+
+    def __init__(self) -> None:
+        self._batch = 0
+        self._runner: Runner | None = None
+
+    def prepare(self, task: _SearchTask) -> None:
+        """Load the model of the run's condition, unless it is there."""
+        self._of(task).prepare(task)
+
+    def make(self, task: _SearchTask) -> Row:
+        """The row of a run."""
+        return self._of(task).make(task)
+
+    def _of(self, task: _SearchTask) -> Runner:
+        if self._runner is None or task.batch != self._batch:
+            self._runner, self._batch = Runner(task.plan), task.batch
+        return self._runner
 
 
 class Growing:
-    """The points of a space that were chosen, beside what a ``study`` varies of its own.
+    """The points of a space that were chosen, beside what a ``study`` varies of its own, and their runs.
 
     ``keys`` are what its file says.  Raises ``ModelError`` unless the model loads at the ends of the space.
     """
@@ -41,30 +75,87 @@ class Growing:
         self._base = replace(tried, study=study, sources=tried.sources | extra, search=search)
         self._levels: dict[Place, Level] = {}  # of all points, each once
         self._told = 0  # points that the folder knows
+        self._batches = 0
+        self._known: dict[str, Row] = {}  # the runs by their keys
+        self._recorder: Recorder
+        self._processes: Processes
 
-    def add(self, points: Sequence[Point]) -> tuple[list[Level], dict[Place, Level]]:
-        """More points: each, and those of them that differ."""
+    @contextmanager
+    def opened(self, points: Sequence[Point], folder: Path, jobs: int | None, timeout: float | None) -> Iterator[None]:
+        """Make runs in a folder, and first those of some points; raises ``StoreError``.
+
+        Runs that are there already are not made again.  At the end, the table of all is written.
+        """
+        self._jobs = jobs or available_cores()
+        self.levels(points)
+        plan = self._whole()
+        with lock(folder):
+            store = prepare(folder, manifest_of(plan))
+            rows: list[Row] = [row for batch in store.rows() for row in batch.to_pylist()]
+            rows.sort(key=lambda row: BEST_FIRST.index(row["status"]), reverse=True)  # the best of a run last
+            self._known = {row["run"]: row for row in rows}
+            with recording(store, Backlog(plan, {}, ()), timeout) as recorder, Processes(_Worker) as processes:
+                self._recorder, self._processes, recorder.tell = recorder, processes, self._keep
+                try:
+                    yield
+                finally:
+                    self._tell(over=True)
+            StudyResults(folder).write_table()
+
+    def _keep(self, row: Row) -> None:
+        self._known[row["run"]] = row
+
+    def levels(self, points: Iterable[Point]) -> list[Level]:
+        """What some points set; the folder will know of them."""
         levels = [self._space.level(point) for point in points]
-        distinct = {place_of(level): level for level in levels}
-        self._levels |= distinct
-        return levels, distinct
+        self._levels |= {_place_of(level): level for level in levels}
+        return levels
 
-    def plan(self, levels: Sequence[Level]) -> Plan:
+    def runs(
+        self, levels: Sequence[Level], replications: Callable[[int], Iterable[int]], tell: Callable[[], None]
+    ) -> list[list[Row]]:
+        """The rows of each point in all conditions of the study, with the replications of each."""
+        self._tell()
+        self._batches += 1
+        distinct = {_place_of(level): level for level in levels}
+        plan, order = self._plan(list(distinct.values())), list(distinct)
+        sent, others = replace(plan, texts={}, files=()), plan.conditions // len(order)
+        keys, tasks = list[list[str]](), dict[str, Task]()
+        for at, level in enumerate(levels):
+            first = order.index(_place_of(level)) * others
+            runs = [(index, each) for index in range(first, first + others) for each in replications(at)]
+            keys.append([])
+            for index, replication in runs:
+                condition = plan.condition(index)
+                keys[-1].append(key := plan.key(condition, replication))
+                if key not in self._known:
+                    seed = plan.seed(condition, replication)
+                    tasks[key] = _SearchTask(index, replication, seed, key, batch=self._batches, plan=sent)
+        self._recorder.backlog = Backlog(plan, {}, tasks.values())
+        make_in(self._processes, self._recorder, self._jobs, tell)
+        return [[self._known[key] for key in each] for each in keys]
+
+    def _plan(self, levels: Sequence[Level]) -> Plan:
         """A plan of some points."""
         dimensions = (*self._space.dimensions(levels), *self.study.dimensions)
         return replace(self._base, study=replace(self.study, dimensions=dimensions), extra=[{} for _ in dimensions])
 
-    def whole(self) -> Plan:
+    def _whole(self) -> Plan:
         """What a folder is to know: all points until now."""
         levels = list(self._levels.values())
-        plan = self.plan(levels)
+        plan = self._plan(levels)
         return replace(plan, study=replace(plan.study, text=text_of(self._keys, levels)))
 
-    def tell(self, made: SearchRuns, *, over: bool = False) -> None:
+    def _tell(self, *, over: bool = False) -> None:
         """Tell the folder of the points, now and then while they grow, and when the search is over."""
         if over or len(self._levels) >= _GROWTH * self._told:
             self._told = len(self._levels)
-            made.describe(self.whole())
+            store = self._recorder.store
+            write(store.folder / "manifest.json", manifest_text({**store.manifest, **self._whole().manifest()}))
+
+
+def _place_of(level: Level) -> Place:
+    return tuple(level.values.values())
 
 
 def text_of(keys: Mapping[str, Any], levels: Sequence[Level]) -> str:

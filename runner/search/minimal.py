@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Container, Hashable, Iterable, Iterator, Sequence
-from functools import partial
-from itertools import pairwise
+from itertools import chain, pairwise
 from typing import TypeVar
 
 T = TypeVar("T", bound=Hashable)
@@ -23,33 +22,33 @@ def minimal(
     ``expect`` is told what ``breaks`` will be asked next, in this order, until it holds.
     Source: ddmin of Zeller and Hildebrandt, Simplifying and Isolating Failure-Inducing Input, IEEE TSE 28, 2002.
     """
+    left, number = list(things), 2
+    while True:
+        at_work = active(frozenset(left))
+        fewer = [each for each in left if each in at_work]
+        if 0 < len(fewer) < len(left):
+            # It probably breaks, too, and then its parts are tried.
+            expect(map(frozenset, chain([fewer], (part for part, _ in _parts(fewer, number)))))
+            left = fewer if breaks(frozenset(fewer)) else left
+        expect(frozenset(part) for part, _ in _parts(left, number))
+        broken = next((each for each in _parts(left, number) if breaks(frozenset(each[0]))), None)
+        if broken is None:
+            return left
+        left, number = broken
 
-    def without_idle(part: list[T]) -> list[T]:
-        at_work = active(frozenset(part))
-        fewer = [each for each in part if each in at_work]
-        return fewer if 0 < len(fewer) < len(part) and breaks(frozenset(fewer)) else part
 
-    def first(parts: Callable[[], Iterable[list[T]]]) -> list[T] | None:
-        expect(map(frozenset, parts()))
-        return next((each for each in parts() if breaks(frozenset(each))), None)
+def _parts(left: list[T], number: int) -> Iterator[tuple[list[T], int]]:
+    """What is tried of a part that breaks: so many pieces, what is left without each of them, and then more pieces.
 
-    left, number = without_idle(list(things)), 2
+    With each comes in how many pieces it is divided if it breaks.
+    """
     while len(left) > 1:
         number = min(number, len(left))
         bounds = [len(left) * each // number for each in range(number + 1)]
-        pieces = [left[start:end] for start, end in pairwise(bounds)]
-        if (piece := first(partial(iter, pieces))) is not None:
-            left, number = without_idle(piece), 2
-            continue
-
-        def rests(pieces: list[list[T]] = pieces) -> Iterator[list[T]]:
-            return ([each for other in pieces if other is not piece for each in other] for piece in pieces)
-
-        # Of two pieces, each is the rest of the other.
-        if number > 2 and (rest := first(rests)) is not None:
-            left, number = without_idle(rest), max(number - 1, 2)
-        elif number == len(left):
-            return left
-        else:
-            number *= 2
-    return left
+        pieces = list(pairwise(bounds))
+        yield from ((left[start:end], 2) for start, end in pieces)
+        if number > 2:  # of two pieces, each is the rest of the other
+            yield from (([*left[:start], *left[end:]], max(number - 1, 2)) for start, end in pieces)
+        if number == len(left):
+            return
+        number *= 2

@@ -20,9 +20,7 @@ from ..model.text.problems import Position, Problems
 from ..study.inference import mean
 from ..study.plan.plan import Plan, Search
 from ..study.run.backlog import OK
-from ..study.search_runs import SearchRuns, open_search_runs
-from ..study.session import available_cores
-from .growing import Growing, place_of, text_of
+from .growing import Growing, text_of
 from .optimum import Optimum, Outcome, Tested
 from .proposals import Point, is_guided, proposals
 from .space import read_space
@@ -52,19 +50,15 @@ def optimise(
     found.folder = folder = out or results_folder(work.name, "optimisation")
     chosen = proposals(found.space.widths, work.seed, found.guided, _TOGETHER)
     points = next(chosen)[: goal.points]
-    work.growing.add(points)
-    with open_search_runs(work.growing.whole(), folder, jobs or available_cores(), timeout) as made:
-        try:
-            while True:
-                tested = work.test(points, made)
-                tell(found)
-                if len(found.tested) >= goal.points:
-                    break
-                points = chosen.send([found.cost(each.outcome) for each in tested])[: goal.points - len(found.tested)]
-            if found.point is not None:
-                found.check = work.check(found.point, made)
-        finally:
-            work.growing.tell(made, over=True)
+    with work.growing.opened(points, folder, jobs, timeout):
+        while True:
+            tested = work.test(points)
+            tell(found)
+            if len(found.tested) >= goal.points:
+                break
+            points = chosen.send([found.cost(each.outcome) for each in tested])[: goal.points - len(found.tested)]
+        if found.point is not None:
+            found.check = work.check(found.point)
     return found
 
 
@@ -92,8 +86,7 @@ class _Optimising:
         }
         problems.raise_if_any()
         self._conditions = {text: each for text, each in conditions.items() if each is not None}
-        self._others = base.conditions
-        runs = (goal.points + 1) * self._others * study.replications
+        runs = (goal.points + 1) * base.conditions * study.replications
         self.growing = Growing(study, keys, space, Search(runs=runs, command=list(spec.command)))
         guided = is_guided(space.widths) and space.has_ranges
         self.found = Optimum(goal, space, guided)
@@ -103,27 +96,20 @@ class _Optimising:
         """The seed of the study, which is that of the search."""
         return self.growing.study.seed
 
-    def test(self, points: Sequence[Point], made: SearchRuns) -> list[Tested]:
+    def test(self, points: Sequence[Point]) -> list[Tested]:
         """Make the runs of some points, and judge them."""
-        levels, distinct = self.growing.add(points)
-        self.growing.tell(made)
-        order, replications = list(distinct), range(self.growing.study.replications)
-        numbers = [(index, replication) for index in range(len(order) * self._others) for replication in replications]
-        rows = made.made(self.growing.plan(list(distinct.values())), numbers, lambda: None)
-        share = self._others * len(replications)
-        outcomes = [self._outcome(rows[at * share : (at + 1) * share]) for at in range(len(order))]
+        levels, replications = self.growing.levels(points), range(self.growing.study.replications)
         tested = []
-        for level in levels:
-            outcome = outcomes[order.index(place_of(level))]
-            tested.append(Tested(len(self.found.tested) + 1, level, outcome))
+        for level, rows in zip(levels, self.growing.runs(levels, lambda at: replications, lambda: None), strict=True):
+            tested.append(Tested(len(self.found.tested) + 1, level, self._outcome(rows)))
             self.found.tested.append(tested[-1])
         return tested
 
-    def check(self, best: Tested, made: SearchRuns) -> Outcome:
+    def check(self, best: Tested) -> Outcome:
         """What comes of a point with as many seeds again, which had no part in its choice."""
         count = self.growing.study.replications
-        numbers = [(index, count + each) for index in range(self._others) for each in range(count)]
-        return self._outcome(made.made(self.growing.plan([best.level]), numbers, lambda: None))
+        [rows] = self.growing.runs([best.level], lambda at: range(count, 2 * count), lambda: None)
+        return self._outcome(rows)
 
     def _outcome(self, rows: Sequence[Mapping[str, Any]]) -> Outcome:
         """Conditions must hold in each run; the objective is a mean over runs, all conditions of a study alike."""

@@ -50,15 +50,12 @@ class Interval:
     position: Position
     is_whole: bool
 
+    width: ClassVar[int] = 1  # how many shares lead to a value
+
     @property
     def kind(self) -> str:
         """What its column in the table holds."""
         return "int" if self.is_whole else "float"
-
-    @property
-    def width(self) -> int:
-        """How many shares lead to a value."""
-        return 1
 
     @property
     def ends(self) -> list[Node]:
@@ -93,10 +90,7 @@ class Choice:
     kind: str
     position: Position
 
-    @property
-    def width(self) -> int:
-        """How many shares lead to a value."""
-        return 1
+    width: ClassVar[int] = 1
 
     @property
     def ends(self) -> list[Node]:

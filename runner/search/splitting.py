@@ -31,7 +31,7 @@ from ..support.student import student_quantile
 from ..support.tables import Table
 from .answer import Answer
 from .cache import NUMBER, EvaluationCache
-from .evaluator import Evaluator, Recipe, jobs_for
+from .evaluator import Evaluator
 
 SHARE = 0.2  # of the runs that should get from one level to the next: few levels, and yet many runs at each
 ENOUGH = 0.1  # of the runs from a level that break the property: it needs no further level
@@ -267,11 +267,6 @@ class _Branches(Worker):
         return [made, *self.spent()]
 
 
-def _branches_of(recipe: Recipe, *others: Any) -> _Branches:
-    """The same in another process."""
-    return _Branches(recipe.model(), *others)
-
-
 def rare(
     model: Model,
     monitor: str,
@@ -305,10 +300,8 @@ def rare(
         "digest": "" if folder is None else first.run(until=until).digest,
     }  # fmt: skip
     cache = EvaluationCache(model, about, [[NUMBER], NUMBER, int, int], folder)
-    others = (monitor, guide, seed, until, runs)
     found: list[list[float]] = []
-    here = _Branches(model, *others)
-    with Evaluator(here, jobs_for(model, jobs), _branches_of, Recipe.of(model), *others) as evaluator:
+    with Evaluator.of_model(_Branches, model, monitor, guide, seed, until, runs, jobs=jobs) as evaluator:
 
         def levels_found() -> list[Any]:
             """The levels, and what they took; whole runs, which are half of it, are made in parts."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 import dataclasses
 import json
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
@@ -51,6 +51,13 @@ def short(value: Any) -> str:
         text = value if isinstance(value, str) else repr(value)
     text = " ".join(text.split())
     return text if len(text) <= SHORT else text[: SHORT - 3] + "..."
+
+
+def listed(texts: Sequence[str], last: str = "and", most: int = 1_000_000) -> str:
+    """Texts as a list in a sentence, of which as many are shown as ``most``."""
+    if len(texts) > most:
+        texts = [*texts[:most], f"{len(texts) - most:,} more"]
+    return f" {last} ".join([", ".join(texts[:-1]), texts[-1]] if len(texts) > 1 else texts)
 
 
 def json_line(value: Any, widest: int) -> str:

@@ -14,6 +14,7 @@ from epicycle.actors import EpicycleError, Fault, Parameter, counted, texts_para
 from ...model.language.dimensions import Factor
 from ...study.inference import Estimate, with_interval
 from ...study.plan.plan import Plan
+from ...support.shown import listed
 from ..sheet import LIMIT, Sheet, set_log
 from .data import Condition, Data, Names, is_numeric, mean_of
 from .figure import Layout, Panel, RunKey, StudyFigure
@@ -52,8 +53,8 @@ class Means(TableFigure):
             yield Fault("it names no metric", ("metric",), help=("name at least one",))
         units = {plan.columns[name].unit for name in self.metric if name in plan.columns}
         if self.together and len(units) > 1:
-            listed = ", ".join(f"{name} in {plan.columns[name].unit or '1'}" for name in self.metric)
-            yield Fault("metrics in one panel need the same unit", ("together",), help=(listed,))
+            units_of = ", ".join(f"{name} in {plan.columns[name].unit or '1'}" for name in self.metric)
+            yield Fault("metrics in one panel need the same unit", ("together",), help=(units_of,))
         if self.together and self.lines:
             advice = "leave out 'lines' or 'together'"
             yield Fault("the metrics are already its lines", ("lines",), help=(advice,))
@@ -72,8 +73,9 @@ class Means(TableFigure):
             sheet.call(axes, axis.name, what if self.together else mean_of(names.axis(metric)))
         shares = data.plan.shares.intersection(self.metric)
         kind = "Student" if not shares else "Wilson" if shares.issuperset(self.metric) else "Student; of shares Wilson"
-        said = f"{mean_of(listed(map(names.words, self.metric)))} with 95 % intervals ({kind})."
-        return arranged.finish(sheet, paths, capitalised(said), counts(arranged.chosen, self.metric, names))
+        what = mean_of(listed([*map(names.words, self.metric)]))
+        said = f"{what[:1].upper()}{what[1:]} with 95 % intervals ({kind})."
+        return arranged.finish(sheet, paths, said, counts(arranged.chosen, self.metric, names))
 
     def _points(self, data: Data, axis: _Axis, conditions: Iterable[Condition], metric: str) -> list[_Point]:
         points = [_Point(axis.place(each), each, metric, data.average(each, metric)) for each in conditions]
@@ -248,17 +250,6 @@ def _spread(values: Sequence[float], unit: str) -> str:
     """The numbers that a box shows, in words."""
     low, middle, high = statistics.quantiles(values, method="inclusive") if len(values) > 1 else [values[0]] * 3
     return f"median {middle:.4g} {unit}".rstrip() + f", middle half {low:.4g} to {high:.4g}"
-
-
-def listed(words: Iterable[str]) -> str:
-    """Several things in a sentence."""
-    *others, last = words
-    return f"{', '.join(others)} and {last}" if others else last
-
-
-def capitalised(text: str) -> str:
-    """A text with a capital first letter."""
-    return text[:1].upper() + text[1:]
 
 
 def counts(chosen: Sequence[Condition], metrics: Sequence[str], names: Names) -> str:

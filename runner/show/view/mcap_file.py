@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterable, Iterator
+from functools import reduce
 from heapq import merge
 from io import BytesIO
 from itertools import chain
@@ -19,6 +20,7 @@ from typing import TYPE_CHECKING, Any
 from epicycle.actors import Tag
 
 from ...execution.results import Signal, plain
+from ...support.extras import needed
 from ...support.files import replace_file
 from ...support.shown import finite
 from .export import Act, Colour, Disc, Point, Scene, Thing, about, acts, extent, firings, parts, results_of, things
@@ -44,14 +46,9 @@ def write_mcap(recording: Recording, path: Path) -> None:
 
 
 def require_mcap() -> type[Writer]:
-    """The class that writes MCAP files; raises ``ViewError`` if it is not installed."""
-    try:
-        from mcap.writer import Writer
-    except ImportError:
-        raise ViewError(
-            "an MCAP file needs the package mcap, which is not installed: pip install 'epicycle[mcap]'"
-        ) from None
-    return Writer
+    """The class that writes MCAP files; raises ``EpicycleError`` if it is not installed."""
+    found: type[Writer] = needed("mcap.writer", "an MCAP file", "mcap").Writer
+    return found
 
 
 def mcap(recording: Recording) -> bytes:
@@ -101,76 +98,12 @@ class Channels:
 
 # -- schemas ----------------------------------------------------------------------------------------------------------
 
-
-def _object(**properties: Schema) -> Schema:
-    return {"type": "object", "properties": properties}
+TRUTH, NUMBER, TEXT = ({"type": name} for name in ("boolean", "number", "string"))
 
 
-def _array(items: Schema) -> Schema:
-    return {"type": "array", "items": items}
-
-
-TRUTH, NUMBER, INTEGER, TEXT = ({"type": name} for name in ("boolean", "number", "integer", "string"))
-TIME = _object(sec=INTEGER, nsec=INTEGER)
-VECTOR = _object(x=NUMBER, y=NUMBER, z=NUMBER)
-QUATERNION = _object(x=NUMBER, y=NUMBER, z=NUMBER, w=NUMBER)
-POSE = _object(position=VECTOR, orientation=QUATERNION)
-COLOUR = _object(r=NUMBER, g=NUMBER, b=NUMBER, a=NUMBER)
-SPHERE = _object(pose=POSE, size=VECTOR, color=COLOUR)
-CYLINDER = _object(pose=POSE, size=VECTOR, bottom_scale=NUMBER, top_scale=NUMBER, color=COLOUR)
-LINE = _object(
-    type=INTEGER,
-    pose=POSE,
-    thickness=NUMBER,
-    scale_invariant=TRUTH,
-    points=_array(VECTOR),
-    color=COLOUR,
-    colors=_array(COLOUR),
-    indices=_array(INTEGER),
-)
-LABEL = _object(pose=POSE, billboard=TRUTH, font_size=NUMBER, scale_invariant=TRUTH, color=COLOUR, text=TEXT)
-ENTITY = _object(
-    timestamp=TIME,
-    frame_id=TEXT,
-    id=TEXT,
-    lifetime=TIME,
-    frame_locked=TRUTH,
-    metadata=_array(_object(key=TEXT, value=TEXT)),
-    spheres=_array(SPHERE),
-    cylinders=_array(CYLINDER),
-    lines=_array(LINE),
-    texts=_array(LABEL),
-    # A run has none of these, but a viewer may expect them.
-    **{name: _array(_object(pose=POSE)) for name in ("arrows", "cubes", "triangles", "models")},
-)
-SCENE = _object(deletions=_array(_object(timestamp=TIME, type=INTEGER, id=TEXT)), entities=_array(ENTITY))
-FRAME = _object(timestamp=TIME, parent_frame_id=TEXT, child_frame_id=TEXT, translation=VECTOR, rotation=QUATERNION)
-LOG = _object(timestamp=TIME, level=INTEGER, message=TEXT, name=TEXT, file=TEXT, line=INTEGER)
-FIRING = _object(microstep=INTEGER, count=INTEGER)
-
-
-# -- signals ----------------------------------------------------------------------------------------------------------
-
-
-def _signal(signal: Signal, channels: Channels) -> Iterator[Message]:
-    schema: Schema | None = None
-    for _, token in signal:
-        schema = _common(schema, _schema(_flat(plain(token))))
-    whole = _object(microstep=INTEGER, value=_settled(schema))
-    number = channels.number(["signals", *parts(signal.name)], f"epicycle.{signal.name}", whole)
-    for tag, token in signal:
-        value = _fitted(finite(_flat(plain(token))), whole["properties"]["value"])
-        yield tag.time, number, {"microstep": tag.microstep, "value": value}
-
-
-def _flat(value: Any) -> Any:
-    """A value with nested arrays flattened into one, in order."""
-    if isinstance(value, dict):
-        return {key: _flat(each) for key, each in value.items()}
-    if isinstance(value, list):
-        inner = [_flat(each) for each in value]
-        return list(chain.from_iterable(each if isinstance(each, list) else [each] for each in inner))
-    return value
+def _fitting(messages: Iterable[Any]) -> Schema:
+    """The schema that all of these messages fit."""
+    return _settled(reduce(_common, map(_schema, messages), None))
 
 
 def _schema(value: Any) -> Schema | None:
@@ -180,10 +113,7 @@ def _schema(value: Any) -> Schema | None:
     if isinstance(value, dict):
         return {"type": "object", "properties": {key: _schema(each) for key, each in value.items()}}
     if isinstance(value, list):
-        items: Schema | None = None
-        for each in value:
-            items = _common(items, _schema(each))
-        return {"type": "array", "items": items}
+        return {"type": "array", "items": reduce(_common, map(_schema, value), None)}
     return TRUTH if isinstance(value, bool) else TEXT if isinstance(value, str) else NUMBER
 
 
@@ -205,10 +135,31 @@ def _settled(schema: Schema | None) -> Schema:
     if schema is None:
         return TEXT
     if schema["type"] == "array":
-        return _array(NUMBER if schema["items"] is None else _settled(schema["items"]))
+        return {"type": "array", "items": NUMBER if schema["items"] is None else _settled(schema["items"])}
     if schema["type"] == "object":
         return {"type": "object", "properties": {name: _settled(each) for name, each in schema["properties"].items()}}
     return schema
+
+
+# -- signals ----------------------------------------------------------------------------------------------------------
+
+
+def _signal(signal: Signal, channels: Channels) -> Iterator[Message]:
+    schema = _fitting({"microstep": 0, "value": each} for each in (None, *map(_flat, map(plain, signal.tokens))))
+    number = channels.number(["signals", *parts(signal.name)], f"epicycle.{signal.name}", schema)
+    for tag, token in signal:
+        value = _fitted(finite(_flat(plain(token))), schema["properties"]["value"])
+        yield tag.time, number, {"microstep": tag.microstep, "value": value}
+
+
+def _flat(value: Any) -> Any:
+    """A value with nested arrays flattened into one, in order."""
+    if isinstance(value, dict):
+        return {key: _flat(each) for key, each in value.items()}
+    if isinstance(value, list):
+        inner = [_flat(each) for each in value]
+        return list(chain.from_iterable(each if isinstance(each, list) else [each] for each in inner))
+    return value
 
 
 def _fitted(value: Any, schema: Schema) -> Any:
@@ -291,18 +242,18 @@ def _frames(thing: Thing, channels: Channels) -> Iterator[Message]:
     """A frame for each body, which a viewer can follow."""
     number = channels.number(["frames", *parts(thing.name)], "foxglove.FrameTransform", FRAME)
     for scene in thing.scenes:
-        for x, y in scene.points:
-            yield (
-                scene.time,
-                number,
-                {
-                    "timestamp": _time(scene.time),
-                    "parent_frame_id": WORLD,
-                    "child_frame_id": thing.label,
-                    "translation": _vector(x, y),
-                    "rotation": _turn(0.0),
-                },
-            )
+        for point in scene.points:
+            yield scene.time, number, _frame(thing, scene.time, point)
+
+
+def _frame(thing: Thing, time: int, point: Point) -> dict[str, Any]:
+    return {
+        "timestamp": _time(time),
+        "parent_frame_id": WORLD,
+        "child_frame_id": thing.label,
+        "translation": _vector(*point),
+        "rotation": _turn(0.0),
+    }
 
 
 def _vector(x: float, y: float, z: float = 0.0) -> dict[str, float]:
@@ -327,14 +278,30 @@ def _time(nanoseconds: int) -> dict[str, int]:
     return {"sec": seconds, "nsec": rest}
 
 
+def _every_scene() -> dict[str, Any]:
+    """A message with everything that one may have, and what a run never has, but a viewer expects."""
+    disc = Disc(0.0, 0.0, 1.0, 1.0, 0.0)
+    entity = _entity(EVERY, Scene(0, points=[(0.0, 0.0)], discs=[disc], paths=[[(0.0, 0.0)]]), 1.0)
+    entity |= {name: [{"pose": _pose((0.0, 0.0))}] for name in ("arrows", "cubes", "triangles", "models")}
+    entity["lines"][0] |= {"colors": [_paint(EVERY.colour)], "indices": [0]}
+    return {"deletions": [{"timestamp": _time(0), "type": 0, "id": ""}], "entities": [entity]}
+
+
+EVERY = Thing("", "", "label", (0, 0, 0), [])
+SCENE, FRAME = _fitting([_every_scene()]), _fitting([_frame(EVERY, 0, (0.0, 0.0))])
+
+
 # -- acts and firings -------------------------------------------------------------------------------------------------
 
 
 def _acts(found: Iterable[Act], channels: Channels) -> Iterator[Message]:
-    for tag, aspect, text in found:
-        number = channels.number(["aspects", aspect], "foxglove.Log", LOG)
-        message = {"timestamp": _time(tag.time), "level": INFO, "message": text, "name": aspect, "file": "", "line": 0}
-        yield tag.time, number, message
+    for act in found:
+        yield act.tag.time, channels.number(["aspects", act.aspect], "foxglove.Log", LOG), _log(act)
+
+
+def _log(act: Act) -> dict[str, Any]:
+    told = {"message": act.text, "name": act.aspect, "file": "", "line": 0}
+    return {"timestamp": _time(act.tag.time), "level": INFO, **told}
 
 
 def _firings(found: Iterable[tuple[Tag, str]], channels: Channels) -> Iterator[Message]:
@@ -343,3 +310,6 @@ def _firings(found: Iterable[tuple[Tag, str]], channels: Channels) -> Iterator[M
         counts[actor] = count = counts.get(actor, 0) + 1
         number = channels.number(["firings", *parts(actor)], "epicycle.Firing", FIRING)
         yield tag.time, number, {"microstep": tag.microstep, "count": count}
+
+
+LOG, FIRING = _fitting([_log(Act(Tag(0, 0), "", ""))]), _fitting([{"microstep": 0, "count": 0}])

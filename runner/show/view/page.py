@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import hashlib
-from base64 import b64encode
 from collections.abc import Iterable, Mapping, Sequence
-from html import escape
 from importlib.resources import files
 from pathlib import Path
 from typing import Any
@@ -19,7 +16,7 @@ from ...model.build.model import Model
 from ...model.catalogue.figure import Figure
 from ...model.graph.model_graph import ModelGraph
 from ...support.files import replace_file
-from ...support.html import Html, tag
+from ...support.html import Html, page, tag
 from ...support.shown import short
 from ..sheet import PALETTE
 from .differing import comparison, difference, four
@@ -41,7 +38,14 @@ def write_page(
 
 def page_of(recordings: Sequence[Recording], *, names: Sequence[str] = (), story: Sequence[str] = ()) -> str:
     """The page as text; ``names`` distinguish the runs, ``story`` are sentences about both."""
-    return _document(recordings[0].model.name, data_of(recordings, names=names, story=story))
+    data = Html(data_of(recordings, names=names, story=story))
+    return page(
+        f"{recordings[0].model.name} - Epicycle",
+        part("page.css"),
+        tag("div", tag("noscript", "This page shows a run of a simulation; it needs JavaScript."), id="page"),
+        tag("script", data, type="text/plain", id="data"),
+        script=script(part(f"{name}.js") for name in (*PARTS, "main")),
+    )
 
 
 def data_of(recordings: Sequence[Recording], *, names: Sequence[str] = (), story: Sequence[str] = ()) -> str:
@@ -66,30 +70,6 @@ def script(parts: Iterable[str]) -> str:
 def part(name: str) -> str:
     """A file of this folder's program or style."""
     return (files(__package__) / "browser" / name).read_text(encoding="utf-8")
-
-
-def _document(title: str, data: str) -> str:
-    style, program = part("page.css"), script(part(f"{name}.js") for name in (*PARTS, "main"))
-    allowed = f"default-src 'none'; script-src '{_hash(program)}'; style-src '{_hash(style)}'; base-uri 'none'"
-    head = tag(
-        "head",
-        tag("meta", charset="utf-8"),
-        Html(f'<meta http-equiv="Content-Security-Policy" content="{escape(allowed)}">'),
-        tag("meta", name="viewport", content="width=device-width, initial-scale=1"),
-        tag("title", f"{title} - Epicycle"),
-        tag("style", Html(style)),
-    )
-    body = tag(
-        "body",
-        tag("div", tag("noscript", "This page shows a run of a simulation; it needs JavaScript."), id="page"),
-        tag("script", Html(data), type="text/plain", id="data"),
-        tag("script", Html(program)),
-    )
-    return f"<!DOCTYPE html>\n{tag('html', head, body, lang='en')}\n"
-
-
-def _hash(text: str) -> str:
-    return f"sha256-{b64encode(hashlib.sha256(text.encode()).digest()).decode()}"
 
 
 # -- data of a run ----------------------------------------------------------------------------------------------------

@@ -9,9 +9,10 @@ missing.
 from __future__ import annotations
 
 from array import array
-from bisect import bisect_right
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any, NamedTuple
+
+import numpy as np
 
 from epicycle.actors import EpicycleError, Tag
 
@@ -49,6 +50,7 @@ COLUMNS = {
     "arrival": ("firing", "port", "channel", "record"),
     "wake": ("firing", "tag"),
 }
+REFERENCES = {"firing": "firing", "record": "record", "about": "record"}  # of columns, what their numbers refer to
 OUTSIDE = ("", "resumed", "released")
 
 
@@ -221,25 +223,19 @@ class Recording:
 
     def kept(self) -> Kept:
         """Everything that was kept: firings and records are renumbered, tags are in order."""
-        firings, records, texts = _Renumbered(), _Renumbered(), Names()
-        for stretch in self._stretches:
-            firings.add(stretch.firing, stretch.count("firing"))
-            records.add(stretch.record, stretch.count("record"))
-        tags = sorted({tag for stretch in self._stretches for tag in stretch.tags})
+        tags, texts = sorted({tag for stretch in self._stretches for tag in stretch.tags}), Names()
         place = {tag: number for number, tag in enumerate(tags)}
         columns = {name: array("i") for name in Stretch(0, 0).columns}
         for stretch in self._stretches:
             own_tags, own_texts = [place[tag] for tag in stretch.tags], [texts[text] for text in stretch.texts]
-            numbers: dict[str, Callable[[int], int]] = {
-                "tag": lambda tag, own=own_tags: tag if tag < 0 else own[tag],  # type: ignore[misc]
-                "text": own_texts.__getitem__,
-                "firing": firings.number,
-                "about": records.number,
-                "record": records.number,
-            }
             for name, column in stretch.columns.items():
-                number = numbers.get(name.partition("_")[2])
-                columns[name].extend(column if number is None else map(number, column))
+                if name.endswith("_tag"):
+                    columns[name].extend(tag if tag < 0 else own_tags[tag] for tag in column)
+                else:
+                    columns[name].extend(map(own_texts.__getitem__, column) if name == "record_text" else column)
+        for name, column in columns.items():
+            if (what := REFERENCES.get(name.partition("_")[2])) is not None:
+                columns[name] = array("i", self._among_kept(what, column))
         return Kept(columns, tags, list(texts))
 
     def place(self, number: int) -> str:
@@ -250,17 +246,20 @@ class Recording:
 
     def kept_record(self, number: int) -> int:
         """The number of a record among the kept ones; ``MISSING`` if it was left out or does not exist."""
-        records = _Renumbered()
-        for stretch in self._stretches:
-            records.add(stretch.record, stretch.count("record"))
-        return records.number(number)
+        return self._among_kept("record", [number])[0]
 
     def kept_firing(self, number: int) -> int:
         """The number of a firing among the kept ones, as ``kept_record``."""
-        firings = _Renumbered()
-        for stretch in self._stretches:
-            firings.add(stretch.firing, stretch.count("firing"))
-        return firings.number(number) if number < self.firings else MISSING
+        return self._among_kept("firing", [number])[0]
+
+    def _among_kept(self, what: str, numbers: Sequence[int]) -> list[int]:
+        starts = np.array([0, *(getattr(stretch, what) for stretch in self._stretches)])
+        counts = np.array([0, *(stretch.count(what) for stretch in self._stretches)])
+        old = np.array(numbers, dtype=int)
+        at = np.searchsorted(starts, old, side="right") - 1
+        new = np.cumsum(counts)[at] - counts[at] + old - starts[at]
+        found: list[int] = np.where(old < 0, old, np.where(old < starts[at] + counts[at], new, MISSING)).tolist()
+        return found
 
     def gaps(self) -> list[tuple[int, int]]:
         """The gaps between kept firings: the number of the first one after the gap, and how many are left out."""
@@ -271,28 +270,6 @@ class Recording:
             kept += stretch.count("firing")
             before = stretch.firing + stretch.count("firing")
         return [*found, (kept, self.firings - before)] if self.firings > before else found
-
-
-class _Renumbered:
-    """The remaining things of a sequence: their old and new numbers."""
-
-    def __init__(self) -> None:
-        self._starts: list[int] = []
-        self._counts: list[int] = []
-        self._before: list[int] = []  # how many are kept before each start
-
-    def add(self, start: int, count: int) -> None:
-        self._before.append(self._before[-1] + self._counts[-1] if self._before else 0)
-        self._starts.append(start)
-        self._counts.append(count)
-
-    def number(self, old: int) -> int:
-        """The new number for an old one; ``MISSING`` if it was left out, ``NOTHING`` for nothing."""
-        at = bisect_right(self._starts, old) - 1
-        if old < 0 or at < 0:
-            return old if old < 0 else MISSING
-        place = old - self._starts[at]
-        return self._before[at] + place if place < self._counts[at] else MISSING
 
 
 def _text(token: Any) -> str:

@@ -43,6 +43,11 @@ class Processes:
         self._folders: dict[Process, str] = {}  # of all of them
         self._is_over = False
 
+    def start(self, number: int) -> None:
+        """Start so many, which load while nothing is asked of them."""
+        for process in [self._taken() for _ in range(number)]:
+            self._give_back(process, is_good=True)
+
     def make(
         self, request: object, timeout: float | None = None, is_wanted: Callable[[], bool] = lambda: True
     ) -> Outcome:
