@@ -2,60 +2,45 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 from epicycle.actors import Tag, counted
 
-from ..execution.results import Results, plain
+from ..execution.results import Verdict, plain
+from ..model.build.model import Model
+from ..show.view.differing import affected, difference, first_firing
+from ..show.view.pages import Page
 from ..support.shown import short
 from ..support.tables import Table
 from .answer import Answer, listed
-
-if TYPE_CHECKING:
-    from ..show.view.pages import Page
 
 AS_IT_WAS, INSTEAD = "as it was", "what if"
 _FEW = 8  # actors in a sentence
 
 
-@dataclass(frozen=True)
-class First:
-    """The first firing that is another one, or that only one of the futures has; in words, what it does in each."""
-
-    actor: str
-    time: float  # s
-    microstep: int
-    does: tuple[str, ...]
-
-    @property
-    def tag(self) -> str:
-        return f"({self.time:.9g} s, {self.microstep})"
-
-
-@dataclass(repr=False)
 class WhatIf(Answer):
-    """A run as it was, and the run with changes from a tag on.
+    """A run as it was, and the run with changes from a tag on: ``before`` and ``after`` are their results.
 
     ``first`` is the first firing that changes; ``record`` the first difference of the logs, in words; ``affected`` are
-    the actors that do anything else, with the times (s) at which they begin to.
+    the actors that do anything else, with the times (s) at which they begin to; ``error`` has ended the other future.
     """
 
     NAME: ClassVar[str] = "what_if"
 
-    model: str
-    seed: int
-    at: Tag
-    changes: list[str]
-    before: Results
-    after: Results
-    first: First | None
-    record: list[str]
-    affected: dict[str, float]
-    actors: int
-    error: str = ""  # that ended the other future
-    _page: Page | None = field(default=None, compare=False)
+    def __init__(self, model: Model, at: Tag, changes: list[str], page: Page) -> None:
+        self.model, self.at, self.changes, self._page = model.name, at, changes, page
+        before, after = (each.results for each in page.recordings)
+        assert before is not None
+        assert after is not None
+        self.before, self.after = before, after
+        self.first = first_firing(page.recordings)
+        record = difference(page.recordings)
+        self.record: list[str] = [] if record is None else record["texts"]
+        self.affected = {actor: tag.seconds for actor, tag in affected(page.recordings).items()}
+        self.error = str(page.errors[0]) if page.errors else ""
+        self._actors = len(model.graph.actors)
 
     @property
     def is_same(self) -> bool:
@@ -79,7 +64,7 @@ class WhatIf(Answer):
         more = f" and {len(self.affected) - _FEW:,} more" if len(self.affected) > _FEW else ""
         whom = f": {', '.join(names)}{more}" if names else ""
         do = "does" if len(self.affected) == 1 else "do"
-        said.append(f"{len(self.affected):,} of {counted(self.actors, 'actor')} {do} something else{whom}.")
+        said.append(f"{len(self.affected):,} of {counted(self._actors, 'actor')} {do} something else{whom}.")
         for name, verdict in self.before.monitors.items():
             if (other := self.after.monitors[name]).holds != verdict.holds:
                 said.append(f"Monitor {name}: {_verdict(verdict)} as it was, {_verdict(other)} instead.")
@@ -88,14 +73,15 @@ class WhatIf(Answer):
         return said
 
     def _facts(self) -> dict[str, Any]:
-        both = {AS_IT_WAS: self.before, INSTEAD: self.after}
+        both, first = {AS_IT_WAS: self.before, INSTEAD: self.after}, self.first
         return {
             "model": self.model,
-            "seed": self.seed,
+            "seed": self.before.seed,
             "at": {"time": self.at.seconds, "microstep": self.at.microstep},
             "changes": self.changes,
             "same": self.is_same,
-            "first_firing": None if self.first is None else asdict(self.first),
+            "first_firing": first
+            and {"actor": first.actor, "time": first.time, "microstep": first.at.microstep, "does": first.does},
             "first_difference": dict(zip(both, self.record, strict=False)),
             "affected": self.affected,
             "digests": {name: each.digest for name, each in both.items()},
@@ -109,7 +95,6 @@ class WhatIf(Answer):
 
     def page(self) -> Page:
         """A page with both futures; the first firing that changes is marked."""
-        assert self._page is not None
         self._page.story = self._sentences()
         return self._page
 
@@ -119,12 +104,11 @@ class WhatIf(Answer):
         return [facts, *([self.page().save(facts.with_suffix(".html"))] if page else [])]
 
     def _tables(self) -> list[Table]:
-        metrics = []
-        for name, outcome in self.before.outcomes.items():
-            unit = self.before.units.get(name, "1")
-            instead = self.after.outcomes[name]
-            row = (name, outcome.shown(short), instead.shown(short), "" if unit == "1" else unit)
-            metrics.append(row)
+        units = {name: "" if unit == "1" else unit for name, unit in self.before.units.items()}
+        metrics = [
+            (name, each.shown(short), self.after.outcomes[name].shown(short), units.get(name, ""))
+            for name, each in self.before.outcomes.items()
+        ]
         verdicts = [
             (name, _verdict(each), _verdict(self.after.monitors[name])) for name, each in self.before.monitors.items()
         ]
@@ -138,7 +122,7 @@ class WhatIf(Answer):
         ]
 
 
-def _verdict(verdict: Any) -> str:
+def _verdict(verdict: Verdict) -> str:
     if verdict.holds is None:
         return "cannot be judged"
     if verdict.holds:

@@ -6,7 +6,7 @@ import copy
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 from epicycle.actors import EpicycleError, ParameterError, Tag, declared_parameters, did_you_mean, to_nanoseconds
 from epicycle.aspects import ClockAspect, ExecutionAspect, JoinPoint, PortAspect
@@ -20,13 +20,11 @@ from ..model.language.settings import settings_of
 from ..model.text.document import plain
 from ..model.text.patterns import PatternError, select
 from ..model.text.problems import Problems
+from ..show.view.pages import Watch, recorded
 from ..study.run_spec import opened, seconds, spec_of
 from ..support.shown import short
-from .future import AS_IT_WAS, INSTEAD, First, WhatIf
+from .future import AS_IT_WAS, INSTEAD, WhatIf
 from .monitored import aspect_named
-
-if TYPE_CHECKING:
-    from ..show.view.pages import Watch
 
 _FAILED = "failed"  # what ended a run in an error
 _LET_THROUGH = re.compile(r"(?P<aspect>[^@#]+)(?:@(?P<place>[^#]+))?(?:#(?P<number>[1-9]\d{0,8}))?")
@@ -61,9 +59,6 @@ def what_if(
 
     ``watch`` gives what is called with the time of each run now and then, in place of a bar.
     """
-    from ..show.view.differing import affected, difference, fired, first_firing
-    from ..show.view.pages import recorded
-
     fork = forked(model, at, changes, seed=seed, until=until, watch=watch)
     page = recorded(
         [model, fork.model],
@@ -76,34 +71,15 @@ def what_if(
     )
     if any(isinstance(each, KeyboardInterrupt) for each in page.errors):
         raise KeyboardInterrupt
-    recordings = page.recordings
-    before, after = (each.results for each in recordings)
-    assert before is not None
-    assert after is not None
-    if before.stopped == _FAILED:
+    found = WhatIf(model, at, fork.words, page)
+    if found.before.stopped == _FAILED:
         raise page.errors[0]
-    first, record = None, difference(recordings)
-    if (firing := first_firing(recordings)) is not None:
-        first = First(firing.actor, firing.tag.seconds, firing.tag.microstep, tuple(fired(recordings, firing)))
-        if firing.tag < at:
-            raise EpicycleError(
-                f"two runs of {model.name} differ at {firing.tag}, before {at}: "
-                "something depends on more than model and seed"
-            )
-    return WhatIf(
-        model.name,
-        before.seed,
-        at,
-        fork.words,
-        before,
-        after,
-        first,
-        [] if record is None else record["texts"],
-        {actor: tag.seconds for actor, tag in affected(recordings).items()},
-        len(model.graph.actors),
-        str(page.errors[0]) if page.errors else "",
-        page,
-    )
+    if found.first is not None and found.first.at < at:
+        raise EpicycleError(
+            f"two runs of {model.name} differ at {found.first.at}, before {at}: "
+            "something depends on more than model and seed"
+        )
+    return found
 
 
 class Fork(NamedTuple):
@@ -126,7 +102,7 @@ def forked(
     """The model with changes from a tag on; raises ``EpicycleError``."""
     other, words, always = copy.copy(model), list[str](), set[str]()
 
-    def weave(aspect: _Then, places: Mapping[str, Any]) -> None:
+    def weave(aspect: _Changed | _Lost, places: Mapping[str, Any]) -> None:
         name = f"what_if_{len(always) + 1}"
         while any(woven.name == name for woven in other.aspects):
             name += "_"
@@ -287,39 +263,26 @@ def _next_acts(
     return found
 
 
-class _Then(PortAspect):
-    """An aspect that acts from a tag on."""
+class _Changed(PortAspect):
+    """Gives a parameter another value from a tag on."""
 
     in_model_time: ClassVar[bool] = True
-    events: ClassVar[tuple[str, ...]] = ()
+    at_tag: Tag
+    value: Any
+
+    def pass_token(self, token: Any, point: JoinPoint) -> None:
+        point.forward(self.value if point.tag >= self.at_tag else token)
+
+
+class _Lost(PortAspect):
+    """Loses the first token from a tag on, at one of its places."""
+
+    in_model_time: ClassVar[bool] = True
+    events: ClassVar[tuple[str, ...]] = ("dropped",)
     at_tag: Tag
 
     def pass_token(self, token: Any, point: JoinPoint) -> None:
-        if point.tag >= self.at_tag:
-            self.act(token, point)
-        else:
-            point.forward(token)
-
-    def act(self, token: Any, point: JoinPoint) -> None:
-        raise NotImplementedError
-
-
-class _Changed(_Then):
-    """Gives a parameter another value."""
-
-    value: Any
-
-    def act(self, token: Any, point: JoinPoint) -> None:
-        point.forward(self.value)
-
-
-class _Lost(_Then):
-    """Loses one token, at one of its places."""
-
-    events: ClassVar[tuple[str, ...]] = ("dropped",)
-
-    def act(self, token: Any, point: JoinPoint) -> None:
-        if "is over" in point.shared:
+        if point.tag < self.at_tag or "is over" in point.shared:
             point.forward(token)
         else:
             point.shared["is over"] = True
