@@ -10,8 +10,9 @@ import asyncio
 import hmac
 import json
 import secrets
-from collections.abc import Awaitable, Callable, MutableMapping, Sequence
-from contextlib import suppress
+from collections.abc import AsyncIterator, Awaitable, Callable, MutableMapping, Sequence
+from contextlib import asynccontextmanager, suppress
+from functools import partial
 from html import escape
 from importlib.resources import files
 from pathlib import Path
@@ -30,14 +31,14 @@ from ...model.text.document import MAX_BYTES
 from ...show.view.page import PARTS, part, script
 from ...show.view.recording import ViewError
 from ...support.files import replace_file
-from .workers import Workers
+from .worker import Worker
+from .workers import Message, Workers
 
 OWN = ("socket", "text", "wiring", "fields", "running", "what_if", "arrange")  # in this order
 LONGEST = 2 * MAX_BYTES + 100_000  # bytes of a message, in which a character may take several
 READING, GRACE = 30.0, 10.0  # s that reading a text may take, and that a run may take beyond its limit
 OF_READING = frozenset({"read", "types", "fields", "edit", *ANSWERS})
 
-Message = dict[str, Any]
 Scope = MutableMapping[str, Any]
 App = Callable[[Scope, Callable[..., Awaitable[Any]], Callable[..., Awaitable[None]]], Awaitable[None]]
 
@@ -76,10 +77,10 @@ class Studio:
 
     def __init__(self, document: Document, seconds: float, events: int, types: Sequence[Path]) -> None:
         self.document = document
-        given = [str(document.path), str(seconds), str(events), *map(str, types)]
-        self.workers = dict.fromkeys(OF_READING, Workers("reading of the text", given, READING)) | {
-            "run": Workers("run", given, seconds + GRACE, stops=True),
-            "what_if": Workers("what if", given, 3 * seconds + GRACE, stops=True),
+        make = partial(Worker.limited, document.path, seconds, events, [*map(str, types)])
+        self.workers = dict.fromkeys(OF_READING, Workers("reading of the text", READING, make)) | {
+            "run": Workers("run", seconds + GRACE, make, stops=True),
+            "what_if": Workers("what if", 3 * seconds + GRACE, make, stops=True),
         }
         self.token = secrets.token_urlsafe(32)
         self.nonce = secrets.token_urlsafe(16)
@@ -97,7 +98,7 @@ class Studio:
             Route("/{token}/{name}", self.file),
             WebSocketRoute("/{token}/socket", self.socket),
         ]
-        app = Starlette(routes=routes)
+        app = Starlette(routes=routes, lifespan=self.working)
 
         async def guarded(scope: Scope, receive: Any, send: Any) -> None:
             """Answers requests that come from its own page or from the address line only."""
@@ -208,9 +209,12 @@ class Studio:
         except (EpicycleError, OSError, UnicodeEncodeError) as error:
             return {"error": str(error)}
 
-    def close(self) -> None:
+    @asynccontextmanager
+    async def working(self, app: Starlette) -> AsyncIterator[None]:
+        """While it serves, there are workers."""
+        yield
         for each in self.workers.values():
-            each.stop()
+            each.close()
 
 
 def _response(text: str, kind: str, more: dict[str, str] | None = None) -> Response:
@@ -256,11 +260,7 @@ def serve(studio: Studio, port: int, opened: Callable[[str], None]) -> None:
         limit_concurrency=32,
         server_header=False,
         timeout_graceful_shutdown=1,
-        lifespan="off",
+        lifespan="on",
     )
-    server = uvicorn.Server(config)
     opened(address)
-    try:
-        server.run(sockets=[listening])
-    finally:
-        studio.close()
+    uvicorn.Server(config).run(sockets=[listening])

@@ -3,95 +3,78 @@
 from __future__ import annotations
 
 import asyncio
-import itertools
-import json
-import sys
-from collections.abc import Awaitable, Callable, Sequence
-from contextlib import suppress
+from collections.abc import Awaitable, Callable
+from functools import partial
 from typing import Any
+
+from epicycle.actors import EpicycleError
+
+from ...support.apart import DEAD, DONE, LATE, Outcome, Process
 
 Message = dict[str, Any]
 Tell = Callable[[Message], Awaitable[None]]
-LONGEST = 64 << 20  # bytes of an answer
 START = 60.0  # s that a process may take until it listens
 
 
 class Workers:
-    """One process at a time; of the questions that wait, only the latest of each kind is asked.
+    """One process at a time, in which ``make`` makes what answers; of the questions that wait, only the latest of each
+    kind is asked.
 
     With ``stops``, a question ends the one that is being answered.
     """
 
-    def __init__(self, name: str, arguments: Sequence[str], patience: float, *, stops: bool = False) -> None:
+    def __init__(self, name: str, patience: float, make: Callable[[], Any], *, stops: bool = False) -> None:
         self.name = name
-        self.arguments = [*arguments]
         self.patience = patience  # s
         self.stops = stops
-        self._numbers = itertools.count()
-        self._process: asyncio.subprocess.Process | None = None
+        self._make = partial(Process, make)
+        self._process: Process | None = None
         self._turn = asyncio.Lock()
-        self._latest: dict[str, int] = {}
+        self._latest: dict[str, Message] = {}
 
     async def ask(self, question: Message, tell: Tell) -> Message:
         """The answer; what comes before it goes to ``tell``.  A process that fails gives an answer that says so."""
-        number = next(self._numbers)
-        kind = str(question["ask"])
-        self._latest[kind] = number
+        self._latest[str(question["ask"])] = question
         if self.stops and self._process is not None:
-            await self._send({"ask": "stop"})  # a run looks whether anything waits
+            self._process.hasten()
+        # The turn ends with the answer, even if nobody waits for it any longer.
+        return await asyncio.shield(asyncio.create_task(self._in_turn(question, tell)))
+
+    async def _in_turn(self, question: Message, tell: Tell) -> Message:
+        loop = asyncio.get_running_loop()
         async with self._turn:
-            if self._latest[kind] != number:
+            if self._latest.get(str(question["ask"])) is not question:
                 return {"stale": True}
-            try:
-                await asyncio.wait_for(self._start(), START)
-                return await asyncio.wait_for(self._answer(number, question, tell), self.patience)
-            except TimeoutError:
-                self.stop()
-                return {"error": f"the {self.name} took longer than {self.patience:g} s, and was ended"}
-            except (OSError, ValueError, EOFError):
-                self.stop()
-                return {"error": f"the {self.name} has died; it starts again with the next change"}
+            what, found = await asyncio.to_thread(
+                self._outcome, question, lambda said: asyncio.run_coroutine_threadsafe(tell(said), loop)
+            )
+        if what == DONE:
+            answer: Message = found
+            return answer
+        self.stop()
+        if what == LATE:
+            return {"error": f"the {self.name} took longer than {self.patience:g} s, and was ended"}
+        return {"error": f"the {self.name} has died; it starts again with the next change"}
 
-    async def _answer(self, number: int, question: Message, tell: Tell) -> Message:
-        await self._send({**question, "id": number})
-        assert self._process is not None
-        assert self._process.stdout is not None
-        while line := await self._process.stdout.readline():
-            said: Message = json.loads(line)
-            if said.pop("id") != number:
-                continue  # of a question that nobody waits for
-            if said.pop("done", False):
-                return said
-            await tell(said)
-        raise EOFError
+    def _outcome(self, question: Message, told: Callable[[Message], object]) -> Outcome:
+        """What comes of a question to the process, which is started unless it runs."""
+        if self._process is None or self._process.is_over:
+            self._process = self._make()
+        try:
+            outcome = self._process.begin(START)
+            if outcome[0] == DONE:
+                outcome = self._process.call("answer", question, limit=self.patience, told=told)
+        except EpicycleError:
+            return DEAD, None
+        return outcome
 
-    async def _start(self) -> None:
-        """Start the process, unless it runs; the time that it takes until it listens is not that of a question."""
-        if self._process is not None and self._process.returncode is None:
-            return
-        self._process = await asyncio.create_subprocess_exec(
-            sys.executable,
-            "-m",
-            "epicycle.runner.interface.studio.worker",
-            *self.arguments,
-            stdin=asyncio.subprocess.PIPE,
-            stdout=asyncio.subprocess.PIPE,
-            limit=LONGEST,
-        )
-        assert self._process.stdout is not None
-        if not await self._process.stdout.readline():
-            raise EOFError
-
-    async def _send(self, question: Message) -> None:
-        assert self._process is not None
-        assert self._process.stdin is not None
-        with suppress(ConnectionError):
-            self._process.stdin.write(json.dumps(question).encode() + b"\n")
-            await self._process.stdin.drain()
+    def close(self) -> None:
+        """End the process; nothing is asked any more."""
+        self._latest.clear()
+        self.stop()
 
     def stop(self) -> None:
         """End the process; the next question starts another one."""
-        if self._process is not None and self._process.returncode is None:
-            with suppress(ProcessLookupError):
-                self._process.kill()
+        if self._process is not None:
+            self._process.end()
         self._process = None
