@@ -18,7 +18,7 @@ from yaml.events import AliasEvent, CollectionEndEvent, CollectionStartEvent, Ma
 from epicycle.actors import EpicycleError
 
 from ..model.language.models import COMPOSITE, MODEL
-from ..model.text.document import Scalar, parse, plain
+from ..model.text.document import LOADER, Scalar, parse, plain
 from ..model.text.document import Sequence as ListNode
 from ..model.text.problems import Problems
 from ..model.text.scalars import resolve
@@ -26,7 +26,6 @@ from ..model.text.scalars import resolve
 Keys = tuple[str | int, ...]
 SECTIONS = ("actors", "connections", "aspects")  # that go with their last entry
 _ORDER = tuple(dict.fromkeys((*("model", "doc", "extends", "include", "composites"), *MODEL.keys, *COMPOSITE.keys)))
-_LOADER: type[yaml.CSafeLoader] | type[yaml.SafeLoader] = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 _PLAIN = re.compile(r"[A-Za-z0-9_.+*/^%°$(<>=-][A-Za-z0-9_.+*/^%°$()<>= -]*\Z")
 _PLAIN_ITEM = re.compile(
     r"[A-Za-z_][\w.\[\]*, ]* [=-]> [\w.\[\]*, ]*\w\Z", re.ASCII
@@ -90,7 +89,7 @@ def parts_of(text: str) -> Part | None:
     """The outermost part of a text that can be read; None if it is empty."""
     mark = text.startswith("\ufeff")
     stack, root = list[Part](), None
-    for event in yaml.parse(text[mark:], Loader=_LOADER):
+    for event in yaml.parse(text[mark:], Loader=LOADER):
         start, end = (at.index + mark if at else 0 for at in (event.start_mark, event.end_mark))
         if isinstance(event, CollectionEndEvent):
             made = stack.pop()

@@ -8,47 +8,39 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import yaml
 
-from ..model.text.document import LINE_BREAK, Mapping, Node, Scalar, Sequence, parse
+from ..model.text.document import LINE_BREAK, LOADER, Mapping, Node, Scalar, Sequence, parse
 from ..model.text.problems import Problems
 
 Keys = tuple[str | int, ...]
 MARK = "epicycle_mark_here"
-_LOADER: type[yaml.CSafeLoader] | type[yaml.SafeLoader] = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 _CLOSING = {"{": "}", "[": "]"}
 _QUOTED = re.compile(r"'(?:[^']|'')*'|\"(?:[^\"\\]|\\.)*\"|(?<![^\s])#.*")
 
 
-class Stands(NamedTuple):
-    """A key or value in a text, and the nodes around it, outermost first.
+class Place(NamedTuple):
+    """A place in a text: a key or value, and the nodes around it, outermost first.
 
-    ``keys`` lead to the value, or to the mapping of the key.
+    ``keys`` lead to the value, or to the mapping of the key (``is_key``).
     """
 
     keys: Keys
     is_key: bool
     node: Scalar
     around: tuple[Node, ...]
+    text: str = ""  # as it was parsed, if there is a mark
 
+    @property
+    def before(self) -> str:
+        """What the key or value has before the mark."""
+        return self.node.text.partition(MARK)[0]
 
-@dataclass(frozen=True)
-class Place:
-    """A place in a text.
-
-    ``keys`` lead to the value, or to the mapping of the key that is written there (``is_key``); ``before`` is what the
-    value or key has before the place, ``whole`` all of it.  ``around`` are the nodes along the keys, outermost first.
-    """
-
-    keys: Keys
-    is_key: bool
-    before: str
-    whole: str
-    around: tuple[Node, ...]
-    text: str  # as it was parsed, with the mark
+    @property
+    def whole(self) -> str:
+        return self.node.text.replace(MARK, "", 1)
 
 
 def lines_of(text: str) -> list[str]:
@@ -75,7 +67,7 @@ def place_at(text: str, line: int, column: int) -> Place | None:
 def _is_yaml(text: str) -> bool:
     """Whether a text can be parsed; it takes longer to say why not."""
     try:
-        for _ in yaml.parse(text, Loader=_LOADER):
+        for _ in yaml.parse(text, Loader=LOADER):
             pass
     except (yaml.YAMLError, ValueError):
         return False
@@ -123,16 +115,16 @@ def _closing(text: str) -> str:
     return quote + "".join(reversed(open_ones))
 
 
-def walk(node: Node, keys: Keys = (), around: tuple[Node, ...] = ()) -> Iterator[Stands]:
+def walk(node: Node, keys: Keys = (), around: tuple[Node, ...] = ()) -> Iterator[Place]:
     """All that stands in a node."""
     if isinstance(node, Scalar):
-        yield Stands(keys, False, node, around)
+        yield Place(keys, False, node, around)
     elif isinstance(node, Sequence):
         for number, item in enumerate(node.items):
             yield from walk(item, (*keys, number), (*around, node))
     else:
         for key, entry in node.entries.items():
-            yield Stands(keys, True, entry.key, (*around, node))
+            yield Place(keys, True, entry.key, (*around, node))
             yield from walk(entry.value, (*keys, key), (*around, node))
 
 
@@ -153,10 +145,7 @@ def text_of(node: Node | None, key: str) -> str:
 
 
 def _marked(root: Node, text: str) -> Place | None:
-    for keys, is_key, node, around in walk(root):
-        if MARK in node.text:
-            before, _, after = node.text.partition(MARK)
-            if not around:  # all of the text: it may become the first key
-                is_key, around = True, (Mapping({}, node.position),)
-            return Place(keys, is_key, before, before + after, around, text)
-    return None
+    place = next((each for each in walk(root) if MARK in each.node.text), None)
+    if place is not None and not place.around:  # all of the text: it may become the first key
+        place = place._replace(is_key=True, around=(Mapping({}, root.position),))
+    return place and place._replace(text=text)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from collections.abc import Awaitable, Callable
+from collections.abc import Callable, Coroutine
 from functools import partial
 from typing import Any
 
@@ -12,7 +12,7 @@ from epicycle.actors import EpicycleError
 from ...support.apart import DEAD, DONE, LATE, Outcome, Process
 
 Message = dict[str, Any]
-Tell = Callable[[Message], Awaitable[None]]
+Tell = Callable[[Message], Coroutine[Any, Any, None]]
 START = 60.0  # s that a process may take until it listens
 
 
