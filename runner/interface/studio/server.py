@@ -10,12 +10,13 @@ import asyncio
 import hmac
 import json
 import secrets
-from collections.abc import AsyncIterator, Awaitable, Callable, MutableMapping, Sequence
+from collections.abc import AsyncIterator, Awaitable, Callable, Mapping, MutableMapping, Sequence
 from contextlib import asynccontextmanager, suppress
 from functools import partial
 from html import escape
 from importlib.resources import files
 from pathlib import Path
+from string import Template
 from typing import Any
 
 from starlette.applications import Starlette
@@ -26,7 +27,6 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from epicycle.actors import EpicycleError, read_regular
 
-from ...desk.answers import ANSWERS
 from ...model.text.document import MAX_BYTES
 from ...show.view.page import PARTS, part, script
 from ...show.view.recording import ViewError
@@ -37,7 +37,13 @@ from .workers import Message, Workers
 OWN = ("socket", "text", "wiring", "fields", "running", "what_if", "arrange")  # in this order
 LONGEST = 2 * MAX_BYTES + 100_000  # bytes of a message, in which a character may take several
 READING, GRACE = 30.0, 10.0  # s that reading a text may take, and that a run may take beyond its limit
-OF_READING = frozenset({"read", "types", "fields", "edit", *ANSWERS})
+HEADERS = {
+    "Cache-Control": "no-store",
+    "Cross-Origin-Opener-Policy": "same-origin",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Referrer-Policy": "no-referrer",
+    "X-Content-Type-Options": "nosniff",
+}
 
 Scope = MutableMapping[str, Any]
 App = Callable[[Scope, Callable[..., Awaitable[Any]], Callable[..., Awaitable[None]]], Awaitable[None]]
@@ -48,9 +54,7 @@ class Document:
 
     def __init__(self, path: Path) -> None:
         self.path = path.resolve()
-        self.data = b""
-        if self.path.exists():
-            self.data = read_regular(self.path)
+        self.data = self._on_disk()
         if len(self.data) > MAX_BYTES:
             raise EpicycleError(f"{path} is larger than {MAX_BYTES // 1_000_000} MB")
         try:
@@ -63,13 +67,15 @@ class Document:
 
     def save(self, text: str, *, anyway: bool) -> Message:
         """Write the text, unless somebody else has written the file."""
-        on_disk = read_regular(self.path) if self.path.exists() else b""
-        if on_disk != self.data and not anyway:
+        if self._on_disk() != self.data and not anyway:
             return {"conflict": f"{self.path.name} was changed by another program since it was read"}
         data = (text.replace("\n", "\r\n") if self.has_crlf else text).encode("utf-8")
         replace_file(self.path, data, ViewError)
         self.data = data
         return {"saved": True}
+
+    def _on_disk(self) -> bytes:
+        return read_regular(self.path) if self.path.exists() else b""
 
 
 class Studio:
@@ -78,7 +84,8 @@ class Studio:
     def __init__(self, document: Document, seconds: float, events: int, types: Sequence[Path]) -> None:
         self.document = document
         make = partial(Worker.limited, document.path, seconds, events, [*map(str, types)])
-        self.workers = dict.fromkeys(OF_READING, Workers("reading of the text", READING, make)) | {
+        self.reading = Workers("reading of the text", READING, make)
+        self.running = {
             "run": Workers("run", seconds + GRACE, make, stops=True),
             "what_if": Workers("what if", 3 * seconds + GRACE, make, stops=True),
         }
@@ -132,28 +139,18 @@ class Studio:
             f"default-src 'none'; script-src 'self'; style-src 'self' 'nonce-{self.nonce}'; img-src data:; "
             f"connect-src ws://{host}; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
         )
-        name = escape(self.document.path.name)
-        html = (
-            '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
-            '<meta name="viewport" content="width=device-width, initial-scale=1">'
-            f'<title>{name} - Epicycle studio</title><link rel="stylesheet" href="studio.css">'
-            '<script src="codemirror.js" defer></script><script src="studio.js" defer></script></head>'
-            f'<body><div id="page" data-nonce="{self.nonce}"><noscript>The studio needs JavaScript.</noscript></div>'
-            "</body></html>\n"
-        )
+        html = Template(_own("studio.html")).substitute(name=escape(self.document.path.name), nonce=self.nonce)
         return _response(html, "text/html", {"Content-Security-Policy": policy, "X-Frame-Options": "DENY"})
 
     async def file(self, request: Request) -> Response:
-        name = request.path_params["name"]
-        own = files(__package__) / "browser"
-        if name == "codemirror.js":
-            return _response((own / name).read_text(encoding="utf-8"), "text/javascript")
-        if name == "studio.js":
-            parts = [part(f"{each}.js") for each in PARTS]
-            parts += [(own / f"{each}.js").read_text(encoding="utf-8") for each in OWN]
-            return _response(script(parts), "text/javascript")
-        if name == "studio.css":
-            return _response(part("page.css") + (own / "studio.css").read_text(encoding="utf-8"), "text/css")
+        match request.path_params["name"]:
+            case "codemirror.js" as name:
+                return _response(_own(name), "text/javascript")
+            case "studio.js":
+                parts = [*(part(f"{each}.js") for each in PARTS), *(_own(f"{each}.js") for each in OWN)]
+                return _response(script(parts), "text/javascript")
+            case "studio.css" as name:
+                return _response(part("page.css") + _own(name), "text/css")
         return PlainTextResponse("Not found", 404)
 
     # -- the socket -----------------------------------------------------------------------------------------------
@@ -194,10 +191,8 @@ class Studio:
 
         if ask == "save":
             found = self.save(message)
-        elif ask in self.workers:
-            found = await self.workers[ask].ask(message, tell)
         else:
-            found = {"error": "there is no such question"}
+            found = await self.running.get(ask, self.reading).ask({**message, "ask": ask}, tell)
         await tell({**found, "done": True})
 
     def save(self, message: Message) -> Message:
@@ -213,19 +208,17 @@ class Studio:
     async def working(self, app: Starlette) -> AsyncIterator[None]:
         """While it serves, there are workers."""
         yield
-        for each in self.workers.values():
+        for each in (self.reading, *self.running.values()):
             each.close()
 
 
-def _response(text: str, kind: str, more: dict[str, str] | None = None) -> Response:
-    headers = {
-        "Cache-Control": "no-store",
-        "Cross-Origin-Opener-Policy": "same-origin",
-        "Cross-Origin-Resource-Policy": "same-origin",
-        "Referrer-Policy": "no-referrer",
-        "X-Content-Type-Options": "nosniff",
-    }
-    return Response(text, media_type=kind, headers=headers | (more or {}))
+def _own(name: str) -> str:
+    """A file of the page's program or style."""
+    return (files(__package__) / "browser" / name).read_text(encoding="utf-8")
+
+
+def _response(text: str, kind: str, more: Mapping[str, str] | None = None) -> Response:
+    return Response(text, media_type=kind, headers={**HEADERS, **(more or {})})
 
 
 async def _send(browser: WebSocket, said: Message) -> None:
