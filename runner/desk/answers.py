@@ -125,13 +125,13 @@ class Answers:
 
     def complete(self, known: Knowledge, params: lsp.CompletionParams) -> list[lsp.CompletionItem]:
         line, column = self.place(known, params)
-        text, at, found, session = known.text, self._at(known.text), [], self.session
-        before = session.readings.get(known.path)
+        at, found, session = self._at(known.text), [], self.session
+        before = session.known[known.path].reading if known.path in session.known else None
         for each in completion.complete(known.path, line, column, session.texts, session.types, before):
             start = at.offset(line, max(column - each.replaces, 0))
             item = lsp.CompletionItem(each.text.strip().removesuffix(":"), kind=_LOOKS[each.kind][0])
             item.detail, item.documentation, item.filter_text = each.what or None, each.doc or None, each.text
-            item.text_edit = lsp.TextEdit(self._range(text, start, at.offset(line, column)), each.text)
+            item.text_edit = lsp.TextEdit(self._range(known.text, start, at.offset(line, column)), each.text)
             found.append(item)
         return found
 

@@ -34,42 +34,28 @@ class Server(LanguageServer):
         super().__init__("epicycle", version, text_document_sync_kind=lsp.TextDocumentSyncKind.Full)
         self.session = Session(types)
         self.ours: set[Path] = set()  # those that have looked like a file of Epicycle since they were opened
-        self.versions: dict[Path, int] = {}
-        self.waiting: dict[Path, asyncio.Task[None]] = {}
+        self.versions: dict[Path, int | None] = {}
+        self.waiting: dict[Path, asyncio.TimerHandle] = {}
 
     def answers(self) -> Answers:
         encoding = self.workspace.position_encoding
         return Answers(self.session, str(getattr(encoding, "value", encoding)))
 
-    def take(self, uri: str, text: str, version: int) -> None:
-        """A text was opened or has changed."""
+    def change(self, uri: str, text: str | None, version: int | None = None) -> None:
+        """A text was opened, has changed or was closed (None): its problems are told when nobody types for a moment."""
         if (path := path_of(uri)) is None:
             return
         self.versions[path] = version
-        if _OURS.search(text):
+        if text is None:
+            self.ours.discard(path)
+        elif _OURS.search(text):
             self.ours.add(path)
-        for each in self.session.change(path, text):
-            self.plan(each)
+        for each in {path, *self.session.change(path, text)}:
+            if each in self.waiting:
+                self.waiting[each].cancel()
+            self.waiting[each] = asyncio.get_running_loop().call_later(_PAUSE, self._tell, each)
 
-    def close(self, uri: str) -> None:
-        if (path := path_of(uri)) is None:
-            return
-        self.ours.discard(path)
-        if (task := self.waiting.pop(path, None)) is not None:
-            task.cancel()
-        for each in self.session.change(path, None):
-            self.plan(each)
-        self.text_document_publish_diagnostics(lsp.PublishDiagnosticsParams(uri, []))
-
-    def plan(self, path: Path) -> None:
-        """Report the problems of a text when nobody has typed for a moment."""
-        if (task := self.waiting.pop(path, None)) is not None:
-            task.cancel()
-        self.waiting[path] = asyncio.get_running_loop().create_task(self._later(path))
-
-    async def _later(self, path: Path) -> None:
-        await asyncio.sleep(_PAUSE)
-        self.waiting.pop(path, None)
+    def _tell(self, path: Path) -> None:
         found = list[lsp.Diagnostic]()
         if path in self.ours and path in self.session.texts:
             found = [each for each, _ in self.answers().problems(self.session.knowledge(path))]
@@ -92,16 +78,16 @@ def make_server(version: str, types: tuple[type, ...] = ()) -> Server:
         document = params.text_document
         if document.language_id == "epicycle" and (path := path_of(document.uri)) is not None:
             server.ours.add(path)
-        server.take(document.uri, document.text, document.version)
+        server.change(document.uri, document.text, document.version)
 
     @server.feature(lsp.TEXT_DOCUMENT_DID_CHANGE)
     def changed(params: lsp.DidChangeTextDocumentParams) -> None:
         uri = params.text_document.uri
-        server.take(uri, server.workspace.get_text_document(uri).source, params.text_document.version)
+        server.change(uri, server.workspace.get_text_document(uri).source, params.text_document.version)
 
     @server.feature(lsp.TEXT_DOCUMENT_DID_CLOSE)
     def closed(params: lsp.DidCloseTextDocumentParams) -> None:
-        server.close(params.text_document.uri)
+        server.change(params.text_document.uri, None)
 
     def offer(method: str) -> None:
         @server.feature(method, _OPTIONS.get(method))

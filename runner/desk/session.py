@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from .knowledge import Knowledge
-from .reading import Reading, read
+from .reading import read
 
 
 class Session:
@@ -14,30 +14,30 @@ class Session:
     def __init__(self, types: tuple[type, ...] = ()) -> None:
         self.types = types
         self.texts: dict[Path, str] = {}
-        self._known: dict[Path, Knowledge] = {}
-        self.readings: dict[Path, Reading] = {}  # the latest ones, perhaps of texts that have changed since
+        self.known: dict[Path, Knowledge] = {}  # perhaps of texts that have changed since
+        self._current = set[Path]()
 
     def change(self, path: Path, text: str | None) -> list[Path]:
         """Open a text, change it, or close it (None); the open files to which that makes a difference."""
         path = path.resolve()
         if text is None:
             self.texts.pop(path, None)
-            self.readings.pop(path, None)
+            self.known.pop(path, None)
+            self._current.discard(path)
         else:
             self.texts[path] = text
-        stale = [each for each, known in self._known.items() if path in _files(known)]
-        for each in {path, *stale}:
-            self._known.pop(each, None)
-        return [each for each in dict.fromkeys((path, *stale)) if each in self.texts]
+        stale = {path, *(each for each in self._current if path in _files(self.known[each]))}
+        self._current -= stale
+        return [each for each in stale if each in self.texts]
 
     def knowledge(self, path: Path) -> Knowledge:
         """What is known of an open file, or of one on disk."""
         path = path.resolve()
-        if path not in self._known:
-            before = self.readings.get(path)
-            reading = self.readings[path] = read(path, self.texts, self.types, before=before)
-            self._known[path] = Knowledge(reading)
-        return self._known[path]
+        if path not in self._current:
+            before = self.known[path].reading if path in self.known else None
+            self.known[path] = Knowledge(read(path, self.texts, self.types, before=before))
+            self._current.add(path)
+        return self.known[path]
 
     def around(self, path: Path) -> Knowledge:
         """What is known of a file, as part of an open model that includes it, if there is one."""
