@@ -10,9 +10,8 @@ from itertools import accumulate
 from pathlib import Path
 from typing import Any
 
-from epicycle.actors import EpicycleError, Parameter, UnitError
+from epicycle.actors import EpicycleError, Parameter
 
-from ..model.language.ports import ParameterText
 from ..model.text.document import Mapping as MappingNode
 from ..model.text.problems import Position, Problem
 from ..model.text.reading import NAME, NAMES_HAVE
@@ -105,32 +104,20 @@ def _missing(knowledge: Knowledge, at: Position, key: str) -> Edit | None:
     return None
 
 
-def sample(parameter: Parameter[Any] | ParameterText | None) -> str | None:
+def sample(parameter: Parameter[Any] | None) -> str | None:
     """A value that a parameter takes; None if only its author can know one."""
-    if parameter is None or (isinstance(parameter, Parameter) and parameter.shape is not None):
+    if parameter is None or parameter.shape is not None:
         return None
     if parameter.choices:
         return str(next(iter(parameter.choices)))
-    kind = parameter.type if isinstance(parameter, Parameter) else float
-    if kind is bool:
+    if parameter.type is bool:
         return "true"
-    if kind not in (int, float, int | float):
+    if parameter.type not in (int, float, int | float):
         return None
-    low, high = limits(parameter)
+    low, high = parameter.min, parameter.max
     value = 1 if (low is None or low <= 1) and (high is None or high >= 1) else low if low is not None else high
     unit = parameter.unit if parameter.unit not in ("", "1") else ""
-    return f"{value:g} {unit}".rstrip() if isinstance(value, (int, float)) else None
-
-
-def limits(parameter: Parameter[Any] | ParameterText) -> tuple[float | None, float | None]:
-    """The least and the greatest value of a parameter in its unit; None where it has none."""
-    if isinstance(parameter, Parameter):
-        return parameter.min, parameter.max
-    try:
-        low, _, high = parameter.bounds()
-    except UnitError:
-        return None, None
-    return low, high
+    return f"{value:g} {unit}".rstrip()
 
 
 # -- problems as data, for programs ------------------------------------------------------------------------------------

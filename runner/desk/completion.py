@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -153,7 +153,7 @@ def _plain(owner: str, keys: Keys, before: str, knowledge: Knowledge, place: Pla
     yield from _chosen(place, knowledge, "value")
     yield from _units(knowledge.unit_of(owner, keys), before)
     parameter = knowledge.parameter(owner, keys)
-    choices: Iterable[Any] = getattr(parameter, "choices", ()) or ()
+    choices = parameter.choices if parameter is not None else ()
     yield from (Known(str(each), "value", replaces=len(before)) for each in choices)
     named = [key for key in keys if isinstance(key, str)]
     at = "at" in named[2:] and keys[0] == "aspects"

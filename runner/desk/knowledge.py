@@ -10,7 +10,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from epicycle.actors import Parameter, counted, declared_parameters, declared_ports, has_own_ports, type_name
+from epicycle.actors import Parameter, UnitError, counted, declared_parameters, declared_ports, has_own_ports, type_name
 
 from ..model.catalogue.metrics import MetricSpec
 from ..model.catalogue.reference import doc_of, first_sentence
@@ -86,14 +86,14 @@ class Knowledge:
         found = None if known is None else known.composites.get(name)
         return found.parameters if found else {}
 
-    def parameters_of(self, kind: str, section: str) -> Mapping[str, Parameter[Any] | ParameterText]:
+    def parameters_of(self, kind: str, section: str) -> Mapping[str, Parameter[Any]]:
         """The parameters of a type, which may be a composite class."""
         if section in ("actors", "aspects") and kind in self.names.classes:
-            return self.composite_parameters(kind)
+            return {name: as_parameter(each) for name, each in self.composite_parameters(kind).items()}
         cls = self.type_called(kind, section)
         return {} if cls is None else declared_parameters(cls)
 
-    def parameter(self, owner: str, keys: Keys) -> Parameter[Any] | ParameterText | None:
+    def parameter(self, owner: str, keys: Keys) -> Parameter[Any] | None:
         """The parameter of which the value is at the end of some keys of a class."""
         if len(keys) < 3 or not isinstance(name := keys[2], str):
             return None
@@ -183,6 +183,17 @@ class Knowledge:
 
 def _before_last(path: str) -> str:
     return path[: path.rfind(".") + 1]
+
+
+def as_parameter(said: ParameterText, kind: type = float) -> Parameter[Any]:
+    """What a text declares, as types declare it, with values of any kind; bounds whose units are wrong are none."""
+    try:
+        low, above, high = said.bounds()
+    except UnitError:
+        low = above = high = None
+    made: Parameter[Any] = Parameter(float, unit=said.unit, min=low, above=above, max=high, doc=said.doc)
+    made.type, made.choices = kind, tuple(said.choices)
+    return made
 
 
 def owner_of(keys: Keys) -> tuple[str, Keys]:
