@@ -12,14 +12,12 @@ from .comparing import Difference, difference
 from .knowledge import Knowledge
 from .parts import EditError
 from .reading import Reading, read
-from .session import Session
 
 __all__ = [
     "Difference",
     "EditError",
     "Knowledge",
     "Reading",
-    "Session",
     "controls",
     "difference",
     "editing",

@@ -14,7 +14,6 @@ from pygls.lsp.server import LanguageServer
 
 from .answers import ANSWERS, FIX_ALL, LEGEND, Answers, path_of, uri_of
 from .changes import RenameError
-from .session import Session
 
 _OURS = re.compile(r"^(?:model|study|disturbance|composites)\s*:", re.MULTILINE)
 _PAUSE = 0.05  # seconds without a change before a text is read
@@ -32,14 +31,16 @@ class Server(LanguageServer):
     def __init__(self, version: str, types: tuple[type, ...] = ()) -> None:
         # Whole texts: the lines of incremental changes are not those that Python counts.
         super().__init__("epicycle", version, text_document_sync_kind=lsp.TextDocumentSyncKind.Full)
-        self.session = Session(types)
+        self._answers = Answers(types)
         self.ours: set[Path] = set()  # those that have looked like a file of Epicycle since they were opened
         self.versions: dict[Path, int | None] = {}
         self.waiting: dict[Path, asyncio.TimerHandle] = {}
 
+    @property
     def answers(self) -> Answers:
         encoding = self.workspace.position_encoding
-        return Answers(self.session, str(getattr(encoding, "value", encoding)))
+        self._answers.encoding = str(getattr(encoding, "value", encoding))
+        return self._answers
 
     def change(self, uri: str, text: str | None, version: int | None = None) -> None:
         """A text was opened, has changed or was closed (None): its problems are told when nobody types for a moment."""
@@ -50,15 +51,15 @@ class Server(LanguageServer):
             self.ours.discard(path)
         elif _OURS.search(text):
             self.ours.add(path)
-        for each in {path, *self.session.change(path, text)}:
+        for each in {path, *self.answers.change(path, text)}:
             if each in self.waiting:
                 self.waiting[each].cancel()
             self.waiting[each] = asyncio.get_running_loop().call_later(_PAUSE, self._tell, each)
 
     def _tell(self, path: Path) -> None:
         found = list[lsp.Diagnostic]()
-        if path in self.ours and path in self.session.texts:
-            found = [each for each, _ in self.answers().problems(self.session.knowledge(path))]
+        if path in self.ours and path in self.answers.texts:
+            found = [each for each, _ in self.answers.problems(self.answers.knowledge(path))]
         params = lsp.PublishDiagnosticsParams(uri_of(path), found, self.versions.get(path))
         self.text_document_publish_diagnostics(params)
 
@@ -93,7 +94,7 @@ def make_server(version: str, types: tuple[type, ...] = ()) -> Server:
         @server.feature(method, _OPTIONS.get(method))
         def answer(params: Any) -> Any:
             try:
-                return server.answers().ask(method, params)
+                return server.answers.ask(method, params)
             except RenameError as error:
                 raise JsonRpcInvalidParams(str(error)) from None
 

@@ -20,7 +20,7 @@ from lsprotocol.converters import get_converter
 
 from epicycle.actors import EpicycleError, Tag
 
-from ...desk import EditError, Knowledge, Session, controls, editing, edits_between
+from ...desk import EditError, Knowledge, controls, editing, edits_between
 from ...desk.answers import ANSWERS, Answers, uri_of
 from ...model.build.model import Model
 from ...model.text.document import MAX_BYTES
@@ -57,8 +57,7 @@ class Worker:
         self.seconds = seconds
         self.events = events
         self.files = tuple(files)
-        self.session = Session(tuple(classes(self.files)))
-        self.answers = Answers(self.session)
+        self.answers = Answers(tuple(classes(self.files)))
         self.ended = ""  # why the latest run was ended
         self.say = say
         self._clearing = threading.Timer(REST, gc.collect)
@@ -95,8 +94,8 @@ class Worker:
         text = asked["text"]
         if not isinstance(text, str) or len(text) > MAX_BYTES:
             raise EpicycleError(f"a text has at most {MAX_BYTES // 1_000_000} MB")
-        if self.session.texts.get(self.path) != text:
-            self.session.change(self.path, text)
+        if self.answers.texts.get(self.path) != text:
+            self.answers.change(self.path, text)
         method = str(asked["ask"])
         act = Worker.language if method in ANSWERS else ASKED.get(method)
         if act is None:
@@ -105,11 +104,11 @@ class Worker:
 
     @property
     def text(self) -> str:
-        return self.session.texts[self.path]
+        return self.answers.texts[self.path]
 
     @property
     def knowledge(self) -> Knowledge:
-        return self.session.knowledge(self.path)
+        return self.answers.knowledge(self.path)
 
     # -- the text -------------------------------------------------------------------------------------------------
 
@@ -124,7 +123,7 @@ class Worker:
             problems.append(found)
         reading = knowledge.reading
         self.say({"problems": problems, "valid": reading.is_valid})
-        reading = controls.so_far(reading, self.session.texts)
+        reading = controls.so_far(reading, self.answers.texts)
         model, known = reading.loading.model, knowledge if reading is knowledge.reading else Knowledge(reading)
         if model is None:
             return {"graph": None, "parameters": [], "aspects": []}
@@ -237,7 +236,7 @@ class Worker:
         changes = Changes(**{key: _texts(asked.get(key, [])) for key in ("change", "remove", "let_through", "lose")})
         model = named(self.model, RunSpec(str(self.path), types=self.files))
         try:
-            with opened(self.session.texts):
+            with opened(self.answers.texts):
                 found = what_if(
                     model,
                     Tag(int(time_), int(microstep)),
