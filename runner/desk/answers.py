@@ -12,7 +12,7 @@ from pygls.uris import from_fs_path, to_fs_path
 from ..model.text.problems import Position, Problem
 from . import changes, completion, meaning
 from .knowledge import Knowledge
-from .positions import Positions, positions
+from .places import Positions, positions
 from .reading import read
 
 FIX_ALL = lsp.CodeActionKind("source.fixAll")

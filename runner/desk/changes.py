@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from difflib import SequenceMatcher
@@ -18,8 +19,7 @@ from ..model.text.reading import NAME, NAMES_HAVE
 from .again import alike
 from .knowledge import Knowledge, owner_of
 from .names import Name
-from .places import value_of, walk
-from .positions import positions
+from .places import positions, value_of, walk
 from .reading import NO_TEXTS, Reading, Texts, read
 
 _PLAIN = re.compile(r"[A-Za-z0-9_.+*/^%° -]+\Z")
@@ -140,17 +140,16 @@ def _fix_data(knowledge: Knowledge, problem: Problem) -> dict[str, Any]:
 
 def as_data(problem: Problem) -> dict[str, Any]:
     """A problem: its code, message, place and help; lines and columns count from 1."""
-    found: dict[str, Any] = {
+    at = problem.position
+    return {
         "code": problem.kind.code,
         "kind": problem.kind.title,
         "severity": problem.severity,
         "message": problem.message,
         "file": None,
+        **({"file": at.file, "line": at.line, "column": at.column, "length": at.length} if at is not None else {}),
+        "help": list(problem.help),
     }
-    if (at := problem.position) is not None:
-        found |= {"file": at.file, "line": at.line, "column": at.column, "length": at.length}
-    found["help"] = list(problem.help)
-    return found
 
 
 # -- names ------------------------------------------------------------------------------------------------------------
@@ -205,12 +204,8 @@ def _shape(reading: Reading) -> object:
     model = reading.loading.model
     if model is None:
         return problems
-    kinds: dict[str, int] = {}
-    for each in model.graph.components.values():
-        kinds[each.kind] = kinds.get(each.kind, 0) + 1
-    aspects = [len(each.places) for each in model.aspects]
-    output = model.output
-    ports = [len(each.ports) for each in output.metrics]
+    output, kinds = model.output, Counter(each.kind for each in model.graph.components.values())
+    aspects, ports = [len(each.places) for each in model.aspects], [len(each.ports) for each in output.metrics]
     counts = (sorted(kinds.values()), len(list(model.graph.edges)), aspects, len(output.recorded), ports)
     return problems, counts, len(output.monitors), len(model.parameters)
 

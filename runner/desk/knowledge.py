@@ -22,8 +22,7 @@ from ..model.text.document import Scalar
 from ..model.text.patterns import PatternError, in_general, select
 from ..model.text.problems import Position
 from .names import MODEL, Names
-from .places import Keys, text_of
-from .positions import positions
+from .places import Keys, positions, text_of
 from .reading import Reading
 
 

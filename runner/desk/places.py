@@ -2,12 +2,17 @@
 
 A mark is put at the place, and what is open there is closed, until the text can be parsed; the place is where the mark
 is found among the nodes.
+
+The lines of the Language Server Protocol end only at CR and LF, and its columns are code units.  All lines and columns
+count from 0 here, and ours do not count a byte order mark.
 """
 
 from __future__ import annotations
 
 import re
+from bisect import bisect_right
 from collections.abc import Iterator
+from functools import lru_cache
 from typing import NamedTuple
 
 import yaml
@@ -17,6 +22,9 @@ from ..model.text.problems import Problems
 
 Keys = tuple[str | int, ...]
 MARK = "epicycle_mark_here"
+_THEIRS = re.compile("\r\n|\n|\r")
+_BYTES = {"utf-8": 1, "utf-16": 2, "utf-32": 4}
+BOM = "\ufeff"
 _CLOSING = {"{": "}", "[": "]"}
 _QUOTED = re.compile(r"'(?:[^']|'')*'|\"(?:[^\"\\]|\\.)*\"|(?<![^\s])#.*")
 
@@ -149,3 +157,48 @@ def _marked(root: Node, text: str) -> Place | None:
     if place is not None and not place.around:  # all of the text: it may become the first key
         place = place._replace(is_key=True, around=(Mapping({}, root.position),))
     return place and place._replace(text=text)
+
+
+# -- lines and columns -------------------------------------------------------------------------------------------------
+
+
+class Positions:
+    """The places of one text; ``encoding`` is that of the client's code units."""
+
+    def __init__(self, text: str, encoding: str = "utf-16") -> None:
+        self.text = text
+        self._codec, self._size = (f"{encoding}-le" if encoding != "utf-8" else encoding), _BYTES[encoding]
+        self._ours, self._theirs = (
+            [0, *(found.end() for found in breaks.finditer(text))] for breaks in (LINE_BREAK, _THEIRS)
+        )
+
+    def offset(self, line: int, column: int) -> int:
+        """The character at our line and column; what is behind the text is at its end."""
+        if line >= len(self._ours):
+            return len(self.text)
+        return min(self._ours[line] + column + (line == 0 and self.text.startswith(BOM)), len(self.text))
+
+    def place(self, offset: int) -> tuple[int, int]:
+        """Our line and column of a character."""
+        here = bisect_right(self._ours, offset) - 1
+        return here, offset - self._ours[here] - (here == 0 and self.text.startswith(BOM))
+
+    def to_client(self, offset: int) -> tuple[int, int]:
+        """Line and column of the protocol for a character."""
+        there = bisect_right(self._theirs, offset) - 1
+        code = self.text[self._theirs[there] : offset].encode(self._codec, "surrogatepass")
+        return there, len(code) // self._size
+
+    def from_client(self, line: int, column: int) -> int:
+        """The character at a line and column of the protocol."""
+        if line >= len(self._theirs):
+            return len(self.text)
+        start, end = (*self._theirs, len(self.text))[line : line + 2]
+        code = self.text[start:end].encode(self._codec, "surrogatepass")[: max(column, 0) * self._size]
+        return start + len(code.decode(self._codec, "ignore" if self._size < 4 else "surrogatepass"))
+
+
+@lru_cache(maxsize=8)
+def positions(text: str, encoding: str = "utf-16") -> Positions:
+    """The places of a text; those of the latest texts are kept."""
+    return Positions(text, encoding)

@@ -246,7 +246,7 @@ def test_hostile_arguments_end_with_a_message(folder: Path, tmp_path: Path) -> N
 )
 def test_what_no_process_can_be_given(folder: Path, words: list[str], message: str) -> None:
     with pytest.raises(ToolError) as raised:
-        LimitedCall(folder).json("run", words[:1], *words[1:])
+        LimitedCall(folder).call("run", words[:1], *words[1:])
     assert str(raised.value) == message
 
 
