@@ -27,7 +27,7 @@ from epicycle.runner.search.calibration import Calibration as Calibration
 from epicycle.runner.search.comparing import Comparison as Comparison
 from epicycle.runner.search.explanation import Explanation as Explanation
 from epicycle.runner.search.falsification import Falsification as Falsification
-from epicycle.runner.search.future import WhatIf as WhatIf
+from epicycle.runner.search.what_if import WhatIf as WhatIf
 from epicycle.runner.search.optimum import Optimum as Optimum
 from epicycle.runner.search.spec import Break as Break
 from epicycle.runner.search.spec import Match as Match

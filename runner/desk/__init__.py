@@ -7,20 +7,17 @@ these as the Language Server Protocol has them; ``comparing`` finds what differs
 """
 
 from . import controls, editing
-from .changes import edits_between
+from .changes import edits_between, report
 from .comparing import Difference, difference
 from .knowledge import Knowledge
 from .parts import EditError
-from .problem_data import report
 from .reading import Reading, read
-from .session import Session
 
 __all__ = [
     "Difference",
     "EditError",
     "Knowledge",
     "Reading",
-    "Session",
     "controls",
     "difference",
     "editing",

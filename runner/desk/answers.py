@@ -12,8 +12,8 @@ from pygls.uris import from_fs_path, to_fs_path
 from ..model.text.problems import Position, Problem
 from . import changes, completion, meaning
 from .knowledge import Knowledge
-from .positions import Positions, positions
-from .session import Session
+from .places import Positions, positions
+from .reading import read
 
 FIX_ALL = lsp.CodeActionKind("source.fixAll")
 _SEVERITY = {"error": lsp.DiagnosticSeverity.Error, "warning": lsp.DiagnosticSeverity.Warning}
@@ -41,18 +41,54 @@ LEGEND = lsp.SemanticTokensLegend([token for *_, token in _LOOKS.values() if tok
 
 
 class Answers:
-    """Answers about the texts of a session; ``encoding`` is that of the client's columns."""
+    """Texts that somebody has open, by their resolved paths, and answers about them; what has changed is read again.
 
-    def __init__(self, session: Session, encoding: str = "utf-16") -> None:
-        self.session = session
+    ``encoding`` is that of the client's columns.
+    """
+
+    def __init__(self, types: tuple[type, ...] = (), encoding: str = "utf-16") -> None:
+        self.types = types
         self.encoding = encoding
+        self.texts: dict[Path, str] = {}
+        self._known: dict[Path, Knowledge] = {}  # perhaps of texts that have changed since
+        self._current = set[Path]()
+
+    def change(self, path: Path, text: str | None) -> list[Path]:
+        """Open a text, change it, or close it (None); the open files to which that makes a difference."""
+        path = path.resolve()
+        if text is None:
+            self.texts.pop(path, None)
+            self._known.pop(path, None)
+            self._current.discard(path)
+        else:
+            self.texts[path] = text
+        stale = {path, *(each for each in self._current if path in _files(self._known[each]))}
+        self._current -= stale
+        return [each for each in stale if each in self.texts]
+
+    def knowledge(self, path: Path) -> Knowledge:
+        """What is known of an open file, or of one on disk."""
+        path = path.resolve()
+        if path not in self._current:
+            before = self._known[path].reading if path in self._known else None
+            self._known[path] = Knowledge(read(path, self.texts, self.types, before=before))
+            self._current.add(path)
+        return self._known[path]
+
+    def around(self, path: Path) -> Knowledge:
+        """What is known of a file, as part of an open model that includes it, if there is one."""
+        path = path.resolve()
+        for each in self.texts:
+            if each != path and path in _files(known := self.knowledge(each)):
+                return Knowledge(known.reading, path)
+        return self.knowledge(path)
 
     def ask(self, method: str, params: Any) -> Any:
         """The answer to a request; None if that is about no text of ours."""
         path = path_of(params.text_document.uri)
-        if path is None or path not in self.session.texts:
+        if path is None or path not in self.texts:
             return None
-        return ANSWERS[method](self, self.session.around(path), params)
+        return ANSWERS[method](self, self.around(path), params)
 
     # -- places ---------------------------------------------------------------------------------------------------
 
@@ -125,13 +161,13 @@ class Answers:
 
     def complete(self, known: Knowledge, params: lsp.CompletionParams) -> list[lsp.CompletionItem]:
         line, column = self.place(known, params)
-        text, at, found, session = known.text, self._at(known.text), [], self.session
-        before = session.readings.get(known.path)
-        for each in completion.complete(known.path, line, column, session.texts, session.types, before):
+        at, found = self._at(known.text), []
+        before = self._known[known.path].reading if known.path in self._known else None
+        for each in completion.complete(known.path, line, column, self.texts, self.types, before):
             start = at.offset(line, max(column - each.replaces, 0))
             item = lsp.CompletionItem(each.text.strip().removesuffix(":"), kind=_LOOKS[each.kind][0])
             item.detail, item.documentation, item.filter_text = each.what or None, each.doc or None, each.text
-            item.text_edit = lsp.TextEdit(self._range(text, start, at.offset(line, column)), each.text)
+            item.text_edit = lsp.TextEdit(self._range(known.text, start, at.offset(line, column)), each.text)
             found.append(item)
         return found
 
@@ -150,7 +186,7 @@ class Answers:
         return None if use is None else self.range_of(known, use.position)
 
     def rename(self, known: Knowledge, params: lsp.RenameParams) -> lsp.WorkspaceEdit:
-        edits = changes.rename(known, *self.place(known, params), params.new_name, self.session.texts)
+        edits = changes.rename(known, *self.place(known, params), params.new_name, self.texts)
         return self.workspace_edit(known, edits)
 
     # -- requests about a text ------------------------------------------------------------------------------------
@@ -192,6 +228,10 @@ ANSWERS: Mapping[str, Callable[[Answers, Knowledge, Any], Any]] = {
     lsp.TEXT_DOCUMENT_SEMANTIC_TOKENS_FULL: Answers.tokens,
     lsp.TEXT_DOCUMENT_CODE_ACTION: Answers.actions,
 }
+
+
+def _files(known: Knowledge) -> set[Path]:
+    return {path.resolve() for path, _ in known.reading.files.values()} | {known.reading.path.resolve()}
 
 
 def path_of(uri: str) -> Path | None:

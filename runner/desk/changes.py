@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from difflib import SequenceMatcher
@@ -10,16 +11,15 @@ from itertools import accumulate
 from pathlib import Path
 from typing import Any
 
-from epicycle.actors import EpicycleError, Parameter, UnitError
+from epicycle.actors import EpicycleError, Parameter
 
-from ..model.language.ports import ParameterText
 from ..model.text.document import Mapping as MappingNode
 from ..model.text.problems import Position, Problem
 from ..model.text.reading import NAME, NAMES_HAVE
 from .again import alike
 from .knowledge import Knowledge, owner_of
 from .names import Name
-from .places import value_of, walk
+from .places import positions, value_of, walk
 from .reading import NO_TEXTS, Reading, Texts, read
 
 _PLAIN = re.compile(r"[A-Za-z0-9_.+*/^%° -]+\Z")
@@ -104,32 +104,52 @@ def _missing(knowledge: Knowledge, at: Position, key: str) -> Edit | None:
     return None
 
 
-def sample(parameter: Parameter[Any] | ParameterText | None) -> str | None:
+def sample(parameter: Parameter[Any] | None) -> str | None:
     """A value that a parameter takes; None if only its author can know one."""
-    if parameter is None or (isinstance(parameter, Parameter) and parameter.shape is not None):
+    if parameter is None or parameter.shape is not None:
         return None
     if parameter.choices:
         return str(next(iter(parameter.choices)))
-    kind = parameter.type if isinstance(parameter, Parameter) else float
-    if kind is bool:
+    if parameter.type is bool:
         return "true"
-    if kind not in (int, float, int | float):
+    if parameter.type not in (int, float, int | float):
         return None
-    low, high = limits(parameter)
+    low, high = parameter.min, parameter.max
     value = 1 if (low is None or low <= 1) and (high is None or high >= 1) else low if low is not None else high
     unit = parameter.unit if parameter.unit not in ("", "1") else ""
-    return f"{value:g} {unit}".rstrip() if isinstance(value, (int, float)) else None
+    return f"{value:g} {unit}".rstrip()
 
 
-def limits(parameter: Parameter[Any] | ParameterText) -> tuple[float | None, float | None]:
-    """The least and the greatest value of a parameter in its unit; None where it has none."""
-    if isinstance(parameter, Parameter):
-        return parameter.min, parameter.max
-    try:
-        low, _, high = parameter.bounds()
-    except UnitError:
-        return None, None
-    return low, high
+# -- problems as data, for programs ------------------------------------------------------------------------------------
+
+
+def report(problems: Iterable[Problem] = (), more: bool = False, knowledge: Knowledge | None = None) -> dict[str, Any]:
+    """Whether something is valid, and all that is wrong with it; by what is known of a text, with what removes it."""
+    found = [as_data(each) | (_fix_data(knowledge, each) if knowledge else {}) for each in problems]
+    return {"valid": all(each["severity"] != "error" for each in found), "problems": found, "more": more}
+
+
+def _fix_data(knowledge: Knowledge, problem: Problem) -> dict[str, Any]:
+    """The change that removes a problem."""
+    if (edit := fix(knowledge, problem)) is None:
+        return {}
+    line, column = positions(dict(knowledge.reading.files.values())[edit.path]).place(edit.start)
+    place = {"file": str(edit.path), "line": line + 1, "column": column + 1, "length": edit.end - edit.start}
+    return {"fix": {**place, "text": edit.text}}
+
+
+def as_data(problem: Problem) -> dict[str, Any]:
+    """A problem: its code, message, place and help; lines and columns count from 1."""
+    at = problem.position
+    return {
+        "code": problem.kind.code,
+        "kind": problem.kind.title,
+        "severity": problem.severity,
+        "message": problem.message,
+        "file": None,
+        **({"file": at.file, "line": at.line, "column": at.column, "length": at.length} if at is not None else {}),
+        "help": list(problem.help),
+    }
 
 
 # -- names ------------------------------------------------------------------------------------------------------------
@@ -184,12 +204,8 @@ def _shape(reading: Reading) -> object:
     model = reading.loading.model
     if model is None:
         return problems
-    kinds: dict[str, int] = {}
-    for each in model.graph.components.values():
-        kinds[each.kind] = kinds.get(each.kind, 0) + 1
-    aspects = [len(each.places) for each in model.aspects]
-    output = model.output
-    ports = [len(each.ports) for each in output.metrics]
+    output, kinds = model.output, Counter(each.kind for each in model.graph.components.values())
+    aspects, ports = [len(each.places) for each in model.aspects], [len(each.ports) for each in output.metrics]
     counts = (sorted(kinds.values()), len(list(model.graph.edges)), aspects, len(output.recorded), ports)
     return problems, counts, len(output.monitors), len(model.parameters)
 

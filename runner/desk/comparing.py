@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from itertools import groupby
 from typing import Any
@@ -33,14 +33,13 @@ class Change:
     after: Any
 
     def __str__(self) -> str:
+        sign = _SIGNS[self.what]
         if self.what == "changed":
             name = f"{self.path}.{self.fact}" if self.fact else self.path
-            return f"~ {name}: {_said(self.before)} -> {_said(self.after)}"
+            return f"{sign} {name}: {shown(self.before)} -> {shown(self.after)}"
         facts = self.after if self.what == "added" else self.before
-        words = ", ".join(
-            f"{key} {_said(value)}".lstrip() for key, value in facts.items() if value not in (None, [], {}, "")
-        )
-        return f"{_SIGNS[self.what]} {self.path}" + (f": {words}" if words else "")
+        said = [f"{key} {shown(value)}".lstrip() for key, value in facts.items() if value not in (None, [], {}, "")]
+        return f"{sign} {self.path}" + (f": {', '.join(said)}" if said else "")
 
 
 @dataclass(frozen=True)
@@ -97,47 +96,42 @@ def _changes(before: Contents, after: Contents) -> Iterator[Change]:
 def contents(model: Model) -> Contents:
     """Everything that a model consists of, with the values that its parameters have."""
     graph, output = model.graph, model.output
-    ports: dict[str, Facts] = {}
-    components: dict[str, Facts] = {}
-    for path, component in graph.components.items():
-        actor = graph.actors.get(path)
-        found: Facts = {"type": component.kind}
-        if component.priority:
-            found["priority"] = component.priority
-        if component.tags:
-            found["tags"] = list(component.tags)
-        if actor is not None:
-            found |= _values(actor)
-        components[path or "model"] = found
-    for path in graph.ports:
-        if graph.components[graph.owner(path)].kind:
-            ports[path] = {"direction": graph.direction(path), "type": type_name(graph.type_of(path))}
-    directors = {
-        path or "model": {
-            "like": each.dialect.name,
-            "start": in_time(each.clock.start / 1e9),
-            "rate": str(each.clock.rate),
-        }
-        for path, each in graph.domains.items()
+    run = {
+        "stop": None if model.stop is None else in_time(model.stop),
+        "stop_when": list(output.stop_ports),
+        "seed": output.seed,
+        "record": sorted(output.recorded),
     }
     return {
         "model": {"model": {"name": model.name}},
         "parameters": {name: {"": _plain(value)} for name, value in model.parameters.items()},
-        "directors": directors,
-        "actors": components,
-        "ports": ports,
+        "directors": {
+            path or "model": {
+                "like": each.dialect.name,
+                "start": in_time(each.clock.start / 1e9),
+                "rate": str(each.clock.rate),
+            }
+            for path, each in graph.domains.items()
+        },
+        "actors": {
+            path or "model": {
+                "type": each.kind,
+                **({"priority": each.priority} if each.priority else {}),
+                **({"tags": list(each.tags)} if each.tags else {}),
+                **_values(graph.actors.get(path)),
+            }
+            for path, each in graph.components.items()
+        },
+        "ports": {
+            path: {"direction": graph.direction(path), "type": type_name(graph.type_of(path))}
+            for path in graph.ports
+            if graph.components[graph.owner(path)].kind
+        },
         "connections": _connections(model),
         "aspects": {
             each.name: {"type": each.kind, "at": sorted(each.places), **_values(each.aspect)} for each in model.aspects
         },
-        "run": {
-            "run": {
-                "stop": None if model.stop is None else in_time(model.stop),
-                "stop_when": list(output.stop_ports),
-                "seed": output.seed,
-                "record": sorted(output.recorded),
-            }
-        },
+        "run": {"run": run},
         "metrics": {each.name: _metric(each) for each in output.metrics if not each.monitor},
         "monitors": {each.name: _values(each.requirement) for each in output.monitors},
         "figures": {
@@ -174,9 +168,3 @@ def _plain(value: object) -> Any:
     """A value as a model file would write it; what no file can say by its description."""
     written = as_written(plain(value))
     return repr(value) if isinstance(written, str) and written == f"<{type(value).__name__}>" else written
-
-
-def _said(value: object) -> str:
-    if isinstance(value, Mapping):
-        value = dict(value)
-    return shown(value)

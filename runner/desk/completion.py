@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -17,28 +17,12 @@ from .knowledge import Knowledge, Known, owner_of
 from .names import MODEL
 from .places import Keys, Place, lines_of, place_at, value_of
 from .reading import NO_TEXTS, Reading, Texts, read
-from .schema import allowed, applying, language
+from .schema import allowed, applying, described, language
 
 _PATH = re.compile(r"!?\s*((?:[\w*]+(?:\[[^\]\s]*\])?\.)*)[\w*\[\]]*\Z")
 _QUANTITY = re.compile(r"\s*[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?(\s*)([^\s\d]*)\Z")
 _ENDS = re.compile(r"->|=>|,|\[(?![\d*.])")
-_AT_OUTPUTS = frozenset({"output"})
-_ANYWHERE = frozenset({"input", "output"})
 _OF_PORTS = {"of", "record", "stop_when", "property", "signals", "robots", "obstacle"}
-
-
-@dataclass(frozen=True)
-class Suggestion:
-    """Something that may be written: it takes the place of so many characters before the cursor.
-
-    ``kind`` is key, type, actor, port, parameter, value, unit, path, function or file.
-    """
-
-    text: str
-    kind: str
-    what: str = ""
-    doc: str = ""
-    replaces: int = 0
 
 
 def complete(
@@ -48,7 +32,7 @@ def complete(
     texts: Texts = NO_TEXTS,
     types: tuple[type, ...] = (),
     before: Reading | None = None,
-) -> list[Suggestion]:
+) -> list[Known]:
     """What may be written in a file, which was read ``before``, at a line and column, which count from 0."""
     text = texts.get(path.resolve())
     if text is None:
@@ -67,33 +51,27 @@ def complete(
 # -- keys -------------------------------------------------------------------------------------------------------------
 
 
-def _keys(place: Place, knowledge: Knowledge, follows: str) -> Iterator[Suggestion]:
+def _keys(place: Place, knowledge: Knowledge, follows: str) -> Iterator[Known]:
     root, here = language(knowledge.reading.types), place.around[-1]
     there = here.entries if place.is_key and isinstance(here, Mapping) else {}
-    ending = "" if re.match(r"\w*\s*:", follows) else ": "
     found: dict[str, tuple[str, str]] = {}
     for each in allowed(root, place.around[0], place.keys):
         for key, said in each.get("properties", {}).items():
             if isinstance(said, dict) and key not in found:
-                doc = next(
-                    (each["description"] for each in applying(root, [said], place.around[-1]) if "description" in each),
-                    "",
-                )
-                found[key] = "", doc
+                found[key] = "", described(applying(root, [said], here))
     owner, keys = owner_of(place.keys)
     if len(keys) == 2 and keys[0] in ("actors", "aspects"):
         for kind in knowledge.names.inner(owner, str(keys[1])):
             for name, parameter in knowledge.composite_parameters(kind).items():
                 found[name] = f"parameter of {kind}", parameter.doc
-    for key, (what, doc) in found.items():
-        if key not in there:
-            yield Suggestion(key + ending, "key", what, doc, len(place.before))
+    ending = "" if re.match(r"\w*\s*:", follows) else ": "
+    return (Known(key + ending, "key", *said, len(place.before)) for key, said in found.items() if key not in there)
 
 
 # -- values -----------------------------------------------------------------------------------------------------------
 
 
-def _values(place: Place, knowledge: Knowledge) -> Iterator[Suggestion]:
+def _values(place: Place, knowledge: Knowledge) -> Iterator[Known]:
     owner, keys = owner_of(place.keys)
     before = place.before
     named = [key for key in keys if isinstance(key, str)]
@@ -107,25 +85,24 @@ def _values(place: Place, knowledge: Knowledge) -> Iterator[Suggestion]:
         yield from _files(owner, named[-1], before, knowledge)
     elif named[-1:] == ["inherit"]:
         names = ["all", *knowledge.names.declared(owner, "parameter")]
-        yield from (Suggestion(each, "parameter", replaces=len(before)) for each in names)
+        yield from (Known(each, "parameter", replaces=len(before)) for each in names)
     else:
         yield from _plain(owner, keys, before, knowledge, place)
 
 
-def _names(owner: str, before: str, knowledge: Knowledge) -> Iterator[Suggestion]:
+def _names(owner: str, before: str, knowledge: Knowledge) -> Iterator[Known]:
     """Inside of an expression."""
-    word = re.search(r"\w*\Z", before)
-    length = 0 if word is None else len(word[0])
-    model = knowledge.reading.loading.model
-    values = model.parameters if model is not None and owner == MODEL else {}
+    length = len(before) - len(re.sub(r"\w+\Z", "", before))
+    model = knowledge.reading.loading.model if owner == MODEL else None
     for name in knowledge.names.declared(owner, "parameter"):
-        said = model.declared[name].doc if model is not None and owner == MODEL and name in model.declared else ""
-        yield Suggestion(name, "parameter", f"= {values[name]}" if name in values else "", said, length)
-    yield Suggestion("index", "parameter", "the index of an instance in its array", "", length)
-    yield from (Suggestion(name, "function", replaces=length) for name in sorted(FUNCTIONS))
+        value = f"= {model.parameters[name]}" if model is not None and name in model.parameters else ""
+        doc = model.declared[name].doc if model is not None and name in model.declared else ""
+        yield Known(name, "parameter", value, doc, length)
+    yield Known("index", "parameter", "the index of an instance in its array", "", length)
+    yield from (Known(name, "function", replaces=length) for name in sorted(FUNCTIONS))
 
 
-def _ends(owner: str, keys: list[str], before: str, knowledge: Knowledge) -> Iterator[Suggestion]:
+def _ends(owner: str, keys: list[str], before: str, knowledge: Knowledge) -> Iterator[Known]:
     """The ends of a connection."""
     is_source = not re.search("->|=>", before) if keys[-1] not in ("from", "to") else keys[-1] == "from"
     direction = "output" if is_source else "input"
@@ -133,88 +110,84 @@ def _ends(owner: str, keys: list[str], before: str, knowledge: Knowledge) -> Ite
     actor, dot, port = part.rpartition(".")
     if dot:
         name = actor.partition("[")[0]
-        yield from _known(knowledge.ports_of(owner, name, direction), "port", len(port))
+        yield from (replace(each, replaces=len(port)) for each in knowledge.ports_of(owner, name, direction))
         return
     for name, entry in knowledge.names.declared(owner, "actor").items():
         if not any(knowledge.ports_of(owner, name, direction)) and knowledge.names.types_of(owner, name):
             continue
         is_array = value_of(entry.value, "count") is not None
         kind = ", ".join(knowledge.names.types_of(owner, name))
-        yield Suggestion(f"{name}[*]" if is_array else name, "actor", kind, "", len(part))
+        yield Known(f"{name}[*]" if is_array else name, "actor", kind, "", len(part))
     # Seen from inside, tokens come from an own input.
     own = knowledge.own_ports(owner, "input" if is_source else "output") if owner != MODEL else ()
-    yield from _known(own, "port", len(part))
+    yield from (replace(each, replaces=len(part)) for each in own)
 
 
-def _types(keys: Keys, before: str, knowledge: Knowledge, place: Place) -> Iterator[Suggestion]:
+def _types(keys: Keys, before: str, knowledge: Knowledge, place: Place) -> Iterator[Known]:
     section = str(keys[0])
     if len(keys) == 3 and section in ("actors", "aspects"):
         for name in knowledge.names.classes:
             if name:
-                yield Suggestion(name, "type", "composite", knowledge.of_type(name, section), len(before))
+                yield Known(name, "type", "composite", knowledge.of_type(name, section), len(before))
     yield from _chosen(place, knowledge, "type")
     if "at" in keys:  # of a pointcut
         graph = knowledge.graph
         kinds = dict.fromkeys(each.kind for each in graph.components.values()) if graph is not None else ()
-        yield from (Suggestion(kind, "type", replaces=len(before)) for kind in kinds)
+        yield from (Known(kind, "type", replaces=len(before)) for kind in kinds)
 
 
-def _files(owner: str, key: str, before: str, knowledge: Knowledge) -> Iterator[Suggestion]:
+def _files(owner: str, key: str, before: str, knowledge: Knowledge) -> Iterator[Known]:
     if key == "extends" and owner != MODEL:
         classes = (each for each in knowledge.names.classes if each not in ("", owner))
-        yield from (Suggestion(each, "type", "composite", replaces=len(before)) for each in classes)
+        yield from (Known(each, "type", "composite", replaces=len(before)) for each in classes)
         return
     folder, own = knowledge.reading.path.parent, knowledge.reading.path
     for each in sorted((*folder.glob("*.yaml"), *folder.glob("*/*.yaml")))[:200]:
         if each != own:
-            yield Suggestion(each.relative_to(folder).as_posix(), "file", replaces=len(before))
+            yield Known(each.relative_to(folder).as_posix(), "file", replaces=len(before))
     if key == "extends":
-        yield from (Suggestion(each, "file", "a packaged model", replaces=len(before)) for each in packaged_models())
+        yield from (Known(each, "file", "a packaged model", replaces=len(before)) for each in packaged_models())
 
 
-def _plain(owner: str, keys: Keys, before: str, knowledge: Knowledge, place: Place) -> Iterator[Suggestion]:
+def _plain(owner: str, keys: Keys, before: str, knowledge: Knowledge, place: Place) -> Iterator[Known]:
     yield from _chosen(place, knowledge, "value")
     yield from _units(knowledge.unit_of(owner, keys), before)
     parameter = knowledge.parameter(owner, keys)
-    choices: Iterable[Any] = getattr(parameter, "choices", ()) or ()
-    yield from (Suggestion(str(each), "value", replaces=len(before)) for each in choices)
+    choices = parameter.choices if parameter is not None else ()
+    yield from (Known(str(each), "value", replaces=len(before)) for each in choices)
     named = [key for key in keys if isinstance(key, str)]
     at = "at" in named[2:] and keys[0] == "aspects"
     if at and named[-1] == "port":
         return
-    directions = _AT_OUTPUTS
+    directions = frozenset({"output"})
     if at:
         kind = next(iter(knowledge.names.types_of(owner, named[1])), "")
         cls: Any = knowledge.type_called(kind, "aspects")
-        directions = frozenset() if cls is not None and not cls.at_ports else getattr(cls, "stands_at", _ANYWHERE)
+        anywhere = frozenset({"input", "output"})
+        directions = frozenset() if cls is not None and not cls.at_ports else getattr(cls, "stands_at", anywhere)
     elif not _OF_PORTS & set(named) and "." not in before:
         return
     tail = re.split(r"->|[\s,(\[](?![\d*])", before)[-1]
     if (found := _PATH.match(tail)) is not None:
-        start = found[1]
-        word = tail[found.end(1) :]
-        yield from _known(knowledge.next_names(owner, start, frozenset(directions)), "path", len(word))
+        names = knowledge.next_names(owner, found[1], frozenset(directions))
+        yield from (replace(each, replaces=len(tail) - found.end(1)) for each in names)
 
 
-def _units(unit: str, before: str) -> Iterator[Suggestion]:
+def _units(unit: str, before: str) -> Iterator[Known]:
     if unit and (found := _QUANTITY.match(before)) is not None:
         gap = "" if found[1] else " "
         for each in units_like(unit):
-            yield Suggestion(f"{gap}{each}", "unit", "the parameter's unit" if each == unit else "", "", len(found[2]))
+            yield Known(f"{gap}{each}", "unit", "the parameter's unit" if each == unit else "", "", len(found[2]))
 
 
-def _chosen(place: Place, knowledge: Knowledge, kind: str) -> Iterator[Suggestion]:
+def _chosen(place: Place, knowledge: Knowledge, kind: str) -> Iterator[Known]:
     """The values that the schema lists."""
     root = language(knowledge.reading.types)
     for each in allowed(root, place.around[0], place.keys):
         docs = each.get("enumDescriptions", ())
         for number, value in enumerate(each.get("enum", ())):
             doc = docs[number] if number < len(docs) else ""
-            yield Suggestion(str(value), kind, "", doc, len(place.before))
+            yield Known(str(value), kind, "", doc, len(place.before))
         kinds = each["type"] if isinstance(each.get("type"), list) else [each.get("type")]
         if "boolean" in kinds and "number" not in kinds:
-            yield from (Suggestion(said, kind, "", "", len(place.before)) for said in ("true", "false"))
-
-
-def _known(found: Iterable[Known], kind: str, replaces: int) -> Iterator[Suggestion]:
-    return (Suggestion(each.name, kind, each.what, each.doc, replaces) for each in found)
+            yield from (Known(said, kind, "", "", len(place.before)) for said in ("true", "false"))

@@ -8,12 +8,11 @@ from typing import Any
 from epicycle.actors import Parameter, declared_parameters
 
 from ..model.catalogue.reference import as_written, doc_of, first_sentence, shown
-from ..model.language.ports import ParameterText
 from ..model.text.document import Mapping as MappingNode
 from ..model.text.document import Node, Scalar, plain
 from . import parts
-from .changes import limits, sample
-from .knowledge import Knowledge
+from .changes import sample
+from .knowledge import Knowledge, as_parameter
 from .names import MODEL
 from .parts import EditError
 from .places import lines_of, value_of
@@ -44,11 +43,12 @@ def parameters(knowledge: Knowledge) -> list[dict[str, Any]]:
     model = knowledge.reading.loading.model
     found = []
     for name, entry in knowledge.names.declared(MODEL, "parameter").items():
-        if entry.key.position.file != knowledge.file:
-            continue
-        declared = None if model is None else model.declared.get(name)
-        said = value_of(entry.value, "value") if isinstance(entry.value, MappingNode) else entry.value
-        found.append(_field(name, declared, said, None if model is None else model.parameters.get(name)))
+        if entry.key.position.file == knowledge.file:
+            said = value_of(entry.value, "value") if isinstance(entry.value, MappingNode) else entry.value
+            value = None if model is None else model.parameters.get(name)
+            declared = None if model is None else model.declared.get(name)
+            known = None if declared is None else as_parameter(declared, type(value))
+            found.append(_field(name, known, said, value))
     return found
 
 
@@ -57,33 +57,34 @@ def fields(knowledge: Knowledge, owner: str, section: str, name: str) -> list[di
     entry = knowledge.names.entry(owner, section.removesuffix("s"), name)
     made = knowledge.made(owner, section, name)
     made = made.aspect if section == "aspects" and made is not None else made
-    found: dict[str, dict[str, Any]] = {}
+    known: dict[str, Parameter[Any]] = {}
     for kind in knowledge.names.types_of(owner, name):
-        for each, parameter in knowledge.parameters_of(kind, section).items():
-            said = value_of(entry.value, each) if entry is not None else None
-            value = parameter.value_in(made) if isinstance(parameter, Parameter) and made is not None else None
-            found[each] = _field(each, parameter, said, value)
-    return list(found.values())
+        known |= knowledge.parameters_of(kind, section)
+    return [
+        _field(
+            each,
+            parameter,
+            value_of(entry.value, each) if entry is not None else None,
+            parameter.value_in(made) if made is not None and each in declared_parameters(type(made)) else None,
+        )
+        for each, parameter in known.items()
+    ]
 
 
-def _field(
-    name: str, parameter: Parameter[Any] | ParameterText | None, said: Node | None, value: Any
-) -> dict[str, Any]:
+def _field(name: str, parameter: Parameter[Any] | None, said: Node | None, value: Any) -> dict[str, Any]:
     """A parameter: what was written, what it is, and what it may be."""
     written = "" if said is None else said.text if isinstance(said, Scalar) else parts.written(plain(said))
     found = {"name": name, "said": written, "value": "" if value is None else shown(as_written(value)), "kind": "text"}
     if parameter is None:
         return found
-    low, high = (_finite(each) for each in limits(parameter))
-    of_type = parameter.type if isinstance(parameter, Parameter) else type(value)
     return found | {
-        "kind": "choice" if parameter.choices else "switch" if of_type is bool else "text",
+        "kind": "choice" if parameter.choices else "switch" if parameter.type is bool else "text",
         "unit": "" if parameter.unit == "1" else parameter.unit,
         "choices": list(parameter.choices),
         "doc": parameter.doc,
-        "low": low,
-        "high": high,
-        "whole": of_type is int,
+        "low": _finite(parameter.min),
+        "high": _finite(parameter.max),
+        "whole": parameter.type is int,
         "number": _finite(value),
         "computed": "${" in written,
     }
@@ -113,13 +114,13 @@ def aspects(knowledge: Knowledge) -> Iterator[dict[str, Any]]:
 def types(knowledge: Knowledge) -> dict[str, list[dict[str, Any]]]:
     """All types of actors and aspects, and the values that a new one needs."""
     catalogue, _ = knowledge.catalogue.loaded()
-    found = {}
-    for section, known in (("actors", catalogue.actors), ("aspects", catalogue.aspects)):
-        found[section] = [
+    return {
+        section: [
             {"name": name, "doc": first_sentence(doc_of(cls)), "needs": _needed(declared_parameters(cls).values())}
             for name, cls in known.items()
         ]
-    return found
+        for section, known in (("actors", catalogue.actors), ("aspects", catalogue.aspects))
+    }
 
 
 def _needed(declared: Iterable[Parameter[Any]]) -> dict[str, str]:
@@ -151,17 +152,12 @@ def local_ends(knowledge: Knowledge, source: str, target: str) -> tuple[str, str
         owners.append((graph.owner(first), graph.direction(first)))
     (one, from_), (other, to) = owners
     # Seen from inside, tokens come from an input of the composite, and go to an output.
-    scopes = (one if from_ == "input" else _before(one), other if to == "output" else _before(other))
-    if scopes[0] != scopes[1]:
+    scope = one if from_ == "input" else one.rpartition(".")[0]
+    if scope != (other if to == "output" else other.rpartition(".")[0]):
         raise EditError(f"{source} and {target} are not in one composite")
-    scope = scopes[0]
     kind = graph.components[scope].kind if scope else MODEL
     entry = knowledge.names.entry(MODEL, "composite", kind)
     if scope and (entry is None or entry.key.position.file != knowledge.file):
         raise EditError(f"{kind} is declared in another file: change it there")
-    ends = [path[len(scope) + 1 :] if scope else path for path in (source, target)]
-    return kind, ends[0], ends[1]
-
-
-def _before(path: str) -> str:
-    return path.rpartition(".")[0]
+    inside = f"{scope}." if scope else ""
+    return kind, source[len(inside) :], target[len(inside) :]

@@ -31,7 +31,6 @@ def _of_text(act: Callable[Concatenate[Any, _P], None]) -> Callable[Concatenate[
     @wraps(act)
     def change(text: str, /, *given: _P.args, **named: _P.kwargs) -> str:
         data = data_of(text)
-        data = {} if data is None else data
         act(data, *given, **named)
         return rendered(text, data)
 
@@ -100,9 +99,10 @@ def attach(text: str, owner: str, name: str, kind: str, at: str, values: Mapping
 @_of_text
 def remove(data: Any, owner: str, section: str, name: str) -> None:
     """Remove an actor, with its connections, or an aspect."""
-    keys, parts = _keys(owner), _found(data, (*_keys(owner), section))
+    keys = _keys(owner)
+    parts = _found(data, (*keys, section))
     if not isinstance(parts, dict) or name not in parts:
-        raise EditError(f"there is no {path((*keys, section, name))} in this text")
+        raise EditError(f"there is no {path(*keys, section, name)} in this text")
     del parts[name]
     items = _found(data, (*keys, "connections")) or []
     is_end = re.compile(rf"\A{re.escape(name)}(?:\[.*\])?\.")
@@ -170,9 +170,7 @@ def set_value(data: Any, keys: Keys, said: str) -> None:
 
 def _set(data: Any, keys: Keys, value: Any) -> Any:
     """Set a value at the end of some keys; what it is in is the answer."""
-    holder = _found(data, keys[:-1])
-    if not isinstance(holder, dict):
-        raise EditError(f"there is no {path(keys[:-1])} in this text")
+    holder = _holder(data, keys[:-1])
     holder[keys[-1]] = value
     return holder
 
@@ -184,17 +182,21 @@ def _set_declared(data: Any, keys: Keys, value: Any) -> None:
 
 def _section(data: Any, owner: str, section: str, empty: Any) -> Any:
     """A section of a class, which is made if it is missing."""
-    keys = _keys(owner)
-    for number in range(len(keys) + 1):
-        if not isinstance(_found(data, keys[:number]), dict):
-            raise EditError(f"there is no {path(keys[:number])} in this text")
-    holder = _found(data, keys)
+    holder = _holder(data, _keys(owner))
     if holder.get(section) is None:
         holder[section] = empty
     if not isinstance(holder[section], type(empty)):
         kind = "list" if isinstance(empty, list) else "mapping"
-        raise EditError(f"{path((*keys, section))} is no {kind}: change it by hand")
+        raise EditError(f"{path(*_keys(owner), section)} is no {kind}: change it by hand")
     return holder[section]
+
+
+def _holder(data: Any, keys: Keys) -> Any:
+    """The mapping at the end of some keys."""
+    for number in range(len(keys) + 1):
+        if not isinstance(_found(data, keys[:number]), dict):
+            raise EditError(f"there is no {path(*keys[:number])} in this text")
+    return _found(data, keys)
 
 
 def _add(data: Any, owner: str, section: str, name: str, value: Any) -> None:

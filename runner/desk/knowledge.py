@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from epicycle.actors import Parameter, counted, declared_parameters, declared_ports, has_own_ports, type_name
+from epicycle.actors import Parameter, UnitError, counted, declared_parameters, declared_ports, has_own_ports, type_name
 
 from ..model.catalogue.metrics import MetricSpec
 from ..model.catalogue.reference import doc_of, first_sentence
@@ -20,20 +22,22 @@ from ..model.text.document import Scalar
 from ..model.text.patterns import PatternError, in_general, select
 from ..model.text.problems import Position
 from .names import MODEL, Names
-from .places import Keys, text_of
-from .positions import positions
+from .places import Keys, positions, text_of
 from .reading import Reading
-
-_OF_KEYS: dict[Keys, str] = {("run", "stop"): "s"}  # units of what is no parameter
 
 
 @dataclass(frozen=True)
 class Known:
-    """A name that may stand somewhere, and what it is."""
+    """Something that may be written somewhere: it takes the place of so many characters before the cursor.
 
-    name: str
-    what: str
+    ``kind`` is key, type, actor, port, parameter, value, unit, path, function or file.
+    """
+
+    text: str
+    kind: str
+    what: str = ""
     doc: str = ""
+    replaces: int = 0
 
 
 class Knowledge:
@@ -69,13 +73,11 @@ class Knowledge:
 
     def type_called(self, name: str, section: str) -> type | None:
         """The class of an actor, aspect or figure type; None if there is none."""
-        types: Mapping[str, type] = self.catalogue.actors
-        if section != "actors":
-            types = self.catalogue.aspects if section == "aspects" else figure_types()
-        try:
-            return types.get(name)
-        except CatalogueError:
-            return None
+        with suppress(CatalogueError):
+            if section in ("actors", "aspects"):
+                return (self.catalogue.actors if section == "actors" else self.catalogue.aspects).get(name)
+            return figure_types().get(name)
+        return None
 
     def composite_parameters(self, name: str) -> Mapping[str, ParameterText]:
         """The parameters of a composite class, with what their takers say of them."""
@@ -83,14 +85,14 @@ class Knowledge:
         found = None if known is None else known.composites.get(name)
         return found.parameters if found else {}
 
-    def parameters_of(self, kind: str, section: str) -> Mapping[str, Parameter[Any] | ParameterText]:
+    def parameters_of(self, kind: str, section: str) -> Mapping[str, Parameter[Any]]:
         """The parameters of a type, which may be a composite class."""
         if section in ("actors", "aspects") and kind in self.names.classes:
-            return self.composite_parameters(kind)
+            return {name: as_parameter(each) for name, each in self.composite_parameters(kind).items()}
         cls = self.type_called(kind, section)
         return {} if cls is None else declared_parameters(cls)
 
-    def parameter(self, owner: str, keys: Keys) -> Parameter[Any] | ParameterText | None:
+    def parameter(self, owner: str, keys: Keys) -> Parameter[Any] | None:
         """The parameter of which the value is at the end of some keys of a class."""
         if len(keys) < 3 or not isinstance(name := keys[2], str):
             return None
@@ -103,10 +105,8 @@ class Knowledge:
 
     def unit_of(self, owner: str, keys: Keys) -> str:
         """The unit of a value; empty if it is no number."""
-        if keys[:1] == ("connections",) and keys[-1:] == ("delay",):
-            return "s"
-        if keys in _OF_KEYS:
-            return _OF_KEYS[keys]
+        if keys == ("run", "stop") or (keys[:1] == ("connections",) and keys[-1:] == ("delay",)):
+            return "s"  # these are no parameters
         found = self.parameter(owner, keys)
         return "" if found is None or found.unit in ("", "1") else found.unit
 
@@ -118,65 +118,57 @@ class Knowledge:
             if kind in self.names.classes:
                 yield from self.own_ports(kind, direction)
             elif (cls := self.type_called(kind, "actors")) is not None:
-                for name, port in declared_ports(cls).items():
-                    if port.direction == direction:
-                        yield Known(name, type_name(port.type), port.doc)
+                ports = {name: port for name, port in declared_ports(cls).items() if port.direction == direction}
                 if has_own_ports(cls) and (made := self.made(owner, "actors", actor)) is not None:
-                    ports = (made.inputs if direction == "input" else made.outputs).items()
-                    yield from (Known(n, type_name(p.type), p.doc) for n, p in ports if n not in declared_ports(cls))
+                    ports |= made.inputs if direction == "input" else made.outputs
+                yield from (Known(name, "port", type_name(each.type), each.doc) for name, each in ports.items())
 
     def own_ports(self, owner: str, direction: str) -> Iterator[Known]:
         """The ports of a class."""
         for name, entry in self.names.declared(owner, f"{direction}s").items():
             said = entry.value.text if isinstance(entry.value, Scalar) and entry.key is not entry.value else ""
-            yield Known(name, text_of(entry.value, "type") or said, text_of(entry.value, "doc"))
+            yield Known(name, "port", text_of(entry.value, "type") or said, text_of(entry.value, "doc"))
 
     # -- paths ----------------------------------------------------------------------------------------------------
 
-    def scopes(self, owner: str) -> list[str]:
-        """What the paths inside the instances of a class begin with."""
+    def scope(self, owner: str) -> str | None:
+        """What the paths inside the first instance of a class begin with; None if there is none."""
         if owner == MODEL:
-            return [""]
+            return ""
         found = self.graph.components.items() if self.graph is not None else ()
-        return [f"{path}." for path, each in found if each.kind == owner]
+        return next((f"{path}." for path, each in found if each.kind == owner), None)
 
     def made(self, owner: str, section: str, name: str) -> Any:
         """The first actor, or woven aspect, that is made of a part of a class; None if there is none yet."""
-        model = self.reading.loading.model
-        for scope in self.scopes(owner)[:1] if model is not None else ():
-            assert model is not None
-            if section == "aspects":
-                return next((each for each in model.aspects if each.name == f"{scope}{name}"), None)
-            return model.graph.actors.get(f"{scope}{name}") or model.graph.actors.get(f"{scope}{name}[0]")
-        return None
+        model, scope = self.reading.loading.model, self.scope(owner)
+        if model is None or scope is None:
+            return None
+        if section == "aspects":
+            return next((each for each in model.aspects if each.name == f"{scope}{name}"), None)
+        return model.graph.actors.get(f"{scope}{name}") or model.graph.actors.get(f"{scope}{name}[0]")
 
     def next_names(self, owner: str, start: str, directions: frozenset[str]) -> Iterator[Known]:
         """What may follow a pattern, which is empty or ends with a dot: components and ports, and what they match."""
-        graph, scope = self.graph, next(iter(self.scopes(owner)), None)
+        graph, scope = self.graph, self.scope(owner)
         if graph is None or scope is None:
             return
-        holders = [path for path in graph.components if path.startswith(scope) and path + "." != scope]
+        inside = {scope}
         if start:
+            holders = [path for path in graph.components if path.startswith(scope) and path + "." != scope]
             try:
-                chosen = select(scope + start[:-1], holders)
+                inside = {f"{path}." if path else "" for path in select(scope + start[:-1], holders)}
             except PatternError:
                 return
-        else:
-            chosen = [scope[:-1]] if scope else [""]
-        parts: dict[str, str] = {}
-        ports: dict[str, int] = {}
-        inside = {f"{path}." if path else "" for path in chosen}
+        parts = dict[str, str]()
         for path, component in graph.components.items():
             if path and _before_last(path) in inside:
                 parts.setdefault(in_general(path.rpartition(".")[2]), component.kind)
-        for path in graph.ports:
-            if _before_last(path) in inside and graph.direction(path) in directions:
-                ports[path.rpartition(".")[2]] = ports.get(path.rpartition(".")[2], 0) + 1
-        yield from (Known(name, kind) for name, kind in parts.items())
-        for name, number in ports.items():
-            yield Known(name, f"matches {counted(number, 'port')}")
+        yield from (Known(name, "path", kind) for name, kind in parts.items())
+        ports = (each for each in graph.ports if _before_last(each) in inside and graph.direction(each) in directions)
+        for name, number in Counter(path.rpartition(".")[2] for path in ports).items():
+            yield Known(name, "path", f"matches {counted(number, 'port')}")
         if not start and parts:
-            yield Known("*", f"matches {counted(len(parts), 'name')}")
+            yield Known("*", "path", f"matches {counted(len(parts), 'name')}")
 
     # -- words ----------------------------------------------------------------------------------------------------
 
@@ -190,6 +182,17 @@ class Knowledge:
 
 def _before_last(path: str) -> str:
     return path[: path.rfind(".") + 1]
+
+
+def as_parameter(said: ParameterText, kind: type = float) -> Parameter[Any]:
+    """What a text declares, as types declare it, with values of any kind; bounds whose units are wrong are none."""
+    try:
+        low, above, high = said.bounds()
+    except UnitError:
+        low = above = high = None
+    made: Parameter[Any] = Parameter(float, unit=said.unit, min=low, above=above, max=high, doc=said.doc)
+    made.type, made.choices = kind, tuple(said.choices)
+    return made
 
 
 def owner_of(keys: Keys) -> tuple[str, Keys]:

@@ -20,10 +20,10 @@ from ..support.shown import short
 from .knowledge import Knowledge, Known, owner_of
 from .names import MODEL, SECTIONS, Name, Use, declared_in
 from .places import Keys, Place, place_at, scalars, value_of
-from .schema import allowed, language
+from .schema import allowed, described, language
 
-# The keys of a file that name others, and of which kind those are that may be packaged; a study names a model, too.
 _PORT = re.compile(r"(?<![\w.])(?P<actor>[A-Za-z_]\w*)(?:\[[^\]]*\])?\.(?P<port>\w*)\Z")
+# The keys of a file that name others, and of which kind those are that may be packaged; a study names a model, too.
 _FILES = {"include": "", "extends": "model"}
 
 
@@ -146,7 +146,7 @@ def _of_port(knowledge: Knowledge, place: Place) -> Iterator[str]:
 def _ports(ports: Iterable[Known], name: str, what: str) -> Iterator[str]:
     """The ports that have a name, in words."""
     for each in ports:
-        if each.name == name:
+        if each.text == name:
             yield f"**{name}**: {', '.join(filter(None, (what, each.what)))}: {each.doc}".removesuffix(": ")
 
 
@@ -154,7 +154,7 @@ def _of_place(knowledge: Knowledge, place: Place) -> Iterator[str]:
     """What the language says of the value at a place, or of a key there, and which value it has."""
     keys: Keys = (*place.keys, place.whole) if place.is_key else place.keys
     schemas = allowed(language(knowledge.reading.types), place.around[0], keys)
-    yield next((each["description"] for each in schemas if "description" in each), "")
+    yield described(schemas)
     for each in schemas:
         chosen = zip(each.get("enum", ()), each.get("enumDescriptions", ()), strict=False)
         yield from (f"`{value}`: {words}" for value, words in chosen if value == place.whole)

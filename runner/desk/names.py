@@ -48,9 +48,6 @@ class Name:
     name: str
 
 
-_Used = tuple[Iterable[Name | None], Position | None, bool]
-
-
 @dataclass(frozen=True)
 class Use:
     """A place where a name stands; it may stand for several, if a pattern selects in several classes."""
@@ -72,24 +69,17 @@ class Names:
                         self.classes[name].append(entry.value)
                 self.classes[MODEL].append(node)
         # By class, and by section as well as by kind.
-        self._declared: dict[str, dict[str, dict[str, Entry]]] = {}
+        self._declared: dict[tuple[str, str], dict[str, Entry]] = defaultdict(dict)
         for owner, mappings in self.classes.items():
-            found = self._declared[owner] = defaultdict(dict)
             for section, kind in SECTIONS.items():
                 for name, entry in [each for mapping in mappings for each in declared_in(mapping, section).items()]:
-                    found[section].setdefault(name, entry)
-                    found[kind].setdefault(name, entry)
+                    self._declared[owner, section].setdefault(name, entry)
+                    self._declared[owner, kind].setdefault(name, entry)
 
     @cached_property
     def uses(self) -> list[Use]:
         """Where names stand; found when somebody asks, which takes longer than to read what is declared."""
-        found = []
-        for owner, mappings in self.classes.items():
-            for names, at, declares in [each for mapping in mappings for each in self._used(owner, mapping)]:
-                known = frozenset(each for each in names if each is not None)
-                if known and at is not None:
-                    found.append(Use(known, at, declares))
-        return found
+        return [use for owner, mappings in self.classes.items() for each in mappings for use in self._used(owner, each)]
 
     # -- what is declared -----------------------------------------------------------------------------------------
 
@@ -108,27 +98,29 @@ class Names:
         """What a class and its bases declare of a kind, or in a section, by name."""
         found: dict[str, Entry] = {}
         for each in reversed(self.bases(owner)):
-            found |= self._declared.get(each, {}).get(what, {})
+            found |= self._declared[each, what]
         return found
+
+    def _declaring(self, owner: str, kind: str, name: str) -> list[str]:
+        """The classes, this one and its bases, that declare a name; its own declaration comes first."""
+        return [each for each in self.bases(owner) if name in self._declared[each, kind]]
 
     def name_of(self, owner: str, kind: str, name: str) -> Name | None:
         """What a name means in a class."""
-        for each in reversed(self.bases(owner)):
-            if name in self._declared.get(each, {}).get(kind, {}):
-                return Name(kind, each, name)
-        return None
-
-    def entries(self, owner: str, kind: str, name: str) -> Iterator[Entry]:
-        """Where a class and its bases declare a name; its own declaration comes first."""
-        found = (self._declared.get(each, {}).get(kind, {}).get(name) for each in self.bases(owner))
-        return (each for each in found if each is not None)
+        found = self._declaring(owner, kind, name)
+        return Name(kind, found[-1], name) if found else None
 
     def entry(self, owner: str, kind: str, name: str) -> Entry | None:
-        return next(self.entries(owner, kind, name), None)
+        """Where a name is declared that a class has."""
+        return next((self._declared[each, kind][name] for each in self._declaring(owner, kind, name)), None)
 
     def types_of(self, owner: str, part: str, *kinds: str) -> list[str]:
         """The types that an actor, an aspect, or a part of other kinds may have; a parameter may choose one."""
-        entries = (each for kind in kinds or ("actor", "aspect") for each in self.entries(owner, kind, part))
+        entries = [
+            self._declared[each, kind][part]
+            for kind in kinds or ("actor", "aspect")
+            for each in self._declaring(owner, kind, part)
+        ]
         said = next((said for each in entries if (said := text_of(each.value, "type").strip())), "")
         if not said.startswith("${"):
             return [said] if said else []
@@ -154,34 +146,42 @@ class Names:
         """Where a name stands."""
         return [use for use in self.uses if name in use.names]
 
-    def _used(self, owner: str, mapping: MappingNode) -> Iterator[_Used]:
+    def _used(self, owner: str, mapping: MappingNode) -> Iterator[Use]:
         """The names in a mapping that declares a class."""
-        for keys, is_key, node, around in walk(mapping):
+        for keys, is_key, node, around, _ in walk(mapping):
+            owners, kind, declares = list[str](), "", False
             match (is_key, *keys):
-                case (True, section) if section in SECTIONS and (owner == MODEL or section != "composites"):
-                    yield [self.name_of(owner, SECTIONS[str(section)], node.text)], node.position, True
+                case (True, str(section)) if section in SECTIONS and (owner == MODEL or section != "composites"):
+                    owners, kind, declares = [owner], SECTIONS[section], True
                 case (False, "inputs" | "outputs") | (False, "inputs" | "outputs", int()):
-                    yield [self.name_of(owner, "port", node.text)], node.position, True
+                    owners, kind, declares = [owner], "port", True
                 case (True, "actors" | "aspects", name):
-                    inner = self.inner(owner, str(name))
-                    yield [self.name_of(each, "parameter", node.text) for each in inner], node.position, False
+                    owners, kind = self.inner(owner, str(name)), "parameter"
                 case (False, "actors" | "aspects", name, "inherit", *_):
-                    inner = [owner, *self.inner(owner, str(name))]
-                    yield [self.name_of(each, "parameter", node.text) for each in inner], _whole(node), False
+                    owners, kind = [owner, *self.inner(owner, str(name))], "parameter"
                 case (
                     (False, "actors" | "aspects", _, "type")
                     | (False, "aspects", _, "at", *_, "type")
                     | (False, "parameters", _, "choices", *_)
                 ):
-                    yield [self.name_of(MODEL, "composite", node.text)], _whole(node), False
+                    owners, kind = [MODEL], "composite"
                 case (False, "aspects", _, "at", *_, "port"):
-                    yield [self.name_of(text_of(around[-1], "type"), "port", node.text)], _whole(node), False
+                    owners, kind = [text_of(around[-1], "type")], "port"
                 case (False, "extends") if owner != MODEL:
-                    yield [self.name_of(MODEL, "composite", node.text)], _whole(node), False
+                    owners, kind = [MODEL], "composite"
+            yield from self._use(owners, [kind], node, 0, node.text, declares)
             if not is_key and keys and keys[0] not in _NO_NAMES:
                 yield from self._used_in_text(owner, node, keys)
 
-    def _used_in_text(self, owner: str, node: Scalar, keys: Keys) -> Iterator[_Used]:
+    def _use(
+        self, owners: Iterable[str], kinds: Iterable[str], node: Scalar, start: int, name: str, declares: bool = False
+    ) -> Iterator[Use]:
+        """What a name means at a place in a text, as one of some kinds in one of some classes."""
+        found = {self.name_of(owner, kind, name) for owner in owners for kind in kinds} - {None}
+        if found and (at := _part_of(node, start, name)) is not None:
+            yield Use(frozenset(filter(None, found)), at, declares)
+
+    def _used_in_text(self, owner: str, node: Scalar, keys: Keys) -> Iterator[Use]:
         text, section = node.text, keys[0]
         rule = next((key for key in reversed(keys) if key in _OWN_RULES), "")
         for found in _EXPRESSION.finditer(text):
@@ -191,8 +191,7 @@ class Names:
                 continue
             for word in re.finditer(r"(?<![\w.])[A-Za-z_]\w*", found[0]):
                 if word[0] in asked:
-                    at = _part_of(node, found.start() + word.start(), word[0])
-                    yield [self.name_of(owner, "parameter", word[0])], at, False
+                    yield from self._use([owner], ["parameter"], node, found.start() + word.start(), word[0])
         # Names in expressions have been found; the rest keeps its offsets.
         text = _EXPRESSION.sub(lambda each: "0" * len(each[0]), text)
         for dotted in _DOTTED.finditer(text):
@@ -203,11 +202,11 @@ class Names:
         elif section != "connections" and (section, rule) != ("aspects", "at"):
             return
         for word in words.finditer(text):
-            yield [self.name_of(owner, kind, word[1])], _part_of(node, word.start(1), word[1]), False
+            yield from self._use([owner], [kind], node, word.start(1), word[1])
 
-    def _path(self, owner: str, node: Scalar, start: int, path: str) -> Iterator[_Used]:
+    def _path(self, owner: str, node: Scalar, start: int, path: str) -> Iterator[Use]:
         """The names along a dotted path or pattern, as far as it is one."""
-        classes, offset, found = {owner}, start, list[tuple[set[Name | None], int, str]]()
+        classes = {owner}
         segments = path.split(".")
         for number, segment in enumerate(segments):
             name = segment.partition("[")[0]
@@ -217,15 +216,14 @@ class Names:
             elif name == "*":
                 classes = self._insides(classes)
             else:
-                is_last = number == len(segments) - 1
-                kinds = ("port", "parameter", "actor") if is_last and number else ("actor", "aspect")
-                named = {self.name_of(each, kind, name) for each in classes for kind in kinds} - {None}
-                if not named and not number:
+                is_last = 0 < number == len(segments) - 1
+                kinds = ("port", "parameter", "actor") if is_last else ("actor", "aspect")
+                used = [*self._use(classes, kinds, node, start, name)]
+                if not used and not number:
                     return  # it is something else
-                found.append((named, offset, name))
+                yield from used
                 classes = {inner for each in classes for inner in self.inner(each, name)}
-            offset += len(segment) + 1
-        yield from ((named, _part_of(node, at, name), False) for named, at, name in found)
+            start += len(segment) + 1
 
     def _insides(self, classes: Iterable[str]) -> set[str]:
         """The composite classes of all actors of some classes."""
@@ -240,10 +238,6 @@ def declared_in(
     if isinstance(node, MappingNode):
         return node.entries
     return {each.text: Entry(each, each) for each in scalars(node) if each.text and section in listed}
-
-
-def _whole(node: Scalar) -> Position | None:
-    return _part_of(node, 0, node.text)
 
 
 def _part_of(node: Scalar, offset: int, part: str) -> Position | None:

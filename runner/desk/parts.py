@@ -18,7 +18,7 @@ from yaml.events import AliasEvent, CollectionEndEvent, CollectionStartEvent, Ma
 from epicycle.actors import EpicycleError
 
 from ..model.language.models import COMPOSITE, MODEL
-from ..model.text.document import Scalar, parse, plain
+from ..model.text.document import LOADER, Scalar, parse, plain
 from ..model.text.document import Sequence as ListNode
 from ..model.text.problems import Problems
 from ..model.text.scalars import resolve
@@ -26,7 +26,6 @@ from ..model.text.scalars import resolve
 Keys = tuple[str | int, ...]
 SECTIONS = ("actors", "connections", "aspects")  # that go with their last entry
 _ORDER = tuple(dict.fromkeys((*("model", "doc", "extends", "include", "composites"), *MODEL.keys, *COMPOSITE.keys)))
-_LOADER: type[yaml.CSafeLoader] | type[yaml.SafeLoader] = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 _PLAIN = re.compile(r"[A-Za-z0-9_.+*/^%°$(<>=-][A-Za-z0-9_.+*/^%°$()<>= -]*\Z")
 _PLAIN_ITEM = re.compile(
     r"[A-Za-z_][\w.\[\]*, ]* [=-]> [\w.\[\]*, ]*\w\Z", re.ASCII
@@ -78,19 +77,19 @@ class Part:
 def data_of(text: str) -> Any:
     """What a text holds, as plain data; raises ``EditError`` if it cannot be read."""
     if not _COMMENT.sub("", text).strip("\ufeff \t\r\n"):
-        return None
+        return {}
     problems = Problems()
     node = parse(text, "the text", problems)
     if problems.found:
         raise EditError(f"this can be changed once the text can be read: {problems.found[0].message}")
-    return None if node is None else plain(node)
+    return {} if node is None else plain(node)
 
 
 def parts_of(text: str) -> Part | None:
     """The outermost part of a text that can be read; None if it is empty."""
     mark = text.startswith("\ufeff")
     stack, root = list[Part](), None
-    for event in yaml.parse(text[mark:], Loader=_LOADER):
+    for event in yaml.parse(text[mark:], Loader=LOADER):
         start, end = (at.index + mark if at else 0 for at in (event.start_mark, event.end_mark))
         if isinstance(event, CollectionEndEvent):
             made = stack.pop()
@@ -119,7 +118,7 @@ def _along(text: str, keys: Keys) -> list[Part]:
     found = [root]
     for number in range(len(keys) + 1):
         if found[-1].kind == "alias":
-            raise EditError(f"{path(keys[:number])} is an alias: change it by hand")
+            raise EditError(f"{path(*keys[:number])} is an alias: change it by hand")
         if number < len(keys):
             found.append(found[-1].items[found[-1].find(keys[number])])
     return found
@@ -161,10 +160,6 @@ def typed(said: str) -> Said:
     return Said(quoted(said), said)
 
 
-def _same(one: Any, other: Any) -> bool:
-    return _canonical(one) == _canonical(other)
-
-
 def _canonical(data: Any) -> str:
     """Data as text: true is not 1, entries have no order, and an empty section is none."""
     if isinstance(data, dict):
@@ -183,18 +178,17 @@ def _kept(data: dict[str, Any]) -> dict[str, Any]:
 
 def rendered(text: str, after: Any) -> str:
     """The text with other data, by the smallest changes; raises ``EditError`` if it cannot be written so."""
-    before, changed = data_of(text), text
-    for act, keys, value in _steps({} if before is None else before, after, ()):
+    changed = text
+    for act, keys, value in _steps(data_of(text), after, ()):
         changed = act(changed, keys, value)
-    found = data_of(changed)
-    if not _same({} if found is None else found, after):
+    if _canonical(data_of(changed)) != _canonical(after):
         raise EditError("this text is written in a way that no program can change here: change it by hand")
     return changed
 
 
 def _steps(before: Any, after: Any, keys: Keys) -> Iterator[tuple[Callable[[str, Keys, Any], str], Keys, Any]]:
     """What makes other data of some, at the end of keys; in lists from behind, so that numbers stay right."""
-    if _same(before, after):
+    if _canonical(before) == _canonical(after):
         return
     if isinstance(before, dict) and isinstance(after, dict) and after:
         new = _kept(after)
@@ -330,6 +324,6 @@ def _break(text: str) -> str:
     return "\r\n" if "\r\n" in text else "\n"
 
 
-def path(keys: Keys) -> str:
+def path(*keys: str | int) -> str:
     """Keys as people write them."""
     return ".".join(map(str, keys))

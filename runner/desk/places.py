@@ -2,53 +2,53 @@
 
 A mark is put at the place, and what is open there is closed, until the text can be parsed; the place is where the mark
 is found among the nodes.
+
+The lines of the Language Server Protocol end only at CR and LF, and its columns are code units.  All lines and columns
+count from 0 here, and ours do not count a byte order mark.
 """
 
 from __future__ import annotations
 
 import re
+from bisect import bisect_right
 from collections.abc import Iterator
-from dataclasses import dataclass
+from functools import lru_cache
 from typing import NamedTuple
 
 import yaml
 
-from ..model.text.document import LINE_BREAK, Mapping, Node, Scalar, Sequence, parse
+from ..model.text.document import LINE_BREAK, LOADER, Mapping, Node, Scalar, Sequence, parse
 from ..model.text.problems import Problems
 
 Keys = tuple[str | int, ...]
 MARK = "epicycle_mark_here"
-_LOADER: type[yaml.CSafeLoader] | type[yaml.SafeLoader] = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+_THEIRS = re.compile("\r\n|\n|\r")
+_BYTES = {"utf-8": 1, "utf-16": 2, "utf-32": 4}
+BOM = "\ufeff"
 _CLOSING = {"{": "}", "[": "]"}
 _QUOTED = re.compile(r"'(?:[^']|'')*'|\"(?:[^\"\\]|\\.)*\"|(?<![^\s])#.*")
 
 
-class Stands(NamedTuple):
-    """A key or value in a text, and the nodes around it, outermost first.
+class Place(NamedTuple):
+    """A place in a text: a key or value, and the nodes around it, outermost first.
 
-    ``keys`` lead to the value, or to the mapping of the key.
+    ``keys`` lead to the value, or to the mapping of the key (``is_key``).
     """
 
     keys: Keys
     is_key: bool
     node: Scalar
     around: tuple[Node, ...]
+    text: str = ""  # as it was parsed, if there is a mark
 
+    @property
+    def before(self) -> str:
+        """What the key or value has before the mark."""
+        return self.node.text.partition(MARK)[0]
 
-@dataclass(frozen=True)
-class Place:
-    """A place in a text.
-
-    ``keys`` lead to the value, or to the mapping of the key that is written there (``is_key``); ``before`` is what the
-    value or key has before the place, ``whole`` all of it.  ``around`` are the nodes along the keys, outermost first.
-    """
-
-    keys: Keys
-    is_key: bool
-    before: str
-    whole: str
-    around: tuple[Node, ...]
-    text: str  # as it was parsed, with the mark
+    @property
+    def whole(self) -> str:
+        return self.node.text.replace(MARK, "", 1)
 
 
 def lines_of(text: str) -> list[str]:
@@ -75,7 +75,7 @@ def place_at(text: str, line: int, column: int) -> Place | None:
 def _is_yaml(text: str) -> bool:
     """Whether a text can be parsed; it takes longer to say why not."""
     try:
-        for _ in yaml.parse(text, Loader=_LOADER):
+        for _ in yaml.parse(text, Loader=LOADER):
             pass
     except (yaml.YAMLError, ValueError):
         return False
@@ -123,16 +123,16 @@ def _closing(text: str) -> str:
     return quote + "".join(reversed(open_ones))
 
 
-def walk(node: Node, keys: Keys = (), around: tuple[Node, ...] = ()) -> Iterator[Stands]:
+def walk(node: Node, keys: Keys = (), around: tuple[Node, ...] = ()) -> Iterator[Place]:
     """All that stands in a node."""
     if isinstance(node, Scalar):
-        yield Stands(keys, False, node, around)
+        yield Place(keys, False, node, around)
     elif isinstance(node, Sequence):
         for number, item in enumerate(node.items):
             yield from walk(item, (*keys, number), (*around, node))
     else:
         for key, entry in node.entries.items():
-            yield Stands(keys, True, entry.key, (*around, node))
+            yield Place(keys, True, entry.key, (*around, node))
             yield from walk(entry.value, (*keys, key), (*around, node))
 
 
@@ -153,10 +153,52 @@ def text_of(node: Node | None, key: str) -> str:
 
 
 def _marked(root: Node, text: str) -> Place | None:
-    for keys, is_key, node, around in walk(root):
-        if MARK in node.text:
-            before, _, after = node.text.partition(MARK)
-            if not around:  # all of the text: it may become the first key
-                is_key, around = True, (Mapping({}, node.position),)
-            return Place(keys, is_key, before, before + after, around, text)
-    return None
+    place = next((each for each in walk(root) if MARK in each.node.text), None)
+    if place is not None and not place.around:  # all of the text: it may become the first key
+        place = place._replace(is_key=True, around=(Mapping({}, root.position),))
+    return place and place._replace(text=text)
+
+
+# -- lines and columns -------------------------------------------------------------------------------------------------
+
+
+class Positions:
+    """The places of one text; ``encoding`` is that of the client's code units."""
+
+    def __init__(self, text: str, encoding: str = "utf-16") -> None:
+        self.text = text
+        self._codec, self._size = (f"{encoding}-le" if encoding != "utf-8" else encoding), _BYTES[encoding]
+        self._ours, self._theirs = (
+            [0, *(found.end() for found in breaks.finditer(text))] for breaks in (LINE_BREAK, _THEIRS)
+        )
+
+    def offset(self, line: int, column: int) -> int:
+        """The character at our line and column; what is behind the text is at its end."""
+        if line >= len(self._ours):
+            return len(self.text)
+        return min(self._ours[line] + column + (line == 0 and self.text.startswith(BOM)), len(self.text))
+
+    def place(self, offset: int) -> tuple[int, int]:
+        """Our line and column of a character."""
+        here = bisect_right(self._ours, offset) - 1
+        return here, offset - self._ours[here] - (here == 0 and self.text.startswith(BOM))
+
+    def to_client(self, offset: int) -> tuple[int, int]:
+        """Line and column of the protocol for a character."""
+        there = bisect_right(self._theirs, offset) - 1
+        code = self.text[self._theirs[there] : offset].encode(self._codec, "surrogatepass")
+        return there, len(code) // self._size
+
+    def from_client(self, line: int, column: int) -> int:
+        """The character at a line and column of the protocol."""
+        if line >= len(self._theirs):
+            return len(self.text)
+        start, end = (*self._theirs, len(self.text))[line : line + 2]
+        code = self.text[start:end].encode(self._codec, "surrogatepass")[: max(column, 0) * self._size]
+        return start + len(code.decode(self._codec, "ignore" if self._size < 4 else "surrogatepass"))
+
+
+@lru_cache(maxsize=8)
+def positions(text: str, encoding: str = "utf-16") -> Positions:
+    """The places of a text; those of the latest texts are kept."""
+    return Positions(text, encoding)

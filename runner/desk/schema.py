@@ -50,6 +50,11 @@ def applying(root: Schema, schemas: Iterable[Schema], node: Node) -> Iterator[Sc
             waiting += [branch] if isinstance(branch, dict) else []
 
 
+def described(schemas: Iterable[Schema]) -> str:
+    """What the language says of a value."""
+    return next((each["description"] for each in schemas if "description" in each), "")
+
+
 def _below(schema: Schema, key: str | int) -> Iterator[Schema]:
     if isinstance(key, int):
         found = schema.get("items")

@@ -14,7 +14,6 @@ from pygls.lsp.server import LanguageServer
 
 from .answers import ANSWERS, FIX_ALL, LEGEND, Answers, path_of, uri_of
 from .changes import RenameError
-from .session import Session
 
 _OURS = re.compile(r"^(?:model|study|disturbance|composites)\s*:", re.MULTILINE)
 _PAUSE = 0.05  # seconds without a change before a text is read
@@ -32,47 +31,35 @@ class Server(LanguageServer):
     def __init__(self, version: str, types: tuple[type, ...] = ()) -> None:
         # Whole texts: the lines of incremental changes are not those that Python counts.
         super().__init__("epicycle", version, text_document_sync_kind=lsp.TextDocumentSyncKind.Full)
-        self.session = Session(types)
+        self._answers = Answers(types)
         self.ours: set[Path] = set()  # those that have looked like a file of Epicycle since they were opened
-        self.versions: dict[Path, int] = {}
-        self.waiting: dict[Path, asyncio.Task[None]] = {}
+        self.versions: dict[Path, int | None] = {}
+        self.waiting: dict[Path, asyncio.TimerHandle] = {}
 
+    @property
     def answers(self) -> Answers:
         encoding = self.workspace.position_encoding
-        return Answers(self.session, str(getattr(encoding, "value", encoding)))
+        self._answers.encoding = str(getattr(encoding, "value", encoding))
+        return self._answers
 
-    def take(self, uri: str, text: str, version: int) -> None:
-        """A text was opened or has changed."""
+    def change(self, uri: str, text: str | None, version: int | None = None) -> None:
+        """A text was opened, has changed or was closed (None): its problems are told when nobody types for a moment."""
         if (path := path_of(uri)) is None:
             return
         self.versions[path] = version
-        if _OURS.search(text):
+        if text is None:
+            self.ours.discard(path)
+        elif _OURS.search(text):
             self.ours.add(path)
-        for each in self.session.change(path, text):
-            self.plan(each)
+        for each in {path, *self.answers.change(path, text)}:
+            if each in self.waiting:
+                self.waiting[each].cancel()
+            self.waiting[each] = asyncio.get_running_loop().call_later(_PAUSE, self._tell, each)
 
-    def close(self, uri: str) -> None:
-        if (path := path_of(uri)) is None:
-            return
-        self.ours.discard(path)
-        if (task := self.waiting.pop(path, None)) is not None:
-            task.cancel()
-        for each in self.session.change(path, None):
-            self.plan(each)
-        self.text_document_publish_diagnostics(lsp.PublishDiagnosticsParams(uri, []))
-
-    def plan(self, path: Path) -> None:
-        """Report the problems of a text when nobody has typed for a moment."""
-        if (task := self.waiting.pop(path, None)) is not None:
-            task.cancel()
-        self.waiting[path] = asyncio.get_running_loop().create_task(self._later(path))
-
-    async def _later(self, path: Path) -> None:
-        await asyncio.sleep(_PAUSE)
-        self.waiting.pop(path, None)
+    def _tell(self, path: Path) -> None:
         found = list[lsp.Diagnostic]()
-        if path in self.ours and path in self.session.texts:
-            found = [each for each, _ in self.answers().problems(self.session.knowledge(path))]
+        if path in self.ours and path in self.answers.texts:
+            found = [each for each, _ in self.answers.problems(self.answers.knowledge(path))]
         params = lsp.PublishDiagnosticsParams(uri_of(path), found, self.versions.get(path))
         self.text_document_publish_diagnostics(params)
 
@@ -92,22 +79,22 @@ def make_server(version: str, types: tuple[type, ...] = ()) -> Server:
         document = params.text_document
         if document.language_id == "epicycle" and (path := path_of(document.uri)) is not None:
             server.ours.add(path)
-        server.take(document.uri, document.text, document.version)
+        server.change(document.uri, document.text, document.version)
 
     @server.feature(lsp.TEXT_DOCUMENT_DID_CHANGE)
     def changed(params: lsp.DidChangeTextDocumentParams) -> None:
         uri = params.text_document.uri
-        server.take(uri, server.workspace.get_text_document(uri).source, params.text_document.version)
+        server.change(uri, server.workspace.get_text_document(uri).source, params.text_document.version)
 
     @server.feature(lsp.TEXT_DOCUMENT_DID_CLOSE)
     def closed(params: lsp.DidCloseTextDocumentParams) -> None:
-        server.close(params.text_document.uri)
+        server.change(params.text_document.uri, None)
 
     def offer(method: str) -> None:
         @server.feature(method, _OPTIONS.get(method))
         def answer(params: Any) -> Any:
             try:
-                return server.answers().ask(method, params)
+                return server.answers.ask(method, params)
             except RenameError as error:
                 raise JsonRpcInvalidParams(str(error)) from None
 

@@ -5,14 +5,25 @@ from __future__ import annotations
 import copy
 import re
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, ClassVar, NamedTuple
 
-from epicycle.actors import EpicycleError, ParameterError, Tag, declared_parameters, did_you_mean, to_nanoseconds
+from epicycle.actors import (
+    EpicycleError,
+    ParameterError,
+    Tag,
+    counted,
+    declared_parameters,
+    did_you_mean,
+    to_nanoseconds,
+)
 from epicycle.aspects import ClockAspect, ExecutionAspect, JoinPoint, PortAspect
 
 from ..desk import difference
 from ..execution.engine import Interventions, Simulation
+from ..execution.results import Verdict
+from ..execution.results import plain as plain_value
 from ..model.build.model import Model
 from ..model.graph.acts import Act
 from ..model.graph.woven import WovenAspect
@@ -20,13 +31,16 @@ from ..model.language.settings import settings_of
 from ..model.text.document import plain
 from ..model.text.patterns import PatternError, select
 from ..model.text.problems import Problems
+from ..show.view import differing
+from ..show.view.pages import Page, Watch, recorded
 from ..study.run_spec import opened, seconds, spec_of
 from ..support.shown import short
-from .future import AS_IT_WAS, INSTEAD, First, WhatIf
+from ..support.tables import Table
+from .answer import Answer, listed
 from .monitored import aspect_named
 
-if TYPE_CHECKING:
-    from ..show.view.pages import Watch
+AS_IT_WAS, INSTEAD = "as it was", "what if"
+_FEW = 8  # actors in a sentence
 
 _FAILED = "failed"  # what ended a run in an error
 _LET_THROUGH = re.compile(r"(?P<aspect>[^@#]+)(?:@(?P<place>[^#]+))?(?:#(?P<number>[1-9]\d{0,8}))?")
@@ -61,9 +75,6 @@ def what_if(
 
     ``watch`` gives what is called with the time of each run now and then, in place of a bar.
     """
-    from ..show.view.differing import affected, difference, fired, first_firing
-    from ..show.view.pages import recorded
-
     fork = forked(model, at, changes, seed=seed, until=until, watch=watch)
     page = recorded(
         [model, fork.model],
@@ -76,34 +87,15 @@ def what_if(
     )
     if any(isinstance(each, KeyboardInterrupt) for each in page.errors):
         raise KeyboardInterrupt
-    recordings = page.recordings
-    before, after = (each.results for each in recordings)
-    assert before is not None
-    assert after is not None
-    if before.stopped == _FAILED:
+    found = WhatIf(model, at, fork.words, page)
+    if found.before.stopped == _FAILED:
         raise page.errors[0]
-    first, record = None, difference(recordings)
-    if (firing := first_firing(recordings)) is not None:
-        first = First(firing.actor, firing.tag.seconds, firing.tag.microstep, tuple(fired(recordings, firing)))
-        if firing.tag < at:
-            raise EpicycleError(
-                f"two runs of {model.name} differ at {firing.tag}, before {at}: "
-                "something depends on more than model and seed"
-            )
-    return WhatIf(
-        model.name,
-        before.seed,
-        at,
-        fork.words,
-        before,
-        after,
-        first,
-        [] if record is None else record["texts"],
-        {actor: tag.seconds for actor, tag in affected(recordings).items()},
-        len(model.graph.actors),
-        str(page.errors[0]) if page.errors else "",
-        page,
-    )
+    if found.first is not None and found.first.at < at:
+        raise EpicycleError(
+            f"two runs of {model.name} differ at {found.first.at}, before {at}: "
+            "something depends on more than model and seed"
+        )
+    return found
 
 
 class Fork(NamedTuple):
@@ -126,7 +118,7 @@ def forked(
     """The model with changes from a tag on; raises ``EpicycleError``."""
     other, words, always = copy.copy(model), list[str](), set[str]()
 
-    def weave(aspect: _Then, places: Mapping[str, Any]) -> None:
+    def weave(aspect: _Changed | _Lost, places: Mapping[str, Any]) -> None:
         name = f"what_if_{len(always) + 1}"
         while any(woven.name == name for woven in other.aspects):
             name += "_"
@@ -287,40 +279,140 @@ def _next_acts(
     return found
 
 
-class _Then(PortAspect):
-    """An aspect that acts from a tag on."""
+class _Changed(PortAspect):
+    """Gives a parameter another value from a tag on."""
 
     in_model_time: ClassVar[bool] = True
-    events: ClassVar[tuple[str, ...]] = ()
+    at_tag: Tag
+    value: Any
+
+    def pass_token(self, token: Any, point: JoinPoint) -> None:
+        point.forward(self.value if point.tag >= self.at_tag else token)
+
+
+class _Lost(PortAspect):
+    """Loses the first token from a tag on, at one of its places."""
+
+    in_model_time: ClassVar[bool] = True
+    events: ClassVar[tuple[str, ...]] = ("dropped",)
     at_tag: Tag
 
     def pass_token(self, token: Any, point: JoinPoint) -> None:
-        if point.tag >= self.at_tag:
-            self.act(token, point)
-        else:
-            point.forward(token)
-
-    def act(self, token: Any, point: JoinPoint) -> None:
-        raise NotImplementedError
-
-
-class _Changed(_Then):
-    """Gives a parameter another value."""
-
-    value: Any
-
-    def act(self, token: Any, point: JoinPoint) -> None:
-        point.forward(self.value)
-
-
-class _Lost(_Then):
-    """Loses one token, at one of its places."""
-
-    events: ClassVar[tuple[str, ...]] = ("dropped",)
-
-    def act(self, token: Any, point: JoinPoint) -> None:
-        if "is over" in point.shared:
+        if point.tag < self.at_tag or "is over" in point.shared:
             point.forward(token)
         else:
             point.shared["is over"] = True
             point.act("dropped", token)
+
+
+# -- what came of it ---------------------------------------------------------------------------------------------------
+
+
+class WhatIf(Answer):
+    """A run as it was, and the run with changes from a tag on: ``before`` and ``after`` are their results.
+
+    ``first`` is the first firing that changes; ``record`` the first difference of the logs, in words; ``affected`` are
+    the actors that do anything else, with the times (s) at which they begin to; ``error`` has ended the other future.
+    """
+
+    NAME: ClassVar[str] = "what_if"
+
+    def __init__(self, model: Model, at: Tag, changes: list[str], page: Page) -> None:
+        self.model, self.at, self.changes, self._page = model.name, at, changes, page
+        before, after = (each.results for each in page.recordings)
+        assert before is not None
+        assert after is not None
+        self.before, self.after = before, after
+        self.first = differing.first_firing(page.recordings)
+        record = differing.difference(page.recordings)
+        self.record: list[str] = [] if record is None else record["texts"]
+        self.affected = {actor: tag.seconds for actor, tag in differing.affected(page.recordings).items()}
+        self.error = str(page.errors[0]) if page.errors else ""
+        self._actors = len(model.graph.actors)
+
+    @property
+    def is_same(self) -> bool:
+        """Whether nothing has changed: the logs are equal, bit for bit."""
+        return self.before.digest == self.after.digest
+
+    def _sentences(self) -> list[str]:
+        what = f" {listed(self.changes)}." if self.changes else " nothing is changed."
+        said = [f"From {self.at.seconds:.9g} s on,{what}"]
+        if self.is_same:
+            reason = (
+                "Both futures have the same log"
+                if not self.changes
+                else "It makes no difference: both futures have the same log; what an actor reads only at its start "
+                "does not change later"
+            )
+            return [*said, f"{reason}."]
+        if self.first is not None:
+            said.append(f"The first firing that changes is {self.first.actor} at {self.first.tag}.")
+        names = [*self.affected][:_FEW]
+        more = f" and {len(self.affected) - _FEW:,} more" if len(self.affected) > _FEW else ""
+        whom = f": {', '.join(names)}{more}" if names else ""
+        do = "does" if len(self.affected) == 1 else "do"
+        said.append(f"{len(self.affected):,} of {counted(self._actors, 'actor')} {do} something else{whom}.")
+        for name, verdict in self.before.monitors.items():
+            if (other := self.after.monitors[name]).holds != verdict.holds:
+                said.append(f"Monitor {name}: {_verdict(verdict)} as it was, {_verdict(other)} instead.")
+        if self.error:
+            said.append(f"The other future ends in an error: {self.error}")
+        return said
+
+    def _facts(self) -> dict[str, Any]:
+        both, first = {AS_IT_WAS: self.before, INSTEAD: self.after}, self.first
+        return {
+            "model": self.model,
+            "seed": self.before.seed,
+            "at": {"time": self.at.seconds, "microstep": self.at.microstep},
+            "changes": self.changes,
+            "same": self.is_same,
+            "first_firing": first
+            and {"actor": first.actor, "time": first.time, "microstep": first.at.microstep, "does": first.does},
+            "first_difference": dict(zip(both, self.record, strict=False)),
+            "affected": self.affected,
+            "digests": {name: each.digest for name, each in both.items()},
+            "stopped": {name: each.stopped for name, each in both.items()},
+            "metrics": {name: plain_value(each.metrics) for name, each in both.items()},
+            "monitors": {
+                name: {key: asdict(verdict) for key, verdict in each.monitors.items()} for name, each in both.items()
+            },
+            "error": self.error,
+        }
+
+    def page(self) -> Page:
+        """A page with both futures; the first firing that changes is marked."""
+        self._page.story = self._sentences()
+        return self._page
+
+    def save(self, folder: str | Path | None = None, *, page: bool = True) -> list[Path]:
+        """Write what_if.json and, unless refused, what_if.html."""
+        [facts] = super().save(folder)
+        return [facts, *([self.page().save(facts.with_suffix(".html"))] if page else [])]
+
+    def _tables(self) -> list[Table]:
+        units = {name: "" if unit == "1" else unit for name, unit in self.before.units.items()}
+        metrics = [
+            (name, each.shown(short), self.after.outcomes[name].shown(short), units.get(name, ""))
+            for name, each in self.before.outcomes.items()
+        ]
+        verdicts = [
+            (name, _verdict(each), _verdict(self.after.monitors[name])) for name, each in self.before.monitors.items()
+        ]
+        rows = [("first difference", *self.record)] if self.record else []
+        if self.first is not None:
+            rows.insert(0, (f"{self.first.actor} at {self.first.tag}", *self.first.does))
+        return [
+            Table(("", AS_IT_WAS, INSTEAD), rows),
+            Table(("metric", AS_IT_WAS, INSTEAD, "unit"), metrics),
+            Table(("monitor", AS_IT_WAS, INSTEAD), verdicts),
+        ]
+
+
+def _verdict(verdict: Verdict) -> str:
+    if verdict.holds is None:
+        return "cannot be judged"
+    if verdict.holds:
+        return "holds"
+    return "broken" if verdict.time is None else f"broken at {verdict.time:.9g} s"

@@ -28,7 +28,7 @@ _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLI
 
 # What comes of a call: its result, it took too long, or the process ended with that exit code.
 DONE, LATE, DEAD = "done", "late", "dead"
-_RAISED = "raised"
+_RAISED, _SAID = "raised", "said"
 Outcome = tuple[str, Any]
 
 
@@ -48,7 +48,7 @@ class UnwantedError(EpicycleError):
     """Nobody waits for the result any longer."""
 
 
-def _always() -> bool:
+def _always(*_: object) -> bool:
     return True
 
 
@@ -75,6 +75,10 @@ class Process:
         self._give((make, given))
         self.has_started = self.is_ready = False
 
+    @property
+    def is_over(self) -> bool:
+        return self._process.poll() is not None
+
     def begin(self, limit: float | None = None, is_wanted: Callable[[], bool] = _always) -> Outcome:
         """Wait until the object is there; raises as ``call``."""
         outcome: Outcome = DONE, None
@@ -85,31 +89,46 @@ class Process:
         return outcome
 
     def call(
-        self, method: str, *given: object, limit: float | None = None, is_wanted: Callable[[], bool] = _always
+        self,
+        method: str,
+        *given: object,
+        limit: float | None = None,
+        is_wanted: Callable[[], bool] = _always,
+        told: Callable[[Any], object] = _always,
     ) -> Outcome:
-        """The outcome of a call, in at most ``limit`` s.
+        """The outcome of a call, in at most ``limit`` s; what the object says before it is ``told``.
 
         Raises what the object raises, ``RaisedError`` where that is of another package, and ``UnwantedError``.
         """
         self._give((method, given))
-        return self._answer(limit, is_wanted)
+        return self._answer(limit, is_wanted, told)
 
-    def _answer(self, limit: float | None, is_wanted: Callable[[], bool]) -> Outcome:
+    def hasten(self) -> None:
+        """Let a call come to its end that looks whether something waits."""
+        self._give(())
+
+    def _answer(
+        self, limit: float | None, is_wanted: Callable[[], bool], told: Callable[[Any], object] = _always
+    ) -> Outcome:
         since = time.monotonic()
         while True:
             try:
-                what, told = self._told.get(timeout=_LOOK if limit is None else min(_LOOK, limit))
+                what, found = self._told.get(timeout=_LOOK if limit is None else min(_LOOK, limit))
             except queue.Empty:
+                what, found = "", None
+            if what == _SAID:
+                told(found)
+            if what in ("", _SAID):
                 if not is_wanted():
-                    raise UnwantedError from None
+                    raise UnwantedError
                 if limit is not None and time.monotonic() - since > limit:
                     return LATE, None
                 continue
             if what == _RAISED:
-                raise told if isinstance(told, Exception) else RaisedError(*told)
+                raise found if isinstance(found, Exception) else RaisedError(*found)
             if what == DEAD:
-                self._told.put((what, told))  # as of every later call
-            return what, told
+                self._told.put((what, found))  # as of every later call
+            return what, found
 
     def end(self) -> int:
         """Kill it if it still runs; its exit code."""
@@ -119,7 +138,7 @@ class Process:
     def _give(self, what: object) -> None:
         assert self._process.stdin is not None
         try:
-            pickle.dump(what, self._process.stdin)
+            self._process.stdin.write(pickle.dumps(what))  # in one piece, as threads may do it at once
             self._process.stdin.flush()
         except OSError:  # it has died, which the listener reports
             return
@@ -177,31 +196,48 @@ class Apart:
 
 # -- inside such a process --------------------------------------------------------------------------------------------
 
+_given: queue.SimpleQueue[Any] = queue.SimpleQueue()  # what it is to do
+_replies: list[BinaryIO] = []  # where it answers, once it serves
+
+
+def say(message: object) -> None:
+    """Tell who waits for the outcome of a call something before it."""
+    _reply(pickle.dumps((_SAID, message)))
+
+
+def is_hastened() -> bool:
+    """Whether something waits, such as another call."""
+    return not _given.empty()
+
 
 def serve() -> None:
     """Serve the process that started this one."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the waiting process decides what an interrupt means
-    requests, replies = os.fdopen(os.dup(0), "rb"), os.fdopen(os.dup(1), "wb")
+    requests = os.fdopen(os.dup(0), "rb")
+    _replies.append(os.fdopen(os.dup(1), "wb"))
     nothing = os.open(os.devnull, os.O_RDWR)
     for each in (0, 1):  # an object that prints would corrupt the answers
         os.dup2(nothing, each)
-    given: queue.SimpleQueue[Any] = queue.SimpleQueue()
-    threading.Thread(target=_listen, args=(requests, given), daemon=True).start()
+    threading.Thread(target=_listen, args=(requests,), daemon=True).start()
 
     it: list[Any] = []  # the object, once it is there
     try:
         with seldom_collecting():
-            replies.write(_answer_to(it, None))
-            replies.flush()
-            for number, request in enumerate(iter(given.get, None)):
-                replies.write(_answer_to(it, request))
-                replies.flush()
+            _reply(_answer_to(it, None))
+            for number, request in enumerate(filter(None, iter(_given.get, None))):
+                _reply(_answer_to(it, request))
                 if number == _SETTLED:  # what has been loaded until now need not be searched for garbage again
                     keep_for_good()
         if it and hasattr(it[0], "close"):
             it[0].close()
     except BrokenPipeError:
         os._exit(1)
+
+
+def _reply(what: bytes) -> None:
+    for each in _replies:
+        each.write(what)
+        each.flush()
 
 
 def _answer_to(it: list[Any], request: Any) -> bytes:
@@ -223,14 +259,14 @@ def _answer_to(it: list[Any], request: Any) -> bytes:
         return pickle.dumps((_RAISED, (type(error).__name__, str(error))))
 
 
-def _listen(requests: BinaryIO, given: queue.SimpleQueue[Any]) -> None:
+def _listen(requests: BinaryIO) -> None:
     """Read the requests; if the process that sends them ends in any way, end even in the middle of a call."""
     try:
         while True:
-            given.put(pickle.load(requests))
+            _given.put(pickle.load(requests))
     except (EOFError, OSError):
-        given.put(None)
+        _given.put(None)
         time.sleep(_GRACE)
         os._exit(1)
     except Exception as error:  # what it is made of is not there
-        given.put(error)
+        _given.put(error)

@@ -246,7 +246,7 @@ def test_hostile_arguments_end_with_a_message(folder: Path, tmp_path: Path) -> N
 )
 def test_what_no_process_can_be_given(folder: Path, words: list[str], message: str) -> None:
     with pytest.raises(ToolError) as raised:
-        LimitedCall(folder).json("run", words[:1], *words[1:])
+        LimitedCall(folder).call("run", words[:1], *words[1:])
     assert str(raised.value) == message
 
 
@@ -306,7 +306,7 @@ def test_other_commands_import_none_of_it(words: list[str]) -> None:
     program = (
         "import sys\nfrom epicycle.runner.interface.cli import main\n"
         "try:\n    main(sys.argv[1:])\nexcept SystemExit:\n    pass\n"
-        "ours = ['interface.agents', 'search.what_if', 'search.future']\n"
+        "ours = ['interface.agents', 'search.what_if']\n"
         "ours = ['mcp', *('epicycle.runner.' + each for each in ours)]\n"
         "print([each for each in ours if each in sys.modules], file=sys.stderr)"
     )

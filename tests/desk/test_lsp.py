@@ -15,7 +15,7 @@ import pytest
 from lsprotocol import types as lsp
 from pygls.exceptions import JsonRpcException, JsonRpcInvalidParams
 
-from epicycle.runner.desk.positions import Positions
+from epicycle.runner.desk.places import Positions
 from epicycle.runner.model.build.load import load_model
 from epicycle.runner.model.catalogue.packaged import packaged_models
 from epicycle.runner.model.text.problems import ModelError, Problem

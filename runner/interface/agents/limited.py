@@ -7,7 +7,7 @@ import signal
 import subprocess
 import sys
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -41,34 +41,28 @@ class LimitedCall:
         self.types = [f"--types={Path(each).resolve()}" for each in types]
         self.limits = limits or Limits()
 
-    def json(self, command: str, names: Sequence[str], *options: str, good: Sequence[int] = (0,)) -> str:
-        """What a command prints as JSON."""
+    def call(
+        self, command: str, names: Sequence[str], *options: str, good: Sequence[int] = (0,), file: str = ""
+    ) -> bytes:
+        """What a command prints as JSON, or a file that it writes with ``-o``; raises ``ToolError``."""
         with tempfile.TemporaryDirectory(prefix="epicycle-") as out:
-            text = self._answer(out, command, names, [*options, "--json"], good)
-        if len(text) > self.limits.answer:
+            named = [self._named(each, out, number) for number, each in enumerate(names)]
+            asked = [each.replace("{out}", f"{out}/found") for each in options]
+            asked.append(f"-o={out}/{file}" if file else "--json")
+            words = [sys.executable, "-P", "-m", "epicycle", command, *asked, *self.types, "--", *named]
+            if sum(map(len, words)) > self.limits.argument or not all(map(_is_text, words)):
+                raise ToolError(f"the arguments have more than {self.limits.argument:,} characters, or are no text")
+            code, told, complained = self._run(words, out)
+            if code not in good or not told:
+                raise ToolError((complained or told)[: self.limits.answer] or f"the command ended with {code}")
+            if file:
+                return Path(out, file).read_bytes()
+        if len(told) > self.limits.answer:
             raise ToolError(
-                f"the answer has {len(text):,} characters, more than {self.limits.answer:,}: "
+                f"the answer has {len(told):,} characters, more than {self.limits.answer:,}: "
                 "ask for less, or of a smaller model"
             )
-        return text
-
-    def file(self, command: str, names: Sequence[str], *options: str, name: str) -> bytes:
-        """A file that a command writes with ``-o``."""
-        with tempfile.TemporaryDirectory(prefix="epicycle-") as out:
-            self._answer(out, command, names, [*options, f"-o={out}/{name}"], (0,))
-            return Path(out, name).read_bytes()
-
-    def _answer(self, out: str, command: str, names: Sequence[str], options: Sequence[str], good: Sequence[int]) -> str:
-        named = [self._named(each, out, number) for number, each in enumerate(names)]
-        options = [each.replace("{out}", f"{out}/found") for each in options]
-        words = [sys.executable, "-P", "-m", "epicycle", command, *options, *self.types, "--", *named]
-        if sum(map(len, words)) > self.limits.argument or not all(map(_is_text, words)):
-            raise ToolError(f"the arguments have more than {self.limits.argument:,} characters, or are no text")
-        code, told, complained = self._run(words, out)
-        told, complained = (each.replace(f"{out}/", "").strip() for each in (told, complained))
-        if code not in good or not told:
-            raise ToolError((complained or told)[: self.limits.answer] or f"the command ended with {code}")
-        return told
+        return told.encode()
 
     def _named(self, name: str, out: str, number: int) -> str:
         """A model as the command line names it: a packaged one or type, a file in the folder, or a text."""
@@ -94,12 +88,15 @@ class LimitedCall:
         return str(path.relative_to(self.folder))
 
     def _run(self, words: Sequence[str], out: str) -> tuple[int, str, str]:
+        """The exit code of a command, and what it told and complained of."""
         streams = Path(out, ".stdout"), Path(out, ".stderr")
-        named = [each.partition("=")[2] for each in self.types]
-        folders = os.pathsep.join(
-            str(Path(each).resolve()) for each in [str(self.folder), out, *map(str, model_folders()), *named]
-        )
-        environment: Mapping[str, str] = {**os.environ, FOLDERS: folders, "NO_COLOR": "1", "COLUMNS": "120"}
+        readable: list[str | Path] = [
+            self.folder,
+            out,
+            *model_folders(),
+            *(each.partition("=")[2] for each in self.types),
+        ]
+        folders = os.pathsep.join(str(Path(each).resolve()) for each in readable)
         with streams[0].open("wb") as told, streams[1].open("wb") as complained:
             process = subprocess.Popen(
                 words,
@@ -107,7 +104,7 @@ class LimitedCall:
                 stdin=subprocess.DEVNULL,
                 stdout=told,
                 stderr=complained,
-                env=environment,
+                env={**os.environ, FOLDERS: folders, "NO_COLOR": "1", "COLUMNS": "120"},
                 start_new_session=True,
             )
             self._bound(process.pid)
@@ -126,8 +123,8 @@ class LimitedCall:
             raise ToolError(
                 f"it was ended by {signal.Signals(-code).name}: it may have needed too much memory or output"
             )
-        told_text, complained_text = (each.read_text("utf-8", errors="replace") for each in streams)
-        return code, told_text, complained_text
+        said, wrong = (each.read_text("utf-8", errors="replace").replace(f"{out}/", "").strip() for each in streams)
+        return code, said, wrong
 
     def _bound(self, process: int) -> None:
         if sys.platform == "linux":

@@ -31,7 +31,7 @@ class Tool(NamedTuple):
     always: tuple[str, ...] = ()
     unless_given: Mapping[str, str] = {}
     good: tuple[int, ...] = (0,)
-    is_picture: bool = False
+    picture: str = ""  # its name, where the answer is one
 
 
 _CHANGES = Tool("").options
@@ -48,7 +48,7 @@ TOOLS = {
     "explain": Tool("explain", f"{_RUN} monitor runs", ("--jobs=1", "--no-page", _FOLDER)),
     "diff": Tool("diff", good=(0, 1)),
     "what_if": Tool("what-if", f"{_RUN} at change remove let_through lose", ("--no-page", _FOLDER)),
-    "draw": Tool("graph", f"{_CHANGES} depth", is_picture=True),
+    "draw": Tool("graph", f"{_CHANGES} depth", picture="graph.png"),
 }
 
 
@@ -57,9 +57,8 @@ class Offered:
 
     def __init__(self, name: str, tool: Tool, parser: argparse.ArgumentParser) -> None:
         self.name, self.tool, self.said = name, tool, parser.description
-        wanted = tool.options.split()
-        named = [(_name(each), each) for each in parser._actions]
-        self.known = {name: each for name, each in named if name in wanted or not each.option_strings}
+        wanted, known = tool.options.split(), {_name(each): each for each in parser._actions}
+        self.known = {name: each for name, each in known.items() if name in wanted or not each.option_strings}
 
     def described(self) -> mcp.Tool:
         properties = {name: _schema(each) for name, each in self.known.items()}
@@ -130,10 +129,10 @@ class Assisting(MCPServer):
         if (chosen := self.offered.get(name)) is None:
             raise ToolError(f"there is no tool {name[:80]!r}: {', '.join(self.offered)}")
         tool, (names, options) = chosen.tool, chosen.words(self.call, given)
-        if tool.is_picture:
-            data = base64.b64encode(self.call.file(tool.command, names, *options, name="graph.png")).decode()
-            return mcp.ImageContent(type="image", data=data, mime_type="image/png")
-        return mcp.TextContent(type="text", text=self.call.json(tool.command, names, *options, good=tool.good))
+        found = self.call.call(tool.command, names, *options, good=tool.good, file=tool.picture)
+        if tool.picture:
+            return mcp.ImageContent(type="image", data=base64.b64encode(found).decode(), mime_type="image/png")
+        return mcp.TextContent(type="text", text=found.decode())
 
 
 def make_server(call: LimitedCall, version: str, parsers: Mapping[str, argparse.ArgumentParser]) -> MCPServer:
@@ -149,7 +148,7 @@ def make_server(call: LimitedCall, version: str, parsers: Mapping[str, argparse.
     async def reference(name: str) -> str:
         """Ports and parameters of a type of actors or aspects."""
         try:
-            return await anyio.to_thread.run_sync(call.json, "describe", [name])
+            return (await anyio.to_thread.run_sync(call.call, "describe", [name])).decode()
         except ToolError as error:
             raise ResourceError(str(error)) from None
 

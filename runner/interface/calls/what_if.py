@@ -14,7 +14,7 @@ if TYPE_CHECKING:
     from epicycle.actors import Tag
 
     from ...model.build.model import Model
-    from ...search.future import WhatIf
+    from ...search.what_if import WhatIf
 
 
 def what_if(

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from ...support.printing import complain, tell
-from . import agents, completion, describe, editor, listing, new, recording, running, searching, studies
+from . import completion, describe, listing, new, recording, running, searching, serving, studies
 from .offered import offered_commands
 from .options import BAD_INPUT, BROKEN, DONE, FAILED, JSON, TYPES, Command, command, option, own_types, several
 
@@ -24,9 +24,9 @@ GROUPS = {
         describe.describe,
         describe.graph,
         listing.list_,
-        editor.lsp,
-        agents.mcp,
-        editor.studio,
+        serving.lsp,
+        serving.mcp,
+        serving.studio,
     ),
     "set up a shell": (completion.completion,),
 }

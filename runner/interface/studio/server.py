@@ -10,11 +10,13 @@ import asyncio
 import hmac
 import json
 import secrets
-from collections.abc import Awaitable, Callable, MutableMapping, Sequence
-from contextlib import suppress
+from collections.abc import AsyncIterator, Awaitable, Callable, Coroutine, Mapping, MutableMapping, Sequence
+from contextlib import asynccontextmanager, suppress
+from functools import partial
 from html import escape
 from importlib.resources import files
 from pathlib import Path
+from string import Template
 from typing import Any
 
 from starlette.applications import Starlette
@@ -25,21 +27,92 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from epicycle.actors import EpicycleError, read_regular
 
-from ...desk.answers import ANSWERS
 from ...model.text.document import MAX_BYTES
 from ...show.view.page import PARTS, part, script
 from ...show.view.recording import ViewError
+from ...support.apart import DEAD, DONE, LATE, Outcome, Process
 from ...support.files import replace_file
-from .workers import Workers
+from .worker import Message, Worker
 
 OWN = ("socket", "text", "wiring", "fields", "running", "what_if", "arrange")  # in this order
 LONGEST = 2 * MAX_BYTES + 100_000  # bytes of a message, in which a character may take several
 READING, GRACE = 30.0, 10.0  # s that reading a text may take, and that a run may take beyond its limit
-OF_READING = frozenset({"read", "types", "fields", "edit", *ANSWERS})
+START = 60.0  # s that a process may take until it listens
+HEADERS = {
+    "Cache-Control": "no-store",
+    "Cross-Origin-Opener-Policy": "same-origin",
+    "Cross-Origin-Resource-Policy": "same-origin",
+    "Referrer-Policy": "no-referrer",
+    "X-Content-Type-Options": "nosniff",
+}
 
-Message = dict[str, Any]
+Tell = Callable[[Message], Coroutine[Any, Any, None]]
 Scope = MutableMapping[str, Any]
 App = Callable[[Scope, Callable[..., Awaitable[Any]], Callable[..., Awaitable[None]]], Awaitable[None]]
+
+
+class Workers:
+    """One process at a time, in which ``make`` makes what answers; of the questions that wait, only the latest of each
+    kind is asked.
+
+    With ``stops``, a question ends the one that is being answered.
+    """
+
+    def __init__(self, name: str, patience: float, make: Callable[[], Any], *, stops: bool = False) -> None:
+        self.name = name
+        self.patience = patience  # s
+        self.stops = stops
+        self._make = partial(Process, make)
+        self._process: Process | None = None
+        self._turn = asyncio.Lock()
+        self._latest: dict[str, Message] = {}
+
+    async def ask(self, question: Message, tell: Tell) -> Message:
+        """The answer; what comes before it goes to ``tell``.  A process that fails gives an answer that says so."""
+        self._latest[str(question["ask"])] = question
+        if self.stops and self._process is not None:
+            self._process.hasten()
+        # The turn ends with the answer, even if nobody waits for it any longer.
+        return await asyncio.shield(asyncio.create_task(self._in_turn(question, tell)))
+
+    async def _in_turn(self, question: Message, tell: Tell) -> Message:
+        loop = asyncio.get_running_loop()
+        async with self._turn:
+            if self._latest.get(str(question["ask"])) is not question:
+                return {"stale": True}
+            what, found = await asyncio.to_thread(
+                self._outcome, question, lambda said: asyncio.run_coroutine_threadsafe(tell(said), loop)
+            )
+        if what == DONE:
+            answer: Message = found
+            return answer
+        self.stop()
+        if what == LATE:
+            return {"error": f"the {self.name} took longer than {self.patience:g} s, and was ended"}
+        return {"error": f"the {self.name} has died; it starts again with the next change"}
+
+    def _outcome(self, question: Message, told: Callable[[Message], object]) -> Outcome:
+        """What comes of a question to the process, which is started unless it runs."""
+        if self._process is None or self._process.is_over:
+            self._process = self._make()
+        try:
+            outcome = self._process.begin(START)
+            if outcome[0] == DONE:
+                outcome = self._process.call("answer", question, limit=self.patience, told=told)
+        except EpicycleError:
+            return DEAD, None
+        return outcome
+
+    def close(self) -> None:
+        """End the process; nothing is asked any more."""
+        self._latest.clear()
+        self.stop()
+
+    def stop(self) -> None:
+        """End the process; the next question starts another one."""
+        if self._process is not None:
+            self._process.end()
+        self._process = None
 
 
 class Document:
@@ -47,9 +120,7 @@ class Document:
 
     def __init__(self, path: Path) -> None:
         self.path = path.resolve()
-        self.data = b""
-        if self.path.exists():
-            self.data = read_regular(self.path)
+        self.data = self._on_disk()
         if len(self.data) > MAX_BYTES:
             raise EpicycleError(f"{path} is larger than {MAX_BYTES // 1_000_000} MB")
         try:
@@ -62,13 +133,15 @@ class Document:
 
     def save(self, text: str, *, anyway: bool) -> Message:
         """Write the text, unless somebody else has written the file."""
-        on_disk = read_regular(self.path) if self.path.exists() else b""
-        if on_disk != self.data and not anyway:
+        if self._on_disk() != self.data and not anyway:
             return {"conflict": f"{self.path.name} was changed by another program since it was read"}
         data = (text.replace("\n", "\r\n") if self.has_crlf else text).encode("utf-8")
         replace_file(self.path, data, ViewError)
         self.data = data
         return {"saved": True}
+
+    def _on_disk(self) -> bytes:
+        return read_regular(self.path) if self.path.exists() else b""
 
 
 class Studio:
@@ -76,10 +149,11 @@ class Studio:
 
     def __init__(self, document: Document, seconds: float, events: int, types: Sequence[Path]) -> None:
         self.document = document
-        given = [str(document.path), str(seconds), str(events), *map(str, types)]
-        self.workers = dict.fromkeys(OF_READING, Workers("reading of the text", given, READING)) | {
-            "run": Workers("run", given, seconds + GRACE, stops=True),
-            "what_if": Workers("what if", given, 3 * seconds + GRACE, stops=True),
+        make = partial(Worker.limited, document.path, seconds, events, [*map(str, types)])
+        self.reading = Workers("reading of the text", READING, make)
+        self.running = {
+            "run": Workers("run", seconds + GRACE, make, stops=True),
+            "what_if": Workers("what if", 3 * seconds + GRACE, make, stops=True),
         }
         self.token = secrets.token_urlsafe(32)
         self.nonce = secrets.token_urlsafe(16)
@@ -97,7 +171,7 @@ class Studio:
             Route("/{token}/{name}", self.file),
             WebSocketRoute("/{token}/socket", self.socket),
         ]
-        app = Starlette(routes=routes)
+        app = Starlette(routes=routes, lifespan=self.working)
 
         async def guarded(scope: Scope, receive: Any, send: Any) -> None:
             """Answers requests that come from its own page or from the address line only."""
@@ -131,28 +205,18 @@ class Studio:
             f"default-src 'none'; script-src 'self'; style-src 'self' 'nonce-{self.nonce}'; img-src data:; "
             f"connect-src ws://{host}; base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
         )
-        name = escape(self.document.path.name)
-        html = (
-            '<!DOCTYPE html>\n<html lang="en"><head><meta charset="utf-8">'
-            '<meta name="viewport" content="width=device-width, initial-scale=1">'
-            f'<title>{name} - Epicycle studio</title><link rel="stylesheet" href="studio.css">'
-            '<script src="codemirror.js" defer></script><script src="studio.js" defer></script></head>'
-            f'<body><div id="page" data-nonce="{self.nonce}"><noscript>The studio needs JavaScript.</noscript></div>'
-            "</body></html>\n"
-        )
+        html = Template(_own("studio.html")).substitute(name=escape(self.document.path.name), nonce=self.nonce)
         return _response(html, "text/html", {"Content-Security-Policy": policy, "X-Frame-Options": "DENY"})
 
     async def file(self, request: Request) -> Response:
-        name = request.path_params["name"]
-        own = files(__package__) / "browser"
-        if name == "codemirror.js":
-            return _response((own / name).read_text(encoding="utf-8"), "text/javascript")
-        if name == "studio.js":
-            parts = [part(f"{each}.js") for each in PARTS]
-            parts += [(own / f"{each}.js").read_text(encoding="utf-8") for each in OWN]
-            return _response(script(parts), "text/javascript")
-        if name == "studio.css":
-            return _response(part("page.css") + (own / "studio.css").read_text(encoding="utf-8"), "text/css")
+        match request.path_params["name"]:
+            case "codemirror.js" as name:
+                return _response(_own(name), "text/javascript")
+            case "studio.js":
+                parts = [*(part(f"{each}.js") for each in PARTS), *(_own(f"{each}.js") for each in OWN)]
+                return _response(script(parts), "text/javascript")
+            case "studio.css" as name:
+                return _response(part("page.css") + _own(name), "text/css")
         return PlainTextResponse("Not found", 404)
 
     # -- the socket -----------------------------------------------------------------------------------------------
@@ -193,10 +257,8 @@ class Studio:
 
         if ask == "save":
             found = self.save(message)
-        elif ask in self.workers:
-            found = await self.workers[ask].ask(message, tell)
         else:
-            found = {"error": "there is no such question"}
+            found = await self.running.get(ask, self.reading).ask({**message, "ask": ask}, tell)
         await tell({**found, "done": True})
 
     def save(self, message: Message) -> Message:
@@ -208,20 +270,21 @@ class Studio:
         except (EpicycleError, OSError, UnicodeEncodeError) as error:
             return {"error": str(error)}
 
-    def close(self) -> None:
-        for each in self.workers.values():
-            each.stop()
+    @asynccontextmanager
+    async def working(self, app: Starlette) -> AsyncIterator[None]:
+        """While it serves, there are workers."""
+        yield
+        for each in (self.reading, *self.running.values()):
+            each.close()
 
 
-def _response(text: str, kind: str, more: dict[str, str] | None = None) -> Response:
-    headers = {
-        "Cache-Control": "no-store",
-        "Cross-Origin-Opener-Policy": "same-origin",
-        "Cross-Origin-Resource-Policy": "same-origin",
-        "Referrer-Policy": "no-referrer",
-        "X-Content-Type-Options": "nosniff",
-    }
-    return Response(text, media_type=kind, headers=headers | (more or {}))
+def _own(name: str) -> str:
+    """A file of the page's program or style."""
+    return (files(__package__) / "browser" / name).read_text(encoding="utf-8")
+
+
+def _response(text: str, kind: str, more: Mapping[str, str] | None = None) -> Response:
+    return Response(text, media_type=kind, headers={**HEADERS, **(more or {})})
 
 
 async def _send(browser: WebSocket, said: Message) -> None:
@@ -256,11 +319,7 @@ def serve(studio: Studio, port: int, opened: Callable[[str], None]) -> None:
         limit_concurrency=32,
         server_header=False,
         timeout_graceful_shutdown=1,
-        lifespan="off",
+        lifespan="on",
     )
-    server = uvicorn.Server(config)
     opened(address)
-    try:
-        server.run(sockets=[listening])
-    finally:
-        studio.close()
+    uvicorn.Server(config).run(sockets=[listening])

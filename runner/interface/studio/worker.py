@@ -1,23 +1,18 @@
-"""A process that answers questions about a text, and makes runs: one JSON object per line comes in, and goes out.
+"""What answers questions about a text, and makes runs, in a process of its own.
 
-``python -m epicycle.runner.interface.studio.worker MODEL.yaml SECONDS EVENTS [FILE.py ...]``.  What an editor asks
-about the text, and changes of it, are those of the Language Server Protocol.
+What an editor asks about the text, and changes of it, are those of the Language Server Protocol.
 """
 
 from __future__ import annotations
 
 import gc
-import json
-import os
-import queue
-import sys
 import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any
 
 from cattrs.errors import BaseValidationError
 from lsprotocol import types as lsp
@@ -25,7 +20,7 @@ from lsprotocol.converters import get_converter
 
 from epicycle.actors import EpicycleError, Tag
 
-from ...desk import EditError, Knowledge, Session, controls, editing, edits_between
+from ...desk import EditError, Knowledge, controls, editing, edits_between
 from ...desk.answers import ANSWERS, Answers, uri_of
 from ...model.build.model import Model
 from ...model.text.document import MAX_BYTES
@@ -36,7 +31,7 @@ from ...show.view.page import data_of, metrics
 from ...show.view.pages import recorded
 from ...show.view.recording import Recording
 from ...study.run_spec import RunSpec, named
-from ...support.collection import keep_for_good, seldom_collecting
+from ...support.apart import is_hastened, say
 from ..calls.changes import classes
 
 MEMORY = 4 << 30  # bytes that a worker may take
@@ -55,37 +50,33 @@ class StaleError(Exception):
 class Worker:
     """Everything that a process knows: the text under work, and the limits of runs."""
 
-    def __init__(self, path: Path, seconds: float, events: int, files: Sequence[str], say: Callable[..., None]):
+    def __init__(
+        self, path: Path, seconds: float, events: int, files: Sequence[str], say: Callable[[Message], None] = say
+    ) -> None:
         self.path = path
         self.seconds = seconds
         self.events = events
         self.files = tuple(files)
-        self.session = Session(tuple(classes(self.files)))
-        self.answers = Answers(self.session)
+        self.answers = Answers(tuple(classes(self.files)))
         self.ended = ""  # why the latest run was ended
         self.say = say
-        self.waiting: queue.Queue[Message] = queue.Queue()
+        self._clearing = threading.Timer(REST, gc.collect)
 
-    def next(self) -> Message:
-        """The next question; what the ones before have left is cleared away when nobody waits."""
-        with suppress(queue.Empty):
-            return self.waiting.get(timeout=REST)
-        gc.collect()
-        return self.waiting.get()
+    @classmethod
+    def limited(cls, *given: Any) -> Worker:
+        """One that takes no more memory than a model needs; what is too large fails here, not on the whole machine."""
+        with suppress(ImportError, OSError, ValueError):
+            import resource
+
+            resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+            resource.setrlimit(resource.RLIMIT_DATA, (MEMORY, MEMORY))
+        return cls(*given)
 
     def answer(self, asked: Message) -> Message:
-        """The answer to a question; what is wrong with it is said in words."""
+        """The answer to a question; what it leaves is cleared away when nobody waits."""
+        self._clearing.cancel()
         try:
-            text = asked["text"]
-            if not isinstance(text, str) or len(text) > MAX_BYTES:
-                raise EpicycleError(f"a text has at most {MAX_BYTES // 1_000_000} MB")
-            if self.session.texts.get(self.path) != text:
-                self.session.change(self.path, text)
-            method = str(asked["ask"])
-            act = Worker.language if method in ANSWERS else ASKED.get(method)
-            if act is None:
-                raise EpicycleError("there is no such question")
-            return act(self, asked)
+            return self._answer(asked)
         except StaleError:
             return {"stale": True}
         except EpicycleError as error:
@@ -94,14 +85,30 @@ class Worker:
             return {"error": f"this question cannot be read ({type(error).__name__})"}
         except MemoryError:
             return {"error": "there is not enough memory"}
+        finally:
+            self._clearing = threading.Timer(REST, gc.collect)
+            self._clearing.daemon = True
+            self._clearing.start()
+
+    def _answer(self, asked: Message) -> Message:
+        text = asked["text"]
+        if not isinstance(text, str) or len(text) > MAX_BYTES:
+            raise EpicycleError(f"a text has at most {MAX_BYTES // 1_000_000} MB")
+        if self.answers.texts.get(self.path) != text:
+            self.answers.change(self.path, text)
+        method = str(asked["ask"])
+        act = Worker.language if method in ANSWERS else ASKED.get(method)
+        if act is None:
+            raise EpicycleError("there is no such question")
+        return act(self, asked)
 
     @property
     def text(self) -> str:
-        return self.session.texts[self.path]
+        return self.answers.texts[self.path]
 
     @property
     def knowledge(self) -> Knowledge:
-        return self.session.knowledge(self.path)
+        return self.answers.knowledge(self.path)
 
     # -- the text -------------------------------------------------------------------------------------------------
 
@@ -116,7 +123,7 @@ class Worker:
             problems.append(found)
         reading = knowledge.reading
         self.say({"problems": problems, "valid": reading.is_valid})
-        reading = controls.so_far(reading, self.session.texts)
+        reading = controls.so_far(reading, self.answers.texts)
         model, known = reading.loading.model, knowledge if reading is knowledge.reading else Knowledge(reading)
         if model is None:
             return {"graph": None, "parameters": [], "aspects": []}
@@ -207,7 +214,7 @@ class Worker:
 
         def look(now: float) -> None:
             nonlocal last
-            if not self.waiting.empty():
+            if is_hastened():
                 raise StaleError
             if (moment := time.monotonic()) - started > self.seconds:
                 self.ended = f"ended after {self.seconds:g} s: a run in the studio takes no longer (--seconds)"
@@ -229,7 +236,7 @@ class Worker:
         changes = Changes(**{key: _texts(asked.get(key, [])) for key in ("change", "remove", "let_through", "lose")})
         model = named(self.model, RunSpec(str(self.path), types=self.files))
         try:
-            with opened(self.session.texts):
+            with opened(self.answers.texts):
                 found = what_if(
                     model,
                     Tag(int(time_), int(microstep)),
@@ -260,51 +267,3 @@ ASKED: Mapping[str, Callable[[Worker, Message], Message]] = {
     "run": Worker.run,
     "what_if": Worker.what_if,
 }
-
-
-def _limit() -> None:
-    """Take no more memory than a model needs; what is too large fails here, not on the whole machine."""
-    with suppress(ImportError, OSError, ValueError):
-        import resource
-
-        resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-        resource.setrlimit(resource.RLIMIT_DATA, (MEMORY, MEMORY))
-
-
-def _listen(stream: TextIO, worker: Worker) -> None:
-    """Take questions while one is answered, so that a run can notice that it is stale; end with the studio."""
-    for line in stream:
-        worker.waiting.put(json.loads(line))
-    os._exit(0)
-
-
-def main(arguments: list[str]) -> None:
-    path, seconds, events, *files = arguments
-    # What actors print is not ours.
-    out = os.fdopen(os.dup(1), "w", encoding="utf-8", errors="backslashreplace")
-    os.dup2(2, 1)
-    current: Message = {}
-
-    def say(message: Message) -> None:
-        try:
-            out.write(json.dumps({"id": current.get("id"), **message}, allow_nan=False) + "\n")
-            out.flush()
-        except BrokenPipeError:  # the studio has ended
-            os._exit(0)
-
-    _limit()
-    keep_for_good()
-    worker = Worker(Path(path).resolve(), float(seconds), int(events), files, say)
-    say({})  # it listens
-    threading.Thread(target=_listen, args=(sys.stdin, worker), daemon=True).start()
-    with seldom_collecting():
-        while True:
-            asked = worker.next()
-            if asked["ask"] == "stop":  # only a run in progress heeds it
-                continue
-            current = asked
-            say({**worker.answer(asked), "done": True})
-
-
-if __name__ == "__main__":
-    main(sys.argv[1:])

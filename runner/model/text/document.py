@@ -35,7 +35,7 @@ __all__ = ["Entry", "Mapping", "Node", "Scalar", "Sequence", "plain"]  # of node
 MAX_BYTES = 10_000_000
 MAX_NODES = 200_000  # counting each alias as often as it is used
 
-_LOADER: type[yaml.CSafeLoader] | type[yaml.SafeLoader] = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+LOADER: type[yaml.CSafeLoader] | type[yaml.SafeLoader] = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 
 def read(path: Path, problems: Problems, shown_as: str | None = None) -> Node | None:
@@ -171,7 +171,7 @@ class _Builder:
             self._problems.add(message, at, 'write it as an escape in "..."')
             return None
         try:
-            for event in yaml.parse(self._text, Loader=_LOADER):
+            for event in yaml.parse(self._text, Loader=LOADER):
                 self._take(event)
         except yaml.MarkedYAMLError as error:
             if not (self._may_be_deep() and self._is_too_deep()):

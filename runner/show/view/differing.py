@@ -2,57 +2,71 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from dataclasses import dataclass
+from itertools import zip_longest
+from typing import Any
 
 from epicycle.actors import Tag, shortened
 
 from ...support.shown import in_words
-from .recording import NOTHING, Recording
+from .recording import NOTHING, Kept, Recording
 
 _WIDEST, _NARROW = 80, 40  # characters of a token, and of one of several
 
 
-class FirstFiring(NamedTuple):
-    """The first firing that is not the same in two runs; ``numbers`` are those in each, None where it is missing.
+@dataclass(frozen=True)
+class First:
+    """The first firing that is not the same in two runs, or that only one of them has; in words, what it does in each.
 
-    Without one of them, the actor does not fire at that tag in that run.
+    ``numbers`` are those that it has in each, None where it is missing.
     """
 
     actor: str
-    tag: Tag
+    at: Tag
     numbers: tuple[int | None, int | None]
+    does: tuple[str, ...]
+
+    @property
+    def time(self) -> float:
+        return self.at.seconds
+
+    @property
+    def tag(self) -> str:
+        return f"({self.time:.9g} s, {self.at.microstep})"
 
 
 def difference(recordings: Sequence[Recording]) -> dict[str, Any] | None:
     """The first record in which the logs differ, and the first firing: numbers among the kept ones, and words."""
     if (record := _first(*(each.hashes for each in recordings[:2]))) is None:
         return None
-    firing = first_firing(recordings)
-    numbers: Sequence[int | None] = (None, None) if firing is None else firing.numbers
+    first = first_firing(recordings)
+    numbers: Sequence[int | None] = (None, None) if first is None else first.numbers
     return {
         "records": [each.kept_record(record) for each in recordings],
-        "texts": [said(each, record) for each in recordings],
+        "texts": [_said(each, record) for each in recordings],
         "firings": [NOTHING if n is None else each.kept_firing(n) for each, n in zip(recordings, numbers, strict=True)],
-        "fired": []
-        if firing is None
-        else [f"{firing.tag} {firing.actor} {each}" for each in fired(recordings, firing)],
+        "fired": [] if first is None else [f"{first.at} {first.actor} {each}" for each in first.does],
     }
 
 
-def first_firing(recordings: Sequence[Recording]) -> FirstFiring | None:
+def first_firing(recordings: Sequence[Recording]) -> First | None:
     """The first firing that took or sent something else, or that only one of the runs has."""
     one, other = (each.fired for each in recordings[:2])
     number = _first(one.hashes, other.hashes)
     if number is None:
         return None
     heads = {n: _head(each, number) for n, each in enumerate(recordings[:2]) if number < len(each.fired)}
-    if len(heads) == 2 and heads[0] == heads[1]:
-        return FirstFiring(heads[0][1], heads[0][0], (number, number))
-    # Only one of them has this firing: the one that comes first, or that the other run does not have at this tag.
+    # If only one of them has it: the one that comes first, or that the other run does not have at this tag.
     which = min(heads, key=lambda n: (heads[n][0], _comes(recordings[1 - n], number, heads[n])))
     tag, actor = heads[which]
-    return FirstFiring(actor, tag, (number, None) if which == 0 else (None, number))
+    numbers = [number if heads.get(n) == heads[which] else None for n in (0, 1)]
+    does = [
+        "does not fire" if n is None else _took(recording, recording.kept_firing(n))
+        for recording, n in zip(recordings, numbers, strict=False)
+    ]
+    return First(actor, tag, (numbers[0], numbers[1]), tuple(does))
 
 
 def _head(recording: Recording, number: int) -> tuple[Tag, str]:
@@ -73,22 +87,20 @@ def affected(recordings: Sequence[Recording]) -> dict[str, Tag]:
     """The actors whose firings are not the same in both runs, with the tag of the first one, in that order."""
     found: dict[str, Tag] = {}
     both = [_by_actor(each) for each in recordings[:2]]
-    for actor in dict.fromkeys([*both[0], *both[1]]):
-        rows = [each.get(actor, []) for each in both]
-        number = _first(
-            *([recording.fired.hashes[n] for n in row] for recording, row in zip(recordings, rows, strict=False))
-        )
-        if number is not None:
-            tags = [rec.fired.tag(row[number]) for rec, row in zip(recordings, rows, strict=False) if number < len(row)]
-            found[actor] = min(tags)
+    for actor in {**both[0], **both[1]}:
+        for numbers in zip_longest(*(each.get(actor, ()) for each in both)):
+            here = [(each.fired, n) for each, n in zip(recordings, numbers, strict=True) if n is not None]
+            if len(here) == 1 or here[0][0].hashes[here[0][1]] != here[1][0].hashes[here[1][1]]:
+                found[actor] = min(fired.tag(n) for fired, n in here)
+                break
     return dict(sorted(found.items(), key=lambda each: (each[1], each[0])))
 
 
 def _by_actor(recording: Recording) -> dict[str, list[int]]:
-    rows: dict[int, list[int]] = {}
+    rows = defaultdict[str, list[int]](list)
     for number, actor in enumerate(recording.fired.actors):
-        rows.setdefault(actor, []).append(number)
-    return {recording.place(actor): found for actor, found in rows.items()}
+        rows[recording.place(actor)].append(number)
+    return rows
 
 
 def _first(one: Sequence[int], other: Sequence[int]) -> int | None:
@@ -97,50 +109,44 @@ def _first(one: Sequence[int], other: Sequence[int]) -> int | None:
     return None if same == len(one) == len(other) else same
 
 
-def said(recording: Recording, record: int) -> str:
+def _said(recording: Recording, record: int) -> str:
     """A record of the log in words."""
     number = recording.kept_record(record)
     if number < 0:
         return "the run has ended" if record >= recording.records else "a record that this page leaves out"
     kept = recording.kept()
-    return f"{kept.tags[kept.columns['record_tag'][number]]} {_record(recording, number)}"
-
-
-def _record(recording: Recording, number: int) -> str:
-    columns, _, texts = recording.kept()
-    place, name = list(recording.ports)[columns["record_port"][number]]
-    event, aspect = list(recording.events)[columns["record_event"][number]], columns["record_aspect"][number]
+    tag, port, event, aspect = (kept.columns[f"record_{each}"][number] for each in ("tag", "port", "event", "aspect"))
+    place, name = list(recording.ports)[port]
     by = f" by {list(recording.aspects)[aspect]}" if aspect != NOTHING else ""
-    text = shortened(texts[columns["record_text"][number]], _WIDEST)
-    return f"{recording.place(place)}.{name} {event}{by}: {text}"
-
-
-def fired(recordings: Sequence[Recording], firing: FirstFiring) -> list[str]:
-    """What a firing took and sent in each run, in words."""
-    return [
-        "does not fire" if number is None else _took(recording, recording.kept_firing(number))
-        for recording, number in zip(recordings, firing.numbers, strict=False)
-    ]
+    where = f"{kept.tags[tag]} {recording.place(place)}.{name}"
+    return f"{where} {list(recording.events)[event]}{by}: {_token(kept, number, _WIDEST)}"
 
 
 def _took(recording: Recording, firing: int) -> str:
+    """What a firing took and sent, in words."""
     if firing < 0:
         return "a firing that this page leaves out"
-    columns, ports, texts = recording.kept().columns, list(recording.ports), recording.kept().texts
-    took = []
-    for row, owner in enumerate(columns["arrival_firing"]):
-        if owner == firing:
-            record = columns["arrival_record"][row]
-            token = f" {shortened(texts[columns['record_text'][record]], _NARROW)}" if record >= 0 else ""
-            took.append(f"{ports[columns['arrival_port'][row]][1]}{token}")
+    kept, ports = recording.kept(), [name for _, name in recording.ports]
+    columns = kept.columns
+    took = [
+        f"{ports[port]} {_token(kept, record, _NARROW)}".rstrip()
+        for owner, port, record in zip(
+            *(columns[f"arrival_{each}"] for each in ("firing", "port", "record")), strict=True
+        )
+        if owner == firing
+    ]
     woke = ["a wake-up"] * columns["wake_firing"].count(firing)
-    sent = []
-    for row, owner in enumerate(columns["record_firing"]):
-        if owner == firing and columns["record_aspect"][row] == NOTHING:
-            sent.append(
-                f"{ports[columns['record_port'][row]][1]} {shortened(texts[columns['record_text'][row]], _NARROW)}"
-            )
+    sent = [
+        f"{ports[columns['record_port'][row]]} {_token(kept, row, _NARROW)}"
+        for row, owner in enumerate(columns["record_firing"])
+        if owner == firing and columns["record_aspect"][row] == NOTHING
+    ]
     return f"takes {', '.join([*took, *woke]) or 'nothing'}; sends {', '.join(sent) or 'nothing'}"
+
+
+def _token(kept: Kept, record: int, widest: int) -> str:
+    """What a record holds; nothing if it is not kept."""
+    return shortened(kept.texts[kept.columns["record_text"][record]], widest) if record >= 0 else ""
 
 
 def comparison(recordings: Sequence[Recording]) -> list[list[str]]:
