@@ -17,8 +17,7 @@ from ..catalogue.dialect import Dialect
 from ..catalogue.metrics import MetricOptions, MetricSpec, TakeName, take_fault
 from ..graph.woven import WovenAspect
 from ..language.fields import nanoseconds
-from ..language.metrics import MetricText
-from ..language.monitors import MonitorText
+from ..language.metrics import WatchText
 from ..language.ports import ParameterText
 from ..language.values import Locals, Values
 from ..temporal import Requirement, RequirementOptions
@@ -186,7 +185,7 @@ class Model(Building, Scope, Tabled):
             source = Scalar(formula, formula, False, within(position, formula)) if formula else None
             given: dict[str, object] = {"take": take, **options}
             entries = reader.options(MetricSpec, f"metric {name}", given, position)
-            reader.metric(MetricText(name, of_ports, source, entries, position), Locals(), given)
+            reader.metric(WatchText(name, entries, position, of_ports, source), Locals(), given)
             reader.check_formulas()
         self.output = reader.found
 
@@ -206,7 +205,7 @@ class Model(Building, Scope, Tabled):
             reader = OutputReader(self.graph, Values(problems), problems, self.output)
             given: dict[str, object] = {"property": property, **options}
             entries = reader.options(Requirement, f"monitor {name}", given, position)
-            reader.monitor(MonitorText(name, entries, position), Locals(), given)
+            reader.monitor(WatchText(name, entries, position), Locals(), given)
         self.output = reader.found
 
     def outputs(self, pattern: str, what: str, position: Position, problems: Problems) -> list[str]:

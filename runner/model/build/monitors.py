@@ -7,7 +7,7 @@ from epicycle.aspects import Reading
 
 from ..graph.model_graph import ModelGraph
 from ..graph.outputs import Monitor, Part
-from ..language.monitors import MonitorText
+from ..language.metrics import WatchText
 from ..temporal import Condition, Property, PropertyError, Requirement, Sends, Spread, leaves, property_of, spread_of
 from ..text.document import Scalar
 from ..text.limits import RAISE_IT
@@ -20,7 +20,7 @@ from .paths import Paths
 _MOST = 2_000_000  # characters of a property that is written out for every place of a pattern
 
 
-def monitor_of(graph: ModelGraph, text: MonitorText, requirement: Requirement, problems: Problems) -> Monitor | Poison:
+def monitor_of(graph: ModelGraph, text: WatchText, requirement: Requirement, problems: Problems) -> Monitor | Poison:
     """The monitor of a requirement."""
     source, place = requirement.property, text.place("property")
     looks = Looks(Paths(graph), text.name, "", problems, called="monitor")

@@ -14,9 +14,8 @@ from ...support.shown import short
 from ..catalogue.metrics import MetricSpec
 from ..graph.model_graph import ModelGraph
 from ..graph.outputs import Metric, OutputSpec
-from ..language.metrics import MetricText
+from ..language.metrics import WatchText
 from ..language.models import ModelText
-from ..language.monitors import MonitorText
 from ..language.values import Locals, Values
 from ..temporal import Requirement
 from ..text.document import Entry, Node, Scalar, plain
@@ -83,7 +82,7 @@ class OutputReader:
                     self.problems.add(message, text.position, hint)
                     return
 
-    def metric(self, text: MetricText, local: Locals, given: Mapping[str, object] | None = None) -> None:
+    def metric(self, text: WatchText, local: Locals, given: Mapping[str, object] | None = None) -> None:
         """Take one number from what the ports behind a pattern send, or compute it from other metrics.
 
         ``given`` are the values that a program gives for its options.
@@ -118,7 +117,7 @@ class OutputReader:
                     self.problems.add(message, chosen[path].position, "name a port that sends numbers, or take 'count'")
                     return
 
-    def _compute(self, text: MetricText, source: Scalar, measure: MetricSpec | Poison, local: Locals) -> None:
+    def _compute(self, text: WatchText, source: Scalar, measure: MetricSpec | Poison, local: Locals) -> None:
         """Compute a number from other metrics; ``check_formulas`` says whether there are such."""
         name, what = text.name, f"metric {text.name}"
         formula: Formula | Poison = self.values.converted(source, local, what, _formula)
@@ -153,7 +152,7 @@ class OutputReader:
             message = f"metric {circle[0]}: it is computed from itself: {' <- '.join(circle)}"
             self.problems.add(message, self._formulas[circle[0]].position)
 
-    def monitor(self, text: MonitorText, local: Locals, given: Mapping[str, object] = MappingProxyType({})) -> None:
+    def monitor(self, text: WatchText, local: Locals, given: Mapping[str, object] = MappingProxyType({})) -> None:
         """Judge the runs by a property."""
         name, what, at = text.name, f"monitor {text.name}", text.position
         requirement = configure(

@@ -35,9 +35,8 @@ from .fields import (
     ref,
     sound,
 )
-from .metrics import METRICS, MetricText
+from .metrics import METRICS, MONITORS, WatchText
 from .modes import OF_MODES, machine_of
-from .monitors import MONITORS, MonitorText
 from .parts import PartText, parts
 from .places import CONNECTIONS, PATTERNS, ConnectionText
 from .ports import PARAMETERS as PARAMETER_SHAPE
@@ -235,8 +234,8 @@ class ModelText:
     include: tuple[Text, ...] = ()
     composites: dict[str, CompositeText] = field(default_factory=dict)
     run: RunText = field(default_factory=RunText)
-    metrics: tuple[MetricText, ...] = ()
-    monitors: tuple[MonitorText, ...] = ()
+    metrics: tuple[WatchText, ...] = ()
+    monitors: tuple[WatchText, ...] = ()
     exactly: tuple[ActText, ...] | None = None  # the only acts of aspects that happen
     figures: dict[str, PartText] = field(default_factory=dict)
 

@@ -31,9 +31,8 @@ from .fields import (
     ref,
     schema_of,
 )
-from .metrics import METRIC
+from .metrics import METRIC, MONITOR
 from .models import COMPOSITE, DIRECTOR, LIBRARY, MODEL, MODEL_DIRECTOR, RUN, composite_schema
-from .monitors import MONITOR
 from .parts import BESIDE, RESERVED
 from .places import CONNECTION, PATTERN_SCHEMA, POINTCUT, POINTCUTS_SCHEMA, PORT_SCHEMA, PORTS_SCHEMA, connection_schema
 from .ports import PARAMETER, PORT
