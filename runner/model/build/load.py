@@ -13,11 +13,19 @@ from ...support.collection import without_collection
 from ..catalogue.types import installed
 from ..graph.model_graph import ModelGraph
 from ..graph.woven import check_processors
-from ..language.disturbance import COMPOSITE_THERE, add_disturbances, joined, load_disturbances, only_acts
+from ..language.disturbance import (
+    COMPOSITE_THERE,
+    add_disturbances,
+    change_aspect,
+    joined,
+    load_disturbances,
+    only_acts,
+    without,
+)
 from ..language.files import read_model
 from ..language.inheritance import inherit
 from ..language.models import ModelText
-from ..language.settings import Setting, Settings, change_aspect, read_overrides, settings_of, without
+from ..language.settings import Setting, Settings, read_overrides, settings_of
 from ..language.surroundings import Surroundings
 from ..language.usage import check_usage
 from ..language.values import Locals, Values

@@ -56,10 +56,10 @@ class OutputReader:
             value = POISON if computed is None else self.values.value(computed, local, key)
             if value is not POISON:
                 setattr(self.found, "stop_time" if key == "stop" else "seed", value)
-        for metric in text.metrics:
+        for metric in text.metrics.values():
             self.metric(metric, local)
         with self.problems.looking_for(MONITOR):
-            for monitor in text.monitors:
+            for monitor in text.monitors.values():
                 self.monitor(monitor, local)
         self.check_formulas()
         return self.found
