@@ -168,7 +168,7 @@ def build(text: ModelText, known: PartTypes, resolver: ParameterResolver, limits
                 model.exactly = acts_of(text.exactly, woven, problems)
         model.adopt(made.graph, woven)
         with problems.looking_for(OUTPUT):
-            model.output = OutputReader(made.graph, values, problems).read(text, names)
+            model.output = OutputReader(made.graph, values).read(text, names)
         # Numbers without units are in the units that the model declares.
         model.parameters = {
             name: plain(value) if root.parameters[name].unit else counted_in_si(value) for name, value in names.items()

@@ -179,7 +179,7 @@ class Model(Building, Scope, Tabled):
             problems.add(f"metric {name}: {wrong[0]!r} cannot be used with 'formula'", position)
         problems.raise_if_any()
         with raising() as problems:
-            reader = OutputReader(self.graph, Values(problems), problems, self.output)
+            reader = OutputReader(self.graph, Values(problems), self.output)
             texts = (each if isinstance(each, str) else each.path for each in ports)
             of_ports = tuple(Text(each, within(position, each)) for each in texts)
             source = Scalar(formula, formula, False, within(position, formula)) if formula else None
@@ -202,7 +202,7 @@ class Model(Building, Scope, Tabled):
                 if any(each.name == metric for each in self.output.metrics):
                     problems.add(f"there is already a metric {metric!r}", position, "give the monitor another name")
             problems.raise_if_any()
-            reader = OutputReader(self.graph, Values(problems), problems, self.output)
+            reader = OutputReader(self.graph, Values(problems), self.output)
             given: dict[str, object] = {"property": property, **options}
             entries = reader.options(Requirement, f"monitor {name}", given, position)
             reader.monitor(WatchText(name, entries, position), Locals(), given)
@@ -210,13 +210,13 @@ class Model(Building, Scope, Tabled):
 
     def outputs(self, pattern: str, what: str, position: Position, problems: Problems) -> list[str]:
         """The output ports that a pattern selects; what is wrong with it is added to ``problems`` as ``what``'s."""
-        return OutputReader(self.graph, Values(problems), problems).select(Text(pattern, position), what)
+        return OutputReader(self.graph, Values(problems)).select(Text(pattern, position), what)
 
     def _watch(self, ports: Iterable[str | Port], ask: Callable[[OutputReader, Text], None]) -> None:
         """Add what is to be watched, with the rules of a model file."""
         position = call_site()
         with raising() as problems:
-            reader = OutputReader(self.graph, Values(problems), problems, self.output)
+            reader = OutputReader(self.graph, Values(problems), self.output)
             for port in ports:
                 path = port if isinstance(port, str) else port.path
                 ask(reader, Text(path, within(position, path)))
