@@ -42,12 +42,12 @@ def test_disturbance_acts_on_the_scenario(name: str, observers: int) -> None:
 def test_disturbance_says_what_it_is(name: str) -> None:
     problems = Problems()
     disturbance = load_disturbance(name, problems)
-    assert disturbance is not None
+    assert disturbance
     assert len(problems) == 0
-    assert disturbance.text.name == name
-    assert len(disturbance.text.doc) > 50
+    assert disturbance.root.name == name
+    assert len(disturbance.root.doc) > 50
     declared = load_model("collision_avoidance", disturb=name).declared
-    assert [each for each, said in disturbance.text.parameters.items() if not (said.value and declared[each].doc)] == []
+    assert [each for each, said in disturbance.root.parameters.items() if not (said.value and declared[each].doc)] == []
     # Why a parameter has its value is said in a comment before it.
     text = packaged_disturbances()[name].read_text(encoding="utf-8")
     assert "parameters:\n  #" in text

@@ -86,7 +86,7 @@ def state(model: Model) -> Any:
             [repr(metric) for metric in model.output.metrics],
             model.stop,
         ),
-        "scopes": [(id(scope), list(scope._inside.members), repr(scope)) for scope in scopes],
+        "scopes": [(id(scope), list(graph.parts(scope.path)), repr(scope)) for scope in scopes],
     }
 
 

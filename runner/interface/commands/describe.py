@@ -343,4 +343,4 @@ def _disturbances(options: argparse.Namespace) -> Iterator[tuple[str, str]]:
             running.load(**{**given, "disturb": [*given.get("disturb", ()), name]})
         except EpicycleError:  # it is for models of another kind
             continue
-        yield name, first_sentence(disturbance.text.doc) if disturbance is not None else ""
+        yield name, first_sentence(disturbance.root.doc) if disturbance else ""

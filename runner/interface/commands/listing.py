@@ -59,7 +59,7 @@ def _models(options: argparse.Namespace) -> int:
     problems.raise_if_any()
     found = {
         "models": {name: load_model(path).doc for name, path in packaged_models().items()},
-        "disturbances": {name: "" if each is None else each.text.doc for name, each in disturbances.items()},
+        "disturbances": {name: each.root.doc if each else "" for name, each in disturbances.items()},
         "studies": {name: read_study(name).doc for name in packaged_studies()},
     }
     if options.json:

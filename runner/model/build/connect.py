@@ -17,7 +17,7 @@ from ..language.values import Locals, Values
 from ..text.document import Scalar
 from ..text.kinds import CONNECTION, SIZE, UNKNOWN_PORT, Kind
 from ..text.limits import RAISE_IT
-from ..text.problems import POISON, Poison, Problems
+from ..text.problems import NONE, POISON, Near, Poison
 from ..text.reading import split, within
 
 _NUMBER = re.compile(r"-?\d{1,9}", re.ASCII)
@@ -141,19 +141,6 @@ def member_of_actors(
     return member
 
 
-@dataclass(frozen=True)
-class Namespace:
-    """The inside of a composite as its connections see it."""
-
-    path: str
-    name: str
-    inputs: Collection[str]
-    outputs: Collection[str]
-    names: Collection[str]  # of all actors
-    members: Mapping[str, Member]  # those of which anything is known
-    text: CompositeText | None = None  # as a file declares it
-
-
 def make(edges: Sequence[Edge | Poison], graph: ModelGraph) -> None:
     """Add the edges of one connection to the graph."""
     first = graph.next_order  # which distinguishes the connection from all others
@@ -165,15 +152,19 @@ def make(edges: Sequence[Edge | Poison], graph: ModelGraph) -> None:
             graph.connect(edge.source, edge.destination, edge.delay, edge.position, shared)
 
 
+@dataclass(frozen=True)
 class Wiring:
     """Finds the ports that a connection inside a composite names."""
 
-    def __init__(self, inside: Namespace, graph: ModelGraph, values: Values, problems: Problems) -> None:
-        self.inside = inside
-        self.path = inside.path
-        self.graph = graph
-        self.values = values
-        self.problems = problems
+    graph: ModelGraph
+    values: Values
+    path: str
+    name: str
+    inputs: Collection[str]
+    outputs: Collection[str]
+    names: Collection[str]  # of all actors
+    members: Mapping[str, Member]  # those of which anything is known
+    text: CompositeText | None = None  # as a file declares it
 
     def resolve(self, connection: ConnectionText, names: dict[str, object]) -> list[Edge | Poison]:
         """Its edges: every source to every destination; if both select several, the first to the first and so on."""
@@ -218,15 +209,8 @@ class Wiring:
     def _label(self, text: Endpoint) -> str:
         return f"{self.path}.{text.text}" if self.path else text.text
 
-    def _problem(
-        self,
-        message: str,
-        text: Endpoint,
-        *hints: str,
-        kind: Kind = CONNECTION,
-        near: tuple[str, Iterable[str]] = ("", ()),
-    ) -> Poison:
-        return self.problems.add(message, text.position, *hints, scope=self.path, kind=kind, near=near)
+    def _problem(self, message: str, text: Endpoint, *hints: str, kind: Kind = CONNECTION, near: Near = NONE) -> Poison:
+        return self.values.problems.add(message, text.position, *hints, scope=self.path, kind=kind, near=near)
 
     def _delay(self, connection: ConnectionText, names: dict[str, object]) -> int | None:
         if connection.delay is None:
@@ -241,15 +225,14 @@ class Wiring:
         if not name:
             own = self._own(port, wanted, text)
             return End(text, own, own=True) if own else POISON
-        inside = self.inside
-        member = inside.members.get(name)
+        member = self.members.get(name)
         if member is None:
-            if name not in inside.names:  # otherwise its own problem has been reported
-                gone = None if inside.text is None else inside.text.removed.get(name)
-                message = f"{inside.name} has no actor {name!r}"
-                hints = [f"valid actors: {', '.join(inside.names) or 'none'}"]
+            if name not in self.names:  # otherwise its own problem has been reported
+                gone = None if self.text is None else self.text.removed.get(name)
+                message = f"{self.name} has no actor {name!r}"
+                hints = [f"valid actors: {', '.join(self.names) or 'none'}"]
                 hints += [f"it is removed at {gone}"] if gone is not None else []
-                self._problem(message, text, *hints, kind=UNKNOWN_PORT, near=(name, inside.names))
+                self._problem(message, text, *hints, kind=UNKNOWN_PORT, near=(name, self.names))
             return POISON
         has_port = self._has_port(name, member, port, wanted, text)
         found = self._instances(name, index, member, port, text, names)
@@ -265,23 +248,21 @@ class Wiring:
 
     def _own(self, port: str, wanted: str, text: Endpoint) -> list[str] | Poison:
         # Seen from inside, tokens come from an own input and go to an own output.
-        inputs, outputs = self.inside.inputs, self.inside.outputs
-        own, other = (inputs, outputs) if wanted == "output" else (outputs, inputs)
+        own, other = (self.inputs, self.outputs) if wanted == "output" else (self.outputs, self.inputs)
         if port in own and self.path:
             return [f"{self.path}.{port}"]
-        where = self.inside.name
         kind, ends = ("input", "from") if wanted == "output" else ("output", "to")
-        hints, near = [f"its own {kind} ports: {', '.join(own) or 'none'}"], ("", list[str]())
+        hints, near = [f"its own {kind} ports: {', '.join(own) or 'none'}"], NONE
         if port in other:
-            message = f"{port!r} is an {'output' if kind == 'input' else 'input'} of {where}: inside it, tokens "
+            message = f"{port!r} is an {'output' if kind == 'input' else 'input'} of {self.name}: inside it, tokens "
             message += "go to it and cannot come from it" if ends == "from" else "come from it and cannot go to it"
-        elif port in self.inside.members:
-            member = self.inside.members[port]
+        elif port in self.members:
+            member = self.members[port]
             message = f"{self._label(text)} is an actor, not a port"
             index = "[*]" if member.array else ""
             hints = [f"{wanted} ports: {', '.join(f'{port}{index}.{each}' for each in member.ports(wanted)) or 'none'}"]
         else:
-            message, near = f"{where} has no {kind} port {port!r} of its own", (port, list(own))
+            message, near = f"{self.name} has no {kind} port {port!r} of its own", (port, own)
             hints.append("a port of an actor is written 'actor.port'")
         return self._problem(message, text, *hints, kind=UNKNOWN_PORT, near=near)
 
@@ -325,15 +306,15 @@ class Wiring:
             return True
         if not member.is_known:
             return member.count == 0  # otherwise the reason why it could not be made is reported
-        near = "", list[str]()
+        near = NONE
         if port in member.ports("input" if wanted == "output" else "output"):
             direction, ends = ("an input", "come from it") if wanted == "output" else ("an output", "go to it")
             message = f"{path}.{port} is {direction} of {member.kind}, so nothing can {ends}"
         else:
             message, near = f"{path}: {member.kind} has no {wanted} port {port!r}", (port, valid)
         hints = [f"valid {wanted} ports: {', '.join(valid) or 'none'}"]
-        if self.inside.text is not None and self.inside.text.extends is not None:
-            at = self.inside.text.actors[name].type.position  # which may be far from the connection
+        if self.text is not None and self.text.extends is not None:
+            at = self.text.actors[name].type.position  # which may be far from the connection
             hints.append(f"{path} is declared as a {member.kind} at {at}")
         self._problem(message, text, *hints, kind=UNKNOWN_PORT, near=near)
         return False

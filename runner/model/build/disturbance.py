@@ -12,9 +12,9 @@ from ..catalogue.types import Catalogue, installed
 from ..graph.acts import ActName
 from ..graph.model_graph import ModelGraph
 from ..graph.woven import WovenAspect
-from ..language.disturbance import COMPOSITE_THERE, PARAMETER_THERE, Disturbance, joined, load_disturbance
+from ..language.disturbance import COMPOSITE_THERE, PARAMETER_THERE, joined, load_disturbance
 from ..language.inheritance import inherit
-from ..language.models import CompositeText
+from ..language.models import CompositeText, ModelText
 from ..language.parts import PartText
 from ..language.places import PointcutText
 from ..language.ports import ParameterText
@@ -38,14 +38,14 @@ def disturb(
 ) -> tuple[ModelGraph, list[WovenAspect], frozenset[ActName] | None]:
     """The model's graph with the aspects of a disturbance, these aspects, and the only acts; raises ``ModelError``."""
     problems = Problems()
-    disturbance = _loaded(name, problems)
+    disturbance = problems.whole(load_disturbance(name, problems))
     for setting in disturbance.settings:
         hint = f"load the model together with the disturbance: load_model(..., disturb={name!r})"
         problems.add(f"{setting.path!r} can no longer be set: the model has been built", setting.position, hint)
     node = node_of(values, position)
     settings = settings_in(node, problems) if isinstance(node, Mapping) else []
-    for key in sorted(values.keys() & model.parameters.keys() - disturbance.text.parameters.keys()):
-        problems.add(f"{key!r} is a parameter of the model, not of the disturbance {disturbance.text.name}", position)
+    for key in sorted(values.keys() & model.parameters.keys() - disturbance.root.parameters.keys()):
+        problems.add(f"{key!r} is a parameter of the model, not of the disturbance {disturbance.root.name}", position)
     return _woven(model, disturbance, settings, installed().with_types(types), position, problems)
 
 
@@ -62,19 +62,19 @@ def disturb_ports(
     last one counts.  Raises ``ModelError``.
     """
     problems, position, catalogue = Problems(), call_site(), installed().with_types(types)
-    whole = Disturbance(CompositeText("disturbances", position))
+    whole = ModelText(CompositeText("disturbances", position))
     left_out: list[str] = []
     for name in names:
-        one = _loaded(name, problems)
+        one = problems.whole(load_disturbance(name, problems))
         aspects, unused = _of_ports(one, catalogue, at, Paths(model.graph).ports)
         left_out += unused
         if not aspects:
-            message = f"{one.text.name} has no aspect that alters, delays or loses tokens"
-            problems.add(message, one.text.position)
-        parameters = joined(whole.text.parameters, one.text.parameters, PARAMETER_THERE, problems)
+            message = f"{one.root.name} has no aspect that alters, delays or loses tokens"
+            problems.add(message, one.root.position)
+        parameters = joined(whole.root.parameters, one.root.parameters, PARAMETER_THERE, problems)
         whole = replace(
             whole,
-            text=replace(whole.text, parameters=parameters, aspects=whole.text.aspects | aspects),
+            root=replace(whole.root, parameters=parameters, aspects=whole.root.aspects | aspects),
             composites=joined(whole.composites, one.composites, COMPOSITE_THERE, problems),
             exactly=whole.exactly if one.exactly is None else (*(whole.exactly or ()), *one.exactly),
         )
@@ -85,12 +85,12 @@ def disturb_ports(
 
 
 def _of_ports(
-    disturbance: Disturbance, catalogue: Catalogue, at: AnyMapping[str, list[str]] | None, ports: PathIndex
+    disturbance: ModelText, catalogue: Catalogue, at: AnyMapping[str, list[str]] | None, ports: PathIndex
 ) -> tuple[dict[str, PartText], list[str]]:
     """The aspects of a disturbance that alter, delay or lose tokens, and what else there is, in words."""
-    of = f"({disturbance.text.name})"
+    of = f"({disturbance.root.name})"
     aspects, left_out = {}, [f"set {setting.path} {of}" for setting in disturbance.settings]
-    for key, part in disturbance.text.aspects.items():
+    for key, part in disturbance.root.aspects.items():
         cls = catalogue.aspects.get(part.type.text)
         if cls is not None and (not issubclass(cls, PortAspect) or issubclass(cls, ObservationAspect)):
             left_out.append(f"{key}: {part.type.text} {of}")
@@ -122,26 +122,19 @@ def _matches(pattern: str, ports: PathIndex) -> bool:
         return True  # which is reported when the aspect is woven
 
 
-def _loaded(name: str, problems: Problems) -> Disturbance:
-    disturbance = load_disturbance(name, problems)
-    problems.raise_if_any()
-    assert disturbance is not None, "what cannot be read is a problem"
-    return disturbance
-
-
 def _woven(
     model: Building,
-    disturbance: Disturbance,
+    disturbance: ModelText,
     settings: list[Setting],
     catalogue: Catalogue,
     position: Position,
     problems: Problems,
 ) -> tuple[ModelGraph, list[WovenAspect], frozenset[ActName] | None]:
     own = {key: ParameterText(key, position, node_of(value, position)) for key, value in model.parameters.items()}
-    parameters = joined(own, disturbance.text.parameters, PARAMETER_THERE, problems)
-    root = CompositeText(model.name, position, parameters=parameters, aspects=disturbance.text.aspects)
+    parameters = joined(own, disturbance.root.parameters, PARAMETER_THERE, problems)
+    root = CompositeText(model.name, position, parameters=parameters, aspects=disturbance.root.aspects)
     taken = {woven.name for woven in model.aspects}
-    for part in disturbance.text.aspects.values():
+    for part in disturbance.root.aspects.values():
         if part.name in taken:
             problems.add(f"there is already an aspect {part.name!r}", part.position, "unweave it first")
     problems.raise_if_any()

@@ -6,7 +6,7 @@ what is computed from it is not checked; a part that cannot be made is a gap in 
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Mapping
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import cache, partial
@@ -25,11 +25,11 @@ from ..language.ports import PortText
 from ..language.settings import Settings
 from ..language.values import Locals, Values
 from ..text.document import Entry
-from ..text.kinds import CLASS, CONNECTION, DIRECTOR, MODE, NAME, SIZE, TAKEN, UNKNOWN_TYPE, Kind
+from ..text.kinds import CLASS, CONNECTION, DIRECTOR, MODE, NAME, SIZE, TAKEN, UNKNOWN_TYPE
 from ..text.limits import RAISE_IT
 from ..text.problems import POISON, Poison, Position
 from .composite_aspect import as_actor
-from .connect import Member, Namespace, Wiring, make, member_of_actors
+from .connect import Member, Wiring, make, member_of_actors
 from .modes import connect_modes
 from .resolve import OF_DIRECTORS, ParameterResolver
 
@@ -119,10 +119,8 @@ class Instantiator:
                 model := self._aspect_model(path, composite, part, names, within)
             ):
                 members[name] = model
-        inside = Namespace(
-            path, composite.name, composite.inputs, composite.outputs, composite.actors, members, composite
-        )
-        wiring = Wiring(inside, self.graph, self.values, self.problems)
+        ports = composite.inputs, composite.outputs
+        wiring = Wiring(self.graph, self.values, path, composite.name, *ports, composite.actors, members, composite)
         for name, member in others:
             wiring.check_ports(name, member, composite.connections)
         with self.problems.looking_for(CONNECTION):
@@ -148,7 +146,7 @@ class Instantiator:
             elif kind is not None:
                 message = f"{full}: {part.type.text} is an actor, but a refinement must be a composite"
                 hint = "write a composite class that contains that actor"
-                self._tell(message, part.type.position, path, hint, kind=MODE)
+                self.problems.add(message, part.type.position, hint, scope=path, kind=MODE)
         if made:
             graph.domains[path].machine, graph.domains[path].refinements = machine, made
         connect_modes(path, composite, self.known.composites, self.graph, self.problems)
@@ -206,30 +204,30 @@ class Instantiator:
 
     def _type(self, path: str, part: PartText, within: tuple[str, ...]) -> CompositeText | type[Actor] | None:
         """The type of a part; None, and a problem, if it cannot have that type."""
-        known, wanted = self.known_at(path), part.type.text
+        known, wanted, at = self.known_at(path), part.type.text, part.type.position
         inner = known.composites.get(wanted)
         try:
             found = known.catalogue.actors.get(wanted) if inner is None else inner
         except CatalogueError as error:
-            self.values.blame(path, error, part.type.position, Locals(path))
+            self.values.blame(path, error, at, Locals(path))
             return None
         if found is POISON or "${" in wanted:
             return None
         if found is None:
             near = wanted, [*known.composites, *known.catalogue.actors]
             hints, message = known.valid_types("actor", wanted), f"{path}: there is no actor type {wanted!r}"
-            self._tell(message, part.type.position, path, *hints, kind=UNKNOWN_TYPE, near=near)
+            self.problems.add(message, at, *hints, scope=path, kind=UNKNOWN_TYPE, near=near)
         elif part.inherit:
             message = f"{path}: {wanted} cannot inherit, as it is a type of a dialect"
             hint = "write what it takes as 'name: ${name}'"
-            self._tell(message, part.inherit[0].position, path, hint, kind=TAKEN)
+            self.problems.add(message, part.inherit[0].position, hint, scope=path, kind=TAKEN)
         elif wanted in within:
             way = " -> ".join([*within[within.index(wanted) :], wanted])
             message = f"{path}: composite {wanted} contains itself: {way}"
-            self._tell(message, part.type.position, path, kind=CLASS)
+            self.problems.add(message, at, scope=path, kind=CLASS)
         elif len(within) >= MAX_DEPTH:
             message = f"{path}: composites are nested deeper than {MAX_DEPTH} levels"
-            self._tell(message, part.type.position, "", kind=SIZE)
+            self.problems.add(message, at, kind=SIZE)
         else:
             return found
         return None
@@ -240,17 +238,6 @@ class Instantiator:
         if dialect not in self._like:
             self._like[dialect] = self.known.like(dialect)
         return self._like[dialect]
-
-    def _tell(
-        self,
-        message: str,
-        position: Position | None,
-        scope: str,
-        *hints: str,
-        kind: Kind,
-        near: tuple[str, Iterable[str]] = ("", ()),
-    ) -> None:
-        self.problems.add(message, position, *hints, scope=scope, kind=kind, near=near)
 
     def _count(self, path: str, part: PartText, names: Names) -> int | Poison:
         """The number of instances."""
@@ -268,7 +255,7 @@ class Instantiator:
         if self.cost > most:
             if self._trial is None:
                 message = f"{path}: the model has more than {most:,} actors and composites"
-                self._tell(message, part.position, "", RAISE_IT, kind=SIZE)
+                self.problems.add(message, part.position, RAISE_IT, kind=SIZE)
             raise TooLargeError
 
     def _kinds(self, part: PartText) -> set[str]:
@@ -291,7 +278,7 @@ class Instantiator:
         if isinstance(kind, CompositeText) and kind.director is None:
             message = f"{path}: {kind.name} has no priority, because its actors fire one by one"
             hint = f"give the actors inside a priority, or give {kind.name} its own director: 'director: {{}}'"
-            self._tell(message, part.priority.position, path, hint, kind=DIRECTOR)
+            self.problems.add(message, part.priority.position, hint, scope=path, kind=DIRECTOR)
             return 0
         return self.values.value(part.priority, Locals(path, names), f"{path}: priority") or 0
 
@@ -377,13 +364,8 @@ class Instantiator:
         is_port = part.name in composite.inputs or part.name in composite.outputs
         if is_port or part.name in composite.actors or full in graph.components:
             clash = "a port" if is_port else "an actor"
-            self._tell(
-                f"{full!r} is the name of both {clash} and an aspect that is a model",
-                part.position,
-                "",
-                "rename one",
-                kind=NAME,
-            )
+            message = f"{full!r} is the name of both {clash} and an aspect that is a model"
+            self.problems.add(message, part.position, "rename one", kind=NAME)
             return None
         if self.resolver.is_enabled(full, part, Locals(path, names)):
             return self.instances(full, as_actor(part), names, within)

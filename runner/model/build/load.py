@@ -13,11 +13,19 @@ from ...support.collection import without_collection
 from ..catalogue.types import installed
 from ..graph.model_graph import ModelGraph
 from ..graph.woven import check_processors
-from ..language.disturbance import COMPOSITE_THERE, add_disturbances, joined, load_disturbances, only_acts
+from ..language.disturbance import (
+    COMPOSITE_THERE,
+    add_disturbances,
+    change_aspect,
+    joined,
+    load_disturbances,
+    only_acts,
+    without,
+)
 from ..language.files import read_model
 from ..language.inheritance import inherit
 from ..language.models import ModelText
-from ..language.settings import Setting, Settings, change_aspect, read_overrides, settings_of, without
+from ..language.settings import Setting, Settings, read_overrides, settings_of
 from ..language.surroundings import Surroundings
 from ..language.usage import check_usage
 from ..language.values import Locals, Values
@@ -160,7 +168,7 @@ def build(text: ModelText, known: PartTypes, resolver: ParameterResolver, limits
                 model.exactly = acts_of(text.exactly, woven, problems)
         model.adopt(made.graph, woven)
         with problems.looking_for(OUTPUT):
-            model.output = OutputReader(made.graph, values, problems).read(text, names)
+            model.output = OutputReader(made.graph, values).read(text, names)
         # Numbers without units are in the units that the model declares.
         model.parameters = {
             name: plain(value) if root.parameters[name].unit else counted_in_si(value) for name, value in names.items()

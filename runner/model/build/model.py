@@ -17,8 +17,7 @@ from ..catalogue.dialect import Dialect
 from ..catalogue.metrics import MetricOptions, MetricSpec, TakeName, take_fault
 from ..graph.woven import WovenAspect
 from ..language.fields import nanoseconds
-from ..language.metrics import MetricText
-from ..language.monitors import MonitorText
+from ..language.metrics import WatchText
 from ..language.ports import ParameterText
 from ..language.values import Locals, Values
 from ..temporal import Requirement, RequirementOptions
@@ -180,13 +179,13 @@ class Model(Building, Scope, Tabled):
             problems.add(f"metric {name}: {wrong[0]!r} cannot be used with 'formula'", position)
         problems.raise_if_any()
         with raising() as problems:
-            reader = OutputReader(self.graph, Values(problems), problems, self.output)
+            reader = OutputReader(self.graph, Values(problems), self.output)
             texts = (each if isinstance(each, str) else each.path for each in ports)
             of_ports = tuple(Text(each, within(position, each)) for each in texts)
             source = Scalar(formula, formula, False, within(position, formula)) if formula else None
             given: dict[str, object] = {"take": take, **options}
             entries = reader.options(MetricSpec, f"metric {name}", given, position)
-            reader.metric(MetricText(name, of_ports, source, entries, position), Locals(), given)
+            reader.metric(WatchText(name, entries, position, of_ports, source), Locals(), given)
             reader.check_formulas()
         self.output = reader.found
 
@@ -203,21 +202,21 @@ class Model(Building, Scope, Tabled):
                 if any(each.name == metric for each in self.output.metrics):
                     problems.add(f"there is already a metric {metric!r}", position, "give the monitor another name")
             problems.raise_if_any()
-            reader = OutputReader(self.graph, Values(problems), problems, self.output)
+            reader = OutputReader(self.graph, Values(problems), self.output)
             given: dict[str, object] = {"property": property, **options}
             entries = reader.options(Requirement, f"monitor {name}", given, position)
-            reader.monitor(MonitorText(name, entries, position), Locals(), given)
+            reader.monitor(WatchText(name, entries, position), Locals(), given)
         self.output = reader.found
 
     def outputs(self, pattern: str, what: str, position: Position, problems: Problems) -> list[str]:
         """The output ports that a pattern selects; what is wrong with it is added to ``problems`` as ``what``'s."""
-        return OutputReader(self.graph, Values(problems), problems).select(Text(pattern, position), what)
+        return OutputReader(self.graph, Values(problems)).select(Text(pattern, position), what)
 
     def _watch(self, ports: Iterable[str | Port], ask: Callable[[OutputReader, Text], None]) -> None:
         """Add what is to be watched, with the rules of a model file."""
         position = call_site()
         with raising() as problems:
-            reader = OutputReader(self.graph, Values(problems), problems, self.output)
+            reader = OutputReader(self.graph, Values(problems), self.output)
             for port in ports:
                 path = port if isinstance(port, str) else port.path
                 ask(reader, Text(path, within(position, path)))

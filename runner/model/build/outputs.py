@@ -7,37 +7,51 @@ from graphlib import CycleError, TopologicalSorter
 from types import MappingProxyType
 from typing import Any
 
-from epicycle.actors import Parameter, ParameterError, accepts, declared_parameters, did_you_mean, type_name
+from epicycle.actors import (
+    FaultError,
+    Parameter,
+    ParameterError,
+    Quantity,
+    UnitError,
+    accepts,
+    declared_parameters,
+    did_you_mean,
+    parse_unit,
+    type_name,
+)
 from epicycle.actors.expression import Formula, as_text
+from epicycle.aspects import Reading
 
 from ...support.shown import short
 from ..catalogue.metrics import MetricSpec
 from ..graph.model_graph import ModelGraph
-from ..graph.outputs import Metric, OutputSpec
-from ..language.metrics import MetricText
+from ..graph.outputs import Metric, Monitor, OutputSpec, Part
+from ..language.metrics import WatchText
 from ..language.models import ModelText
-from ..language.monitors import MonitorText
 from ..language.values import Locals, Values
-from ..temporal import Requirement
+from ..temporal import Condition, Property, PropertyError, Requirement, Sends, Spread, leaves, property_of, spread_of
 from ..text.document import Entry, Node, Scalar, plain
 from ..text.kinds import MONITOR
 from ..text.limits import MAX_SEED, RAISE_IT
 from ..text.patterns import PathIndex, PatternError, TooManyError
-from ..text.problems import POISON, Poison, Position, Problems
+from ..text.problems import POISON, Poison, Position
 from ..text.program import entries_of
 from ..text.reading import Text, within
 from .configure import configure
-from .monitors import monitor_of
+from .looks import Looks
+from .paths import Paths
+
+_MOST = 2_000_000  # characters of a property that is written out for every place of a pattern
 
 
 class OutputReader:
     """Adds to what is watched (``found``): ``read`` what a file declares, the others what a program asks for."""
 
-    def __init__(self, graph: ModelGraph, values: Values, problems: Problems, found: OutputSpec | None = None) -> None:
+    def __init__(self, graph: ModelGraph, values: Values, found: OutputSpec | None = None) -> None:
         self.found = OutputSpec() if found is None else found.copy()
         self.graph = graph
         self.values = values
-        self.problems = problems
+        self.problems = values.problems
         outputs = (path for path, node in self.graph.ports.items() if node.direction == "output")
         self._outputs = PathIndex(outputs, self.graph.limits)
         self._recorded = set(self.found.recorded)
@@ -57,10 +71,10 @@ class OutputReader:
             value = POISON if computed is None else self.values.value(computed, local, key)
             if value is not POISON:
                 setattr(self.found, "stop_time" if key == "stop" else "seed", value)
-        for metric in text.metrics:
+        for metric in text.metrics.values():
             self.metric(metric, local)
         with self.problems.looking_for(MONITOR):
-            for monitor in text.monitors:
+            for monitor in text.monitors.values():
                 self.monitor(monitor, local)
         self.check_formulas()
         return self.found
@@ -83,7 +97,7 @@ class OutputReader:
                     self.problems.add(message, text.position, hint)
                     return
 
-    def metric(self, text: MetricText, local: Locals, given: Mapping[str, object] | None = None) -> None:
+    def metric(self, text: WatchText, local: Locals, given: Mapping[str, object] | None = None) -> None:
         """Take one number from what the ports behind a pattern send, or compute it from other metrics.
 
         ``given`` are the values that a program gives for its options.
@@ -118,7 +132,7 @@ class OutputReader:
                     self.problems.add(message, chosen[path].position, "name a port that sends numbers, or take 'count'")
                     return
 
-    def _compute(self, text: MetricText, source: Scalar, measure: MetricSpec | Poison, local: Locals) -> None:
+    def _compute(self, text: WatchText, source: Scalar, measure: MetricSpec | Poison, local: Locals) -> None:
         """Compute a number from other metrics; ``check_formulas`` says whether there are such."""
         name, what = text.name, f"metric {text.name}"
         formula: Formula | Poison = self.values.converted(source, local, what, _formula)
@@ -153,13 +167,13 @@ class OutputReader:
             message = f"metric {circle[0]}: it is computed from itself: {' <- '.join(circle)}"
             self.problems.add(message, self._formulas[circle[0]].position)
 
-    def monitor(self, text: MonitorText, local: Locals, given: Mapping[str, object] = MappingProxyType({})) -> None:
+    def monitor(self, text: WatchText, local: Locals, given: Mapping[str, object] = MappingProxyType({})) -> None:
         """Judge the runs by a property."""
         name, what, at = text.name, f"monitor {text.name}", text.position
         requirement = configure(
             Requirement, text.values, local, what, at, self.values, make=Requirement, evaluated=given
         )
-        found = requirement and monitor_of(self.graph, text, requirement, self.problems)
+        found = requirement and self._monitor(text, requirement)
         if not found:
             return
         self._watched += len(found.ports)
@@ -170,6 +184,48 @@ class OutputReader:
         self.found.monitors.append(found)
         self.found.metrics += found.metrics
 
+    def _monitor(self, text: WatchText, requirement: Requirement) -> Monitor | Poison:
+        """The monitor of a requirement."""
+        source, place = requirement.property, text.place("property")
+        looks = Looks(Paths(self.graph), text.name, "", self.problems, called="monitor")
+        before = len(self.problems)
+        try:
+            spread = spread_of(source)
+            paths = [""] if spread is None else self._spread(looks, spread, place)
+            if spread is not None and len(paths) * len(spread.body) > _MOST:
+                message = f"for {len(paths):,} places, the property is longer than {_MOST:,} characters"
+                raise PropertyError(message, spread.offset, len(spread.pattern))
+            parts, size = [], 1.0
+            for path in paths:
+                tree = property_of(source if spread is None else spread.of(path))
+                parts.append(Part(path, tree, [_readings(looks, each, place) for each in leaves(tree)]))
+                try:
+                    size = _size(tree, requirement.unit)
+                except FaultError as error:
+                    looks.blame(error, text.place("unit"))
+                if len(self.problems) > before:  # the others would say the same
+                    return POISON
+        except PropertyError as error:
+            # The part that is wrong, if the text is in the file unchanged.
+            whole = within(place, source)
+            is_written = whole.length == len(source) and "\n" not in source
+            return looks.blame(error, Scalar(source, source, True, whole) if is_written else whole)
+        if len(self.problems) > before:
+            return POISON
+        return Monitor(text.name, requirement, parts, spread is not None and spread.any, size)
+
+    def _spread(self, looks: Looks, spread: Spread, place: Position) -> list[str]:
+        """The actors and composites that a pattern selects; if there are none, the output ports."""
+        what, pattern = f"monitor {looks.name}", Text(spread.pattern, within(place, spread.pattern))
+        holders = looks.paths.holders
+        found = self._found(holders, pattern, what)
+        if found == []:
+            found = self._found(self._outputs, pattern, what)
+        if found == [] and not self.graph.excuses(f"{pattern.text}.*"):
+            message = f"{what}: {pattern.text!r} matches no actor, composite or output port"
+            self.problems.add(message, place, near=holders.near(pattern.text))
+        return found or []
+
     def options(self, cls: type, what: str, given: Mapping[str, object], position: Position) -> dict[str, Entry]:
         """The options that a program gives; unknown ones are reported."""
         declared = declared_parameters(cls)
@@ -179,20 +235,61 @@ class OutputReader:
 
     def select(self, text: Text, what: str) -> list[str]:
         """The output ports that a pattern selects, including those of composites."""
-        try:
-            found = self._outputs.select(text.text)
-        except PatternError as error:
-            self.problems.add(f"{what}: {text.text!r} is not a pattern: {error}", text.position)
-            return []
-        except TooManyError as error:
-            self.problems.stop(f"{what}: {error}", text.position, RAISE_IT)
-        if found or self.graph.excuses(text.text):
-            return found
+        found = self._found(self._outputs, text, what)
+        if found or found is POISON or self.graph.excuses(text.text):
+            return found or []
         message, hints = f"{what}: {text.text!r} matches no output port", self._outputs.advice(text.text)
         if text.text in self.graph.ports:
             message, hints = f"{what}: {text.text} is an input port, but an output port is needed", ()
         self.problems.add(message, text.position, *hints, near=self._outputs.near(text.text))
         return []
+
+    def _found(self, index: PathIndex, text: Text, what: str) -> list[str] | Poison:
+        """What a pattern selects; poison if it is none."""
+        try:
+            return index.select(text.text)
+        except PatternError as error:
+            return self.problems.add(f"{what}: {text.text!r} is not a pattern: {error}", text.position)
+        except TooManyError as error:
+            self.problems.stop(f"{what}: {error}", text.position, RAISE_IT)
+
+
+def _size(tree: Property, unit: str) -> float:
+    """The size of the unit of a robustness, in what the margins are in; raises ``FaultError`` if it does not fit.
+
+    Where numbers have units, all counts in SI; elsewhere, the unit is that of what the ports send.
+    """
+    conditions = [each for each in leaves(tree) if isinstance(each, Condition)]
+    if not unit or not any(each.units for each in conditions):
+        return 1.0
+    try:
+        size = parse_unit(unit).factor
+    except UnitError as error:
+        advice = "write the unit in which its robustness is to be given, such as m"
+        raise FaultError(f"unit: {error}", help=[advice]) from None
+    for condition in conditions:
+        for other in condition.compared:
+            try:
+                Quantity(1.0, other).to(unit)
+            except UnitError:
+                problem = f"its robustness cannot be given in {unit!r}: {condition.source!r} compares in {other!r}"
+                advice = f"write 'unit: {other}', or, where units differ, a monitor for each, or no unit"
+                raise FaultError(problem, help=[advice]) from None
+    return size
+
+
+def _readings(looks: Looks, condition: Condition | Sends, place: Position) -> list[Reading]:
+    """What a condition reads."""
+    if isinstance(condition, Sends):
+        port, fields = looks.reading("property", condition.port, within(place, condition.port))
+        if fields:
+            message = f"monitor {looks.name}: 'sends {condition.port}' names a part of what {port} sends"
+            looks.problems.add(message, place, f"write 'sends {port}'")
+        return [(port, ())]
+    found = []
+    for reference in condition.references:
+        found.append(looks.reading("property", reference, within(place, reference)))
+    return found
 
 
 def _formula(value: object) -> Formula:

@@ -14,7 +14,7 @@ from ..language.values import Locals, Values
 from ..text.document import Node
 from ..text.kinds import Kind
 from ..text.patterns import PathIndex
-from ..text.problems import Poison, Position, Problems
+from ..text.problems import NONE, Near, Poison, Position, Problems
 from ..text.reading import Text
 
 
@@ -72,7 +72,7 @@ class View:
         *hints: str,
         about: tuple[str, ...] = (),
         kind: Kind | None = None,
-        near: tuple[str, Iterable[str]] = ("", ()),
+        near: Near = NONE,
     ) -> Poison:
         """Report a problem of the aspect or monitor."""
         position = where.position if isinstance(where, (PointcutText, Text)) else where

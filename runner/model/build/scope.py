@@ -25,7 +25,7 @@ from ..text.reading import NAME, NAMES_HAVE
 from .building import Building
 from .composite_aspect import check_nesting, weave_model
 from .composite_class import CompositeInstance
-from .connect import Member, Namespace, Wiring, make, member_of_actors
+from .connect import Member, Wiring, make, member_of_actors
 from .named import (
     CompositePort,
     Ends,
@@ -79,12 +79,9 @@ class Scope(Holder):
         self._model = model
 
     @property
-    def _inside(self) -> Namespace:
-        graph = self._model.graph
-        inputs, outputs = graph.borders(self.path)
-        members = _Members(graph, self.path)
-        label = _label(graph, self.path) if self.path else self._model.name
-        return Namespace(self.path, label, _names(inputs), _names(outputs), members.keys(), members)
+    def _name(self) -> str:
+        """Its name in messages."""
+        return _label(self._model.graph, self.path) if self.path else self._model.name
 
     # -- parts ----------------------------------------------------------------------------------------------------
 
@@ -174,7 +171,7 @@ class Scope(Holder):
             if full not in instances:
                 known = [path[len(self._full("")) :] for each in parts.values() for path in each]
                 hint = f"valid actors: {', '.join(known) or 'none'}"
-                problems.add(f"{self._inside.name} has no actor {name!r}{did_you_mean(name, known)}", position, hint)
+                problems.add(f"{self._name} has no actor {name!r}{did_you_mean(name, known)}", position, hint)
             elif full != instances[-1]:
                 problems.add(f"{full} is not the last of its array", position, f"only {instances[-1]} can be removed")
         self._model.forget(full)
@@ -267,14 +264,13 @@ class Scope(Holder):
     def _edges(
         self, source: Ends, destination: Ends | None, delay: float | str | None, position: Position, problems: Problems
     ) -> list[Edge]:
-        inside = self._inside
-        connection = Named(self._model.graph, self.path, position, problems).connection(
-            source, destination, delay, inside.name
-        )
+        graph = self._model.graph
+        connection = Named(graph, self.path, position, problems).connection(source, destination, delay, self._name)
         if connection is None:
             return []
-        found = Wiring(inside, self._model.graph, Values(problems), problems).resolve(connection, {})
-        return [edge for edge in found if edge]
+        members, (inputs, outputs) = _Members(graph, self.path), map(_names, graph.borders(self.path))
+        wiring = Wiring(graph, Values(problems), self.path, self._name, inputs, outputs, members.keys(), members)
+        return [edge for edge in wiring.resolve(connection, {}) if edge]
 
     def _judge(self, edges: list[Edge], problems: Problems) -> None:
         """Check what can be checked of new connections now; the rest is checked when the model is complete."""

@@ -6,10 +6,10 @@ import math
 import re
 import sys
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from inspect import cleandoc
 from pathlib import Path
-from typing import Final
+from typing import Any, Final, TypeVar
 
 import numpy as np
 
@@ -27,7 +27,7 @@ from epicycle.actors.expression import Formula, PortFormula, TokenFormula
 from epicycle.aspects import Aspect
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class PortReference:
     """A port of an actor type; ``depends_on`` is for outputs; None means all inputs."""
 
@@ -35,13 +35,13 @@ class PortReference:
     direction: str
     type: str
     multi: bool
-    required: bool
-    depends_on: tuple[str, ...] | None
+    required: bool = False
+    depends_on: tuple[str, ...] | None = None
     doc: str
     triggers: bool = True  # of an input: whether a token there triggers the actor
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class ParameterReference:
     """A parameter of a type; ``type`` is in words, ``default`` as it would be written in a model file.
 
@@ -60,6 +60,9 @@ class ParameterReference:
     max: float | None
     choices: tuple[str, ...]
     doc: str
+
+
+R = TypeVar("R", PortReference, ParameterReference)
 
 
 @dataclass(frozen=True)
@@ -97,19 +100,20 @@ def describe(name: str, cls: type[Configurable]) -> TypeReference:
         about_group=about,
         doc=doc_of(cls),
         ports=tuple(
-            PortReference(
-                port.name,
-                port.direction,
-                type_name(port.type),
-                port.multi,
-                getattr(port, "required", False),
-                getattr(port, "depends_on", None),
-                port.doc,
-                getattr(port, "triggers", True),
-            )
+            _taken(PortReference, port, type=type_name(port.type))
             for port in (declared_ports(cls).values() if issubclass(cls, Actor) else ())
         ),
-        parameters=tuple(_parameter(each) for each in declared_parameters(cls).values()),
+        parameters=tuple(
+            _taken(
+                ParameterReference,
+                each,
+                type=each.describe_type(),
+                part=each.type.__name__ if is_part(each) else "",
+                unit=each.unit if each.unit != "1" else "",
+                default=None if each.required else as_written(each.default),
+            )
+            for each in declared_parameters(cls).values()
+        ),
         has_own_ports=issubclass(cls, Actor) and has_own_ports(cls),
         stands_at=tuple(sorted(cls.stands_at)) if issubclass(cls, Aspect) else (),
         events=tuple(cls.events) if issubclass(cls, Aspect) else (),
@@ -118,21 +122,10 @@ def describe(name: str, cls: type[Configurable]) -> TypeReference:
     )
 
 
-def _parameter(parameter: Parameter[object]) -> ParameterReference:
-    return ParameterReference(
-        parameter.name,
-        parameter.describe_type(),
-        parameter.type.__name__ if is_part(parameter) else "",
-        parameter.unit if parameter.unit != "1" else "",
-        parameter.required,
-        parameter.optional,
-        None if parameter.required else as_written(parameter.default),
-        parameter.min,
-        parameter.above,
-        parameter.max,
-        parameter.choices,
-        parameter.doc,
-    )
+def _taken(reference: type[R], declared: object, **others: Any) -> R:
+    """A reference with the attributes of what is declared, and others that are said in another way."""
+    names = (each.name for each in fields(reference) if each.name not in others and hasattr(declared, each.name))
+    return reference(**{name: getattr(declared, name) for name in names}, **others)
 
 
 def parts_of(types: Iterable[type[Configurable]]) -> dict[type[Configurable], dict[str, type[Configurable]]]:

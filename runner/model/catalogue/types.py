@@ -67,7 +67,7 @@ class CatalogueError(FaultError):
         return "\n   help: ".join(self.args)
 
 
-@dataclass(frozen=True)
+@dataclass
 class _Offer:
     """A type that a package declares as an entry point."""
 
@@ -85,18 +85,27 @@ class _Offer:
         return f"{re.sub(r'[-_.]+', '_', self.distribution).lower()}.{self.point.name}"
 
     def load(self) -> type:
-        """Import it; raises a ``CatalogueError`` that names the package if anything goes wrong."""
+        """The type, which is imported once; raises a ``CatalogueError`` if anything goes wrong."""
+        if isinstance(self.found, CatalogueError):
+            raise self.found
+        if self.point.dist is not None:
+            note_package(self.point.dist.name, self.point.dist.version)
+        return self.found
+
+    @cached_property
+    def found(self) -> type | CatalogueError:
+        """The type, or what is wrong with it."""
         if not _ENTRY.match(self.point.value):
-            raise self._error("its entry point is not of the form package.module:Class")
+            return self._error("its entry point is not of the form package.module:Class")
         try:
             found = self.point.load()
         except (Exception, SystemExit) as error:  # a package's module may raise anything while it is imported
-            raise self._error(f"{type(error).__name__}: {error}") from error
+            return self._error(f"{type(error).__name__}: {error}")
         if not (isinstance(found, type) and issubclass(found, self.base)) or isabstract(found):
-            raise self._error(f"{self.point.value} is not a complete subclass of {self.base.__name__}")
+            return self._error(f"{self.point.value} is not a complete subclass of {self.base.__name__}")
         name = found.name if issubclass(found, Dialect) else found.__name__
         if name != self.point.name:
-            raise self._error(f"the class is called {name}, and its entry point must have the same name")
+            return self._error(f"the class is called {name}, and its entry point must have the same name")
         return found
 
     def _error(self, reason: str) -> CatalogueError:
@@ -123,88 +132,63 @@ def _points(group: str) -> Iterable[EntryPoint]:
         raise
 
 
-class _Offers:
-    """What the installed packages offer of a kind; they are searched on first use, which takes a while."""
-
-    def __init__(self, base: type, group: str) -> None:
-        self._base = base
-        self._group = group
-        self.loaded: dict[str, Any] = {}  # types, or what is wrong with them
-
-    @cached_property
-    def qualified(self) -> dict[str, _Offer]:
-        """By ``package.Name``."""
-        found: dict[str, _Offer] = {}
-        offers = (_Offer(point, self._base) for point in _points(self._group))
-        for offer in sorted(offers, key=lambda offer: offer.qualified):
-            found.setdefault(offer.qualified, offer)
-        return found
-
-    @cached_property
-    def by_name(self) -> dict[str, list[str]]:
-        """The qualified names for a name."""
-        found: dict[str, list[str]] = {}
-        for qualified, offer in self.qualified.items():
-            found.setdefault(offer.point.name, []).append(qualified)
-        return found
+@cache
+def _offered(base: Any, group: str) -> dict[str, list[_Offer]]:
+    """What the installed packages offer of a kind, by ``Name`` and by ``package.Name``; the search takes a while."""
+    # Of two with one name, the first counts.
+    offers = {(offer := _Offer(point, base)).qualified: offer for point in [*_points(group)][::-1]}
+    found: dict[str, list[_Offer]] = {}
+    for qualified in sorted(offers):
+        found.setdefault(offers[qualified].point.name, []).append(offers[qualified])
+    return found | {qualified: [offer] for qualified, offer in offers.items()}
 
 
 class Types(Mapping[str, type[T]], Generic[T]):
-    """Types by name; looking one up may import it, and raises ``CatalogueError`` if that fails."""
+    """Types by name; looking one up may import it, and raises ``CatalogueError`` if that fails.
+
+    ``own`` win over those that packages offer in a ``group`` of entry points.
+    """
 
     def __init__(self, base: type[T], own: Mapping[str, type[T]], group: str) -> None:
+        self._base = base
         self._own = own
-        self._kind = _words(base)
-        self._offers = _Offers(base, group)
-        self._former = epicycle.actors.FORMER if base is Actor else {}
+        self._group = group
+
+    @property
+    def _offers(self) -> dict[str, list[_Offer]]:
+        kind: Any = self._base
+        return _offered(kind, self._group)
 
     def __getitem__(self, name: str) -> type[T]:
         if name in self._own:
             return self._own[name]
-        offers, loaded = self._offers.qualified, self._offers.loaded
-        qualified = self._offers.by_name.get(name, [name])
-        if name in self._former and name not in self._offers.by_name:
-            raise CatalogueError(f"there is no {self._kind} type {name!r} any more", self._former[name])
-        if len(qualified) > 1:
-            packages = " and ".join(repr(offers[each].distribution) for each in qualified)
-            raise CatalogueError(
-                f"{self._kind} type {name!r} is offered by the packages {packages}", f"write {' or '.join(qualified)}"
-            )
-        offer = offers[qualified[0]]
-        if qualified[0] not in loaded:
-            try:
-                loaded[qualified[0]] = offer.load()
-            except CatalogueError as error:
-                loaded[qualified[0]] = error
-        found: type[T] | CatalogueError = loaded[qualified[0]]
-        if isinstance(found, CatalogueError):
-            raise found
-        if (distribution := offer.point.dist) is not None:
-            note_package(distribution.name, distribution.version)
-        return found
+        offers, kind = self._offers.get(name), _words(self._base)
+        if offers is None:
+            if self._base is Actor and name in epicycle.actors.FORMER:
+                raise CatalogueError(f"there is no {kind} type {name!r} any more", epicycle.actors.FORMER[name])
+            raise KeyError(name)
+        if len(offers) > 1:
+            packages = " and ".join(repr(each.distribution) for each in offers)
+            names = " or ".join(each.qualified for each in offers)
+            raise CatalogueError(f"{kind} type {name!r} is offered by the packages {packages}", f"write {names}")
+        return offers[0].load()
 
     def __contains__(self, name: object) -> bool:
-        return name in self._own or name in self._offers.by_name or name in self._offers.qualified
+        return name in self._own or name in self._offers
 
     def __iter__(self) -> Iterator[str]:
         """The shortest name of each type."""
         yield from self._own
-        for name, qualified in self._offers.by_name.items():
-            yield from [name] if len(qualified) == 1 and name not in self._own else qualified
+        for name, offers in self._offers.items():
+            if name == offers[0].point.name:
+                yield from [name] if len(offers) == 1 and name not in self._own else (each.qualified for each in offers)
 
     def __len__(self) -> int:
-        return len(self._own) + len(self._offers.qualified)
-
-    @property
-    def loaded(self) -> list[type[T]]:
-        """The types of packages that have been imported."""
-        return [each for each in self._offers.loaded.values() if isinstance(each, type)]
+        return sum(1 for _ in self)
 
     def with_types(self, own: Mapping[str, type[T]]) -> Types[T]:
         """The same with further types, which win over others with their name."""
-        result = Types.__new__(Types)
-        result.__dict__.update(self.__dict__, _own=_with(self._own, own))
-        return result
+        return Types(self._base, _with(self._own, own), self._group)
 
 
 @dataclass(frozen=True)
@@ -279,27 +263,19 @@ def installed() -> Catalogue:
     return Catalogue(Types(Actor, own.actors, "epicycle.actors"), Types(Aspect, own.aspects, "epicycle.aspects"))
 
 
-@cache
-def _offered(base: Any, group: str) -> Types[Any]:
-    """What installed packages offer of a kind whose own types are registered when they are defined."""
-    return Types(base, {}, group)
-
-
 def with_offered(base: type[T], group: str, own: Mapping[str, type[T]]) -> Mapping[str, type[T]]:
     """Types by name, and those that installed packages offer, which are named by their entry points."""
     kind: Any = base
-    offered = _offered(kind, group)
-    return offered.with_types({name: cls for name, cls in own.items() if cls not in offered.loaded})
+    loaded = [vars(each).get("found") for offers in _offered(kind, group).values() for each in offers]
+    return Types(base, {name: cls for name, cls in own.items() if cls not in loaded}, group)
 
 
 def _import_part(name: str) -> None:
     """Import the parts of a name that installed packages offer; raises ``ParameterError`` if that fails."""
-    offered = _offered(Configurable, "epicycle.parts")
-    if name in offered:
-        try:
-            _ = offered[name]
-        except CatalogueError as error:
-            raise ParameterError("; ".join((error.message, *error.help))) from None
+    try:
+        Types(Configurable, {}, "epicycle.parts").get(name)
+    except CatalogueError as error:
+        raise ParameterError("; ".join((error.message, *error.help))) from None
 
 
 part_finders.append(_import_part)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from epicycle.actors import did_you_mean
 
 from ..text.problems import Position, Problems
 from ..text.reading import Text
 from .dimensions import Factor
+from .fields import AT, LABEL, TEXT, Reader, Schema, keyed, number, ref
 
 LESS, GREATER, RISES, FALLS, ALWAYS = "less", "greater", "rises", "falls", "always"
 FORMS = {
@@ -23,6 +24,21 @@ FORMS = {
 Selection = dict[str, tuple[Factor, ...]]  # levels by factor
 
 
+_LEVELS: Schema = {
+    "type": "object",
+    "minProperties": 1,
+    "additionalProperties": {"anyOf": [LABEL, {"type": "array", "minItems": 1}]},
+}
+
+
+def _levels(key: str) -> Reader:
+    return Reader(_LEVELS, lambda reader, node, what: reader.selection(node, what, key))
+
+
+def _trend(key: str) -> Reader:
+    return Reader({"type": "string"}, lambda reader, node, what: reader.trend(node, what, key))
+
+
 @dataclass(frozen=True)
 class Claim:
     """One hypothesis on the results of a study; see docs/studies.md for what each form means.
@@ -34,14 +50,29 @@ class Claim:
     form: str
     metrics: tuple[Text, ...]
     position: Position
-    doc: str = ""
+    doc: str = keyed(TEXT, "The claim in words.", called="doc", default="")
     condition: str = ""
-    at: Selection = field(default_factory=dict)
-    than: Selection | None = None  # None: all other levels
-    over: str = ""
-    per: str = ""
-    where: Selection = field(default_factory=dict)
-    share: float = 1.0
+    at: Selection = keyed(
+        _levels("at"),
+        "Where they are less, or greater: 'factor: level' or 'factor: [level, ...]'.",
+        default_factory=dict,
+    )
+    than: Selection | None = keyed(
+        _levels("than"),
+        "What they are compared with (default: all other levels, so that these are the best).",
+        default=None,
+    )
+    over: str = keyed(_trend("over"), "The factor over which something rises or falls.", default="")
+    per: str = keyed(_trend("per"), "What rises or falls is the slope over this factor.", default="")
+    where: Selection = keyed(
+        _levels("where"), "The levels to which the claim is restricted (default: all).", default_factory=dict
+    )
+    share: float = keyed(
+        number(float, 0.5, 1.0),
+        "The share of the comparisons, or runs, in which it must hold (default: 1, all).",
+        called="{what}: share",
+        default=1.0,
+    )
 
     @property
     def statement(self) -> str:
@@ -71,10 +102,25 @@ class Guideline:
     best.
     """
 
-    choose: str
-    metric: Text
-    greatest: bool = False
-    tolerance: float = 0.0
+    choose: str = keyed(
+        TEXT.described({"type": "string"}),
+        "The factor whose best level is to be found, for every combination of the others.",
+    )
+    least: Text | None = keyed(AT.described(ref("name")), "The metric to minimise.", default=None)
+    greatest: Text | None = keyed(AT.described(ref("name")), "The metric to maximise.", default=None)
+    tolerance: float = keyed(
+        number(float, 0.0),
+        "How much worse than the best is still good enough (default: 0).",
+        called="guideline: tolerance",
+        default=0.0,
+    )
+
+    @property
+    def metric(self) -> Text:
+        """What is to be minimised or maximised."""
+        found = self.least or self.greatest
+        assert found is not None
+        return found
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,6 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping
 from dataclasses import replace
-from typing import Any
 
 from epicycle.actors import UnitError, did_you_mean
 
@@ -67,15 +66,11 @@ def extended(base: ModelText, text: ModelText, problems: Problems) -> ModelText:
         text,
         root=replace(root, written=(*base.root.written, *text.root.written)),
         run=replace(base.run, **run),
-        metrics=_by_name(base.metrics, text.metrics),
-        monitors=_by_name(base.monitors, text.monitors),
+        metrics={**base.metrics, **text.metrics},
+        monitors={**base.monitors, **text.monitors},
         exactly=base.exactly if text.exactly is None else text.exactly,
         figures={**base.figures, **text.figures},
     )
-
-
-def _by_name(old: tuple[Any, ...], new: tuple[Any, ...]) -> tuple[Any, ...]:
-    return tuple({each.name: each for each in (*old, *new)}.values())
 
 
 def _size(text: CompositeText) -> int:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 from epicycle.actors import Parameter
 
@@ -14,7 +13,7 @@ from ..text.kinds import NAME as NOT_A_NAME
 from ..text.limits import MAX_SEED
 from ..text.problems import POISON, Poison, Position, Problems
 from ..text.reading import NodeReader, Text
-from .acts import ActText
+from .acts import ACTS, ActText
 from .fields import (
     AT,
     NAMED,
@@ -35,13 +34,13 @@ from .fields import (
     ref,
     sound,
 )
-from .metrics import METRICS, MetricText
+from .metrics import METRICS, MONITORS, WatchText
 from .modes import OF_MODES, machine_of
-from .monitors import MONITORS, MonitorText
 from .parts import PartText, parts
 from .places import CONNECTIONS, PATTERNS, ConnectionText
 from .ports import PARAMETERS as PARAMETER_SHAPE
 from .ports import PORTS, ParameterText, PortText
+from .settings import Setting, settings_like
 
 # -- composite classes --------------------------------------------------------------------------------------------
 
@@ -68,8 +67,6 @@ DIRECTOR = Record(
         **_like("as outside"),
     },
 )
-DOC = Field(TEXT, "What it shows or does.")
-INCLUDE = Field(TEXTS, "Files of composite classes, in or below this folder.")
 _SAID_OF_PORTS = "a list of names, or 'name: type' or 'name: {type, doc}'."
 
 
@@ -85,7 +82,7 @@ class CompositeText:
 
     name: str
     position: Position
-    doc: str = keyed(DOC.shape, DOC.doc, default="")
+    doc: str = keyed(TEXT, "What it shows or does.", default="")
     extends: Text | Poison | None = keyed(
         Reader(ref("name"), _base),
         "The composite class that this one inherits from and changes.",
@@ -131,11 +128,10 @@ class CompositeText:
 
 COMPOSITE = Record.of(CompositeText, "A composite class: a graph with its own ports.")
 COMPOSITE.keys |= OF_MODES
-PARAMETERS, ACTORS, ASPECTS = (COMPOSITE.keys[name] for name in ("parameters", "actors", "aspects"))
 # Where a class extends another, its actors and aspects may be changes to inherited ones.
 _CHANGES = {
-    "actors": Field(parts("actor", "changed_actor", derived=True), ACTORS.doc),
-    "aspects": Field(parts("aspect", "changed_aspect", derived=True), ASPECTS.doc),
+    "actors": Field(parts("actor", "changed_actor", derived=True), COMPOSITE.keys["actors"].doc),
+    "aspects": Field(parts("aspect", "changed_aspect", derived=True), COMPOSITE.keys["aspects"].doc),
 }
 HEIR = Record(COMPOSITE.doc, {**COMPOSITE.keys, **_CHANGES})
 
@@ -193,8 +189,6 @@ def composite(
     return CompositeText(name, position, **said, connections=kept, written=(*written, *wrong))
 
 
-COMPOSITES = Field(named(ref("composite"), _composite), "Composite classes, for the types of actors.")
-
 # -- whole files --------------------------------------------------------------------------------------------------
 
 
@@ -228,17 +222,39 @@ def _run(reader: NodeReader, node: Node, what: str) -> RunText | Poison:
 
 @dataclass(frozen=True)
 class ModelText:
-    """A whole model file, without what it includes."""
+    """A whole file, without what it includes: a model, composite classes, or a disturbance."""
 
     root: CompositeText
-    extends: Text | None = None
-    include: tuple[Text, ...] = ()
-    composites: dict[str, CompositeText] = field(default_factory=dict)
-    run: RunText = field(default_factory=RunText)
-    metrics: tuple[MetricText, ...] = ()
-    monitors: tuple[MonitorText, ...] = ()
-    exactly: tuple[ActText, ...] | None = None  # the only acts of aspects that happen
-    figures: dict[str, PartText] = field(default_factory=dict)
+    extends: Text | None = keyed(
+        AT, "The model that this one changes: packaged, or a file in or below this folder.", default=None
+    )
+    include: tuple[Text, ...] = keyed(TEXTS, "Files of composite classes, in or below this folder.", default=())
+    settings: tuple[Setting, ...] = keyed(
+        settings_like("observer[*].sensor.max_range: 5 m"),
+        "Values for parameters of the model: 'path: value', as for --set.",
+        key="set",
+        default=(),
+    )
+    composites: dict[str, CompositeText] = keyed(
+        named(ref("composite"), _composite), "Composite classes, for the types of actors.", default_factory=dict
+    )
+    run: RunText = keyed(Reader(ref("run"), _run), RUN.doc, default_factory=RunText)
+    metrics: dict[str, WatchText] = keyed(
+        METRICS, "Numbers computed from what ports send: 'name: {of, take, after, unit, ...}'.", default_factory=dict
+    )
+    monitors: dict[str, WatchText] = keyed(
+        MONITORS,
+        "Properties that a run must have: 'name: always port >= 2 m', or 'name: {property, between, stop, ...}'.",
+        default_factory=dict,
+    )
+    exactly: tuple[ActText, ...] | None = keyed(
+        ACTS,
+        "The only acts of aspects that happen, these and the model's own: a list of {aspect, at, token}.",
+        default=None,
+    )
+    figures: dict[str, PartText] = keyed(
+        parts("figure"), "Figures of a run: 'name: {type, ...}'.", default_factory=dict
+    )
 
 
 def _model_director(reader: NodeReader, node: Node, what: str) -> dict[str, Entry] | Poison:
@@ -256,70 +272,70 @@ def _model_director(reader: NodeReader, node: Node, what: str) -> dict[str, Entr
     return MODEL_DIRECTOR.entries(reader, node, what)
 
 
-def _all(found: dict[str, Any] | Poison) -> tuple[Any, ...]:
-    return tuple((found or {}).values())
+_OF_FILES = Record.of(ModelText).keys
 
 
-LIBRARY = Record("", {"doc": DOC, "include": INCLUDE, "composites": COMPOSITES})
-MODEL = Record(
+def _of_file(doc: str, *keys: str, **own: Field) -> Record:
+    """A kind of files: these keys in their order, some of them with a meaning of their own."""
+    return Record(doc, {key: own.get(key) or _OF_FILES.get(key) or COMPOSITE.keys[key] for key in keys})
+
+
+LIBRARY = _of_file("", "doc", "include", "composites")
+MODEL = _of_file(
     "",
-    {
-        "model": Field(
-            NAMED,
-            "The name of the model.",
-            "the model's name",
-            missing=("the model has no name", "begin the file with a line like 'model: my_model'"),
-            name="name",
-        ),
-        "doc": COMPOSITE.keys["doc"],
-        "extends": Field(AT, "The model that this one changes: packaged, or a file in or below this folder."),
-        "include": INCLUDE,
-        "parameters": PARAMETERS,
-        "composites": COMPOSITES,
-        "director": Field(Reader(ref("model_director"), _model_director), MODEL_DIRECTOR.doc, "the director of {what}"),
-        "actors": ACTORS,
-        "connections": COMPOSITE.keys["connections"],
-        "aspects": ASPECTS,
-        "run": Field(Reader(ref("run"), _run), RUN.doc),
-        "metrics": Field(
-            Reader(METRICS.schema, lambda reader, node, what: _all(METRICS.read(reader, node, what))),
-            "Numbers computed from what ports send: 'name: {of, take, after, unit, ...}'.",
-        ),
-        "monitors": Field(
-            Reader(MONITORS.schema, lambda reader, node, what: _all(MONITORS.read(reader, node, what))),
-            "Properties that a run must have: 'name: always port >= 2 m', or 'name: {property, between, stop, ...}'.",
-        ),
-        "figures": Field(parts("figure"), "Figures of a run: 'name: {type, ...}'."),
-    },
+    *("model", "doc", "extends", "include", "parameters", "composites", "director", "actors", "connections", "aspects"),
+    *("run", "metrics", "monitors", "figures"),
+    model=Field(
+        NAMED,
+        "The name of the model.",
+        "the model's name",
+        missing=("the model has no name", "begin the file with a line like 'model: my_model'"),
+        name="name",
+    ),
+    director=Field(Reader(ref("model_director"), _model_director), MODEL_DIRECTOR.doc, "the director of {what}"),
 )
-_OF_ROOT = {key for key, each in MODEL.keys.items() if COMPOSITE.keys.get(key) is each}  # as in other composites
-_OF_FILE = Record("", {key: each for key, each in MODEL.keys.items() if key not in _OF_ROOT})
+DISTURBANCE = _of_file(
+    "Aspects in a separate file, to be added to a model.",
+    *("disturbance", "doc", "set", "parameters", "composites", "aspects", "exactly"),
+    disturbance=Field(
+        NAMED,
+        "The name of the disturbance.",
+        "the disturbance's name",
+        missing=("the disturbance has no name", "begin the file with a line like 'disturbance: my_disturbance'"),
+        name="name",
+    ),
+    # Which may take over the ports of the aspects that they replace.
+    aspects=Field(parts("aspect", "added_aspect"), COMPOSITE.keys["aspects"].doc),
+)
 
 
 def model_of(node: Node, problems: Problems) -> ModelText | Poison:
     """The declarations of a model file: one with the key ``model``."""
-    with problems.looking_for(FORM):
-        return _model(node, problems)
-
-
-def _model(node: Node, problems: Problems) -> ModelText | Poison:
-    reader = NodeReader(problems)
-    entries = MODEL.entries(reader, node, "the model")
-    if entries is POISON:
-        return POISON
-    said = sound(_OF_FILE.values(reader, entries, "the model", node.position))
-    own = {key: entry for key, entry in entries.items() if key in _OF_ROOT}
-    director = said.pop("director", None)
-    root = composite(reader, said.pop("name", "model"), own, node.position, "extends" in entries)
-    others = tuple(entry.value for key, entry in entries.items() if key not in (*_OF_ROOT, "composites"))
-    return ModelText(replace(root, director=director, written=(*root.written, *others)), **said)
+    return _read(MODEL, node, "the model", "model", problems)
 
 
 def library_of(node: Node, problems: Problems) -> ModelText | Poison:
     """The declarations of a file of composite classes."""
+    return _read(LIBRARY, node, "an included file", "", problems)
+
+
+def disturbance_of(node: Node, problems: Problems) -> ModelText | Poison:
+    """The declarations of a disturbance."""
+    return _read(DISTURBANCE, node, "the disturbance", "disturbance", problems)
+
+
+def _read(record: Record, node: Node, what: str, name: str, problems: Problems) -> ModelText | Poison:
+    """The declarations of a kind of file; ``name`` is its name if it says none."""
     with problems.looking_for(FORM):
-        read = LIBRARY.read(NodeReader(problems), node, "an included file")
-    if read is POISON:
-        return POISON
-    said = sound(read)
-    return ModelText(CompositeText("", node.position, said.pop("doc", "")), **said)
+        reader = NodeReader(problems)
+        entries = record.entries(reader, node, what)
+        if entries is POISON:
+            return POISON
+        of_root = COMPOSITE.keys.keys() - {"extends", "director"}  # as in other composites
+        keys = Record("", {key: each for key, each in record.keys.items() if key not in of_root})
+        said = sound(keys.values(reader, entries, what, node.position))
+        own = {key: entry for key, entry in entries.items() if key in of_root}
+        director = said.pop("director", None)
+        root = composite(reader, said.pop("name", name), own, node.position, "extends" in entries)
+        others = tuple(entry.value for key, entry in entries.items() if key not in (*of_root, "composites"))
+        return ModelText(replace(root, director=director, written=(*root.written, *others)), **said)

@@ -19,7 +19,7 @@ from ..text.problems import POISON, Poison, Position, Problems
 from ..text.reading import NodeReader, Text, inside
 from .claims import ALWAYS, FALLS, FORMS, GREATER, LESS, RISES, Claim, Guideline, Questions, Selection, shown_level
 from .dimensions import Dimension, Factor, as_factor
-from .fields import AT, LABEL, TEXT, TEXTS, Field, Reader, Record, Schema, names_of, node_as, number, ref
+from .fields import TEXTS, Field, Reader, Record, names_of, node_as, ref
 from .files import named_file
 
 MAX_CONDITIONS = 10_000  # of a study with claims or a guideline, which evaluate all of them
@@ -274,69 +274,31 @@ class QuestionReader(NodeReader):
             return self.problems.add(f"guideline: {name} has only one level, so there is nothing to choose", at)
         if POISON in said.values():
             return POISON
-        return Guideline(name, said[aims[0]], aims[0] == "greatest", said.get("tolerance", 0.0))
+        return Guideline(**said)
 
 
 _METRICS = TEXTS.described({"anyOf": [ref("name"), {"type": "array", "items": ref("name"), "minItems": 1}]})
-_LEVELS: Schema = {
-    "type": "object",
-    "minProperties": 1,
-    "additionalProperties": {"anyOf": [LABEL, {"type": "array", "minItems": 1}]},
-}
-_TEXT: Schema = {"type": "string"}
-
-
-def _levels(key: str, doc: str) -> Field:
-    return Field(Reader(_LEVELS, lambda reader, node, what: reader.selection(node, what, key)), doc, "{what}")
-
-
-def _trend(key: str, doc: str) -> Field:
-    return Field(Reader(_TEXT, lambda reader, node, what: reader.trend(node, what, key)), doc, "{what}")
-
-
 _TREND = "Metrics whose mean, or slope per unit of another factor, {} over the levels of a factor."
+_OF_CLAIM = Record.of(Claim, called="{what}").keys
 CLAIM = Record(
     "A hypothesis on the results.",
     {
-        "doc": Field(TEXT, "The claim in words."),
+        "doc": _OF_CLAIM["doc"],
         LESS: Field(_METRICS, "Metrics whose mean is less at some levels than at others.", "{what}"),
         GREATER: Field(_METRICS, "Metrics whose mean is greater at some levels than at others.", "{what}"),
         RISES: Field(_METRICS, _TREND.format(RISES), "{what}"),
         FALLS: Field(_METRICS, _TREND.format(FALLS), "{what}"),
         ALWAYS: Field(
-            Reader(_TEXT, QuestionReader.condition), "A condition on the metrics that holds in every run.", "{what}"
+            Reader({"type": "string"}, QuestionReader.condition),
+            "A condition on the metrics that holds in every run.",
+            "{what}",
         ),
-        "at": _levels("at", "Where they are less, or greater: 'factor: level' or 'factor: [level, ...]'."),
-        "than": _levels("than", "What they are compared with (default: all other levels, so that these are the best)."),
-        "over": _trend("over", "The factor over which something rises or falls."),
-        "per": _trend("per", "What rises or falls is the slope over this factor."),
-        "where": _levels("where", "The levels to which the claim is restricted (default: all)."),
-        "share": Field(
-            number(float, 0.5, 1.0),
-            "The share of the comparisons, or runs, in which it must hold (default: 1, all).",
-            "{what}: share",
-        ),
+        **_OF_CLAIM,
     },
     type="object",
     oneOf=[{"required": [form, *(key for key in takes if key in ("at", "over"))]} for form, takes in FORMS.items()],
 )
-GUIDELINE = Record(
-    "",
-    {
-        "choose": Field(
-            TEXT.described(_TEXT),
-            "The factor whose best level is to be found, for every combination of the others.",
-        ),
-        "least": Field(AT.described(ref("name")), "The metric to minimise."),
-        "greatest": Field(AT.described(ref("name")), "The metric to maximise."),
-        "tolerance": Field(
-            number(float, 0.0),
-            "How much worse than the best is still good enough (default: 0).",
-            "guideline: tolerance",
-        ),
-    },
-    type="object",
-    required=["choose"],
-    oneOf=[{"required": ["least"]}, {"required": ["greatest"]}],
+GUIDELINE = Record.of(
+    Guideline, type="object", required=["choose"], oneOf=[{"required": ["least"]}, {"required": ["greatest"]}]
 )
-CLAIMS = node_as({"anyOf": [names_of(ref("claim")), _TEXT]})
+CLAIMS = node_as({"anyOf": [names_of(ref("claim")), {"type": "string"}]})

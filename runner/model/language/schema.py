@@ -18,7 +18,6 @@ from ..catalogue.reference import doc_of, first_sentence, parts_of
 from ..catalogue.types import Catalogue
 from .acts import ACT
 from .dimensions import RANGE, dimension_schema
-from .disturbance import DISTURBANCE
 from .fields import (
     EXPRESSION,
     LABEL,
@@ -31,9 +30,8 @@ from .fields import (
     ref,
     schema_of,
 )
-from .metrics import METRIC
-from .models import COMPOSITE, DIRECTOR, LIBRARY, MODEL, MODEL_DIRECTOR, RUN, composite_schema
-from .monitors import MONITOR
+from .metrics import METRIC, MONITOR
+from .models import COMPOSITE, DIRECTOR, DISTURBANCE, LIBRARY, MODEL, MODEL_DIRECTOR, RUN, composite_schema
 from .parts import BESIDE, RESERVED
 from .places import CONNECTION, PATTERN_SCHEMA, POINTCUT, POINTCUTS_SCHEMA, PORT_SCHEMA, PORTS_SCHEMA, connection_schema
 from .ports import PARAMETER, PORT

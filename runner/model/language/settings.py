@@ -1,26 +1,21 @@
-"""Settings from outside: ``--set path=value``, ``--overrides file``, ``--aspect name=Type,...``, ``--without name``."""
+"""Settings from outside: ``--set path=value``, ``--overrides file``."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterable
 from collections.abc import Mapping as AnyMapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 
-from epicycle.actors import did_you_mean
-
-from ..text.document import Entry, Mapping, Node, Scalar, parse, read
+from ..text.document import Mapping, Node, Scalar, parse, read
 from ..text.files import COMMAND_LINE
 from ..text.limits import NORMAL, Limits
 from ..text.patterns import Comparisons, PatternError, check_pattern, matches, names_asked, names_of
 from ..text.problems import Position, Problems
 from ..text.program import call_site, node_of
-from ..text.reading import NAME, NAMES_HAVE, NodeReader, Text, is_empty, split
+from ..text.reading import NodeReader, is_empty, split
 from .fields import Reader
-from .models import ModelText
-from .parts import PartText, beside
-from .places import PointcutText
 
 
 @dataclass(frozen=True)
@@ -137,7 +132,7 @@ def parse_settings(text: str, problems: Problems, flag: str) -> list[Setting]:
     for part in map(str.strip, parts):
         if _NUMBER_AND_MORE.match(part):
             message = f"{part!r} sets more than one parameter without a comma between them"
-            problems.add(message, _in_option(f"{flag} {text}", len(flag) + 1), "write load=0.9,servers=2")
+            problems.add(message, in_option(f"{flag} {text}", len(flag) + 1), "write load=0.9,servers=2")
         else:
             found.append(parse_setting(part, problems, flag))
     return [setting for setting in found if setting is not None]
@@ -156,7 +151,7 @@ def is_pattern(path: str, position: Position, problems: Problems) -> bool:
 def parse_setting(text: str, problems: Problems, flag: str = "--set") -> Setting | None:
     """``path=value``, where value is a YAML value such as ``3``, ``5 m`` or ``[0, 1]``; the ``flag`` stands before."""
     option = f"{flag} {text}"
-    position = _in_option(option, len(flag) + 1)
+    position = in_option(option, len(flag) + 1)
     path, equals, value = text.partition("=")
     path = path.strip()
     if not equals or not path:
@@ -164,90 +159,19 @@ def parse_setting(text: str, problems: Problems, flag: str = "--set") -> Setting
         return None
     if not is_pattern(path, position, problems):
         return None
-    node = _value(value, option, len(option) - len(value), problems)
+    node = value_in(value, option, len(option) - len(value), problems)
     return None if node is None else Setting(path, node, position)
 
 
-def _in_option(option: str, start: int, length: int | None = None) -> Position:
+def in_option(option: str, start: int, length: int | None = None) -> Position:
     """A place on the command line: the part of an option from ``start`` on."""
     return Position(COMMAND_LINE, 1, start + 1, max(1, len(option) - start if length is None else length), option)
 
 
-def _value(text: str, option: str, offset: int, problems: Problems) -> Node | None:
+def value_in(text: str, option: str, offset: int, problems: Problems) -> Node | None:
     """The YAML value in an option from ``offset`` on."""
     if not text.strip():
-        return Scalar(None, "", True, _in_option(option, 0))
+        return Scalar(None, "", True, in_option(option, 0))
     if len(option.splitlines()) > 1:  # lines and columns then count within the value
         return parse(text, COMMAND_LINE, problems)
     return parse(" " * offset + text, COMMAND_LINE, problems, option)
-
-
-def without(text: ModelText, name: str, problems: Problems) -> ModelText:
-    aspects = text.root.aspects
-    if name not in aspects:
-        message = f"the model has no aspect {name!r}{did_you_mean(name, list(aspects))}"
-        problems.add(message, _in_option(f"--without {name}", 10), f"its aspects: {', '.join(aspects) or 'none'}")
-    left = {key: part for key, part in aspects.items() if key != name}
-    return replace(text, root=replace(text.root, aspects=left))
-
-
-def change_aspect(text: ModelText, change: str, problems: Problems) -> ModelText:
-    """``name=Type,key=value,...``: the model with a new aspect, or with an existing one replaced.
-
-    ``put_aspect`` documents what a replaced aspect leaves to the new one.
-    """
-    option = f"--aspect {change}"
-    position = _in_option(option, 9)
-    name, equals, rest = change.partition("=")
-    places = split(rest, ",")
-    parts = [rest[start:end].strip() for start, end in places]
-    if not equals or not name.strip() or not parts or not parts[0]:
-        problems.add(f"{change!r} is not of the form name=Type,key=value", position)
-        return text
-    name = name.strip()
-    values: dict[str, Entry] = {}
-    at: tuple[PointcutText, ...] | None = None
-    for part, (_, end) in zip(parts[1:], places[1:], strict=True):
-        key, equals, value = part.partition("=")
-        key = key.strip()
-        if not equals or not key:
-            problems.add(f"{part!r} is not of the form key=value", position)
-            return text
-        stop = len(option) - len(rest) + end
-        if key == "at":
-            at = _pointcuts(value, option, stop - len(value))
-            continue
-        node = _value(value, option, stop - len(value), problems)
-        if node is None:
-            return text
-        values[key] = Entry(Scalar(key, key, True, position), node)
-    if not NAME.match(name):
-        problems.add(f"{name!r} is not a name", position, NAMES_HAVE)
-        return text
-    enabled = beside("enabled", values.pop("enabled").value) if "enabled" in values else None
-    added = PartText(name, position, Text(parts[0], position), values, at=at or (), enabled=enabled)
-    return put_aspect(text, added)
-
-
-def put_aspect(text: ModelText, part: PartText) -> ModelText:
-    """The model with a new aspect, which replaces the one with its name.
-
-    The replaced aspect leaves its ports unless the new one has its own, and its parameters if the type stays the same.
-    """
-    old = text.root.aspects.get(part.name)
-    if old is not None:
-        values = {**old.values, **part.values} if old.type.text == part.type.text else part.values
-        part = replace(part, at=part.at or old.at, values=values)
-    return replace(text, root=replace(text.root, aspects={**text.root.aspects, part.name: part}))
-
-
-def _pointcuts(value: str, option: str, offset: int) -> tuple[PointcutText, ...]:
-    """``port`` or ``[port, port]``, read without YAML, where ``[observer[*].plan]`` is a broken list."""
-    if value.startswith("[") and value.endswith("]"):
-        value, offset = value[1:-1], offset + 1
-    found = []
-    for start, end in split(value, ","):
-        text = value[start:end].strip(" '\"")
-        at = offset + start + value[start:end].find(text)
-        found.append(PointcutText.of(Text(text, _in_option(option, at, len(text)))))
-    return tuple(found)

@@ -23,7 +23,6 @@ from .fields import (
     LABEL,
     NAMED,
     TEXT,
-    Field,
     Reader,
     Record,
     keyed,
@@ -47,22 +46,7 @@ MAX_STUDY_SEED = MAX_SEED - MAX_REPLICATIONS
 RESERVED = ("run", "condition", "replication", "seed", "status", "events", "digest", "error", "wall_time", "replay")
 
 
-METRIC = Record(
-    "A number that is kept for each run.",
-    {
-        "value": Field(
-            node_as(LABEL),
-            "The expression, over metrics of the model and other results of a run.",
-            missing=("{what} has no value", "add 'value: ...', an expression"),
-        ),
-        "unit": Field(TEXT, "Its unit; a metric of the model has its own."),
-        "to": Field(TEXT, "Its unit in the table (default: the same)."),
-        "doc": Field(TEXT, "What it is."),
-        "label": Field(TEXT, "Its label in figures and reports (default: the model's label, or its name)."),
-    },
-    type="object",
-    required=["value"],
-)
+METRIC = Record.of(StudyMetric, "A number that is kept for each run.", type="object", required=["value"])
 _METRICS = {"anyOf": [names_of({"anyOf": [LABEL, METRIC.schema]}), {"type": "array", "items": ref("name")}]}
 _DISTURB = {"anyOf": [{"type": "object", "additionalProperties": one_or_more({"type": "string"})}, ref("texts")]}
 _HAS_NO = ("{what} has no {key!r}", "write {{metric: mean_wait, half_width: 0.1, at_most: 1000}}")
@@ -202,9 +186,8 @@ def read_study(
     node = None if path is None else read(path, problems)
     problems.raise_if_any()
     assert path is not None
-    assert node is not None
     text = opened_text(path) or path.read_text(encoding="utf-8")
-    return _StudyReader(problems, path).changed(node, text, set, types, replications, seed)
+    return study_of_text(text, path, set, types, replications, seed, node=node)
 
 
 def study_of_text(
@@ -215,17 +198,33 @@ def study_of_text(
     replications: int | None = None,
     seed: int | None = None,
     lender: tuple[str, str] | None = None,
+    node: Node | None = None,
 ) -> Study:
-    """The study in a text that was once read from ``path``; the files that it names may no longer exist.
+    """The study in a text, with settings from outside; raises ``ModelError``.
 
-    ``lender``: file and text of the study that its claims are from.
+    The text was once read from ``path``: the files that it names may no longer exist, unless it was read now, as this
+    ``node``.  ``lender``: file and text of the study that its claims are from.
     """
     problems = Problems(OF_STUDY)
-    node = parse(text, str(path), problems)
+    reader = _StudyReader(problems, path, lender, asks_for_files=node is not None)
+    tree = node or parse(text, str(path), problems)
     problems.raise_if_any()
-    assert node is not None, "a text that cannot be read is a problem"
-    reader = _StudyReader(problems, path, lender, asks_for_files=False)
-    return reader.changed(node, text, set, types, replications, seed)
+    assert tree is not None, "a text that cannot be read is a problem"
+    study, changes = problems.whole(reader.study(tree, text)), tuple(set)
+    settings = [each for change in changes if (each := parse_setting(change, problems)) is not None]
+    for each in settings:
+        if each.path in study.factors:
+            message = f"{each.position.source}: the study varies {each.path}"
+            problems.add(message, None, "change it in the study")
+    problems.raise_if_any()
+    return replace(
+        study,
+        replications=study.replications if replications is None else replications,
+        seed=study.seed if seed is None else seed,
+        fixed=(*study.fixed, *settings),
+        changes=changes,
+        types=tuple(types),
+    )
 
 
 class _StudyReader(NodeReader):
@@ -238,32 +237,6 @@ class _StudyReader(NodeReader):
         self.path = path
         self.asks_for_files = asks_for_files  # whether what is named must exist
         self.lender = lender  # file and text of the study whose claims are judged here, if they are known
-
-    def changed(
-        self,
-        node: Node,
-        text: str,
-        set: Iterable[str],
-        types: Iterable[Path],
-        replications: int | None,
-        seed: int | None,
-    ) -> Study:
-        """The whole file, with the settings from outside; raises ``ModelError``."""
-        study, changes = self.problems.whole(self.study(node, text)), tuple(set)
-        settings = [each for change in changes if (each := parse_setting(change, self.problems)) is not None]
-        for each in settings:
-            if each.path in study.factors:
-                message = f"{each.position.source}: the study varies {each.path}"
-                self.problems.add(message, None, "change it in the study")
-        self.problems.raise_if_any()
-        return replace(
-            study,
-            replications=study.replications if replications is None else replications,
-            seed=study.seed if seed is None else seed,
-            fixed=(*study.fixed, *settings),
-            changes=changes,
-            types=tuple(types),
-        )
 
     def study(self, node: Node, text: str) -> Study | None:
         if (
@@ -351,7 +324,7 @@ class _StudyReader(NodeReader):
             entries = METRIC.entries(self, entry.value, what) or {}
             said = sound(METRIC.values(self, entries, what, entry.key.position))
             places = {key: each.value.position for key, each in entries.items()}
-            value = said.pop("value", None)
+            value = said.pop("node", None)
         if isinstance(value, Scalar):
             return checked_metric(name, value, self.problems, said, places)
         if value is not None:

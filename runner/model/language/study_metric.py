@@ -12,6 +12,7 @@ from epicycle.actors.expression import ExpressionError, Formula
 from ..text.document import Scalar
 from ..text.faults import blame
 from ..text.problems import Position, Problems
+from .fields import LABEL, TEXT, keyed, node_as
 
 ASPECTS, SIGNALS = "aspects", "signals"
 NUMBERS = ("end", "events", "firings")  # the other results that an expression knows
@@ -28,11 +29,17 @@ class StudyMetric:
 
     name: str
     source: str
-    node: Scalar | None = None  # where it is declared; None if the study takes all metrics of its model
-    unit: str = ""  # the unit of the expression; a metric of the model has its own
-    to: str = ""  # its unit in the table, if that is different
-    doc: str = ""
-    label: str = ""
+    node: Scalar | None = keyed(  # None if the study takes all metrics of its model
+        node_as(LABEL),
+        "The expression, over metrics of the model and other results of a run.",
+        key="value",
+        missing=("{what} has no value", "add 'value: ...', an expression"),
+        default=None,
+    )
+    unit: str = keyed(TEXT, "Its unit; a metric of the model has its own.", default="")
+    to: str = keyed(TEXT, "Its unit in the table (default: the same).", default="")
+    doc: str = keyed(TEXT, "What it is.", default="")
+    label: str = keyed(TEXT, "Its label in figures and reports (default: the model's label, or its name).", default="")
     places: dict[str, Position] = field(default_factory=dict, compare=False)  # of the unit and what follows
     figures: tuple[tuple[str, str], ...] = field(init=False)
     signals: tuple[str, ...] = field(init=False)

@@ -6,7 +6,7 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from enum import Enum
-from typing import Final, Literal, NoReturn, TypeVar
+from typing import Final, Literal, NoReturn, TypeAlias, TypeVar
 
 from epicycle.actors import EpicycleError, nearest, shortened, visible, visible_character
 
@@ -17,6 +17,8 @@ MAX_SOURCE_WIDTH = 120
 _CUT = "..."
 
 T = TypeVar("T")
+Near: TypeAlias = tuple[str, Iterable[str]]  # a wrong name, and the right ones
+NONE: Final[Near] = ("", ())
 
 
 class Poison(Enum):
@@ -171,7 +173,7 @@ class Problems:
         raised: Position | None = None,
         cause: BaseException | None = None,
         kind: Kind | None = None,
-        near: tuple[str, Iterable[str]] = ("", ()),
+        near: Near = NONE,
         fix: Fix | None = None,
     ) -> Poison:
         """Note a problem; each hint becomes a line of help.  One too many raises all problems as a ModelError.
