@@ -296,7 +296,7 @@ def test_size_limit(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
 def test_without_the_c_parser(monkeypatch: pytest.MonkeyPatch) -> None:
     text = "a: &a [1, {b: 'c'}]\nd: *a\ne:\n  - !!str 1\n  - é f  # c\n"
     expected = load(text)
-    monkeypatch.setattr(document, "_LOADER", yaml.SafeLoader)
+    monkeypatch.setattr(document, "LOADER", yaml.SafeLoader)
     assert load(text) == expected
     assert faults("a: b: c").startswith("m.yaml:1:5: error: broken YAML: mapping values are not allowed here")
 
