@@ -31,6 +31,7 @@ class Trajectory:
     ) -> None:
         self.names = tuple(rates)
         self.guards: list[Guard] = []
+        self._watched: list[tuple[Formula, str]] = []  # what they are of
         self.time, self.fraction = 0, 0.0
         self.solution: Solution
         self._formulas = dict(rates)
@@ -48,6 +49,7 @@ class Trajectory:
 
         guard = Guard(value, partial(self._bounds, formula), rising, falling)
         self.guards.append(guard)
+        self._watched.append((formula, what))
         return guard
 
     def begin(self, time: int, fraction: float, state: State) -> None:
@@ -129,7 +131,8 @@ class Trajectory:
 
     def signs(self, at: float, state: State) -> list[int]:
         """The sides of the guards."""
-        return [sign_of(guard.value(at, state)) for guard in self.guards]
+        names = self.values(at, state) if self.guards else {}
+        return [sign_of(number_of(formula, names, what)) for formula, what in self._watched]
 
     def _rates(self, at: float, state: State) -> State:
         if self._function is not None:

@@ -31,7 +31,7 @@ class Tableau:
     extra: tuple[Stage, ...] = ()
     alternates: bool = False
 
-    @property
+    @cached_property
     def factors(self) -> list[tuple[float, float]]:
         """The factors of the polynomial, each as slope and offset."""
         return [(-1.0, 1.0) if self.alternates and number % 2 else (1.0, 0.0) for number in range(len(self.dense))]
@@ -43,12 +43,13 @@ class Tableau:
             [(share, _moved(weights)) for share, weights in self.stages],
             [(share, _moved(weights)) for share, weights in self.extra],
             [_sum(weights) for weights in self.errors],
-            [_sum(weights) for weights in self.dense],
+            _rows(self.dense),
         )
 
 
 Sum = Callable[[list[State]], State]  # of the derivatives at stages
 Moved = Callable[[State, float, list[State]], State]  # a state, and a step times the sum added to it
+Rows = Callable[[float, list[State]], Iterable[tuple[float, ...]]]  # a step times each of several sums
 
 
 class Sums(NamedTuple):
@@ -57,12 +58,19 @@ class Sums(NamedTuple):
     stages: list[tuple[float, Moved]]
     extra: list[tuple[float, Moved]]
     errors: list[Sum]
-    dense: list[Sum]
+    dense: Rows
 
 
 def _sum(weights: Weights) -> Sum:
     text, names, stages = _written(weights)
     made: Sum = _function(f"lambda rates: [{text} for {names}, in zip({stages})]")
+    return made
+
+
+def _rows(sums: tuple[Weights, ...]) -> Rows:
+    _, names, stages = _written(tuple({stage: 1.0 for weights in sums for stage, _ in weights}.items()))
+    texts = [f"step * ({_written(weights)[0]})" for weights in sums]
+    made: Rows = _function(f"lambda step, rates: zip(*[({', '.join(texts)},) for {names}, in zip({stages})])")
     return made
 
 
@@ -130,8 +138,8 @@ class RungeKutta(Stepper):
         start, state = self._begin
         step, rates = self.time - start, list(self._latest)
         self._pass(self._tableau.sums.extra, self._begin, step, rates)
-        rows = [[step * value for value in each(rates)] for each in self._tableau.sums.dense]
-        return Piece(start, self.time, start, step, self._tableau.factors, [state, *rows])
+        rows = [state, *self._tableau.sums.dense(step, rates)]
+        return Piece(start, self.time, start, step, self._tableau.factors, rows)
 
 
 # fmt: off

@@ -10,7 +10,7 @@ import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from operator import add, mul, sub, truediv
+from operator import add, mul, sub
 from typing import Final
 
 from ..core.elementary import total
@@ -33,13 +33,18 @@ def root_power(base: float, exponent: float) -> float:
         if exponent >= 1.0:
             exponent -= 1.0
             result *= base
+            if exponent == 0.0:
+                break
     return result
 
 
 def norm(values: Sequence[float], scale: Sequence[float]) -> float:
     """The root mean square of the values, each divided by its scale."""
-    ratios = list(map(truediv, values, scale))
-    return math.sqrt(dot(ratios, ratios) / len(scale))
+    squares = 0.0
+    for value, unit in zip(values, scale, strict=True):
+        ratio = value / unit
+        squares += ratio * ratio
+    return math.sqrt(squares / len(scale))
 
 
 def added(one: Sequence[float], other: Sequence[float]) -> State:
@@ -60,7 +65,7 @@ def combined(weights: Sequence[float], rows: Sequence[State]) -> State:
     return [dot(weights, column) for column in zip(*rows, strict=True)]
 
 
-@dataclass(frozen=True)
+@dataclass(slots=True)
 class Piece:
     """The solution along one step, from ``start`` to ``end``: a polynomial for each state.
 
@@ -73,26 +78,30 @@ class Piece:
     origin: float
     width: float
     factors: Sequence[tuple[float, float]]
-    rows: Sequence[State]
+    rows: Sequence[Sequence[float]]
 
     def at(self, time: float) -> State:
         """The states at a given time."""
         x = (time - self.origin) / self.width
-        values = self.rows[-1]
-        for (slope, offset), row in zip(self.factors[::-1], self.rows[-2::-1], strict=True):
-            factor = slope * x + offset
-            values = [value * factor + each for value, each in zip(values, row, strict=True)]
+        factors = [slope * x + offset for slope, offset in self.factors[::-1]]
+        values = []
+        for value, *rest in zip(*self.rows[::-1], strict=True):
+            for factor, each in zip(factors, rest, strict=True):
+                value = value * factor + each
+            values.append(value)
         return values
 
     def bounds(self, left: float, right: float) -> list[Bounds]:
         """Bounds on each state between two times, by interval arithmetic."""
         x, y = (left - self.origin) / self.width, (right - self.origin) / self.width
-        found = [(value, value) for value in self.rows[-1]]
-        for (slope, offset), row in zip(self.factors[::-1], self.rows[-2::-1], strict=True):
-            a, b = slope * x + offset, slope * y + offset
-            for number, ((low, high), each) in enumerate(zip(found, row, strict=True)):
+        factors = [(slope * x + offset, slope * y + offset) for slope, offset in self.factors[::-1]]
+        found = []
+        for low, *rest in zip(*self.rows[::-1], strict=True):
+            high = low
+            for (a, b), each in zip(factors, rest, strict=True):
                 products = (low * a, low * b, high * a, high * b)
-                found[number] = (min(products) + each, max(products) + each)
+                low, high = min(products) + each, max(products) + each
+            found.append((low, high))
         return found
 
 

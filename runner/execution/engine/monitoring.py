@@ -24,6 +24,7 @@ from ...model.temporal import (
     looks_ahead,
     moment,
     time_of,
+    waits_for_tokens,
 )
 from ..results import Past, Verdict
 
@@ -123,6 +124,7 @@ class PartMonitoring:
         "_time",
         "_values",
         "_verdict",
+        "_waits",
         "monitor",
         "part",
     )  # fmt: skip
@@ -147,6 +149,7 @@ class PartMonitoring:
         self._sent: dict[str, list[Any]] = {}  # at the present tag
         self._verdict = PropertyVerdict()
         self._missing = ""  # why it cannot be judged
+        self._waits = waits_for_tokens(part.tree)
         self._is_late = looks_ahead(part.tree) or linear  # a break may be found out later than it happens
         self._past: Past[tuple[int, dict[str, Any]]] = Past()
         self._values: dict[str, Any] = {}  # of its ports where it broke first
@@ -166,7 +169,7 @@ class PartMonitoring:
     def add(self, port: str, tag: Moment, token: Any) -> None:
         """Take in what a port sends at a tag."""
         if tag.time > self._time:
-            self.settle(tag.time)
+            self._settle(tag.time)
         elif self._sent and tag.microstep != self._microstep:
             self._sample_tag(None)
         self._microstep = tag.microstep
@@ -174,6 +177,10 @@ class PartMonitoring:
 
     def settle(self, upcoming: int) -> None:
         """What was sent by now stands until a later time (ns)."""
+        if self._sent or not self._waits:
+            self._settle(upcoming)
+
+    def _settle(self, upcoming: int) -> None:
         if upcoming > self._time:
             self._sample_tag(moment(upcoming))
             self._time = upcoming
@@ -229,7 +236,7 @@ class PartMonitoring:
 
     def verdict(self, end: int) -> Verdict:
         """What it comes to when the run ends at a time (ns); nothing more may be added."""
-        self.settle(end + 1)
+        self._settle(end + 1)
         if self._missing:
             return Verdict(missing=self._missing)
         for each in self._conditions:

@@ -152,6 +152,17 @@ def looks_ahead(tree: Property) -> bool:
             return True
 
 
+def waits_for_tokens(tree: Property) -> bool:
+    """Whether it breaks only when a token comes, not as time goes on."""
+    match tree:
+        case Junction():
+            return waits_for_tokens(tree.left) and waits_for_tokens(tree.right)
+        case Quantified(any=False, start=0):
+            return _is_of_now(tree.of) and all(isinstance(each, Condition) for each in leaves(tree))
+        case _:
+            return False
+
+
 def _is_of_now(tree: Property) -> bool:
     match tree:
         case Not():
