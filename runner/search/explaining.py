@@ -16,6 +16,7 @@ from ..execution.results import Results, Verdict, canonical, plain
 from ..model.build.model import Model
 from ..model.graph.acts import Act, ActName
 from ..model.graph.model_graph import ModelGraph
+from ..model.temporal import looks_ahead
 from ..study.run.processes import Worker
 from .cache import NUMBER, EvaluationCache
 from .evaluator import Evaluator
@@ -181,6 +182,7 @@ def explain(
         whole = _Worker(model, seed, until).results(model.exactly)
         monitor, *also = _broken(model.name, {each: whole.monitors[each] for each in monitors})
         verdict, source = whole.monitors[monitor], sources[monitor]
+        asked = next(each for each in model.output.monitors if each.name == monitor)
         about = {
             "model": model.name,
             "seed": whole.seed,
@@ -203,7 +205,9 @@ def explain(
             return found
 
         try:
-            sets.expect([none, frozenset(before)])
+            # Acts before the break seldom suffice for a property that is about what comes later.
+            late = [mine] if any(looks_ahead(part.tree) for part in asked.parts) else []
+            sets.expect(map(frozenset, (none, before, *late)))
             if not breaks(none):
                 candidates = before
                 if not breaks(frozenset(before)):
@@ -233,9 +237,8 @@ def explain(
         # An act that is not noted in the run of the set is reported as it was.
         there |= {name: acts[name] for name in sorted(best) if name not in there}
         if there and not ended:
-            ports = next(each.ports for each in model.output.monitors if each.name == monitor)
             rest = sets.run(best - {next(iter(there))}, keep_log=True)
-            steps = _steps(model.graph, ports, with_set.sends, rest.sends)
+            steps = _steps(model.graph, asked.ports, with_set.sends, rest.sends)
     return Explanation(
         model.name,
         whole.seed,

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,12 +11,10 @@ from epicycle.actors import EpicycleError
 
 from ..execution.engine import Interventions, Simulation
 from ..model.build.model import Model
-from ..model.language.study import study_of_text
 from ..model.text.problems import Problems
-from ..study.plan.plan import Search
 from .falsification import Falsification, Run
 from .faults import FaultSpace
-from .growing import Growing, text_of
+from .growing import Growing, study_of
 from .monitored import AD_HOC, monitors_named, property_of
 from .proposals import Point, is_guided, proposals
 from .space import read_space
@@ -74,13 +71,7 @@ class _Searching:
                 f"each\n   help: search with --runs {most} and several seeds, in a folder each"
             )
         keys = self._keys(model.name, metrics)
-        study = replace(
-            study_of_text(text_of(keys, []), FILE, spec.set, spec.types),
-            aspects=tuple(spec.aspects),
-            without_aspects=tuple(spec.without_aspects),
-            stop=spec.until,
-        )
-        self.growing = Growing(study, keys, searched, Search(runs=goal.runs, command=list(spec.command)))
+        self.growing = Growing(study_of(spec, keys, FILE), keys, searched, runs=goal.runs, command=spec.command)
         guided = is_guided(space.widths) and space.has_ranges
         self.found = Falsification(spec, goal, model.name, monitors, searched, guided)
         self._proposals = (

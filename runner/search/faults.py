@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from heapq import heappop, heappush
 from itertools import islice
 
 from epicycle.actors import random_stream
@@ -73,21 +74,13 @@ class FaultSpace:
 
 def _by_sum(size: int, count: int) -> Iterator[tuple[int, ...]]:
     """All sets of so many numbers below ``count``, those with the least sum first."""
-    for total in range(math.comb(size, 2), size * count - math.comb(size + 1, 2) + 1):
-        yield from _with_sum(size, total, 0, count)
-
-
-def _with_sum(size: int, total: int, least: int, count: int) -> Iterator[tuple[int, ...]]:
-    if size == 1:
-        if least <= total < count:
-            yield (total,)
-        return
-    rest = math.comb(size - 1, 2)
-    for first in range(least, count):
-        # What is left must be a sum of larger numbers below the count.
-        left = total - first
-        if (size - 1) * (first + 1) + rest > left:
-            return
-        if left <= (size - 1) * count - math.comb(size, 2):
-            for others in _with_sum(size - 1, left, first + 1, count):
-                yield (first, *others)
+    least = tuple(range(size))
+    waiting, seen = [(sum(least), least)], {least}
+    while waiting:
+        total, each = heappop(waiting)
+        yield each
+        for place, following in enumerate([*each[1:], count]):
+            more = (*each[:place], each[place] + 1, *each[place + 1 :])
+            if more[place] < following and more not in seen:
+                seen.add(more)
+                heappush(waiting, (total + 1, more))

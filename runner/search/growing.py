@@ -11,7 +11,7 @@ from typing import Any
 import yaml
 
 from ..model.language.dimensions import Level
-from ..model.language.study import Study
+from ..model.language.study import Study, study_of_text
 from ..study.judge.study_results import StudyResults
 from ..study.plan.plan import Plan, Search
 from ..study.run.backlog import Backlog, Task
@@ -25,6 +25,7 @@ from ..study.session import available_cores, manifest_of
 from .faults import FaultSpace
 from .proposals import Point
 from .space import Space, said
+from .spec import SearchSpec
 
 _GROWTH = 1.1  # of the number of points, after which the folder is told of them: each time, of all
 
@@ -66,13 +67,22 @@ class Growing:
     ``keys`` are what its file says.  Raises ``ModelError`` unless the model loads at the ends of the space.
     """
 
-    def __init__(self, study: Study, keys: Mapping[str, Any], space: Space | FaultSpace, search: Search) -> None:
+    def __init__(
+        self,
+        study: Study,
+        keys: Mapping[str, Any],
+        space: Space | FaultSpace,
+        *,
+        runs: int,
+        command: Sequence[str],
+    ) -> None:
         tried = Plan.made(replace(study, dimensions=(*space.ends(), *study.dimensions)))
         extra = {name: digest for each in tried.extra for more in each.values() for name, digest in more.items()}
         self.study = study
         self._keys = keys
         self._space = space
-        self._base = replace(tried, study=study, sources=tried.sources | extra, search=search)
+        self._base = replace(tried, study=study, sources=tried.sources | extra)
+        self._base = replace(self._base, search=Search(runs=runs, command=list(command)))
         self._levels: dict[Place, Level] = {}  # of all points, each once
         self._told = 0  # points that the folder knows
         self._batches = 0
@@ -144,7 +154,7 @@ class Growing:
         """What a folder is to know: all points until now."""
         levels = list(self._levels.values())
         plan = self._plan(levels)
-        return replace(plan, study=replace(plan.study, text=text_of(self._keys, levels)))
+        return replace(plan, study=replace(plan.study, text=_text_of(self._keys, levels)))
 
     def _tell(self, *, over: bool = False) -> None:
         """Tell the folder of the points, now and then while they grow, and when the search is over."""
@@ -158,7 +168,16 @@ def _place_of(level: Level) -> Place:
     return tuple(level.values.values())
 
 
-def text_of(keys: Mapping[str, Any], levels: Sequence[Level]) -> str:
+def study_of(
+    spec: SearchSpec, keys: Mapping[str, Any], path: Path, replications: int | None = None, seed: int | None = None
+) -> Study:
+    """The study that gets points: what its file says, and what the search changes in its model."""
+    study = study_of_text(_text_of(keys, []), path, spec.set, spec.types, replications, seed)
+    aspects, without_aspects = tuple(spec.aspects), tuple(spec.without_aspects)
+    return replace(study, aspects=aspects, without_aspects=without_aspects, stop=spec.until)
+
+
+def _text_of(keys: Mapping[str, Any], levels: Sequence[Level]) -> str:
     """The study of some points, as its file would say it."""
     vary = {**said(levels), **(keys.get("vary") or {})}
     text: str = yaml.safe_dump(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,15 +11,15 @@ from epicycle.actors import EpicycleError, did_you_mean
 from epicycle.actors.expression import ExpressionError, Formula
 
 from ..model.catalogue.packaged import is_path, packaged_files
-from ..model.language.study import is_study, read_study, study_of_text
+from ..model.language.study import is_study, read_study
 from ..model.language.study_metric import asks_for_none
 from ..model.text.document import parse, plain
 from ..model.text.files import COMMAND_LINE
 from ..model.text.problems import Position, Problems
 from ..study.inference import mean
-from ..study.plan.plan import Plan, Search
+from ..study.plan.plan import Plan
 from ..study.run.backlog import OK
-from .growing import Growing, text_of
+from .growing import Growing, study_of
 from .optimum import Optimum, Outcome, Tested
 from .proposals import Point, is_guided, proposals
 from .space import read_space
@@ -65,9 +64,7 @@ def optimise(
 class _Optimising:
     def __init__(self, spec: SearchSpec, goal: Minimise) -> None:
         keys, path = _keys_of(spec)
-        study = study_of_text(text_of(keys, []), path, spec.set, spec.types, goal.replications, spec.seed)
-        aspects, without_aspects = tuple(spec.aspects), tuple(spec.without_aspects)
-        study = replace(study, aspects=aspects, without_aspects=without_aspects, stop=spec.until)
+        study = study_of(spec, keys, path, goal.replications, spec.seed)
         base = Plan.made(study)
         problems = Problems()
         metrics = [metric.name for metric in base.metrics]
@@ -87,7 +84,7 @@ class _Optimising:
         problems.raise_if_any()
         self._conditions = {text: each for text, each in conditions.items() if each is not None}
         runs = (goal.points + 1) * base.conditions * study.replications
-        self.growing = Growing(study, keys, space, Search(runs=runs, command=list(spec.command)))
+        self.growing = Growing(study, keys, space, runs=runs, command=spec.command)
         guided = is_guided(space.widths) and space.has_ranges
         self.found = Optimum(goal, space, guided)
 

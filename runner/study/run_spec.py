@@ -17,6 +17,7 @@ from ..model.catalogue.types import types_of_file
 from ..model.language.settings import Setting
 from ..model.text.document import plain
 from ..model.text.program import call_site, node_of
+from ..support.shapes import fits
 
 if TYPE_CHECKING:
     from .plan.plan import Plan
@@ -106,20 +107,12 @@ class RunSpec:
         """The same from JSON; raises ``ValueError``."""
         if not isinstance(said, dict) or bool(said.get("model")) == bool(said.get("study") and said.get("run")):
             raise ValueError("'run' names neither a model nor a run of a study")
-        shapes: dict[str, Any] = {each.name: each.default for each in fields(cls)}
+        shapes: dict[Any, Any] = {"": str, (): [str], None: int}  # by defaults
+        known = {each.name: shapes[each.default] for each in fields(cls)} | {"until": (str, float, int)}
         for name, value in said.items():
-            default = shapes.get(name, ...)
-            if default == ():
-                is_right = isinstance(value, list) and all(isinstance(each, str) for each in value)
-            elif name == "until":
-                is_right = isinstance(value, (str, float, int))
-            else:
-                is_right = type(value) is (int if default is None else type(default))
-            if not is_right:
+            if not fits(value, known.get(name, ())):
                 raise ValueError(f"'run' cannot have {name!r}: {json.dumps(value)[:60]}")
-        made: dict[str, Any] = {
-            name: tuple(value) if isinstance(value, list) else value for name, value in said.items()
-        }
+        made: dict[str, Any] = {name: tuple(each) if isinstance(each, list) else each for name, each in said.items()}
         return cls(**made)
 
     def changed(self, other: RunSpec) -> RunSpec:
