@@ -165,6 +165,12 @@ def set_value(data: Any, keys: Keys, said: str) -> None:
     _set(data, keys, typed(said))
 
 
+CHANGES: Mapping[str, Callable[..., str]] = {
+    each.__name__: each
+    for each in (connect, disconnect, add_part, attach, remove, set_parameter, switch, swap, drop_in)
+}
+
+
 # -- data -------------------------------------------------------------------------------------------------------------
 
 
