@@ -104,7 +104,7 @@ class Workers:
         return outcome
 
     def close(self) -> None:
-        """End the process; nothing is asked any more."""
+        """End the process; it is no longer asked anything."""
         self._latest.clear()
         self.stop()
 
