@@ -42,7 +42,7 @@ class Server(LanguageServer):
         return self._answers
 
     def change(self, uri: str, text: str | None, version: int | None = None) -> None:
-        """A text was opened, has changed or was closed (None): its problems are shown when nobody types for a moment."""
+        """A text was opened, has changed or was closed (None): its problems follow when nobody types for a moment."""
         if (path := path_of(uri)) is None:
             return
         self.versions[path] = version
