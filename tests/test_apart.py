@@ -10,7 +10,7 @@ import pytest
 
 from epicycle.actors import EpicycleError
 from epicycle.runner.support import apart
-from epicycle.runner.support.apart import Apart
+from epicycle.runner.support.apart import DONE, Apart, Process
 
 
 class Told:
@@ -28,6 +28,14 @@ class Told:
     def sleep(self) -> None:
         time.sleep(60)
 
+    def count(self) -> str:
+        """Count until somebody hastens it."""
+        apart.say("one")
+        while not apart.is_hastened():
+            time.sleep(0.01)
+        apart.say("two")
+        return "three"
+
     def close(self) -> None:
         Path(self.name).touch()
 
@@ -40,6 +48,22 @@ def test_its_methods_are_called_there_and_it_closes_itself(tmp_path: Path) -> No
     assert str(raised.value) == "it: unsupported operand type(s) for *: 'int' and 'NoneType'"
     it.close()
     assert (tmp_path / "closed").exists()
+
+
+def test_it_tells_something_before_its_answer_and_may_be_hastened() -> None:
+    it, told = Process(Told, ""), list[str]()
+
+    def hear(said: str) -> None:
+        told.append(said)
+        it.hasten()
+
+    assert it.begin(30.0) == (DONE, None)
+    assert it.call("count", limit=30.0, told=hear) == (DONE, "three")
+    assert told == ["one", "two"]
+    assert it.call("twice", 4, limit=30.0) == (DONE, 8)  # what came too late is for nobody
+    assert not it.is_over
+    it.end()
+    assert it.is_over
 
 
 @pytest.mark.parametrize(

@@ -154,8 +154,8 @@ class Answers:
             everything = lsp.CodeAction("fix all problems that have one certain fix", FIX_ALL)
             everything.edit = self.workspace_edit(known, edits)
             found.append(everything)
-        only = [_value(each) for each in params.context.only or ()]
-        return [each for each in found if not only or any(_value(each.kind).startswith(kind) for kind in only)]
+        only = [plain_value(each) for each in params.context.only or ()]
+        return [each for each in found if not only or any(plain_value(each.kind).startswith(kind) for kind in only)]
 
     # -- requests about a place -----------------------------------------------------------------------------------
 
@@ -247,5 +247,6 @@ def uri_of(path: Path) -> str:
     return from_fs_path(str(path.resolve())) or ""
 
 
-def _value(kind: Any) -> str:
+def plain_value(kind: Any) -> str:
+    """A text of the protocol, which may be one of an enumeration."""
     return str(getattr(kind, "value", kind))

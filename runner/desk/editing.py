@@ -91,11 +91,6 @@ def add_part(data: Any, owner: str, section: str, name: str, kind: str, values: 
         _check_name(key)
 
 
-def attach(text: str, owner: str, name: str, kind: str, at: str, values: Mapping[str, str] | None = None) -> str:
-    """Attach an aspect at the places of a pattern."""
-    return add_part(text, owner, "aspects", name, kind, {**(values or {}), "at": at})
-
-
 @_of_text
 def remove(data: Any, owner: str, section: str, name: str) -> None:
     """Remove an actor, with its connections, or an aspect."""
@@ -159,10 +154,9 @@ def drop_in(data: Any, disturbance: str) -> None:
         _set_declared(data, ("parameters", name), value)
 
 
-@_of_text
-def set_value(data: Any, keys: Keys, said: str) -> None:
-    """Write a value, as somebody types it, in the place of another, or behind the others if there is none."""
-    _set(data, keys, typed(said))
+CHANGES: Mapping[str, Callable[..., str]] = {
+    each.__name__: each for each in (connect, disconnect, add_part, remove, set_parameter, switch, swap, drop_in)
+}
 
 
 # -- data -------------------------------------------------------------------------------------------------------------

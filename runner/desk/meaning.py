@@ -39,8 +39,8 @@ class Symbol:
 
 def definition(knowledge: Knowledge, line: int, column: int) -> list[Position]:
     """Where what stands at a line and column of the file is declared; they count from 0."""
-    if (use := knowledge.names.at(knowledge.file, line, column)) is not None:
-        return [each.position for each in _uses(knowledge, use) if each.declares]
+    if uses := _uses(knowledge, line, column):
+        return [each.position for each in uses if each.declares]
     for at, path in links(knowledge):
         if at.line == line + 1 and at.column - 1 <= column <= at.column - 1 + at.length:
             return [Position(str(path), 1, 1, 0, "")]
@@ -64,13 +64,13 @@ def links(knowledge: Knowledge) -> Iterator[tuple[Position, Path]]:
 
 def references(knowledge: Knowledge, line: int, column: int) -> list[Position]:
     """Where what stands at a line and column stands elsewhere, its declaration included."""
+    return [each.position for each in _uses(knowledge, line, column)]
+
+
+def _uses(knowledge: Knowledge, line: int, column: int) -> list[Use]:
     use = knowledge.names.at(knowledge.file, line, column)
-    return [] if use is None else [each.position for each in _uses(knowledge, use)]
-
-
-def _uses(knowledge: Knowledge, use: Use) -> list[Use]:
-    found = {each.position: each for name in use.names for each in knowledge.names.of(name)}
-    return list(found.values())
+    names = use.names if use is not None else ()
+    return list({each.position: each for name in names for each in knowledge.names.of(name)}.values())
 
 
 # -- descriptions -----------------------------------------------------------------------------------------------------
@@ -79,9 +79,10 @@ def _uses(knowledge: Knowledge, use: Use) -> list[Use]:
 def hover(knowledge: Knowledge, line: int, column: int) -> str:
     """What stands at a line and column, in Markdown; empty if that is nothing."""
     use = knowledge.names.at(knowledge.file, line, column)
-    parts = [_of_name(knowledge, name) for name in sorted(use.names, key=str)] if use is not None else []
+    names = sorted(use.names, key=str) if use is not None else []
+    parts = [_of_name(knowledge, name) for name in names]
     place = place_at(knowledge.text, line, column)
-    if place is not None and not any(each.kind in ("actor", "port") for each in (use.names if use else ())):
+    if place is not None and not any(each.kind in ("actor", "port") for each in names):
         parts += _of_port(knowledge, place)
         parts += _of_place(knowledge, place)
     return "\n\n".join(dict.fromkeys(each for each in parts if each))

@@ -70,12 +70,10 @@ def _holds(root: Schema, condition: Schema, node: Node) -> bool:
         return _holds(root, root["$defs"][condition["$ref"].rpartition("/")[2]], node)
     if "not" in condition:
         return not _holds(root, condition["not"], node)
-    entries = node.entries if isinstance(node, Mapping) else {}
-    if any(key not in entries for key in condition.get("required", ())):
+    values = {key: each.value for key, each in node.entries.items()} if isinstance(node, Mapping) else {}
+    if not values.keys() >= set(condition.get("required", ())):
         return False
     for key, wanted in condition.get("properties", {}).items():
-        value = entries[key].value if key in entries else None
-        said = value.value if isinstance(value, Scalar) else None
-        if value is not None and "const" in wanted and said != wanted["const"]:
+        if key in values and "const" in wanted and getattr(values[key], "value", None) != wanted["const"]:
             return False
     return "type" not in condition or condition["type"] != "object" or isinstance(node, Mapping)

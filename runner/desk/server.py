@@ -12,7 +12,7 @@ from lsprotocol import types as lsp
 from pygls.exceptions import JsonRpcInvalidParams
 from pygls.lsp.server import LanguageServer
 
-from .answers import ANSWERS, FIX_ALL, LEGEND, Answers, path_of, uri_of
+from .answers import ANSWERS, FIX_ALL, LEGEND, Answers, path_of, plain_value, uri_of
 from .changes import RenameError
 
 _OURS = re.compile(r"^(?:model|study|disturbance|composites)\s*:", re.MULTILINE)
@@ -38,12 +38,11 @@ class Server(LanguageServer):
 
     @property
     def answers(self) -> Answers:
-        encoding = self.workspace.position_encoding
-        self._answers.encoding = str(getattr(encoding, "value", encoding))
+        self._answers.encoding = plain_value(self.workspace.position_encoding)
         return self._answers
 
     def change(self, uri: str, text: str | None, version: int | None = None) -> None:
-        """A text was opened, has changed or was closed (None): its problems are told when nobody types for a moment."""
+        """A text was opened, has changed or was closed (None): its problems follow when nobody types for a moment."""
         if (path := path_of(uri)) is None:
             return
         self.versions[path] = version

@@ -127,6 +127,10 @@ def forked(
         other.enlist([WovenAspect(name, aspect, **{"ports": [], **places})])
 
     for path, value in _parameters(model, changes.change).items():
+        if path in model.graph.ports and (edges := model.graph.incoming(path)):
+            raise EpicycleError(
+                f"{path} gets its values over a connection, from {edges[0].source}: it cannot be changed"
+            )
         changed = _Changed()
         changed.value = value
         weave(changed, {"parameters": [path]})
@@ -191,9 +195,7 @@ def _parameters(model: Model, change: Iterable[str] | Mapping[str, object]) -> d
                 f"parameters of actors: {each.section} {str(each)[2:]}\n"
                 "   help: compare it from the start, with epicycle compare"
             )
-        path = f"{each.path}.{each.fact}"
-        _check_alterable(model, path)
-        found[path] = declared[each.fact].value_in(actor)
+        found[f"{each.path}.{each.fact}"] = declared[each.fact].value_in(actor)
     return found
 
 
@@ -204,17 +206,11 @@ def _given(model: Model, values: Mapping[str, object]) -> dict[str, Any]:
     for pattern, value in values.items():
         for path in _selected("change", pattern, known, f"{model.name} has no parameter of an actor"):
             owner, _, name = path.rpartition(".")
-            _check_alterable(model, path)
             try:
                 found[path] = declared_parameters(type(graph.actors[owner]))[name].convert(value)
             except ParameterError as error:
                 raise EpicycleError(f"{path}: {error}") from None
     return found
-
-
-def _check_alterable(model: Model, path: str) -> None:
-    if path in model.graph.ports and (edges := model.graph.incoming(path)):
-        raise EpicycleError(f"{path} gets its values over a connection, from {edges[0].source}: it cannot be changed")
 
 
 def _selected(what: str, pattern: str, known: Sequence[str], unknown: str) -> list[str]:

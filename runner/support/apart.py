@@ -201,7 +201,7 @@ _replies: list[BinaryIO] = []  # where it answers, once it serves
 
 
 def say(message: object) -> None:
-    """Tell who waits for the outcome of a call something before it."""
+    """Report something to the one who waits for the outcome of a call, before it."""
     _reply(pickle.dumps((_SAID, message)))
 
 

@@ -10,7 +10,7 @@ import pytest
 
 from epicycle.runner.desk import EditError, Knowledge, controls, difference, editing, read
 from epicycle.runner.desk.changes import apply, edits_between
-from epicycle.runner.desk.parts import data_of
+from epicycle.runner.desk.parts import data_of, rendered, typed
 from epicycle.runner.model.catalogue.packaged import packaged_models
 
 TEXT = """# A line of robots.
@@ -75,6 +75,15 @@ def changes(before: str, after: str, folder: Path) -> list[str]:
     return [str(each) for each in difference(one, other).changes]
 
 
+def set_value(text: str, keys: tuple[str, ...], said: str) -> str:
+    """A text with a value, as somebody types it, in the place of another, or behind the others if there is none."""
+    data = holder = data_of(text)
+    for key in keys[:-1]:
+        holder = holder[key]
+    holder[keys[-1]] = typed(said)
+    return rendered(text, data)
+
+
 def lines(before: str, after: str) -> tuple[list[str], list[str]]:
     """The lines that went, and those that came; the others are the same, in the same order."""
     old, new = before.splitlines(keepends=True), after.splitlines(keepends=True)
@@ -123,7 +132,7 @@ CASES: dict[str, tuple[str, Act, list[str], list[str], list[str]]] = {
     ),
     "remove an actor": (
         TEXT,
-        lambda text: editing.remove(editing.set_value(text, ("run", "record"), "left.state"), "", "actors", "right"),
+        lambda text: editing.remove(set_value(text, ("run", "record"), "left.state"), "", "actors", "right"),
         [
             "  right:\n",
             "    type: CircularMotion\n",
@@ -157,7 +166,7 @@ CASES: dict[str, tuple[str, Act, list[str], list[str], list[str]]] = {
     ),
     "attach an aspect": (
         TEXT,
-        lambda text: editing.attach(text, "", "late", "Latency", "clock.output", {"delay": "1 s"}),
+        lambda text: editing.add_part(text, "", "aspects", "late", "Latency", {"delay": "1 s", "at": "clock.output"}),
         [],
         ["  late: {type: Latency, delay: 1 s, at: clock.output}\n"],
         [],
@@ -220,7 +229,9 @@ CASES: dict[str, tuple[str, Act, list[str], list[str], list[str]]] = {
     ),
     "inside of a composite: the first aspect": (
         COMPOSITE,
-        lambda text: editing.attach(text, "Pair", "lossy", "PacketLoss", "gain.input", {"probability": "0.5"}),
+        lambda text: editing.add_part(
+            text, "Pair", "aspects", "lossy", "PacketLoss", {"probability": "0.5", "at": "gain.input"}
+        ),
         [],
         ["    aspects:\n", "      lossy: {type: PacketLoss, probability: 0.5, at: gain.input}\n"],
         ["+ pair.lossy: type PacketLoss, at [pair.gain.input], probability 0.5, spare_first false, from 0"],
@@ -261,9 +272,9 @@ def test_what_a_swapped_aspect_does_not_know_goes(tmp_path: Path) -> None:
 
 def test_a_model_grows_from_nothing(tmp_path: Path) -> None:
     text = "# mine\n"
-    text = editing.set_value(text, ("model",), "grown")
-    text = editing.set_value(text, ("run",), "{stop: 3 s}")
-    text = editing.attach(text, "", "lossy", "PacketLoss", "*.input", {"probability": "0.5"})
+    text = set_value(text, ("model",), "grown")
+    text = set_value(text, ("run",), "{stop: 3 s}")
+    text = editing.add_part(text, "", "aspects", "lossy", "PacketLoss", {"probability": "0.5", "at": "*.input"})
     text = editing.add_part(text, "", "actors", "clock", "Clock", {"period": "1 s"})
     text = editing.add_part(text, "", "actors", "gain", "Scale", {"factor": "2"})
     text = editing.connect(text, "", "clock.output", "gain.input")
@@ -301,7 +312,7 @@ def test_switching_off_and_on_leaves_a_packaged_model_as_it_was(name: str) -> No
         assert editing.switch(off, "", aspect, True) == text
     for actor, said in data.get("actors", {}).items():
         if "type" in said:
-            assert editing.set_value(text, ("actors", actor, "type"), said["type"]) == text
+            assert set_value(text, ("actors", actor, "type"), said["type"]) == text
         new = editing.add_part(text, "", "actors", f"{actor}_twin", "Merge", {})
         assert editing.remove(new, "", "actors", f"{actor}_twin") == text
 
@@ -359,7 +370,7 @@ HOSTILE = (
 def test_a_value_stays_one_value(said: str, text: str) -> None:
     before = data_of(text)
     for keys in (("run", "stop"), ("run", "extra"), ("actors", "clock", "period"), ("actors", "clock", "extra")):
-        data = data_of(editing.set_value(text, keys, said))
+        data = data_of(set_value(text, keys, said))
         holder, old = data, before
         for key in keys[:-1]:
             holder, old = holder[key], old[key]
@@ -396,7 +407,10 @@ def test_a_name_is_a_name(said: str) -> None:
     [
         (lambda text: editing.disconnect(text, "", "a.b", "c.d"), "there is no connection a.b -> c.d in this text"),
         (lambda text: editing.remove(text, "", "aspects", "none"), "there is no aspects.none in this text"),
-        (lambda text: editing.set_value(text, ("actors", "none", "x"), "1"), "there is no actors.none in this text"),
+        (
+            lambda text: editing.set_parameter(text, "", "actors", "none", "x", "1"),
+            "there is no actors.none in this text",
+        ),
         (
             lambda text: editing.add_part(text, "", "actors", "clock", "Clock", {}),
             "there is already 'clock' among the actors",
@@ -449,7 +463,7 @@ def test_bounds_are_numbers_in_the_unit_of_the_parameter(tmp_path: Path) -> None
         lambda text: editing.switch(text, "", "a", False),
         lambda text: editing.switch(text, "", "a", True),
         lambda text: editing.add_part(text, "", "actors", "b", "Clock", {}),
-        lambda text: editing.attach(text, "", "b", "PacketLoss", "a.b"),
+        lambda text: editing.add_part(text, "", "aspects", "b", "PacketLoss", {"at": "a.b"}),
         lambda text: editing.connect(text, "", "a.b", "c.d"),
         lambda text: editing.disconnect(text, "", "a.b", "c.d"),
         lambda text: editing.set_parameter(text, "", "actors", "a", "period", "1 s"),

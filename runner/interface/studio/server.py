@@ -10,7 +10,7 @@ import asyncio
 import hmac
 import json
 import secrets
-from collections.abc import AsyncIterator, Awaitable, Callable, Coroutine, Mapping, MutableMapping, Sequence
+from collections.abc import AsyncIterator, Callable, Coroutine, Mapping, MutableMapping, Sequence
 from contextlib import asynccontextmanager, suppress
 from functools import partial
 from html import escape
@@ -20,6 +20,7 @@ from string import Template
 from typing import Any
 
 from starlette.applications import Starlette
+from starlette.datastructures import Headers
 from starlette.requests import Request
 from starlette.responses import PlainTextResponse, Response
 from starlette.routing import Route, WebSocketRoute
@@ -48,7 +49,6 @@ HEADERS = {
 
 Tell = Callable[[Message], Coroutine[Any, Any, None]]
 Scope = MutableMapping[str, Any]
-App = Callable[[Scope, Callable[..., Awaitable[Any]], Callable[..., Awaitable[None]]], Awaitable[None]]
 
 
 class Workers:
@@ -104,7 +104,7 @@ class Workers:
         return outcome
 
     def close(self) -> None:
-        """End the process; nothing is asked any more."""
+        """End the process; it is no longer asked anything."""
         self._latest.clear()
         self.stop()
 
@@ -159,43 +159,37 @@ class Studio:
         self.nonce = secrets.token_urlsafe(16)
         self.hosts: frozenset[str] = frozenset()
         self._browser: WebSocket | None = None
+        routes = [
+            Route("/{token}/", self.page),
+            Route("/{token}/{name}", self.file),
+            WebSocketRoute("/{token}/socket", self.socket),
+        ]
+        self._app = Starlette(routes=routes, lifespan=self.working)
 
     def address(self, port: int) -> str:
         """The address for the browser; only this one is answered."""
         self.hosts = frozenset({f"127.0.0.1:{port}", f"localhost:{port}"})
         return f"http://127.0.0.1:{port}/{self.token}/"
 
-    def app(self) -> App:
-        routes = [
-            Route("/{token}/", self.page),
-            Route("/{token}/{name}", self.file),
-            WebSocketRoute("/{token}/socket", self.socket),
-        ]
-        app = Starlette(routes=routes, lifespan=self.working)
-
-        async def guarded(scope: Scope, receive: Any, send: Any) -> None:
-            """Answers requests that come from its own page or from the address line only."""
-            if scope["type"] not in ("http", "websocket") or self.is_welcome(scope):
-                await app(scope, receive, send)
-            elif scope["type"] == "websocket":
-                await send({"type": "websocket.close", "code": 1008})
-            else:
-                await PlainTextResponse("Not found", 404)(scope, receive, send)
-
-        return guarded
+    async def __call__(self, scope: Scope, receive: Any, send: Any) -> None:
+        """Answers requests that come from its own page or from the address line only."""
+        if scope["type"] not in ("http", "websocket") or self.is_welcome(scope):
+            await self._app(scope, receive, send)
+        elif scope["type"] == "websocket":
+            await send({"type": "websocket.close", "code": 1008})
+        else:
+            await PlainTextResponse("Not found", 404)(scope, receive, send)
 
     def is_welcome(self, scope: Scope) -> bool:
         """Whether a request has the secret, and comes from where it must."""
-        headers: dict[str, list[str]] = {}
-        for name, value in scope["headers"]:
-            headers.setdefault(name.decode("latin-1"), []).append(value.decode("latin-1"))
+        headers = Headers(scope=scope)
         token = scope["path"].removeprefix("/").partition("/")[0].encode("utf-8", "surrogateescape")
-        hosts, origins = headers.get("host", []), headers.get("origin", [])
+        hosts, origins = headers.getlist("host"), headers.getlist("origin")
         if not hmac.compare_digest(token, self.token.encode()) or len(hosts) != 1 or hosts[0] not in self.hosts:
             return False
         if origins != [f"http://{hosts[0]}"] and (origins or scope["type"] == "websocket"):
             return False
-        return headers.get("sec-fetch-site", ["none"])[0] in ("none", "same-origin")
+        return headers.get("sec-fetch-site", "none") in ("none", "same-origin")
 
     # -- the page -------------------------------------------------------------------------------------------------
 
@@ -230,30 +224,27 @@ class Studio:
         document = self.document
         hello = {"text": document.text, "name": document.path.name, "is_new": not document.path.exists()}
         await browser.send_text(json.dumps({"hello": hello}))
-        tasks = set[asyncio.Task[None]]()
         try:
-            while True:
-                message = json.loads(await browser.receive_text())
-                if not isinstance(message, dict) or not isinstance(message.get("id"), int):
-                    raise ValueError("not a question")
-                task = asyncio.create_task(self.answer(browser, message))
-                tasks.add(task)
-                task.add_done_callback(tasks.discard)
-        except WebSocketDisconnect:
+            async with asyncio.TaskGroup() as answers:
+                while True:
+                    message = json.loads(await browser.receive_text())
+                    if not isinstance(message, dict) or not isinstance(message.get("id"), int):
+                        raise ValueError("not a question")
+                    answers.create_task(self.answer(browser, message))
+        except* WebSocketDisconnect:
             pass
-        except (ValueError, KeyError, RecursionError):
+        except* (ValueError, KeyError, RecursionError):
             await _close(browser, "this was not a question")
         finally:
-            for task in tasks:
-                task.cancel()
             if self._browser is browser:
                 self._browser = None
 
     async def answer(self, browser: WebSocket, message: Message) -> None:
-        number, ask = message["id"], str(message.get("ask"))
+        ask = str(message.get("ask"))
 
         async def tell(said: Message) -> None:
-            await _send(browser, {**said, "id": number})
+            with suppress(RuntimeError, WebSocketDisconnect):  # it has gone
+                await browser.send_text(json.dumps({**said, "id": message["id"]}))
 
         if ask == "save":
             found = self.save(message)
@@ -287,11 +278,6 @@ def _response(text: str, kind: str, more: Mapping[str, str] | None = None) -> Re
     return Response(text, media_type=kind, headers={**HEADERS, **(more or {})})
 
 
-async def _send(browser: WebSocket, said: Message) -> None:
-    with suppress(RuntimeError, WebSocketDisconnect):  # it has gone
-        await browser.send_text(json.dumps(said))
-
-
 async def _close(browser: WebSocket, reason: str) -> None:
     with suppress(RuntimeError, WebSocketDisconnect):
         await browser.close(1000, reason)
@@ -311,7 +297,7 @@ def serve(studio: Studio, port: int, opened: Callable[[str], None]) -> None:
         raise EpicycleError(f"port {port} cannot be used: {error.strerror or error}") from error
     address = studio.address(listening.getsockname()[1])
     config = uvicorn.Config(
-        studio.app(),
+        studio,
         log_level="error",
         access_log=False,
         ws_max_size=LONGEST,

@@ -96,15 +96,9 @@ class Worker:
             raise EpicycleError(f"a text has at most {MAX_BYTES // 1_000_000} MB")
         if self.answers.texts.get(self.path) != text:
             self.answers.change(self.path, text)
-        method = str(asked["ask"])
-        act = Worker.language if method in ANSWERS else ASKED.get(method)
-        if act is None:
+        if (ask := str(asked["ask"])) not in ASKED:
             raise EpicycleError("there is no such question")
-        return act(self, asked)
-
-    @property
-    def text(self) -> str:
-        return self.answers.texts[self.path]
+        return ASKED[ask](self, asked)
 
     @property
     def knowledge(self) -> Knowledge:
@@ -137,11 +131,9 @@ class Worker:
 
     def language(self, asked: Message) -> Message:
         """What the page's editor asks about the text."""
-        method = str(asked["ask"])
         about = {**asked["params"], "textDocument": {"uri": uri_of(self.path)}}
-        kind: Any = lsp.METHOD_TO_TYPES[method][2]
-        params: Any = _DATA.structure(about, kind)
-        return {"result": _DATA.unstructure(self.answers.ask(method, params))}
+        kind: Any = lsp.METHOD_TO_TYPES[asked["ask"]][2]
+        return {"result": _DATA.unstructure(self.answers.ask(asked["ask"], _DATA.structure(about, kind)))}
 
     def types(self, asked: Message) -> Message:
         return {"types": controls.types(self.knowledge)}
@@ -162,16 +154,14 @@ class Worker:
         what, given = str(asked["what"]), asked["given"]
         if not isinstance(given, list) or not all(isinstance(each, (str, bool, dict)) for each in given):
             raise EditError("this change cannot be read")
-        before = self.text
-        match what:
-            case "connect" | "disconnect":
-                after = getattr(editing, what)(before, *controls.local_ends(self.knowledge, *map(str, given)))
-            case "swap":
-                after = editing.swap(before, self.knowledge, "", str(given[0]), str(given[1]))
-            case "add_part" | "attach" | "remove" | "set_parameter" | "switch" | "drop_in":
-                after = getattr(editing, what)(before, *given)
-            case _:
-                raise EditError("there is no such change")
+        if what not in editing.CHANGES:
+            raise EditError("there is no such change")
+        if what in ("connect", "disconnect"):
+            given = controls.local_ends(self.knowledge, *map(str, given))
+        elif what == "swap":
+            given = [self.knowledge, "", *map(str, given)]
+        before = self.answers.texts[self.path]
+        after = editing.CHANGES[what](before, *given)
         edits = edits_between(self.path, before, after)
         return {"edits": [_DATA.unstructure(self.answers.text_edit(self.knowledge, each)) for each in edits]}
 
@@ -260,6 +250,7 @@ def _texts(given: Any) -> list[str]:
 
 
 ASKED: Mapping[str, Callable[[Worker, Message], Message]] = {
+    **dict.fromkeys(ANSWERS, Worker.language),
     "read": Worker.read,
     "types": Worker.types,
     "fields": Worker.fields,

@@ -97,10 +97,10 @@ def affected(recordings: Sequence[Recording]) -> dict[str, Tag]:
 
 
 def _by_actor(recording: Recording) -> dict[str, list[int]]:
-    rows = defaultdict[str, list[int]](list)
+    rows = defaultdict[int, list[int]](list)
     for number, actor in enumerate(recording.fired.actors):
-        rows[recording.place(actor)].append(number)
-    return rows
+        rows[actor].append(number)
+    return {recording.place(actor): found for actor, found in rows.items()}
 
 
 def _first(one: Sequence[int], other: Sequence[int]) -> int | None:
@@ -128,19 +128,16 @@ def _took(recording: Recording, firing: int) -> str:
         return "a firing that this page leaves out"
     kept, ports = recording.kept(), [name for _, name in recording.ports]
     columns = kept.columns
-    took = [
-        f"{ports[port]} {_token(kept, record, _NARROW)}".rstrip()
-        for owner, port, record in zip(
-            *(columns[f"arrival_{each}"] for each in ("firing", "port", "record")), strict=True
-        )
-        if owner == firing
-    ]
-    woke = ["a wake-up"] * columns["wake_firing"].count(firing)
-    sent = [
-        f"{ports[columns['record_port'][row]]} {_token(kept, row, _NARROW)}"
-        for row, owner in enumerate(columns["record_firing"])
-        if owner == firing and columns["record_aspect"][row] == NOTHING
-    ]
+
+    def rows(kind: str) -> list[int]:
+        return [row for row, owner in enumerate(columns[f"{kind}_firing"]) if owner == firing]
+
+    def said(port: int, record: int) -> str:
+        return f"{ports[port]} {_token(kept, record, _NARROW)}".rstrip()
+
+    took = [said(columns["arrival_port"][row], columns["arrival_record"][row]) for row in rows("arrival")]
+    woke = ["a wake-up" for _ in rows("wake")]
+    sent = [said(columns["record_port"][r], r) for r in rows("record") if columns["record_aspect"][r] == NOTHING]
     return f"takes {', '.join([*took, *woke]) or 'nothing'}; sends {', '.join(sent) or 'nothing'}"
 
 

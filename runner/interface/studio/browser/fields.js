@@ -150,7 +150,7 @@ function attachRow({ edit, names, typeOf, taken }) {
     const base = found.name.replace(/(?<=[a-z])(?=[A-Z])/g, "_").toLowerCase();
     let name = base;
     for (let i = 2; taken().includes(name); i++) name = `${base}_${i}`;
-    await edit("attach", "", name, found.name, place.value.trim(), found.needs);
+    await edit("add_part", "", "aspects", name, found.name, { ...found.needs, at: place.value.trim() });
     on.checked = false;
     type.value = said.textContent = "";
   });
