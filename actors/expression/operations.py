@@ -34,6 +34,7 @@ NUMBERS: Final = frozenset({float, int})
 LIGHT: Final = frozenset({float, int, bool, type(None)})  # which cost nothing
 _PLAIN: Final = frozenset({float, int, bool, type(None), str, list, dict})
 _TEXT: Final = frozenset({str})
+_OF_SLICES: Final = frozenset({int, type(None)})
 _OTHERS: Final = (int, float, str, list, tuple, Mapping, np.generic, np.ndarray, type)
 _DEEP: Final = MAX_DEPTH - 10
 
@@ -151,7 +152,9 @@ def _size(value: Any, depth: int) -> int:
         return size
     for item in value:
         kind = type(item)
-        if kind is str:
+        if kind is dict and _TEXT.issuperset(map(type, item)) and LIGHT.issuperset(map(type, item.values())):
+            size += len(item)  # as an entity mostly is
+        elif kind is str:
             size += len(item) // 10
         elif kind not in LIGHT:
             inner = _size(item, depth + 1) if (kind is list or kind is dict) and depth < _DEEP else -1
@@ -184,18 +187,19 @@ def part(whole: Any, index: Any) -> Any:
 
 def cut(whole: Any, lower: Any, upper: Any, step: Any, left: Left) -> Any:
     """A slice of a list or text."""
-    bounds = [plain(each) for each in (lower, upper, step)]
+    bounds = plain(lower), plain(upper), plain(step)
     whole = plain(whole)
-    if not isinstance(whole, (list, str)) or any(type(each) not in (int, type(None)) for each in bounds):
+    if not isinstance(whole, (list, str)) or not _OF_SLICES.issuperset(map(type, bounds)):
         undecided()
     return weighed(whole[slice(*bounds)], left)
 
 
 def turns(whole: Any, left: Left, steps: int) -> Any:
     """The items of a list, each of which takes so many steps."""
-    whole = plain(whole)
     if type(whole) is not list:
-        undecided()
+        whole = plain(whole)
+        if type(whole) is not list:
+            undecided()
     left[0] -= len(whole) * steps
     if left[0] < 0:
         undecided()
