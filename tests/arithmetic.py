@@ -65,7 +65,6 @@ EXCEPTIONS = {  # file or folder: what it may use, and why
     "runner/recorded/disturbed.py": (("sum",), WHOLE),
     "runner/search/proposals.py": (("sum",), WHOLE),
     "runner/search/space.py": (("sum",), WHOLE),
-    "runner/model/text/problems.py": (("sum",), WHOLE),
     "runner/execution/results/arrow.py": (("numpy.cumsum",), WHOLE),
     "runner/recorded/delays.py": ((), FITTED),
     "runner/recorded/losses.py": ((), FITTED),

@@ -261,7 +261,7 @@ def test_a_graph_that_is_run_is_frozen() -> None:
         lambda: graph.connect("clock.output", "scale.input", None, None),
         lambda: graph.remove("scale"),
         lambda: graph.add_actor(Clock("other", period=1), None),
-        lambda: graph.add_composite("c", "C"),
+        lambda: graph.add_component("c", "C"),
         lambda: graph.disconnect(next(iter(graph.edges))),
     ):
         with pytest.raises(RuntimeError) as caught:

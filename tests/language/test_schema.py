@@ -27,7 +27,7 @@ from epicycle.runner.model.build.connect import indices_of as resolve
 from epicycle.runner.model.catalogue.figure import own_figures
 from epicycle.runner.model.catalogue.packaged import model_folders, packaged_models
 from epicycle.runner.model.catalogue.types import Catalogue, built_in
-from epicycle.runner.model.language import acts, dimensions, disturbance, models, parts, places, ports, questions, study
+from epicycle.runner.model.language import dimensions, models, parts, places, ports, questions, settings, study
 from epicycle.runner.model.language.fields import QUANTITY, Record
 from epicycle.runner.model.language.fields import schema_of as value_schema
 from epicycle.runner.model.language.parts import BESIDE
@@ -165,7 +165,7 @@ def breaks_shape(problem: str, file: str) -> bool:
 
 
 def test_every_key_of_the_language_says_what_it_is() -> None:
-    modules = (acts, disturbance, models, parts, places, ports, questions, study, dimensions)
+    modules = (dimensions, models, parts, places, ports, questions, settings, study)
     constructs = {id(each): each for module in modules for each in vars(module).values() if isinstance(each, Record)}
     assert len(constructs) > 15
     for construct in constructs.values():

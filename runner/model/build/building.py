@@ -2,23 +2,63 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+import sys
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 from epicycle.actors import Tag
 
 from ...support.collection import without_collection
+from ..catalogue.code import code_of
 from ..graph.acts import ActName
 from ..graph.model_graph import ModelGraph
 from ..graph.nodes import is_within
 from ..graph.outputs import OutputSpec
 from ..graph.ranks import firing_order
 from ..graph.woven import WovenAspect, check_processors
+from ..language.settings import Setting
+from ..text.document import plain
+from ..text.files import Noted
 from ..text.problems import Position, Problem, Problems
 from .checks import check
 from .composite_aspect import check_nesting, detours
-from .origin import Origin
 from .weave_all import arranged
+
+
+@dataclass(frozen=True)
+class Origin:
+    """What a loaded model was made from: files, settings, changes of aspects, and the caller's own types.
+
+    What was computed with it is not taken for what another one gives.
+    """
+
+    noted: Noted
+    settings: Sequence[Setting]
+    changes: Sequence[str]
+    types: Sequence[type]
+    spec: Any = None  # how it was named, if that is known
+    state: Any = None  # what a program might have set since
+
+    def facts(self) -> dict[str, Any]:
+        """Everything that a run depends on beside its seed and Epicycle, as plain data without names of folders."""
+        modules = dict.fromkeys(
+            each.__module__ for each in self.types if each.__module__.partition(".")[0] != "epicycle"
+        )
+        files = (getattr(sys.modules.get(name), "__file__", None) for name in modules)
+        code = code_of(Path(file) for file in files if file is not None)
+        return {
+            "files": sorted(_by_name([*self.noted.files.items(), *code.items()])),
+            "packages": sorted(self.noted.packages.items()),
+            "settings": [[each.path, plain(each.node)] for each in self.settings],
+            "changes": list(self.changes),
+            "types": sorted(f"{each.__module__}.{each.__qualname__}" for each in self.types),
+        }
+
+
+def _by_name(files: Iterable[tuple[str, str]]) -> set[tuple[str, str]]:
+    return {(name.replace("\\", "/").rpartition("/")[2], digest) for name, digest in files}
 
 
 class Building:
@@ -80,11 +120,15 @@ class Building:
         self._order = None
         return self.graph
 
-    def adopt(self, graph: ModelGraph, aspects: Iterable[WovenAspect]) -> None:
-        """Continue with a graph made from the present one, with further aspects."""
+    def adopt(
+        self, graph: ModelGraph, aspects: Iterable[WovenAspect], exactly: frozenset[ActName] | None = None
+    ) -> None:
+        """Continue with a graph made from the present one, with further aspects, and only these acts of them."""
         self.graph = graph
         self.edit()
         self.enlist(aspects)
+        if exactly is not None:
+            self.exactly = (self.exactly or frozenset()) | exactly
 
     def enlist(self, aspects: Iterable[WovenAspect]) -> None:
         """Add these aspects to the model."""

@@ -23,7 +23,7 @@ from ..language.parts import PartText, beside
 from ..language.places import PointcutText
 from ..text.faults import place_in
 from ..text.problems import POISON, Poison, Position, Problems
-from .looks import PlaceOf, without_port
+from .paths import PlaceOf, without_port
 from .weave import Places, Pointcuts, bind
 
 BY_PLACE = "or name the input that takes the tokens: {at: ..., request: ...}"

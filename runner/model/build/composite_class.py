@@ -55,7 +55,7 @@ class CompositeInstance:
         part = PartText(self.path, position, Text(cls.name, position), entries_of(self.parameters, position))
         if "priority" in part.values:  # which is given like a parameter, as in a model file
             part = replace(part, priority=beside("priority", part.values.pop("priority").value))
-        resolver = ParameterResolver(Settings(limits=graph.limits), problems)
+        resolver = ParameterResolver(problems, Settings(limits=graph.limits))
         inside = graph.part(graph.director_of(path))
         made = Instantiator(PartTypes(cls.composites, cls.catalogue), resolver, inside)
         _, bracket, index = path.rpartition("[")

@@ -9,8 +9,6 @@ from dataclasses import replace
 from epicycle.aspects import ObservationAspect, PortAspect
 
 from ..catalogue.types import Catalogue, installed
-from ..graph.acts import ActName
-from ..graph.model_graph import ModelGraph
 from ..graph.woven import WovenAspect
 from ..language.disturbance import COMPOSITE_THERE, PARAMETER_THERE, joined, load_disturbance
 from ..language.inheritance import inherit
@@ -25,18 +23,17 @@ from ..text.patterns import PathIndex, PatternError
 from ..text.problems import Position, Problems
 from ..text.program import call_site, node_of
 from ..text.reading import Text
-from .acts import acts_of
 from .building import Building
 from .instantiate import Instantiator, PartTypes
 from .paths import Paths
 from .resolve import ParameterResolver
-from .weave_all import weave_all
+from .weave_all import acts_of, weave_all
 
 
 def disturb(
     model: Building, name: str, values: AnyMapping[str, object], types: Iterable[type], position: Position
-) -> tuple[ModelGraph, list[WovenAspect], frozenset[ActName] | None]:
-    """The model's graph with the aspects of a disturbance, these aspects, and the only acts; raises ``ModelError``."""
+) -> list[WovenAspect]:
+    """Weave the aspects of a disturbance, which are returned; raises ``ModelError``."""
     problems = Problems()
     disturbance = problems.whole(load_disturbance(name, problems))
     for setting in disturbance.settings:
@@ -46,7 +43,7 @@ def disturb(
     settings = settings_in(node, problems) if isinstance(node, Mapping) else []
     for key in sorted(values.keys() & model.parameters.keys() - disturbance.root.parameters.keys()):
         problems.add(f"{key!r} is a parameter of the model, not of the disturbance {disturbance.root.name}", position)
-    return _woven(model, disturbance, settings, installed().with_types(types), position, problems)
+    return _weave(model, disturbance, settings, installed().with_types(types), position, problems)
 
 
 def disturb_ports(
@@ -55,8 +52,8 @@ def disturb_ports(
     at: AnyMapping[str, list[str]] | None,
     values: Iterable[str | Setting] | AnyMapping[str, object],
     types: Iterable[type],
-) -> tuple[list[str], frozenset[ActName] | None]:
-    """Weave the aspects of disturbances that alter, delay or lose tokens; what is left out (in words), the only acts.
+) -> list[str]:
+    """Weave the aspects of disturbances that alter, delay or lose tokens; what is left out is returned, in words.
 
     ``at`` are ports, by direction, in place of those that the disturbances name.  Of aspects with the same name, the
     last one counts.  Raises ``ModelError``.
@@ -79,9 +76,8 @@ def disturb_ports(
             exactly=whole.exactly if one.exactly is None else (*(whole.exactly or ()), *one.exactly),
         )
     settings = settings_of(values, problems)
-    graph, found, acts = _woven(model, whole, settings, catalogue, position, problems)
-    model.adopt(graph, found)
-    return left_out, acts
+    _weave(model, whole, settings, catalogue, position, problems)
+    return left_out
 
 
 def _of_ports(
@@ -122,14 +118,14 @@ def _matches(pattern: str, ports: PathIndex) -> bool:
         return True  # which is reported when the aspect is woven
 
 
-def _woven(
+def _weave(
     model: Building,
     disturbance: ModelText,
     settings: list[Setting],
     catalogue: Catalogue,
     position: Position,
     problems: Problems,
-) -> tuple[ModelGraph, list[WovenAspect], frozenset[ActName] | None]:
+) -> list[WovenAspect]:
     own = {key: ParameterText(key, position, node_of(value, position)) for key, value in model.parameters.items()}
     parameters = joined(own, disturbance.root.parameters, PARAMETER_THERE, problems)
     root = CompositeText(model.name, position, parameters=parameters, aspects=disturbance.root.aspects)
@@ -138,7 +134,7 @@ def _woven(
         if part.name in taken:
             problems.add(f"there is already an aspect {part.name!r}", part.position, "unweave it first")
     problems.raise_if_any()
-    resolver = ParameterResolver(Settings(settings), problems)
+    resolver = ParameterResolver(problems, Settings(settings))
     around = Surroundings(inherit(disturbance.composites, catalogue.actors, problems), catalogue, problems)
     root = around.composite(root)
     made = Instantiator(PartTypes(around.composites, catalogue), resolver, model.graph.copy())
@@ -148,4 +144,5 @@ def _woven(
     exactly = disturbance.exactly
     acts = None if exactly is None else acts_of(exactly, [*model.aspects, *found], problems)
     problems.raise_if_any()
-    return made.graph, found, acts
+    model.adopt(made.graph, found, acts)
+    return found

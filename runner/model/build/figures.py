@@ -10,14 +10,14 @@ from epicycle.actors import Configurable, Fault, declared_parameters, did_you_me
 
 from ..catalogue.figure import Figure
 from ..catalogue.types import CatalogueError, figure_types
-from ..language.values import Locals, Values
+from ..language.values import Locals
 from ..text.document import Mapping
-from ..text.faults import place_in
+from ..text.faults import blame, place_in
 from ..text.kinds import UNKNOWN_TYPE
 from ..text.patterns import select
 from ..text.problems import Poison, Problems
-from .configure import configure
 from .model import DeclaredFigure, Model
+from .resolve import ParameterResolver
 
 T = TypeVar("T", bound=Configurable)
 
@@ -35,14 +35,14 @@ def made_figure(
     try:
         cls = known.get(type_name)
     except CatalogueError as error:
-        return Values(problems).blame(f"figure {name}", error, written.position, Locals())
+        return blame(problems, f"figure {name}", error, written.position)
     if cls is None:
         kind = f"figure {'of a study of type' if of_study else 'type'} {type_name!r}"
         message, hint = f"figure {name}: there is no {kind}", f"valid types: {', '.join(sorted(known))}"
         near = type_name, list(known)
         return problems.add(message, written.position, hint, kind=UNKNOWN_TYPE, near=near)
     where = f"figure {name}", written.position
-    return configure(cls, written.entries, Locals(), *where, Values(problems), make=cls, evaluated=values)
+    return ParameterResolver(problems).configured(cls, written.entries, Locals(), *where, make=cls, evaluated=values)
 
 
 def figures_of(model: Model, problems: Problems, recorded: Collection[str] | None = None) -> dict[str, Figure]:
@@ -62,7 +62,7 @@ def figures_of(model: Model, problems: Problems, recorded: Collection[str] | Non
                 tell_of_figure(fault, name, declared[2], problems)
             found[name] = figure
         except Exception as error:  # of a user's class
-            Values(problems).blame(f"figure {name}", error, declared[2], Locals())
+            blame(problems, f"figure {name}", error, declared[2])
     return found
 
 

@@ -6,7 +6,8 @@ what is computed from it is not checked; a part that cannot be made is a gap in 
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Iterator, Mapping
+from contextlib import contextmanager
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import cache, partial
@@ -22,8 +23,7 @@ from ..graph.nodes import Gap
 from ..language.models import CompositeText
 from ..language.parts import PartText
 from ..language.ports import PortText
-from ..language.settings import Settings
-from ..language.values import Locals, Values
+from ..language.values import Locals
 from ..text.document import Entry
 from ..text.kinds import CLASS, CONNECTION, DIRECTOR, MODE, NAME, SIZE, TAKEN, UNKNOWN_TYPE
 from ..text.limits import RAISE_IT
@@ -85,7 +85,6 @@ class Instantiator:
     ) -> None:
         self.known = known
         self.resolver = resolver
-        self.values = resolver.values
         self.problems = resolver.problems
         self.graph = graph
         self.aspects: list[tuple[str, PartText, Names]] = []  # where they are declared, and what their values may use
@@ -120,7 +119,7 @@ class Instantiator:
             ):
                 members[name] = model
         ports = composite.inputs, composite.outputs
-        wiring = Wiring(self.graph, self.values, path, composite.name, *ports, composite.actors, members, composite)
+        wiring = Wiring(self.graph, self.resolver, path, composite.name, *ports, composite.actors, members, composite)
         for name, member in others:
             wiring.check_ports(name, member, composite.connections)
         with self.problems.looking_for(CONNECTION):
@@ -189,14 +188,19 @@ class Instantiator:
         if not part.choices or (composite.name, part.name) in self._tried:
             return []
         self._tried.add((composite.name, part.name))
-        trial = copy(self)
-        trial.resolver = ParameterResolver(Settings(), self.problems, Values(self.problems, self.values.budget))
-        trial.values = trial.resolver.values
-        trial.graph, trial.aspects, trial.actors = self.graph.part(self.graph.director_of(path)), [], []
         chosen = _chosen(part, names)
         others = [each for each in part.choices.values() if each is not chosen]
-        try:
+        with self._trial_at(path) as trial:
+            trial.resolver = ParameterResolver(self.problems, budget=self.resolver.budget)
             return [member for each in others if (member := trial.instances(path, each, names, within))]
+
+    @contextmanager
+    def _trial_at(self, path: str) -> Iterator[Instantiator]:
+        """What makes parts at a path only to find problems in them."""
+        trial = copy(self)
+        trial.graph, trial.aspects, trial.actors = self.graph.part(self.graph.director_of(path)), [], []
+        try:
+            yield trial
         finally:
             self.cost = trial.cost
 
@@ -209,7 +213,7 @@ class Instantiator:
         try:
             found = known.catalogue.actors.get(wanted) if inner is None else inner
         except CatalogueError as error:
-            self.values.blame(path, error, at, Locals(path))
+            self.resolver.blame(path, error, at, Locals(path))
             return None
         if found is POISON or "${" in wanted:
             return None
@@ -245,7 +249,7 @@ class Instantiator:
             return 1
         count = Parameter(int, min=0, max=self.graph.limits.actors)
         local, node = Locals(path, names), part.count.node
-        found: int | Poison = self.values.converted(node, local, f"{path}: count", count.convert)
+        found: int | Poison = self.resolver.converted(node, local, f"{path}: count", count.convert)
         return found
 
     def _count_one(self, path: str, part: PartText) -> None:
@@ -280,7 +284,7 @@ class Instantiator:
             hint = f"give the actors inside a priority, or give {kind.name} its own director: 'director: {{}}'"
             self.problems.add(message, part.priority.position, hint, scope=path, kind=DIRECTOR)
             return 0
-        return self.values.value(part.priority, Locals(path, names), f"{path}: priority") or 0
+        return self.resolver.value(part.priority, Locals(path, names), f"{path}: priority") or 0
 
     def _actor(self, path: str, actor_type: type[Actor], part: PartText, names: Names) -> None:
         local = Locals(path, names)
@@ -290,7 +294,7 @@ class Instantiator:
             self.graph.add_actor(made, part.position)
             return made
 
-        actor = self.resolver.configured(actor_type, part, local, path, make)
+        actor = self.resolver.configured(actor_type, part.values, local, path, part.position, make=make, path=path)
         if isinstance(actor, Poison):
             self.graph.leave_out(path, actor_type)
         else:
@@ -311,7 +315,7 @@ class Instantiator:
         """One instance of a composite, its ports and its parts; ``inside`` are its parameters."""
         graph = self.graph
         self.classes.add(composite.name)
-        graph.add_composite(path, composite.name, position)
+        graph.add_component(path, composite.name, position)
         for direction in ("input", "output"):
             for name, port in composite.ports(direction).items():
                 kind = self._port_type(composite, port)
@@ -333,7 +337,7 @@ class Instantiator:
         """The settings of a director; wrong ones are left out."""
         local = Locals(path, names)
         found = {
-            key: self.values.converted(entry.value, local, f"{what}: director.{key}", OF_DIRECTORS[key])
+            key: self.resolver.converted(entry.value, local, f"{what}: director.{key}", OF_DIRECTORS[key])
             for key, entry in given.items()
         }
         return {key: value for key, value in found.items() if value is not POISON}
@@ -350,7 +354,7 @@ class Instantiator:
                 self._port_types[text] = error
         found = self._port_types[text]
         if isinstance(found, FaultError):
-            self.values.blame(f"port {port.name!r} of {composite.name}", found, port.type.position, Locals())
+            self.resolver.blame(f"port {port.name!r} of {composite.name}", found, port.type.position, Locals())
             return None
         return found
 
@@ -369,12 +373,8 @@ class Instantiator:
             return None
         if self.resolver.is_enabled(full, part, Locals(path, names)):
             return self.instances(full, as_actor(part), names, within)
-        trial = copy(self)
-        trial.graph, trial.aspects, trial.actors = self.graph.part(graph.director_of(full)), [], []
-        try:
+        with self._trial_at(full) as trial:
             trial.instances(full, as_actor(part), names, within)
-        finally:
-            self.cost = trial.cost
         self.graph.gaps[full] = Gap()
         return None
 

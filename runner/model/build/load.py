@@ -34,16 +34,15 @@ from ..text.files import noting
 from ..text.kinds import ASPECT, CLASS, FIGURE, ODD, OUTPUT, OUTSIDE, VALUE
 from ..text.limits import NORMAL, Limits
 from ..text.problems import POISON, Problems
-from .acts import acts_of
+from .building import Origin
 from .checks import check
 from .figures import figures_of
 from .instantiate import Instantiator, PartTypes, TooLargeError
 from .model import DeclaredFigure, Model
-from .origin import Origin
 from .outputs import OutputReader
 from .resolve import ParameterResolver
 from .untried import try_classes
-from .weave_all import weave_all
+from .weave_all import acts_of, weave_all
 
 
 class ModelChanges(TypedDict, total=False):
@@ -127,7 +126,7 @@ class Loading:
                     text = around.model(text)
             # What results.
             self.text, self.known = text, PartTypes(composites, catalogue)
-            resolver = ParameterResolver(Settings(settings, limits), problems)
+            resolver = ParameterResolver(problems, Settings(settings, limits))
             self.model = Model(text.root.name, doc=text.root.doc)
             with problems.looking_for(VALUE):
                 build(text, self.known, resolver, limits, self.model)
@@ -142,7 +141,7 @@ class Loading:
 
 def build(text: ModelText, known: PartTypes, resolver: ParameterResolver, limits: Limits, model: Model) -> None:
     """Make the model that declarations describe, in passes; it is valid only if there are no problems afterwards."""
-    problems, values, root = resolver.problems, resolver.values, text.root
+    problems, root = resolver.problems, text.root
     # Without a composite, nothing needs the types of all packages.
     for name in sorted(known.composites.keys() & known.catalogue.actors.keys() if known.composites else ()):
         composite = known.composites[name]
@@ -150,7 +149,7 @@ def build(text: ModelText, known: PartTypes, resolver: ParameterResolver, limits
         # Not an error: a model stays valid when a later version adds an actor with that name.
         message = f"composite {name!r} hides the actor type with the same name"
         problems.warn(message, at, "rename it if you need both", kind=ODD)
-    values.of_model = root.parameters
+    resolver.of_model = root.parameters
     names = resolver.parameters("", root, {}, {}, None)
     made = Instantiator(known, resolver, ModelGraph(limits))
     made.dialect(root, names)
@@ -164,18 +163,17 @@ def build(text: ModelText, known: PartTypes, resolver: ParameterResolver, limits
         check(made.graph, problems)
         with problems.looking_for(ASPECT):
             check_processors(woven, problems)
-            if text.exactly is not None:
-                model.exactly = acts_of(text.exactly, woven, problems)
-        model.adopt(made.graph, woven)
+            acts = None if text.exactly is None else acts_of(text.exactly, woven, problems)
+        model.adopt(made.graph, woven, acts)
         with problems.looking_for(OUTPUT):
-            model.output = OutputReader(made.graph, values).read(text, names)
+            model.output = OutputReader(made.graph, resolver).read(text, names)
         # Numbers without units are in the units that the model declares.
         model.parameters = {
             name: plain(value) if root.parameters[name].unit else counted_in_si(value) for name, value in names.items()
         }
         model.declared = dict(root.parameters)
-        model.figures = _figures(text, values, names)
-    try_classes(known, made.classes, values, limits, problems)
+        model.figures = _figures(text, resolver, names)
+    try_classes(known, made.classes, resolver, limits)
 
 
 def _figures(text: ModelText, values: Values, names: dict[str, object]) -> dict[str, DeclaredFigure]:

@@ -19,7 +19,7 @@ from ..graph.woven import WovenAspect
 from ..language.fields import nanoseconds
 from ..language.metrics import WatchText
 from ..language.ports import ParameterText
-from ..language.values import Locals, Values
+from ..language.values import Locals
 from ..temporal import Requirement, RequirementOptions
 from ..text.document import Mapping as MappingNode
 from ..text.document import Scalar
@@ -29,6 +29,7 @@ from ..text.reading import NAME, NAMES_HAVE, Text, within
 from .building import Building
 from .named import Port, director_of, raising
 from .outputs import OutputReader, checked_seed
+from .resolve import ParameterResolver
 from .scope import Scope
 
 DeclaredFigure = tuple[str, dict[str, object], MappingNode]  # type, values, as written
@@ -125,14 +126,9 @@ class Model(Building, Scope, Tabled):
             for path in at:
                 places[self.graph.ports[path].direction].append(path)
             before = len(self.aspects)
-            _, acts = disturb_ports(self, [str(disturbance)], places, set or {}, types)
-            self.exactly = (self.exactly or frozenset()) | acts if acts is not None else self.exactly
+            disturb_ports(self, [str(disturbance)], places, set or {}, types)
             return list(self.aspects[before:])
-        graph, found, acts = disturb(self, str(disturbance), set or {}, types, call_site())
-        self.adopt(graph, found)
-        if acts is not None:
-            self.exactly = (self.exactly or frozenset()) | acts
-        return found
+        return disturb(self, str(disturbance), set or {}, types, call_site())
 
     # -- what is watched ------------------------------------------------------------------------------------------
 
@@ -179,7 +175,7 @@ class Model(Building, Scope, Tabled):
             problems.add(f"metric {name}: {wrong[0]!r} cannot be used with 'formula'", position)
         problems.raise_if_any()
         with raising() as problems:
-            reader = OutputReader(self.graph, Values(problems), self.output)
+            reader = OutputReader(self.graph, ParameterResolver(problems), self.output)
             texts = (each if isinstance(each, str) else each.path for each in ports)
             of_ports = tuple(Text(each, within(position, each)) for each in texts)
             source = Scalar(formula, formula, False, within(position, formula)) if formula else None
@@ -202,7 +198,7 @@ class Model(Building, Scope, Tabled):
                 if any(each.name == metric for each in self.output.metrics):
                     problems.add(f"there is already a metric {metric!r}", position, "give the monitor another name")
             problems.raise_if_any()
-            reader = OutputReader(self.graph, Values(problems), self.output)
+            reader = OutputReader(self.graph, ParameterResolver(problems), self.output)
             given: dict[str, object] = {"property": property, **options}
             entries = reader.options(Requirement, f"monitor {name}", given, position)
             reader.monitor(WatchText(name, entries, position), Locals(), given)
@@ -210,13 +206,13 @@ class Model(Building, Scope, Tabled):
 
     def outputs(self, pattern: str, what: str, position: Position, problems: Problems) -> list[str]:
         """The output ports that a pattern selects; what is wrong with it is added to ``problems`` as ``what``'s."""
-        return OutputReader(self.graph, Values(problems)).select(Text(pattern, position), what)
+        return OutputReader(self.graph, ParameterResolver(problems)).select(Text(pattern, position), what)
 
     def _watch(self, ports: Iterable[str | Port], ask: Callable[[OutputReader, Text], None]) -> None:
         """Add what is to be watched, with the rules of a model file."""
         position = call_site()
         with raising() as problems:
-            reader = OutputReader(self.graph, Values(problems), self.output)
+            reader = OutputReader(self.graph, ParameterResolver(problems), self.output)
             for port in ports:
                 path = port if isinstance(port, str) else port.path
                 ask(reader, Text(path, within(position, path)))

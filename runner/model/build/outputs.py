@@ -28,7 +28,7 @@ from ..graph.model_graph import ModelGraph
 from ..graph.outputs import Metric, Monitor, OutputSpec, Part
 from ..language.metrics import WatchText
 from ..language.models import ModelText
-from ..language.values import Locals, Values
+from ..language.values import Locals
 from ..temporal import Condition, Property, PropertyError, Requirement, Sends, Spread, leaves, property_of, spread_of
 from ..text.document import Entry, Node, Scalar, plain
 from ..text.kinds import MONITOR
@@ -37,9 +37,8 @@ from ..text.patterns import PathIndex, PatternError, TooManyError
 from ..text.problems import POISON, Poison, Position
 from ..text.program import entries_of
 from ..text.reading import Text, within
-from .configure import configure
-from .looks import Looks
-from .paths import Paths
+from .paths import Looks, Paths
+from .resolve import ParameterResolver
 
 _MOST = 2_000_000  # characters of a property that is written out for every place of a pattern
 
@@ -47,7 +46,7 @@ _MOST = 2_000_000  # characters of a property that is written out for every plac
 class OutputReader:
     """Adds to what is watched (``found``): ``read`` what a file declares, the others what a program asks for."""
 
-    def __init__(self, graph: ModelGraph, values: Values, found: OutputSpec | None = None) -> None:
+    def __init__(self, graph: ModelGraph, values: ParameterResolver, found: OutputSpec | None = None) -> None:
         self.found = OutputSpec() if found is None else found.copy()
         self.graph = graph
         self.values = values
@@ -105,8 +104,9 @@ class OutputReader:
         what = f"metric {text.name}"
         if given is None:  # text for people holds no expressions
             given = {key: _words(text.values[key].value) for key in _WORDS if key in text.values}
-        make, at = MetricSpec.fitting, text.position
-        measure = configure(MetricSpec, text.values, local, what, at, self.values, make=make, evaluated=given)
+        measure = self.values.configured(
+            MetricSpec, text.values, local, what, text.position, make=MetricSpec.fitting, evaluated=given
+        )
         if text.formula is not None:
             self._compute(text, text.formula, measure, local)
             return
@@ -169,9 +169,9 @@ class OutputReader:
 
     def monitor(self, text: WatchText, local: Locals, given: Mapping[str, object] = MappingProxyType({})) -> None:
         """Judge the runs by a property."""
-        name, what, at = text.name, f"monitor {text.name}", text.position
-        requirement = configure(
-            Requirement, text.values, local, what, at, self.values, make=Requirement, evaluated=given
+        name, what = text.name, f"monitor {text.name}"
+        requirement = self.values.configured(
+            Requirement, text.values, local, what, text.position, make=Requirement, evaluated=given
         )
         found = requirement and self._monitor(text, requirement)
         if not found:

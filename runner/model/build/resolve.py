@@ -1,12 +1,27 @@
-"""Settling parameters: a setting from outside wins over a given value, and that over the default."""
+"""Settling parameters: a setting from outside wins over a given value, and that over the default.
+
+What a type declares becomes an object with the values; what a composite declares, the names of its expressions.
+"""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Iterable, Mapping
+from pathlib import Path
+from types import MappingProxyType
 from typing import Any, TypeVar
 
-from epicycle.actors import Configurable, Parameter, declared_parameters, did_you_mean, nearest, to_nanoseconds
+from epicycle.actors import (
+    Configurable,
+    Parameter,
+    declared_parameters,
+    did_you_mean,
+    nearest,
+    to_nanoseconds,
+    unknown_parameter,
+    variants,
+)
+from epicycle.actors.expression import Budget
 
 from ..catalogue.like import LIKE
 from ..graph.model_graph import ModelGraph
@@ -15,11 +30,13 @@ from ..language.parts import PartText
 from ..language.settings import Setting, Settings
 from ..language.values import OUTSIDE, Locals, Values
 from ..text.document import Entry, Scalar
+from ..text.document import Mapping as MappingNode
+from ..text.files import data_file
+from ..text.kinds import MISSING_PARAMETER, UNKNOWN_PARAMETER
 from ..text.kinds import OUTSIDE as FROM_OUTSIDE
 from ..text.limits import RAISE_IT
 from ..text.patterns import TooManyError
-from ..text.problems import POISON, Poison, Position, Problems
-from .configure import Chosen, as_meant, configure, tell_missing
+from ..text.problems import POISON, Fix, Poison, Position, Problems, instead
 
 T = TypeVar("T")
 
@@ -35,13 +52,12 @@ _NO_PARAMETERS = {
 }
 
 
-class ParameterResolver:
-    """Finds the values of all parameters of a model, and reports wrong ones."""
+class ParameterResolver(Values):
+    """Finds the values of all parameters of a model, makes objects of them, and reports wrong ones."""
 
-    def __init__(self, settings: Settings, problems: Problems, values: Values | None = None) -> None:
-        self.settings = settings
-        self.problems = problems
-        self.values = values or Values(problems)
+    def __init__(self, problems: Problems, settings: Settings | None = None, budget: Budget | None = None) -> None:
+        super().__init__(problems, budget)
+        self.settings = settings or Settings()
         self._settable: dict[str, None] = {}
 
     def parameters(
@@ -56,36 +72,116 @@ class ParameterResolver:
         names: dict[str, object] = {}
         label, valid = path or composite.name, composite.parameters
         kind = f"{label}: {composite.name}"
-
-        def unknown(key: str) -> str:
-            return f"{kind} has no parameter {key!r}{did_you_mean(key, valid)}"
-
-        given = as_meant(given, valid, self.problems, unknown, path)
+        given = self._as_meant(
+            given, valid, lambda key: f"{kind} has no parameter {key!r}{did_you_mean(key, valid)}", path
+        )
         for name, declared in valid.items():
             full = f"{path}.{name}" if path else name
             node, local = declared.value, Locals(path, names, valid.keys())
             if name in given:
                 node, local = given[name].value, Locals(path, outer)
             if (setting := self._setting(full)) is not None:
-                node, local = setting[0].value, OUTSIDE
+                node, local = setting.value, OUTSIDE
             if node is None:
                 who, at = kind if path else label, position or declared.position
-                about = (declared.doc, declared.undecided)
-                names[name] = tell_missing(who, name, about, at, self.problems, path)
+                names[name] = self._add_missing(who, name, (declared.doc, declared.undecided), at, path)
             else:
-                names[name] = self.values.declared(declared, node, local, full)
+                names[name] = self.declared(declared, node, local, full)
         return names
 
-    def _setting(self, full: str) -> Chosen | None:
+    def configured(
+        self,
+        cls: type,
+        entries: Mapping[str, Entry],
+        local: Locals,
+        label: str,
+        position: Position,
+        *,
+        make: Callable[..., T] | None = None,
+        path: str | None = None,
+        evaluated: Mapping[str, object] = MappingProxyType({}),
+    ) -> T | Poison:
+        """An object of the class with the values of these entries, made by ``make``; what is wrong is reported.
+
+        ``label`` is its name in messages, ``position`` its place.  With a ``path``, its parameters may be set from
+        outside; ``evaluated`` are values that need no evaluation, or defaults.
+        """
+        declared = declared_parameters(cls)
+        given = self._as_meant(entries, declared, lambda key: f"{label}: {unknown_parameter(cls, key)}", local.path)
+        is_whole = given.keys() == entries.keys()
+        chosen: dict[str, tuple[Entry, Locals]] = {}
+        found: dict[str, Any] = {}
+        for name, parameter in declared.items():
+            setting = None if path is None else self._setting(f"{path}.{name}")
+            if setting is not None:
+                chosen[name] = setting, OUTSIDE
+            elif name in given:
+                chosen[name] = given[name], local
+            if name in evaluated and setting is None:
+                found[name] = evaluated[name]
+            elif name in chosen:
+                found[name] = self._value(parameter, *chosen[name], f"{label}.{name}")
+            elif parameter.required:
+                self._add_missing(f"{label}: {cls.__name__}", name, (parameter.doc,), position, local.path)
+                is_whole = False
+        failure = None
+        if is_whole and not any(value is POISON for value in found.values()):
+            try:
+                return (make or cls)(**found)
+            except Exception as error:  # of a user's class
+                failure = error
+        told = False
+        for name, (entry, known) in chosen.items():
+            if found[name] is not POISON:
+                try:
+                    declared[name].convert(found[name])
+                except Exception as error:
+                    hints = _taken_by(declared, name, found[name])
+                    self.blame(f"{label}.{name}", error, entry.value, known, *hints)
+                    told = True
+        if failure is not None and not told:
+            written = MappingNode({name: entry for name, (entry, _) in chosen.items()}, position)
+            self.blame(label, failure, written, local)
+        return POISON
+
+    def _as_meant(
+        self, given: Mapping[str, Entry], valid: Collection[str], unknown: Callable[[str], str], scope: str
+    ) -> dict[str, Entry]:
+        """The values, with wrong names reported and corrected; otherwise they would seem to be missing as well."""
+        result = {name: entry for name, entry in given.items() if name in valid}
+        for name in (each for each in given if each not in valid):
+            hint = f"valid parameters: {', '.join(valid) or 'none'}"
+            meant, at = nearest(name, valid), given[name].key.position
+            fix = None if meant is None else instead(at, name, meant)
+            self.problems.add(unknown(name), at, hint, scope=scope, kind=UNKNOWN_PARAMETER, fix=fix)
+            if meant is not None:
+                result.setdefault(meant, given[name])
+        return result
+
+    def _add_missing(self, who: str, name: str, about: Iterable[str], position: Position, scope: str) -> Poison:
+        hints = [f"{name}: {each}" for each in about if each]
+        message, fix = f"{who} needs a value for {name!r}", Fix(position, "", name)
+        return self.problems.add(message, position, *hints, scope=scope, kind=MISSING_PARAMETER, fix=fix)
+
+    def _value(self, parameter: Parameter[Any], entry: Entry, local: Locals, label: str) -> Any:
+        """The value of an entry; that of a file is where it is."""
+        if parameter.type is not Path:
+            return self.of(entry.value, local, label)
+
+        def file(value: object) -> Path | None:
+            found = parameter.convert(value)
+            return None if found is None else data_file(found, entry.value.position)
+
+        return self.converted(entry.value, local, label, file)
+
+    def _setting(self, full: str) -> Entry | None:
         """The setting for a parameter, if there is one."""
         self._settable[full] = None
         try:
             found = self.settings.find(full)
         except TooManyError as error:
             self.problems.stop(f"{full}: {error}", self.settings.position, RAISE_IT)
-        if found is None:
-            return None
-        return Entry(Scalar(found.path, found.path, False, found.position), found.node), OUTSIDE
+        return None if found is None else Entry(Scalar(found.path, found.path, False, found.position), found.node)
 
     def set_from_outside(self, path: str, part: Configurable) -> dict[str, object]:
         """The new values of the parameters that are set from outside, of a part that already exists."""
@@ -93,28 +189,15 @@ class ParameterResolver:
         for name, parameter in declared_parameters(type(part)).items():
             label = f"{path}.{name}"
             if (setting := self._setting(label)) is not None:
-                value = self.values.converted(setting[0].value, OUTSIDE, label, parameter.convert)
+                value = self.converted(setting.value, OUTSIDE, label, parameter.convert)
                 changed |= {} if value is POISON else {name: value}
         return changed
-
-    def configured(self, cls: type, part: PartText, local: Locals, label: str, make: Callable[..., T]) -> T | Poison:
-        """An object of the class with the values of a part."""
-        return configure(
-            cls,
-            part.values,
-            local,
-            label,
-            part.position,
-            self.values,
-            make=make,
-            outside=lambda name: self._setting(f"{local.path}.{name}"),
-        )
 
     def is_enabled(self, name: str, part: PartText, local: Locals) -> bool:
         """Whether an aspect is active; it is if that is unknown."""
         if part.enabled is None:
             return True
-        found = self.values.value(part.enabled, local, f"aspect {name}.enabled")
+        found = self.value(part.enabled, local, f"aspect {name}.enabled")
         return found is POISON or bool(found)
 
     def check_unused(self, graph: ModelGraph) -> None:
@@ -141,6 +224,18 @@ class ParameterResolver:
         valid = (f"valid parameters {f'of {owner}' if owner else 'here'}: {', '.join(beside)}",) if beside else ()
         message = f"{setting.path!r} matches no parameter{near}"
         self.problems.add(message, setting.position, *(() if near else valid), kind=FROM_OUTSIDE)
+
+
+def _taken_by(declared: Mapping[str, Parameter[Any]], name: str, value: object) -> list[str]:
+    """Which other parameters take such a part: a distribution that is given as a number, say."""
+    kind = value.get("type") if isinstance(value, Mapping) else None
+    bases = {each: other.type for each, other in declared.items() if each != name and isinstance(other.type, type)}
+    takers = [
+        each
+        for each, base in bases.items()
+        if issubclass(base, Configurable) and isinstance(kind, str) and kind in variants(base)
+    ]
+    return [f"{kind} is a value of {each!r}: {each}: {{type: {kind}, ...}}" for each in takers]
 
 
 def _in_terms_of(pattern: str, path: str) -> str:

@@ -155,7 +155,7 @@ class Scope(Holder):
         for number, (_, port) in enumerate(ports):
             made.check_port(port, [each for _, each in ports[:number]], position)
         graph = self._model.edit()
-        graph.add_composite(full, OF_NO_CLASS, position)
+        graph.add_component(full, OF_NO_CLASS, position)
         if director:
             graph.add_director(full, **given)
         for direction, port in ports:

@@ -8,11 +8,10 @@ from epicycle.actors import counted
 
 from ..graph.model_graph import ModelGraph
 from ..language.models import CompositeText
-from ..language.settings import Settings
 from ..language.values import Locals, Values
 from ..text.kinds import ODD
 from ..text.limits import RAISE_IT, Limits
-from ..text.problems import POISON, Problems
+from ..text.problems import POISON
 from .checks import check
 from .instantiate import Instantiator, PartTypes, TooLargeError
 from .resolve import ParameterResolver
@@ -21,12 +20,12 @@ from .weave_all import weave_all
 _OVERHEAD = 3  # the cost of a class besides its contents, in actors
 
 
-def try_classes(known: PartTypes, used: Collection[str], values: Values, limits: Limits, problems: Problems) -> None:
+def try_classes(known: PartTypes, used: Collection[str], values: Values, limits: Limits) -> None:
     """Check what can be checked of every class without an instance in the model.
 
     All trials together may cost as much as a model of half the maximum size; a warning names what remains.
     """
-    tried = set(used)
+    tried, problems = set(used), values.problems
     composites = {name: composite for name, composite in known.composites.items() if composite}
     inner = {
         part.type.text
@@ -42,7 +41,7 @@ def try_classes(known: PartTypes, used: Collection[str], values: Values, limits:
             continue
         is_whole = False
         if left > 0:
-            resolver = ParameterResolver(Settings(), problems, Values(problems, values.budget))
+            resolver = ParameterResolver(problems, budget=values.budget)
             made = Instantiator(known, resolver, ModelGraph(limits), left)
             is_whole = _try(composites[name], made)
             left -= _OVERHEAD + made.cost + (made.graph.connections + made.places) // 5
@@ -60,7 +59,7 @@ def try_classes(known: PartTypes, used: Collection[str], values: Values, limits:
 
 def _try(composite: CompositeText, made: Instantiator) -> bool:
     """Unfold one instance of a class, with its name and nothing around it; returns whether all of it was checked."""
-    path, values, graph = composite.name, made.values, made.graph
+    path, values, graph = composite.name, made.resolver, made.graph
     names: dict[str, object] = {}
     for name, declared in composite.parameters.items():
         if declared.value is not None:

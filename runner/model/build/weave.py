@@ -21,8 +21,7 @@ from ..language.places import PointcutText
 from ..text.kinds import NO_PLACE
 from ..text.patterns import PathIndex, PatternError, in_general
 from ..text.problems import POISON, Poison, Position
-from .looks import Looks, PlaceOf, unknown_inputs
-from .paths import View
+from .paths import Looks, PlaceOf, View, unknown_inputs
 
 Ends = tuple[str, str]
 Found = tuple[PointcutText, list[str] | Poison]  # what a pointcut selects; poison if it rightly selects nothing

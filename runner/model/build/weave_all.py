@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from collections.abc import Mapping as AnyMapping
 from dataclasses import replace
 from functools import partial
 
-from epicycle.actors import Actor, EpicycleError, declared_parameters
+from epicycle.actors import Actor, EpicycleError, declared_parameters, did_you_mean
 from epicycle.aspects import (
     Aspect,
     CompositeAspect,
@@ -18,10 +18,12 @@ from epicycle.aspects import (
 )
 
 from ..catalogue.types import CatalogueError
+from ..graph.acts import ActName
 from ..graph.model_graph import ModelGraph
 from ..graph.woven import WovenAspect
 from ..language.parts import PartText
 from ..language.places import PointcutText
+from ..language.settings import ActText
 from ..language.values import Locals
 from ..text.document import Mapping
 from ..text.faults import place_in
@@ -39,28 +41,24 @@ from .weave import Places, Pointcuts, bind
 def weave_all(made: Instantiator) -> list[WovenAspect]:
     """Attach all aspects, now that all ports exist, in the order in which tokens meet them."""
     with made.problems.looking_for(ASPECT):
-        return _weave_all(made)
-
-
-def _weave_all(made: Instantiator) -> list[WovenAspect]:
-    graph, problems, paths, found = made.graph, made.problems, Paths(made.graph), list[WovenAspect]()
-    for scope, part, names in made.aspects:
-        name = f"{scope}.{part.name}" if scope else part.name
-        try:
-            if (woven := _declared(made, paths, name, scope, part, names)) is not None:
-                found.append(woven)
-        except TooManyError as error:
-            problems.stop(f"aspect {name}: {error}", part.position, RAISE_IT)
-    decorated = {cls for cls in set(map(type, made.actors)) if class_decorations(cls)}
-    for actor in made.actors:
-        if type(actor) in decorated:
-            position = graph.components[actor.path].position
-            assert position is not None, "all that is unfolded is written somewhere"
-            found += weave_decorations(actor, made.graph, problems, position, made.resolver.set_from_outside)
-    found = arranged(found, graph)
-    if check_nesting(found, graph, problems):
-        graph.detours = detours(graph, found)
-    return found
+        graph, problems, paths, found = made.graph, made.problems, Paths(made.graph), list[WovenAspect]()
+        for scope, part, names in made.aspects:
+            name = f"{scope}.{part.name}" if scope else part.name
+            try:
+                if (woven := _declared(made, paths, name, scope, part, names)) is not None:
+                    found.append(woven)
+            except TooManyError as error:
+                problems.stop(f"aspect {name}: {error}", part.position, RAISE_IT)
+        decorated = {cls for cls in set(map(type, made.actors)) if class_decorations(cls)}
+        for actor in made.actors:
+            if type(actor) in decorated:
+                position = graph.components[actor.path].position
+                assert position is not None, "all that is unfolded is written somewhere"
+                found += weave_decorations(actor, made.graph, problems, position, made.resolver.set_from_outside)
+        found = arranged(found, graph)
+        if check_nesting(found, graph, problems):
+            graph.detours = detours(graph, found)
+        return found
 
 
 def _declared(
@@ -72,7 +70,7 @@ def _declared(
     graph, resolver, problems = made.graph, made.resolver, made.problems
     is_model = cls in (CompositeAspect, CompositeExecutionAspect)
     given = {key: entry for key, entry in part.values.items() if not is_model or key in OWN}
-    aspect = resolver.configured(cls, replace(part, values=given), Locals(name, names), f"aspect {name}", cls)
+    aspect = resolver.configured(cls, given, Locals(name, names), f"aspect {name}", part.position, make=cls, path=name)
     if not part.at:
         hint = "add 'at:' with ports or patterns"
         problems.add(f"aspect {name} has no 'at'", part.position, hint, scope=scope, kind=NO_PLACE)
@@ -101,7 +99,7 @@ def _type(made: Instantiator, name: str, scope: str, part: PartText) -> type[Asp
     try:
         cls = known.catalogue.aspects.get(wanted)
     except CatalogueError as error:
-        made.resolver.values.blame(f"aspect {name}", error, part.type.position, Locals(scope))
+        made.resolver.blame(f"aspect {name}", error, part.type.position, Locals(scope))
         return None
     if (inner := known.composites.get(wanted)) is not None:
         return None if inner is POISON else _model_type(made, name, scope, part, cls)
@@ -140,7 +138,7 @@ def _model_type(
 def _timed(made: Instantiator, pointcut: PointcutText, name: str, scope: str, names: dict[str, object]) -> PointcutText:
     if pointcut.time is None:
         return pointcut
-    time = made.resolver.values.value(pointcut.time, Locals(scope, names), f"aspect {name}: time")
+    time = made.resolver.value(pointcut.time, Locals(scope, names), f"aspect {name}: time")
     return replace(pointcut, firing_time=time or 0.0)
 
 
@@ -208,3 +206,25 @@ def arranged(aspects: list[WovenAspect], graph: ModelGraph) -> list[WovenAspect]
 
 def _is_at_outputs(woven: WovenAspect, graph: ModelGraph) -> bool:
     return bool(woven.ports) and all(graph.direction(port) == "output" for port in woven.ports)
+
+
+_FEW = 8  # places that a message lists
+
+
+def acts_of(texts: Iterable[ActText], aspects: Iterable[WovenAspect], problems: Problems) -> frozenset[ActName]:
+    """The names of acts; unknown aspects and places are problems."""
+    places = {woven.name: woven.places for woven in aspects}
+    found = set()
+    for each in texts:
+        aspect, place = each.aspect.text, each.at.text
+        if aspect not in places:
+            message = f"exactly: there is no aspect {aspect!r}{did_you_mean(aspect, places)}"
+            problems.add(message, each.aspect.position, f"the aspects: {', '.join(places) or 'none'}")
+        elif place not in places[aspect]:
+            known = places[aspect]
+            rest = f" and {len(known) - _FEW} more" if len(known) > _FEW else ""
+            message = f"exactly: aspect {aspect} does not attach to {place!r}{did_you_mean(place, known)}"
+            problems.add(message, each.at.position, f"it attaches to {', '.join(known[:_FEW])}{rest}")
+        else:
+            found.add(ActName(aspect, place, each.token))
+    return frozenset(found)

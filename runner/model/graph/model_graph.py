@@ -96,18 +96,15 @@ class ModelGraph:
         self._check_open()
         actor.is_part = True
         self.actors[actor.path] = actor
-        self._add(actor.path, type(actor).__name__, position)
+        self.add_component(actor.path, type(actor).__name__, position)
         self.domains[self.director_of(actor.path)].members.append(actor.path)
         ports: tuple[InputPort[Any] | OutputPort[Any], ...] = (*actor.inputs.values(), *actor.outputs.values())
         for port in ports:
             self.ports[port.path] = PortNode(port, port.direction)
 
-    def add_composite(self, path: str, kind: str, position: Position | None = None) -> None:
-        """Add a composite, of that class."""
+    def add_component(self, path: str, kind: str, position: Position | None = None) -> None:
+        """Add a composite of that class, or what an actor has in common with one."""
         self._check_open()
-        self._add(path, kind, position)
-
-    def _add(self, path: str, kind: str, position: Position | None) -> None:
         self.components[path] = Component(kind, position)
         self._enrol(path)
 

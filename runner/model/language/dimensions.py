@@ -5,10 +5,11 @@ from __future__ import annotations
 import json
 import re
 from abc import ABC, abstractmethod
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from collections.abc import Mapping as AnyMapping
 from dataclasses import dataclass, field
 from decimal import Decimal
+from functools import partial
 from typing import Any, TypeAlias
 
 from epicycle.actors import Quantity, UnitError, parse_unit
@@ -220,14 +221,16 @@ class DimensionReader(NodeReader):
         if isinstance(node, Sequence):
             return self.listed(name, position, {name: Entry(entry.key, node)})
         if isinstance(node, Mapping):
-            keys = node.entries.keys()
-            for form, reader in (("zip", self.zipped), ("cases", self.cases)):
-                if form in keys and len(keys) == 1:
-                    return reader(name, position, node.entries[form].value)
-            for form in SAMPLINGS:
-                if form in keys and len(keys) == 1:
-                    return self.sampled(name, position, form, node.entries[form].value)
-            if keys & RANGE.keys.keys():
+            samplings = {form: partial(self.sampled, form) for form in SAMPLINGS}
+            readers: dict[str, Callable[[str, Position, Node], Dimension | Poison]] = {
+                "zip": self.zipped,
+                "cases": self.cases,
+                **samplings,
+            }
+            form = next(iter(node.entries), "")
+            if form in readers and len(node.entries) == 1:
+                return readers[form](name, position, node.entries[form].value)
+            if node.entries.keys() & RANGE.keys.keys():
                 return self.ranged(name, position, node)
         forms = ", ".join(f"{{{form}: ...}}" for form in ("zip", "cases", LATIN, SOBOL))
         hint = f"give a list, {{from, to, step}}, {forms} or {{{MORRIS}: ...}}"
@@ -326,7 +329,7 @@ class DimensionReader(NodeReader):
             return blame(self.problems, what, error, node)
         return found
 
-    def sampled(self, name: str, position: Position, form: str, node: Node) -> Dimension | Poison:
+    def sampled(self, form: str, name: str, position: Position, node: Node) -> Dimension | Poison:
         """Points of a box: a Latin hypercube, or the design of a sensitivity analysis."""
         entries = SAMPLINGS[form].entries(self, node, f"{form} of {name!r}") or {}
         if "size" not in entries or "ranges" not in entries:

@@ -13,12 +13,11 @@ from ..text.document import Entry, Mapping, Scalar, read
 from ..text.kinds import FILE
 from ..text.problems import POISON, Poison, Problems
 from ..text.reading import NAME, NAMES_HAVE, NodeReader, Text, split
-from .acts import acts
 from .models import CompositeText, ModelText, disturbance_of
 from .parts import PartText, beside
 from .places import PointcutText
 from .ports import ParameterText
-from .settings import Setting, in_option, value_in
+from .settings import Setting, acts, in_option, value_in
 from .usage import check_own_usage
 
 EXACTLY = "exactly"

@@ -37,25 +37,21 @@ def named_file(said: Text, folder: Path, kind: str, problems: Problems, who: str
 def read_model(name: str, problems: Problems) -> tuple[ModelText, dict[str, CompositeText]]:
     """What a model's file declares, and the composite classes of it and of everything it includes."""
     with problems.looking_for(FILE):
-        return _read_model(name, problems)
-
-
-def _read_model(name: str, problems: Problems) -> tuple[ModelText, dict[str, CompositeText]]:
-    path, text = find(name, "model", problems), None
-    node = None if path is None else read(path, problems)
-    if isinstance(node, Mapping) and "study" in node.entries:
-        problems.add(f"{name} is a study, not a model", None, f"run it: epicycle study {name}")
-    elif isinstance(node, Mapping) and "disturbance" in node.entries and "model" not in node.entries:
-        problems.add(f"{name} is a disturbance, not a model", None, f"add it to a model: MODEL --disturb {name}")
-    elif node is not None:
-        text = model_of(node, problems)
-    if path is None or not text:
-        return problems.whole(None)
-    found = _bases(text, path, problems)
-    with problems.looking_for(CLASS):
-        for base, _ in found[1:]:
-            text = extended(base, text, problems)
-    return text, _composites(found, problems)
+        path, text = find(name, "model", problems), None
+        node = None if path is None else read(path, problems)
+        if isinstance(node, Mapping) and "study" in node.entries:
+            problems.add(f"{name} is a study, not a model", None, f"run it: epicycle study {name}")
+        elif isinstance(node, Mapping) and "disturbance" in node.entries and "model" not in node.entries:
+            problems.add(f"{name} is a disturbance, not a model", None, f"add it to a model: MODEL --disturb {name}")
+        elif node is not None:
+            text = model_of(node, problems)
+        if path is None or not text:
+            return problems.whole(None)
+        found = _bases(text, path, problems)
+        with problems.looking_for(CLASS):
+            for base, _ in found[1:]:
+                text = extended(base, text, problems)
+        return text, _composites(found, problems)
 
 
 def _bases(text: ModelText, path: Path, problems: Problems) -> list[tuple[ModelText, Path]]:
@@ -90,18 +86,15 @@ def _is_below(path: Path, folder: Path) -> bool:
 
 def read_library(file: str | Path, problems: Problems) -> dict[str, CompositeText]:
     """The composite classes of a file, at its path or among the packaged ones, and of everything it includes."""
+    path = Path(file)
     with problems.looking_for(FILE):
-        return _read_library(Path(file), problems)
-
-
-def _read_library(path: Path, problems: Problems) -> dict[str, CompositeText]:
-    candidates = (path, *(folder / path for folder in model_folders()))
-    path = next((each for each in candidates if each.is_file()), path)
-    node, text = read(path, problems), None
-    if node is not None:
-        is_model = isinstance(node, Mapping) and "model" in node.entries
-        text = (model_of if is_model else library_of)(node, problems)
-    return _composites([(problems.whole(text), path)], problems)
+        candidates = (path, *(folder / path for folder in model_folders()))
+        path = next((each for each in candidates if each.is_file()), path)
+        node, text = read(path, problems), None
+        if node is not None:
+            is_model = isinstance(node, Mapping) and "model" in node.entries
+            text = (model_of if is_model else library_of)(node, problems)
+        return _composites([(problems.whole(text), path)], problems)
 
 
 def _composites(files: list[tuple[ModelText, Path]], problems: Problems) -> dict[str, CompositeText]:

@@ -13,7 +13,6 @@ from ..text.kinds import NAME as NOT_A_NAME
 from ..text.limits import MAX_SEED
 from ..text.problems import POISON, Poison, Position, Problems
 from ..text.reading import NodeReader, Text
-from .acts import ACTS, ActText
 from .fields import (
     AT,
     NAMED,
@@ -40,7 +39,7 @@ from .parts import PartText, parts
 from .places import CONNECTIONS, PATTERNS, ConnectionText
 from .ports import PARAMETERS as PARAMETER_SHAPE
 from .ports import PORTS, ParameterText, PortText
-from .settings import Setting, settings_like
+from .settings import ACTS, ActText, Setting, settings_like
 
 # -- composite classes --------------------------------------------------------------------------------------------
 
@@ -331,11 +330,13 @@ def _read(record: Record, node: Node, what: str, name: str, problems: Problems) 
         entries = record.entries(reader, node, what)
         if entries is POISON:
             return POISON
-        of_root = COMPOSITE.keys.keys() - {"extends", "director"}  # as in other composites
+        before, of_root = len(problems), COMPOSITE.keys.keys() - {"extends", "director"}  # as in other composites
         keys = Record("", {key: each for key, each in record.keys.items() if key not in of_root})
         said = sound(keys.values(reader, entries, what, node.position))
         own = {key: entry for key, entry in entries.items() if key in of_root}
         director = said.pop("director", None)
         root = composite(reader, said.pop("name", name), own, node.position, "extends" in entries)
-        others = tuple(entry.value for key, entry in entries.items() if key not in (*of_root, "composites"))
-        return ModelText(replace(root, director=director, written=(*root.written, *others)), **said)
+        others = [entry.value for key, entry in entries.items() if key not in (*of_root, "composites")]
+        # In a disturbance, whatever is wrong may use what seems unused.
+        wrong = [POISON] if record is DISTURBANCE and len(problems) > before else []
+        return ModelText(replace(root, director=director, written=(*root.written, *others, *wrong)), **said)

@@ -13,7 +13,7 @@ from typing import TypeAlias
 from epicycle.actors import random_stream
 
 from ..text.limits import MAX_SEED
-from .fields import QUANTITY_SCHEMA, Field, Record, node_as, number
+from .fields import QUANTITY_SCHEMA, Field, Reader, Record, Schema, node_as, number
 
 Point: TypeAlias = tuple[float, ...]
 
@@ -92,36 +92,26 @@ def morris_blocks(
     return blocks, steps
 
 
-_SAMPLING = {
-    "size": Field(number(int, 1, MAX_SAMPLES), "The number of points."),
-    "seed": Field(number(int, 0, MAX_SEED), "The seed that the points are drawn with (default: 0)."),
-    "ranges": Field(
-        node_as(
-            {
-                "type": "object",
-                "additionalProperties": {"type": "array", "items": QUANTITY_SCHEMA, "minItems": 2, "maxItems": 2},
-            }
+_RANGE: Schema = {"type": "array", "items": QUANTITY_SCHEMA, "minItems": 2, "maxItems": 2}
+
+
+def _sampling(size: Reader, about: str, **more: Field) -> Record:
+    """The mapping that says how to fill a box; ``about`` is what its size means."""
+    keys = {
+        "size": Field(size, about),
+        "seed": Field(number(int, 0, MAX_SEED), "The seed that the points are drawn with (default: 0)."),
+        "ranges": Field(
+            node_as({"type": "object", "additionalProperties": _RANGE}), "'path: [low, high]' for each parameter."
         ),
-        "'path: [low, high]' for each parameter.",
-    ),
-}
-HYPERCUBE = Record("", _SAMPLING, required=["size", "ranges"])
+    }
+    return Record("", {**keys, **more}, required=["size", "ranges"])
+
+
 _BLOCKS = number(int, 2, MAX_SAMPLES)
-SOBOL_INDICES = Record(
-    "",
-    {
-        **_SAMPLING,
-        "size": Field(_BLOCKS, "A power of 2: the number of blocks, of two points more than there are ranges."),
-    },
-    required=["size", "ranges"],
-)
-MORRIS_INDICES = Record(
-    "",
-    {
-        **_SAMPLING,
-        "size": Field(_BLOCKS, "The number of trajectories; each has a point per range, and one more."),
-        "levels": Field(number(int, 2, 1_000), "The values of the grid in each range, an even number (default: 4)."),
-    },
-    required=["size", "ranges"],
+_LEVELS = Field(number(int, 2, 1_000), "The values of the grid in each range, an even number (default: 4).")
+HYPERCUBE = _sampling(number(int, 1, MAX_SAMPLES), "The number of points.")
+SOBOL_INDICES = _sampling(_BLOCKS, "A power of 2: the number of blocks, of two points more than there are ranges.")
+MORRIS_INDICES = _sampling(
+    _BLOCKS, "The number of trajectories; each has a point per range, and one more.", levels=_LEVELS
 )
 SAMPLINGS = {LATIN: HYPERCUBE, SOBOL: SOBOL_INDICES, MORRIS: MORRIS_INDICES}

@@ -16,7 +16,6 @@ from epicycle.aspects import FiringTimeParameter
 
 from ..catalogue.reference import doc_of, first_sentence, parts_of
 from ..catalogue.types import Catalogue
-from .acts import ACT
 from .dimensions import RANGE, dimension_schema
 from .fields import (
     EXPRESSION,
@@ -37,6 +36,7 @@ from .places import CONNECTION, PATTERN_SCHEMA, POINTCUT, POINTCUTS_SCHEMA, PORT
 from .ports import PARAMETER, PORT
 from .questions import CLAIM, GUIDELINE
 from .sampling import HYPERCUBE, MORRIS_INDICES, SOBOL_INDICES
+from .settings import ACT
 from .study import METRIC as METRIC_OF_STUDY
 from .study import STUDY, UNTIL
 

@@ -1,4 +1,4 @@
-"""Settings from outside: ``--set path=value``, ``--overrides file``."""
+"""Settings from outside, ``--set path=value`` and ``--overrides file``, and the single acts of aspects that happen."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ from ..text.document import Mapping, Node, Scalar, parse, read
 from ..text.files import COMMAND_LINE
 from ..text.limits import NORMAL, Limits
 from ..text.patterns import Comparisons, PatternError, check_pattern, matches, names_asked, names_of
-from ..text.problems import Position, Problems
+from ..text.problems import POISON, Position, Problems
 from ..text.program import call_site, node_of
-from ..text.reading import NodeReader, is_empty, split
-from .fields import Reader
+from ..text.reading import NodeReader, Text, is_empty, split
+from .fields import AT, Reader, Record, keyed, number, ref
 
 
 @dataclass(frozen=True)
@@ -38,13 +38,13 @@ class Settings:
         self._exact: dict[str, list[int]] = {}
         self._patterns: dict[str, list[int]] = {}
         self._comparisons = Comparisons(limits.comparisons)
-        for number, setting in enumerate(self._all):
+        for place, setting in enumerate(self._all):
             if "*" in setting.path:
                 asked = names_asked(setting.path)
                 rare = next((name for name in asked if "[" in name and "*" not in name), asked[-1] if asked else "")
-                self._patterns.setdefault(rare, []).append(number)
+                self._patterns.setdefault(rare, []).append(place)
             else:
-                self._exact.setdefault(setting.path, []).append(number)
+                self._exact.setdefault(setting.path, []).append(place)
 
     def find(self, full: str) -> Setting | None:
         """The setting for the parameter at this path; all that match are marked as used.  Raises ``TooManyError``."""
@@ -175,3 +175,31 @@ def value_in(text: str, option: str, offset: int, problems: Problems) -> Node | 
     if len(option.splitlines()) > 1:  # lines and columns then count within the value
         return parse(text, COMMAND_LINE, problems)
     return parse(" " * offset + text, COMMAND_LINE, problems, option)
+
+
+@dataclass(frozen=True)
+class ActText:
+    """A single act of an aspect: its place, and the number of the token there, counted from 1."""
+
+    position: Position
+    aspect: Text = keyed(AT, "The name of the aspect.", missing=("an act names no aspect", "add 'aspect: NAME'"))
+    at: Text = keyed(
+        AT, "Its place: a port, a connection or an actor.", missing=("an act names no place", "add 'at: PATH'")
+    )
+    token: int = keyed(
+        number(int, 1),
+        "The number of the token, or firing, that passes it there: 1 is the first.",
+        missing=("an act names no token", "add 'token: 1' for the first"),
+    )
+
+
+ACT = Record.of(ActText, "A single act of an aspect.", type="object")
+
+
+def acts(reader: NodeReader, node: Node, what: str) -> tuple[ActText, ...]:
+    """A list of acts; those that are wrong are left out."""
+    read = [(ACT.read(reader, each, f"an act of {what!r}"), each) for each in reader.items(node, what) or ()]
+    return tuple(ActText(**said, position=each.position) for said, each in read if said and POISON not in said.values())
+
+
+ACTS = Reader({"type": ["array", "null"], "items": ref("act")}, acts)

@@ -255,12 +255,8 @@ class Awaiting:
     def take(self, over: bool) -> Found:
         """See the module."""
         # What there is nothing to judge in stands in nobody's way, and is not what was awaited.
-        self._left += [
-            each if each.value is not None else each._replace(value=math.inf) for each in self._left_of.take(over)
-        ]
-        self._right += [
-            each if each.value is not None else each._replace(value=-math.inf) for each in self._right_of.take(over)
-        ]
+        self._left += _filled(self._left_of.take(over), math.inf)
+        self._right += _filled(self._right_of.take(over), -math.inf)
         if not over or not self._left:
             return []
         left, right, self._left, self._right = self._left, self._right, [], []

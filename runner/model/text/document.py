@@ -23,7 +23,7 @@ from yaml.events import (
 
 from epicycle.actors import MAX_DEPTH, did_you_mean, irregular, open_regular
 
-from .files import note_file, note_text, opened_text, present
+from .files import note_file, opened_text, present
 from .frames import Frame
 from .kinds import FILE, KEY, SIZE, SYNTAX, Kind
 from .nodes import Entry, Mapping, Node, Scalar, Sequence, plain
@@ -46,9 +46,9 @@ def read(path: Path, problems: Problems, shown_as: str | None = None) -> Node | 
             text = _text_of(path, name, problems)
     if text is None:
         return None
-    note_text(path, name, text)
     if (opened := present()) is None:
         return parse(text, name, problems)
+    opened.read[name] = (path, text)
     before = len(problems)
     found: Node | None = opened.nodes.get(name) or opened.recall(name, text) or parse(text, name, problems)
     if found is not None and len(problems) == before:

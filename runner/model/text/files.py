@@ -58,12 +58,6 @@ def opened_text(path: Path) -> str | None:
         return None
 
 
-def note_text(path: Path, name: str, text: str) -> None:
-    """Keep a text that was read for whoever opened others."""
-    if (found := _opened.get()) is not None:
-        found.read[name] = (path, text)
-
-
 def present() -> Opened | None:
     """What is known of the texts that are read for whoever opened others."""
     return _opened.get()

@@ -2,10 +2,12 @@
 
 import re
 import unicodedata
+from bisect import bisect_left, bisect_right
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from enum import Enum
+from itertools import accumulate
 from typing import Final, Literal, NoReturn, TypeAlias, TypeVar
 
 from epicycle.actors import EpicycleError, nearest, shortened, visible, visible_character
@@ -271,38 +273,17 @@ def _excerpt(at: Position) -> tuple[str, str]:
     first = max(0, start - MAX_SOURCE_WIDTH)
     cells = [_cell(character) for character in at.source[first : start + 2 * MAX_SOURCE_WIDTH]]
     start -= first
+    columns = [*accumulate((width for _, width in cells), initial=0)]  # where each begins
     whole = first == 0 and len(cells) == len(at.source)
     low, high = 0, len(cells)
-    if not whole or _width(cells) > MAX_SOURCE_WIDTH:
+    if not whole or columns[-1] > MAX_SOURCE_WIDTH:
         room = MAX_SOURCE_WIDTH - 2 * len(_CUT)
-        low = _reach_left(cells, start, room // 3)
-        high = _reach_right(cells, low, room)
-        low = _reach_left(cells, high, room)  # near the end of the line, the left side takes the remaining room
+        low = bisect_left(columns, columns[start] - room // 3)
+        high = bisect_right(columns, columns[low] + room) - 1
+        low = bisect_left(columns, columns[high] - room)  # near the end of the line, the left side takes what is left
     cut_left = _CUT if first or low else ""
     cut_right = _CUT if first + high < len(at.source) else ""
     source = cut_left + "".join(shown for shown, _ in cells[low:high]) + cut_right
-    before = len(cut_left) + _width(cells[low:start])
+    before = len(cut_left) + columns[start] - columns[low]
     end = min(start + max(at.length, 1), high)
-    return source, " " * before + "^" * max(_width(cells[start:end]), 1)
-
-
-def _width(cells: list[tuple[str, int]]) -> int:
-    return sum(width for _, width in cells)
-
-
-def _reach_left(cells: list[tuple[str, int]], end: int, room: int) -> int:
-    """Return the least index from which the cells up to `end` fit into the room."""
-    index = end
-    while index > 0 and cells[index - 1][1] <= room:
-        index -= 1
-        room -= cells[index][1]
-    return index
-
-
-def _reach_right(cells: list[tuple[str, int]], start: int, room: int) -> int:
-    """Return the greatest index up to which the cells from `start` fit into the room."""
-    index = start
-    while index < len(cells) and cells[index][1] <= room:
-        room -= cells[index][1]
-        index += 1
-    return index
+    return source, " " * before + "^" * max(columns[end] - columns[start], 1)
