@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from bisect import bisect_right
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from itertools import chain
@@ -21,6 +21,7 @@ from ..model.text.files import COMMAND_LINE
 from ..model.text.problems import ModelError, Position, Problems
 from ..study.run.processes import Worker
 from ..study.session import available_cores
+from ..support.bars import Show, unseen
 from ..support.student import student_quantile
 from .cache import NUMBER, EvaluationCache
 from .calibration import Calibration, Fitted, Matched
@@ -47,18 +48,17 @@ def calibrate(
     out: Path | None = None,
     *,
     jobs: int | None = None,
-    tell: Callable[[int], None] = lambda runs: None,
+    show: Show = unseen,
 ) -> Calibration:
     """Fit parameters to measured signals, from the best of points that are spread over the ranges.
 
-    Each run is noted in the folder, so that a search that was killed continues there.  ``tell`` is called with how many
-    runs were made.  Raises ``EpicycleError``.
+    Each run is noted in the folder, so that a search that was killed continues there.  Raises ``EpicycleError``.
     """
     task = _Task(spec, goal)
     folder = out or results_folder(task.model.name, "calibration")
     cache = EvaluationCache(task.model, task.about(), [NUMBER], folder)
     with Evaluator(_Worker(task), jobs or available_cores(), _worker_of, spec, goal) as evaluator:
-        found = _fitted(_Runs(task, evaluator, cache, tell))
+        found = _fitted(_Runs(task, evaluator, cache, show))
     found.folder = folder
     return found
 
@@ -255,9 +255,9 @@ def _worker_of(spec: SearchSpec, goal: Match) -> _Worker:
 class _Runs:
     """Runs with different parameters, each made once."""
 
-    def __init__(self, task: _Task, evaluator: Evaluator, cache: EvaluationCache, tell: Callable[[int], None]) -> None:
+    def __init__(self, task: _Task, evaluator: Evaluator, cache: EvaluationCache, show: Show) -> None:
         self.task = task
-        self._evaluator, self._cache, self._tell = evaluator, cache, tell
+        self._evaluator, self._cache, self._show = evaluator, cache, show
         self._number = 0
 
     def expect(self, points: Iterable[Point]) -> None:
@@ -271,7 +271,7 @@ class _Runs:
 
         def found() -> Any:
             self._number += 1
-            self._tell(self._number)
+            self._show(self._number, None, f"{self._number:,} runs")
             return self._evaluator.make(key, point)
 
         values: list[float] = self._cache.outcome(key, found)

@@ -12,6 +12,8 @@ from epicycle.actors import EpicycleError
 from ..execution.engine import Interventions, Simulation
 from ..model.build.model import Model
 from ..model.text.problems import Problems
+from ..support.bars import Show, unseen
+from ..support.shown import short
 from .falsification import Falsification, Run
 from .faults import FaultSpace
 from .growing import Growing, study_of
@@ -31,20 +33,25 @@ def falsify(
     *,
     jobs: int | None = None,
     timeout: float | None = None,
-    tell: Callable[[int, Run | None], None] = lambda runs, least: None,
+    show: Show = unseen,
 ) -> Falsification:
     """Make runs until one breaks the property, or there are as many as are asked for.
 
-    Runs that are in the folder already are not made again, so that a search that was killed continues.  ``tell`` is
-    called with how many there are, and the one of least robustness.  Raises ``EpicycleError``.
+    Runs that are in the folder already are not made again, so that a search that was killed continues.  Raises
+    ``EpicycleError``.
     """
     searching = _Searching(spec, goal)
     found, growing = searching.found, searching.growing
     found.folder = folder = out or results_folder(found.model, "falsification")
+
+    def told() -> None:
+        known = "" if found.least is None else f", least robustness {short(found.least.robustness)}"
+        show(len(found.runs), goal.runs, f"{len(found.runs):,} runs{known}")
+
     points = searching.next()
     with growing.opened(points, folder, jobs, timeout):
         while points:
-            searching.make(points, lambda: tell(len(found.runs), found.least))
+            searching.make(points, told)
             points = [] if found.broken else searching.next()
     return found
 

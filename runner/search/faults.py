@@ -75,7 +75,7 @@ class FaultSpace:
 def _by_sum(size: int, count: int) -> Iterator[tuple[int, ...]]:
     """All sets of so many numbers below ``count``, those with the least sum first."""
     least = tuple(range(size))
-    waiting, seen = [(sum(least), least)], {least}
+    waiting, seen = [(math.comb(size, 2), least)], {least}  # by their sums
     while waiting:
         total, each = heappop(waiting)
         yield each

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,9 +16,10 @@ from ..model.language.study_metric import asks_for_none
 from ..model.text.document import parse, plain
 from ..model.text.files import COMMAND_LINE
 from ..model.text.problems import Position, Problems
-from ..study.inference import mean
+from ..study.inference import mean, with_interval
 from ..study.plan.plan import Plan
 from ..study.run.backlog import OK
+from ..support.bars import Show, unseen
 from .growing import Growing, study_of
 from .optimum import Optimum, Outcome, Tested
 from .proposals import Point, is_guided, proposals
@@ -37,12 +38,12 @@ def optimise(
     *,
     jobs: int | None = None,
     timeout: float | None = None,
-    tell: Callable[[Optimum], None] = lambda found: None,
+    show: Show = unseen,
 ) -> Optimum:
     """Try points until there are as many as are asked for, and then the best of them with new seeds.
 
-    Runs that are in the folder already are not made again, so that a search that was killed continues.  ``tell`` is
-    called after each batch.  Raises ``EpicycleError``.
+    Runs that are in the folder already are not made again, so that a search that was killed continues.  Raises
+    ``EpicycleError``.
     """
     work = _Optimising(spec, goal)
     found = work.found
@@ -52,7 +53,8 @@ def optimise(
     with work.growing.opened(points, folder, jobs, timeout):
         while True:
             tested = work.test(points)
-            tell(found)
+            known = "" if found.value is None else f", best {with_interval(found.value)}"
+            show(len(found.tested), goal.points, f"{len(found.tested):,} points{known}")
             if len(found.tested) >= goal.points:
                 break
             points = chosen.send([found.cost(each.outcome) for each in tested])[: goal.points - len(found.tested)]

@@ -59,6 +59,10 @@ def telling(
     return tell
 
 
+def unseen(done: float, total: float | None, words: str) -> None:
+    """Nobody looks."""
+
+
 def in_notebook() -> bool:
     """Whether a notebook shows what this process displays."""
     shell = getattr(sys.modules.get("IPython"), "get_ipython", lambda: None)()

@@ -103,6 +103,27 @@ def test_processes_start_where_the_work_is_long() -> None:
         assert [evaluator.make(each, each)[1] == os.getpid() for each in range(4)] == [True, True, False, False]
 
 
+class Waiting(Noted):
+    """Makes the first request only once somebody else has begun the second."""
+
+    def make(self, request: int) -> tuple[int, int]:
+        """The square and the process."""
+        since = time.monotonic()
+        while request == 0 and not [*Path(self._folder).glob("1-*")]:
+            assert time.monotonic() < since + 120.0
+            time.sleep(0.01)
+        return super().make(request)
+
+
+@pytest.mark.slow
+def test_processes_start_in_the_middle_of_what_is_made_here(tmp_path: Path) -> None:
+    with Evaluator(Waiting(str(tmp_path)), 2, Waiting, str(tmp_path), patience=0.1) as evaluator:
+        evaluator.expect((each, each) for each in range(3))
+        made = [evaluator.make(each, each) for each in range(3)]
+    assert [square for square, _ in made] == [0, 1, 4]
+    assert [process == os.getpid() for _, process in made] == [True, False, False]
+
+
 def test_a_model_that_only_this_program_knows(tmp_path: Path) -> None:
     model = epicycle.load("mm1", set={"load": 0.5})
     recipe = Recipe.of(model)

@@ -106,9 +106,13 @@ def search(
     >>> goal = epicycle.Match({"plant.output": "step.csv"})
     >>> epicycle.search("pid_loop", goal, vary={"plant.time_constant": "0.5 s..5 s"}).best
     """
-    from ...search.searching import found
+    from epicycle.actors import EpicycleError
+
+    from ...search.calibrating import calibrate
+    from ...search.falsifying import falsify
+    from ...search.optimising import optimise
     from ...study.run_spec import as_settings, seconds
-    from ...support.bars import bar
+    from ...support.bars import bar, unseen
 
     if unknown := given.keys() - SearchOptions.__annotations__.keys():
         raise TypeError(f"search() got an unexpected keyword argument {min(unknown)!r}")
@@ -126,9 +130,16 @@ def search(
         tuple(command),
     )
     folder = None if out is None else Path(out)
-    with bar("search") as show:
-        seen = show if given.get("progress", True) else None
-        return found(spec, goal, folder, jobs=given.get("jobs"), timeout=given.get("run_timeout"), show=seen)
+    jobs, timeout = given.get("jobs"), given.get("run_timeout")
+    with bar("search") as shown:
+        show = shown if shown is not None and given.get("progress", True) else unseen
+        if isinstance(goal, Break):
+            return falsify(spec, goal, folder, jobs=jobs, timeout=timeout, show=show)
+        if isinstance(goal, Minimise):
+            return optimise(spec, goal, folder, jobs=jobs, timeout=timeout, show=show)
+        if timeout is not None:
+            raise EpicycleError("--run-timeout is not for --match, which needs every run")
+        return calibrate(spec, goal, folder, jobs=jobs, show=show)
 
 
 def explain(

@@ -64,7 +64,7 @@ def _flags_with(name: str) -> Iterator[str]:
             yield first.flag
 
 
-@of_call(searching.search, JSON, first=(_goals,), imports=("search.searching",))
+@of_call(searching.search, JSON, first=(_goals,), imports=("search.falsifying", "search.optimising"))
 def search(options: argparse.Namespace) -> int:
     """Search for what the goal says; the exit code is 3 if a broken run was found, and 1 if nothing was that counts."""
     goal = _goal(options)

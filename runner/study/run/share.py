@@ -52,11 +52,10 @@ class Share:
             return plan.size
         if plan.study.until:
             return len(range(self.number, plan.conditions, self.of)) * plan.replications
-        return sum(  # over what a condition may leave, and what its replications must leave then
-            len(range(rest, plan.conditions, self.of))
-            * len(range((self.number - rest) % self.of, plan.replications, self.of))
-            for rest in range(min(self.of, plan.conditions))
-        )
+        rounds, rest = divmod(plan.replications, self.of)  # `rest` shares have one run more of a condition
+        turns, others = divmod(plan.conditions, self.of)
+        more = sum((self.number - condition) % self.of < rest for condition in range(others))
+        return plan.conditions * rounds + turns * rest + more
 
 
 ALL = Share()
