@@ -27,13 +27,13 @@ from epicycle.runner.search.calibration import Calibration as Calibration
 from epicycle.runner.search.comparing import Comparison as Comparison
 from epicycle.runner.search.explanation import Explanation as Explanation
 from epicycle.runner.search.falsification import Falsification as Falsification
-from epicycle.runner.search.what_if import WhatIf as WhatIf
 from epicycle.runner.search.optimum import Optimum as Optimum
 from epicycle.runner.search.spec import Break as Break
 from epicycle.runner.search.spec import Match as Match
 from epicycle.runner.search.spec import Maximise as Maximise
 from epicycle.runner.search.spec import Minimise as Minimise
 from epicycle.runner.search.splitting import RareEvent as RareEvent
+from epicycle.runner.search.what_if import WhatIf as WhatIf
 from epicycle.runner.show.pictures import Picture as Picture
 from epicycle.runner.show.pictures import plot as plot
 from epicycle.runner.show.pictures import save as save
