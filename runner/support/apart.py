@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import pickle
 import queue
@@ -22,6 +23,7 @@ _PROGRAM = f"from {__name__} import serve; serve()"
 _BEGIN_LIMIT = 30.0  # s until a process has started
 _LOOK = 0.5  # s between two checks whether an answer is still wanted
 _GRACE = 1.0  # s for an object to close itself
+_REST = 0.1  # s without a request
 _SETTLED = 2  # calls after which everything is loaded
 # One thread a process: N processes of N threads each would only be in each other's way.
 _THREADS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS", "NUMBA_NUM_THREADS")
@@ -224,7 +226,7 @@ def serve() -> None:
     try:
         with seldom_collecting():
             _reply(_answer_to(it, None))
-            for number, request in enumerate(filter(None, iter(_given.get, None))):
+            for number, request in enumerate(filter(None, iter(_next, None))):
                 _reply(_answer_to(it, request))
                 if number == _SETTLED:  # what has been loaded until now need not be searched for garbage again
                     keep_for_good()
@@ -232,6 +234,14 @@ def serve() -> None:
             it[0].close()
     except BrokenPipeError:
         os._exit(1)
+
+
+def _next() -> Any:
+    """The next request; what the ones before have left is cleared away when nobody waits."""
+    with suppress(queue.Empty):
+        return _given.get(timeout=_REST)
+    gc.collect()
+    return _given.get()
 
 
 def _reply(what: bytes) -> None:

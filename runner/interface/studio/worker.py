@@ -5,8 +5,6 @@ What an editor asks about the text, and changes of it, are those of the Language
 
 from __future__ import annotations
 
-import gc
-import threading
 import time
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
@@ -37,7 +35,6 @@ from ..calls.changes import classes
 MEMORY = 4 << 30  # bytes that a worker may take
 MOST = 100_000  # firings that a run shows
 BEAT = 0.2  # s between two messages of a run
-REST = 0.1  # s without a question
 
 Message = dict[str, Any]
 _DATA = get_converter()  # of the Language Server Protocol, as JSON has it
@@ -60,7 +57,6 @@ class Worker:
         self.answers = Answers(tuple(classes(self.files)))
         self.ended = ""  # why the latest run was ended
         self.say = say
-        self._clearing = threading.Timer(REST, gc.collect)
 
     @classmethod
     def limited(cls, *given: Any) -> Worker:
@@ -73,8 +69,7 @@ class Worker:
         return cls(*given)
 
     def answer(self, asked: Message) -> Message:
-        """The answer to a question; what it leaves is cleared away when nobody waits."""
-        self._clearing.cancel()
+        """The answer to a question; what is wrong with it is said in words."""
         try:
             return self._answer(asked)
         except StaleError:
@@ -85,10 +80,6 @@ class Worker:
             return {"error": f"this question cannot be read ({type(error).__name__})"}
         except MemoryError:
             return {"error": "there is not enough memory"}
-        finally:
-            self._clearing = threading.Timer(REST, gc.collect)
-            self._clearing.daemon = True
-            self._clearing.start()
 
     def _answer(self, asked: Message) -> Message:
         text = asked["text"]
