@@ -35,8 +35,8 @@ if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:
 
 # Each process that needs kernels would compile them all, and two that start together do so twice.
 KERNELS = (
-    "warm_up._call_solver(2); warm_up._call_tracking()",
-    "warm_up.call_others(); warm_up._call_solver(3); warm_up._call_retreats()",
+    "warm_up.compile_modules('association'); warm_up.compile_modules('barrier', which=slice(1))",
+    "warm_up.compile_others(); warm_up.compile_modules('retreat', 'lines_of_sight', 'barrier')",
 )
 
 

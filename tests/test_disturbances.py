@@ -207,7 +207,7 @@ def test_every_plan_is_as_old_as_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
     from epicycle.actors.robotics.numerics import reachability
     from epicycle.actors.robotics.numerics.warm_up import compile_kernels
 
-    compile_kernels()  # which calls it, too
+    compile_kernels()
     used: list[tuple[float, np.ndarray]] = []
     original = reachability.peer_tubes
 

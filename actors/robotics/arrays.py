@@ -6,8 +6,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Sequence
-from typing import Any, TypeVar
+from collections.abc import Iterable, Sequence
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,7 +15,6 @@ from numpy.typing import ArrayLike, NDArray
 Array = NDArray[np.float64]
 # Of floats: arithmetic on arrays of two takes ten times as long.
 Pair = tuple[float, float]
-Function = TypeVar("Function", bound=Callable[..., object])
 
 _FLOAT = np.dtype(np.float64)  # NumPy searches for it at each call if the type is given instead
 
@@ -70,12 +69,4 @@ def stacked(rows: Iterable[Array], columns: int) -> Array:
     return table
 
 
-def entered(jitted: Function, compiled: Callable[[], Any], takes: str, gives: str) -> Function:
-    """A kernel as Python calls it: by numba's own way, which takes long to check each array.
-
-    In C it is called by its address, which is in the object that ``compiled`` returns, with the address of a row of
-    words: first a function that makes an array from an address and its shape; then the arguments that the kernel
-    ``takes``, a float (d), an int (i), a bool (b), or an array of 1 to 9 dimensions, as its address and a word for each
-    length. If it returns 1, the results it ``gives`` are in the same place.
-    """
-    return jitted
+Entry: Any = None  # in C, what calls a kernel by its address, see ``numerics.entry``

@@ -128,36 +128,54 @@ cpdef stacked(rows, Py_ssize_t columns):
 
 cdef enum:
     WORDS = 128  # more than any kernel takes
-ctypedef int64_t (*Code)(int64_t*) noexcept
+ctypedef int64_t (*Code)(int64_t*, double*) noexcept
 
 
 cdef class Entry:
-    """A kernel called by its address; its arguments become words, see ``entered`` in arrays.py."""
+    """A kernel called by its address, which is in the object that ``compiled`` returns with the kinds of what it takes
+    and gives: a float (d), an int (i), a bool (b), or an array of 1 to 9 dimensions.
+
+    It gets the address of a row of words twice: first a function that makes an array from an address and its shape; then
+    the arguments, an array as its address and a word for each length.  If it returns 1, the results are in the same
+    place.
+    """
 
     cdef Code code  # none before the first call
     cdef object owner  # of the code
-    cdef object compiled
+    cdef object function, compiled, typed
     cdef bytes takes, gives
-    cdef readonly object jitted  # the same, as kernels call it
 
-    def __init__(self, jitted, compiled, str takes, str gives):
-        self.jitted, self.compiled = jitted, compiled
-        self.takes, self.gives = takes.encode(), gives.encode()
-        assert sum([1 + int(each) if each.isdigit() else 1 for each in takes]) < WORDS
+    def __init__(self, function, compiled, typed):
+        self.function, self.compiled, self.typed = function, compiled, typed
 
     def __reduce__(self):  # by name: an address is good in one process
-        return kernel_of, (self.jitted.__module__, self.jitted.__name__)
+        return kernel_of, (self.function.__module__, self.function.__name__)
+
+    @property
+    def _numba_type_(self):
+        return self.typed()  # as numba sees it where a kernel calls another
+
+    def compile(self):
+        self.owner, takes, gives = self.compiled()
+        self.takes, self.gives = takes.encode(), gives.encode()
+        assert sum([1 + int(each) if each.isdigit() else 1 for each in takes]) < WORDS
+        self.code = <Code><intptr_t>self.owner.address
 
     def __call__(self, *arguments):
         cdef int64_t[WORDS] words
         cdef int64_t* word = words + 1
-        cdef const char* kinds = self.takes
-        cdef Py_ssize_t place, count = len(self.takes)
+        cdef const char* kinds
+        cdef Py_ssize_t place = 0, count
         cdef int axis
         cdef list kept = None
         if self.code is NULL:
-            self.owner = self.compiled()
-            self.code = <Code><intptr_t>self.owner.address
+            self.compile()
+        kinds, count = self.takes, len(self.takes)
+        for argument in arguments:
+            if not isinstance(argument, tuple):
+                continue
+            arguments = tuple([field for each in arguments for field in (each if isinstance(each, tuple) else (each,))])
+            break
         if len(arguments) != count:
             raise TypeError(f"a kernel of {count} arguments is given {len(arguments)}")
         for place in range(count):
@@ -180,7 +198,7 @@ cdef class Entry:
                     word[0] = numpy.PyArray_DIM(<numpy.ndarray>value, axis)
             word += 1
         words[0] = <int64_t><intptr_t>&boxed
-        if self.code(words) != 1:
+        if self.code(words, <double*>words) != 1:
             raise MemoryError("a kernel has failed")
         if len(self.gives) == 1:
             return given(self.gives[0], words)
@@ -211,7 +229,3 @@ cdef given(char kind, int64_t* word):
 def kernel_of(module, name):
     """A kernel by its name."""
     return getattr(import_module(module), name)
-
-
-def entered(jitted, compiled, takes, gives):
-    return Entry(jitted, compiled, takes, gives)

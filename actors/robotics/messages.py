@@ -11,7 +11,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from .arrays import floats
+from .arrays import Array, floats
 from .sensor_models import RANGE, SensorModel, model_of
 from .tokens import Numbers, Token, array, part, token
 
@@ -53,13 +53,18 @@ class Measurement(Token):
         """What the sensor measures."""
         return model_of(self.kind, self.along, self.across)
 
+    @property
+    def seen_from(self) -> Array:
+        """The observer as the sensor's model takes it."""
+        return self.observer
+
     def expected(self, target: Sequence[float]) -> Sequence[float]:
         """What would be measured without noise if the state of the target (2 d) were this one."""
-        return self.sensor.h(target, floats(self.observer))
+        return self.sensor.h(target, floats(self.seen_from))
 
     def noise(self, target: Sequence[float]) -> Sequence[Sequence[float]]:
         """The covariance of the measurement if the state of the target were this one."""
-        return self.sensor.noise(target, floats(self.observer))
+        return self.sensor.noise(target, floats(self.seen_from))
 
     def innovation(self, target: Sequence[float]) -> Sequence[float]:
         """What was measured, minus what is expected of a state of the target."""
@@ -83,13 +88,10 @@ class Observation(Measurement):
         """What the sensor measures."""
         return self.model
 
-    def expected(self, target: Sequence[float]) -> Sequence[float]:
-        """What would be measured without noise if the state of the target (2 d) were this one."""
-        return self.model.h(target, floats(self.state))
-
-    def noise(self, target: Sequence[float]) -> Sequence[Sequence[float]]:
-        """The covariance of the measurement if the state of the target were this one."""
-        return self.model.noise(target, floats(self.state))
+    @property
+    def seen_from(self) -> Array:
+        """The state of the robot."""
+        return self.state
 
 
 @token(RANGE=RANGE)

@@ -21,36 +21,42 @@ import math
 
 import numpy as np
 
-from ...core.elementary import exp, hypot
-from .compiled import Array, entry, inner, kernel
-from .ukf import _KIND as KIND
-from .ukf import _OBSERVER as OBSERVER
-from .ukf import RANGE, _finite, _root, constant_velocity, measurement_noise, predict, sigma_points, update
+from ...core.elementary import exp
+from .compiled import Array, Layers, Row, Table, inner, kernel
+from .ukf import (
+    _OBSERVER,
+    _add_products,
+    _finite,
+    _range,
+    _root,
+    centred,
+    constant_velocity,
+    images_of,
+    measurement_noise,
+    predict,
+    rows_of,
+    sigma_points,
+    update,
+)
 
-VALUE = OBSERVER + 2  # column; a scan is in the plane
+VALUE = _OBSERVER + 2  # column; a scan is in the plane
 LARGEST = 1 << 17  # numbers of a pass over a cluster: 10 tracks with 127 detections, or 5 with 4095
 _TERMS = 1000  # of a series that ends long before
 
 
-@kernel
+@inner
 def gate_probability(gate: float, dimensions: int) -> float:
-    """The probability that a sum of squares of 1, 2 or more standard normal variables is at most ``gate``."""
+    """The probability that a sum of squares of 1 or 2 standard normal variables is at most ``gate``."""
     decay = exp(-0.5 * gate)
-    if dimensions % 2 == 0:
-        below, term, first = 1.0 - decay, decay, 2
-    else:
-        below = term = math.sqrt(2.0 * gate / math.pi) * decay  # the series of erf(sqrt(gate / 2))
-        for i in range(1, _TERMS):
-            term *= gate / (2.0 * i + 1.0)
-            below += term
-            if term <= 1e-17 * below:
-                break
-        term, first = math.sqrt(2.0 * gate / math.pi) * decay, 1
-    for k in range(first, dimensions, 2):
-        if k > 1:
-            term *= gate / k
-        below -= term
-    return min(max(below, 0.0), 1.0)
+    if dimensions == 2:
+        return 1.0 - decay
+    below = term = math.sqrt(2.0 * gate / math.pi) * decay  # the series of erf(sqrt(gate / 2))
+    for i in range(1, _TERMS):
+        term *= gate / (2.0 * i + 1.0)
+        below += term
+        if term <= 1e-17 * below:
+            break
+    return min(below, 1.0)
 
 
 @inner
@@ -140,7 +146,7 @@ def _compete(weights: Array) -> Array:
     return result
 
 
-@kernel
+@inner
 def association_probabilities(weights: Array) -> tuple[Array, int]:
     """The probabilities (T, 1 + m) that tracks caused no detection, or one of m, and how many were not exact.
 
@@ -186,26 +192,12 @@ def association_probabilities(weights: Array) -> tuple[Array, int]:
 
 
 @inner
-def _expected(points: Array, weights: Array, detection: Array, noise: Array) -> tuple[Array, Array]:
-    """What the sensor of a detection should measure of a target at sigma points, and the covariance of the innovation
-    as a lower Cholesky factor."""
-    size = 1 if detection[KIND] == RANGE else 2
-    images, expected, spread = np.empty((points.shape[0], size)), np.zeros(size), np.zeros((size, size))
-    for i in range(points.shape[0]):
-        dx, dy = points[i, 0] - detection[OBSERVER], points[i, 1] - detection[OBSERVER + 1]
-        images[i, 0] = hypot(dx, dy) if size == 1 else dx
-        if size == 2:
-            images[i, 1] = dy
-        for k in range(size):
-            expected[k] += weights[i] * images[i, k]
-    spread[0, 0] = noise[0]
-    if size == 2:
-        spread[0, 1] = spread[1, 0] = noise[1]
-        spread[1, 1] = noise[2]
-    for i in range(points.shape[0]):
-        for j in range(size):
-            for k in range(size):
-                spread[j, k] += weights[i] * (images[i, j] - expected[j]) * (images[i, k] - expected[k])
+def _expected(points: Array, weights: Array, sensor: Array, noises: Array) -> tuple[Array, Array]:
+    """What a sensor (1, 7) should measure of a target at sigma points, and the covariance of the innovation as a lower
+    Cholesky factor."""
+    images, _, spread = images_of(points, sensor, noises)
+    expected = centred(images, weights)
+    _add_products(spread, weights, images, images)
     return expected, _root(spread)
 
 
@@ -226,17 +218,16 @@ def _squared(difference: Array, root: Array) -> float:
 
 
 @inner
-def _share_in_range(points: Array, weights: Array, detection: Array, max_range: float) -> float:
-    """The probability that a target at sigma points is within the range of a sensor."""
+def _share_in_range(points: Array, weights: Array, sensor: Array, max_range: float) -> float:
+    """The probability that a target at sigma points is within the range of a sensor (1, 7)."""
     result = 0.0
     for i in range(points.shape[0]):
-        dx, dy = points[i, 0] - detection[OBSERVER], points[i, 1] - detection[OBSERVER + 1]
-        if hypot(dx, dy) <= max_range:
+        if _range(points, i, sensor, 0) <= max_range:
             result += weights[i]
     return result
 
 
-@kernel
+@inner
 def detection_weights(
     means: Array, covariances: Array, existence: Array, kappa: float, sensor: Array, detections: Array,
     probability: float, density: float, max_range: float, gate: float, averaged: bool,
@@ -249,23 +240,19 @@ def detection_weights(
     values, in 1 / m^2, or 1 / m for ranges.
     """
     tracks, count = means.shape[0], detections.shape[0]
-    weights, noises, shares, silent = (
-        np.zeros((tracks, 1 + count)),
-        np.empty((tracks, 3)),
-        np.empty(tracks),
-        np.empty(tracks),
-    )
-    size = 1 if sensor[KIND] == RANGE else 2
+    weights, noises = np.zeros((tracks, 1 + count)), np.empty((tracks, 3))
+    shares, silent = np.empty(tracks), np.empty(tracks)
+    row = sensor.reshape((1, sensor.shape[0]))
+    size = rows_of(row)
     inside = gate_probability(gate, size)
     for t in range(tracks):
         points, spread = sigma_points(means[t], covariances[t], kappa)
-        row = sensor.reshape((1, sensor.shape[0]))
         if averaged:
             noises[t] = measurement_noise(points, spread, row)[0]
         else:
             noises[t] = measurement_noise(points[:1], np.ones(1), row)[0]
-        shares[t] = _share_in_range(points, spread, sensor, max_range)
-        expected, root = _expected(points, spread, sensor, noises[t])
+        shares[t] = _share_in_range(points, spread, row, max_range)
+        expected, root = _expected(points, spread, row, noises[t : t + 1])
         detected = probability * min(shares[t], 1.0)
         silent[t] = 1.0 - detected * inside
         weights[t, 0] = 1.0 - existence[t] * detected * inside
@@ -318,14 +305,11 @@ def _mixed(probabilities: Array, means: Array, covariances: Array) -> tuple[Arra
     return mean, covariance
 
 
-@entry(
-    "Tuple((f8[:, ::1], f8[:, :, ::1], f8[::1], f8[:, ::1], f8[::1], i8))(f8[:, ::1], f8[:, :, ::1], f8[::1], f8, "
-    "f8[::1], f8[:, ::1], f8, f8, f8, f8, b1)"
-)
+@kernel
 def fuse_scan(
-    means: Array, covariances: Array, existence: Array, kappa: float, sensor: Array, detections: Array,
+    means: Table, covariances: Layers, existence: Row, kappa: float, sensor: Row, detections: Table,
     probability: float, density: float, max_range: float, gate: float, averaged: bool,
-) -> tuple[Array, Array, Array, Array, Array, int]:  # fmt: skip
+) -> tuple[Table, Layers, Row, Table, Row, int]:  # fmt: skip
     """Tracks (T, n) after a scan: their means and covariances, how likely each exists (T,), which detection each caused
     if it exists (T, 1 + m), how likely each is in range (T,), and how many tracks' probabilities are not exact.
 
@@ -360,10 +344,10 @@ def fuse_scan(
     return then, spread, alive, caused, shares, rough
 
 
-@entry("Tuple((f8[:, ::1], f8[:, :, ::1], f8[::1]))(f8[:, ::1], f8[:, :, ::1], f8[::1], f8[:, ::1], f8, f8)")
+@kernel
 def predict_tracks(
-    means: Array, covariances: Array, existence: Array, noise: Array, elapsed: float, lifetime: float
-) -> tuple[Array, Array, Array]:
+    means: Table, covariances: Layers, existence: Row, noise: Table, elapsed: float, lifetime: float
+) -> tuple[Table, Layers, Row]:
     """Tracks (T, 4) ``elapsed`` seconds later, with the process ``noise`` of that time; targets have a mean
     ``lifetime``."""
     then, spread, alive = means.copy(), covariances.copy(), existence.copy()
@@ -375,13 +359,13 @@ def predict_tracks(
     return then, spread, alive
 
 
-@entry("Tuple((f8[::1], f8[:, ::1]))(f8[::1], f8)")
-def new_track(detection: Array, velocity_variance: float) -> tuple[Array, Array]:
+@kernel
+def new_track(detection: Row, velocity_variance: float) -> tuple[Row, Table]:
     """The mean (4,) and covariance of a track that begins with one relative position: at rest, so far as is known."""
     mean, covariance = np.zeros(4), np.zeros((4, 4))
     place = np.empty((1, 2))
     for c in range(2):
-        mean[c] = place[0, c] = detection[OBSERVER + c] + detection[VALUE + c]
+        mean[c] = place[0, c] = detection[_OBSERVER + c] + detection[VALUE + c]
         covariance[2 + c, 2 + c] = velocity_variance
     noise = measurement_noise(place, np.ones(1), detection.reshape((1, detection.shape[0])))
     covariance[0, 0], covariance[1, 1] = noise[0, 0], noise[0, 2]
@@ -400,8 +384,8 @@ def _separation(means: Array, covariances: Array, i: int, j: int) -> float:
     return _squared(difference, _root(spread))
 
 
-@entry("f8[::1](f8[:, ::1], f8[:, :, ::1], f8)")
-def duplicates(means: Array, covariances: Array, distance: float) -> Array:
+@kernel
+def duplicates(means: Table, covariances: Layers, distance: float) -> Row:
     """1 for each track (T, n) nearer than a squared Mahalanobis ``distance`` to an earlier one without a 1, else 0."""
     result = np.zeros(means.shape[0])
     for i in range(means.shape[0]):
@@ -411,8 +395,8 @@ def duplicates(means: Array, covariances: Array, distance: float) -> Array:
     return result
 
 
-@entry("f8[:, ::1](f8[:, ::1], f8[:, :, ::1], i8)")
-def separations(means: Array, covariances: Array, count: int) -> Array:
+@kernel
+def separations(means: Table, covariances: Layers, count: int) -> Table:
     """The squared Mahalanobis distance of each of the first ``count`` tracks (T, n), a row, to each of the others."""
     others = means.shape[0] - count
     result = np.empty((count, others))

@@ -21,11 +21,11 @@ mean: the result keeps f1 and f2 if the start does.
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
-from .compiled import Array, borrower, entry
+from .compiled import Array, Layers, Table, borrower, kernel
 from .constraints import BOUND, ROUNDING, VALUE
 from .horizon import TOLERANCE, HorizonProblem, Solution
 from .newton import newton_step
@@ -226,33 +226,26 @@ def solve(problem: HorizonProblem, starts: Array, rules: Rules = _RULES) -> Solu
     hardest braking that f2 allows.  Never raises, and the controls are always finite and keep f2; if numbers of the
     problem are not finite, or too large to be squared, the violation may be inf.
     """
-    solve_here = _solve_in_plane if len(problem.position) == 2 else _solve_in_space
-    return Solution(*solve_here(*problem, *rules, starts))  # field by field, as a named tuple takes numba 4 us longer
+    solve_here = SOLVERS[len(problem.position)]
+    return Solution(*solve_here(problem, rules, starts))
 
 
-_SIGNATURE = (
-    "Tuple((f8[:, ::1], f8, f8, i8))(f8, f8[::1], f8[::1], f8, f8, f8[:, ::1], f8[::1], f8, f8, f8[:, :, ::1], "
-    "f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1], i8, f8[:, ::1], f8[:, ::1], f8[::1], f8[:, ::1], f8, f8, f8, "
-    "f8, f8, f8, f8, f8, f8, i8, i8, f8[:, :, ::1])"
-)
-
-
-@entry(_SIGNATURE)
-def _solve_in_plane(*fields: Any) -> tuple[Array, float, float, int]:
-    """The fields of the problem and the rules, and the starts."""
-    problem, rules, starts = HorizonProblem(*fields[:-5]), Rules(*fields[-5:-1]), fields[-1]
+@kernel
+def _solve_in_plane(problem: HorizonProblem, rules: Rules, starts: Layers) -> tuple[Table, float, float, int]:
     best, room = np.empty(starts.shape[1:]), np.empty(room_for(problem, starts.shape[1], 2))
     violation, objective, iterations = _search(problem, rules, starts, best, room, (0.0, 0.0))
     return best, violation, objective, iterations
 
 
-@entry(_SIGNATURE)
-def _solve_in_space(*fields: Any) -> tuple[Array, float, float, int]:
+@kernel
+def _solve_in_space(problem: HorizonProblem, rules: Rules, starts: Layers) -> tuple[Table, float, float, int]:
     """The same with vectors of three numbers, compiled when first needed."""
-    problem, rules, starts = HorizonProblem(*fields[:-5]), Rules(*fields[-5:-1]), fields[-1]
     best, room = np.empty(starts.shape[1:]), np.empty(room_for(problem, starts.shape[1], 3))
     violation, objective, iterations = _search(problem, rules, starts, best, room, (0.0, 0.0, 0.0))
     return best, violation, objective, iterations
+
+
+SOLVERS = {2: _solve_in_plane, 3: _solve_in_space}
 
 
 @borrower

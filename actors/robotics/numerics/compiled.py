@@ -7,22 +7,53 @@ Both give the same bits.  Numba is heavy, and imported where it compiles or load
 
 from __future__ import annotations
 
+import hashlib
 import importlib
 import os
 import sys
 import time
 from collections.abc import Callable
-from typing import Any, TypeVar, cast
+from contextlib import suppress
+from pathlib import Path
+from typing import Annotated, Any, TypeAlias, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .kept import folder, mark
+from ...core import elementary
 
 Array = NDArray[np.float64]  # the one array type of the kernels
+# The same with its dimensions, which is what the annotations of a ``kernel`` say.
+Row: TypeAlias = Annotated[Array, 1]
+Table: TypeAlias = Annotated[Array, 2]
+Layers: TypeAlias = Annotated[Array, 3]
 Function = TypeVar("Function", bound=Callable[..., object])
 
 _LIMIT = 10.0  # s that a process spends in kernels as Python before it compiles them
+_HERE = Path(__file__).parent
+_FILES = [path for folder in (_HERE, Path(elementary.__file__).parent) for path in sorted(folder.glob("*.py"))]
+_SOURCES = hashlib.sha256(b"".join(path.read_bytes() for path in _FILES)).hexdigest()[:16]
+
+
+def folder() -> Path:
+    """Where compiled code is kept; named after all sources of this package and of the elementary functions.
+
+    By itself, numba checks only the file of a kernel, and would keep using old code that it calls from others.
+    """
+    if own := os.environ.get("NUMBA_CACHE_DIR"):
+        above = Path(own)
+    elif os.access(_HERE, os.W_OK):
+        above = _HERE / "__pycache__"
+    else:
+        above = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "epicycle"
+    return above / _SOURCES
+
+
+def mark(name: str) -> None:
+    """Leave a note for later processes, if files can be made."""
+    with suppress(OSError):
+        folder().mkdir(parents=True, exist_ok=True)
+        (folder() / name).touch()
 
 
 class _Ledger:
@@ -67,10 +98,9 @@ LEDGER = _Ledger()
 class Kernel:
     """A kernel that Python runs until it is worth compiling."""
 
-    def __init__(self, function: Callable[..., Any], compiled: Callable[[], Any]) -> None:
+    def __init__(self, function: Callable[..., Any]) -> None:
         self.__module__, self.__name__, self.__doc__ = function.__module__, function.__name__, function.__doc__
         self._function = function
-        self._compile = compiled
         self._compiled: Any = None
 
     def __call__(self, *arguments: Any) -> Any:
@@ -83,7 +113,7 @@ class Kernel:
             except (ArithmeticError, ValueError):  # where compiled code gives inf or NaN
                 LEDGER.close()
             LEDGER.prepare()
-            self._compiled = self._compile()
+            self._compiled = entered(self._function)
         return self._compiled(*arguments)
 
     def __reduce__(self) -> Any:
@@ -100,33 +130,24 @@ def kernel_of(module: str, name: str) -> Any:
     return getattr(importlib.import_module(module), name)
 
 
-def _made(function: Function, compiled: Callable[[], Any]) -> Function:
+def kernel(function: Function) -> Function:
+    """A pure function that Python calls, and that its annotations give the types of.
+
+    It takes and returns floats, ints, bools, and contiguous arrays of floats (``Row``, ``Table``, ``Layers``), and
+    takes named tuples of them.
+    """
+    KERNELS.setdefault(function.__module__, []).append(function)
     if IS_PYTHON:
         return function
-    return compiled() if IS_READY else cast(Function, Kernel(function, compiled))
+    return cast(Function, entered(function) if IS_READY else Kernel(function))
 
 
-def kernel(function: Function) -> Function:
-    """A pure function on arrays that Python calls."""
-    return _made(function, lambda: jit().dispatcher(function))
+def entered(function: Callable[..., Any]) -> Any:
+    """A kernel that is compiled, or found on disk, when it is called."""
+    jit()
+    from . import entry
 
-
-def entry(signature: str) -> Callable[[Function], Function]:
-    """A ``kernel`` that Python calls often, with the types of a numba signature.
-
-    It takes and returns floats, ints, bools, and contiguous arrays of floats.
-    """
-
-    def decorate(function: Function) -> Function:
-        def compiled() -> Any:
-            jit()
-            from .entry import entered_by_address
-
-            return entered_by_address(function, signature)
-
-        return _made(function, compiled)
-
-    return decorate
+    return entry.entered(function)
 
 
 def _called_by_kernels(function: Function, **options: bool) -> Function:
@@ -183,4 +204,5 @@ def jit() -> Any:
 
 IS_PYTHON = os.environ.get("NUMBA_DISABLE_JIT", "0") not in ("", "0")
 IS_READY = not IS_PYTHON and (folder() / "compiled").exists()
+KERNELS: dict[str, list[Callable[..., Any]]] = {}  # by module
 _DECLARED: list[Callable[[Any], None]] = []

@@ -1,126 +1,144 @@
-"""The entry from Python into a kernel.
+"""The entry from Python into a kernel, made of its annotations.
 
-Numba's own entry checks the type of each argument, counts references to each array, and takes 0.5 us for each array
-that a kernel returns.  The compiled core calls a kernel by its address instead, with a row of words that locate all
-numbers (``Entry`` in ``arrays.pyx``); with it, only this entry is compiled.
+Numba's own entry checks the type of each argument, counts references to each array, looks at a named tuple for 4 us,
+and takes 0.5 us for each array that a kernel returns.  The compiled core calls a kernel by its address instead, with a
+row of words that locate all numbers (``Entry`` in ``arrays.pyx``).
 """
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable
-from types import FunctionType
-from typing import Any
+from itertools import count
+from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
+import numba
 import numba.core.cgutils
-import numba.core.sigutils
 import numba.extending
 import numba.np.arrayobj
+import numpy as np
 
-from ..arrays import entered
-from .jit import cached, dispatcher, options, types
+from .. import arrays
+from .jit import cached, dispatcher, options, typed, types
 
 _code: Any = numba.core.cgutils
-_arrays: Any = numba.np.arrayobj
-_signatures: Any = numba.core.sigutils
+_array: Any = numba.np.arrayobj.make_array
 _extending: Any = numba.extending
-_KINDS = {types.float64: "d", types.int64: "i", types.boolean: "b"}
+_numba: Any = numba
+_KINDS = {float: "d", int: "i", bool: "b"}
+_TYPES = {"d": types.float64, "i": types.int64, "b": types.boolean}
+_WORDS = {"d": "numbers[{}]", "i": "words[{}]", "b": "words[{}] != 0"}
 
 
-def entered_by_address(function: Callable[..., Any], signature: str) -> Any:
-    """A kernel with the types of a numba signature, called by its address where the compiled core is there."""
-    takes, gives = _signatures.normalize_signature(signature)
-    return entered(dispatcher(function), lambda: _compile(function, takes), _kinds(takes), _kinds(_each(gives)))
+@functools.cache
+def entered(function: Callable[..., Any]) -> Any:
+    """A kernel as Python calls it."""
+    if arrays.Entry is not None:
+        return arrays.Entry(function, functools.partial(_by_address, function), functools.partial(typed, function))
+    return functools.partial(_called, _by_fields(function))
 
 
-def _each(gives: Any) -> Any:
-    return gives.types if isinstance(gives, types.BaseTuple) else (gives,)
+def compile_now(function: Callable[..., Any]) -> None:
+    """Compile a kernel, or load what was compiled before."""
+    if arrays.Entry is not None:
+        entered(function).compile()
+    else:
+        takes = [_TYPES.get(each) or types.Array(types.float64, int(each), "C") for each in _call(function)[1]]
+        _by_fields(function).compile(tuple(takes))
 
 
-def _kinds(each: Any) -> str:
-    return "".join(str(one.ndim) if isinstance(one, types.Array) else _KINDS[one] for one in each)
+def _by_address(function: Callable[..., Any]) -> tuple[Any, str, str]:
+    """Code for C that reads what a kernel takes from words, and writes what it returns there; and the kinds of both.
 
+    It returns 0 if the kernel has failed.
+    """
+    call, takes, gives = _call(function)
+    place = count(1)  # the first word is a function that makes arrays
 
-def _compile(function: Any, takes: Any) -> Any:
-    """The code of ``_enter`` for a kernel, with its ``address``; it is in the cache as a part of its module."""
-    compiler: Any = numba.njit
-    names = {
-        "_kernel": compiler(**options(no_cpython_wrapper=True))(function),
-        "_taken": _reader(takes),
-        "_put": _extending.intrinsic(_write),
-        "__name__": function.__module__,
-    }
-    code = function.__code__
-    enter = FunctionType(
-        _enter.__code__.replace(co_filename=code.co_filename, co_firstlineno=code.co_firstlineno), names, "_enter"
-    )
-    enter.__qualname__ = f"{function.__name__}_entry"
+    def read(kind: str) -> str:
+        if kind in _WORDS:
+            return _WORDS[kind].format(next(place))
+        address, shape = next(place), "".join([f"words[{next(place)}], " for _ in range(int(kind))])
+        return f"carray(pointer(words[{address}]), ({shape}))"
+
+    results = [f"result_{i}" for i in range(len(gives))]
+    lines = ["maker = words[0]", f"{', '.join(results)} = {call.format(*map(read, takes))}"]
+    for i, kind in enumerate(gives):
+        made = f"boxed(maker, result_{i})" if kind.isdigit() else f"result_{i}"
+        lines.append(f"{'numbers' if kind == 'd' else 'words'}[{i}] = {made}")
+    enter = _function(function, "words, numbers", [*lines, "return 1"])
     with cached():
-        return numba.cfunc("i8(CPointer(i8))", cache=True, **options())(enter)
+        return _numba.cfunc("i8(CPointer(i8), CPointer(f8))", cache=True, **options())(enter), takes, gives
 
 
-def _enter(words: Any) -> int:
-    """Call the kernel with the arguments in the words, and put its results in their place; returns 0 if it has
-    failed."""
-    _put(words, _kernel(*_taken(words)))  # type: ignore[name-defined]  # noqa: F821
-    return 1
+@functools.cache
+def _by_fields(function: Callable[..., Any]) -> Any:
+    """A kernel that takes the fields of named tuples instead of these, for numba's entry."""
+    call, takes, _ = _call(function)
+    names = [f"given_{i}" for i in range(len(takes))]
+    made = _function(function, ", ".join(names), [f"return {call.format(*names)}"])
+    with cached():
+        return _numba.njit(**options(cache=True))(made)
 
 
-def _reader(takes: Any) -> Any:
-    """A function for compiled code that makes arguments from words: an array is an address and its shape."""
-    made = types.Tuple(takes)
+def _called(flat: Any, *given: Any) -> Any:
+    """Call it with copies of arrays: for those that are read-only or not contiguous, numba would compile it again."""
+    fields = [field for each in given for field in (each if isinstance(each, tuple) else (each,))]
+    return flat(*[np.array(each, order="C") if isinstance(each, np.ndarray) else each for each in fields])
+
+
+def _call(function: Callable[..., Any]) -> tuple[str, str, str]:
+    """The call of a kernel, with a gap for each number and array, their kinds, and those of what it returns: a letter
+    for a number, and for an array the number of its dimensions."""
+    hints, kinds = get_type_hints(function, include_extras=True), [""]
+
+    def gaps(hint: Any) -> str:
+        if hint in _KINDS or get_origin(hint) is Annotated:
+            kinds[-1] += _KINDS.get(hint) or str(hint.__metadata__[0])
+            return "{}"
+        fields = get_args(hint) or get_type_hints(hint, include_extras=True).values()
+        return f"{hint.__name__}({', '.join(map(gaps, fields))})"
+
+    returned = hints.pop("return")
+    call = f"kernel({', '.join(map(gaps, hints.values()))})"
+    kinds.append("")
+    gaps(returned)
+    return call, kinds[0], kinds[1]
+
+
+def _function(of: Callable[..., Any], takes: str, lines: list[str]) -> Callable[..., Any]:
+    """A function for numba that calls a kernel; it is in the cache as a part of the kernel's module."""
+    name, names = f"{of.__name__}_entry", {**of.__globals__, **_NAMES, "kernel": dispatcher(of)}
+    exec(compile(f"def {name}({takes}):\n    " + "\n    ".join(lines), of.__code__.co_filename, "exec"), names)
+    made: Callable[..., Any] = names[name]
+    return made
+
+
+def _pointer(typing: Any, address: Any) -> Any:
+    """A word as the address of numbers."""
+    wanted = types.CPointer(types.float64)
+    return wanted(address), lambda context, builder, _, given: builder.inttoptr(
+        given[0], context.get_value_type(wanted)
+    )
+
+
+def _boxed(typing: Any, maker: Any, array: Any) -> Any:
+    """What the function at an address makes of an array, given its numbers, its shape and the number of dimensions."""
+    if array.layout != "C":
+        raise TypeError(f"a kernel returns {array}, which may not be contiguous")
 
     def lower(context: Any, builder: Any, _: Any, given: Any) -> Any:
-        place = 0  # the first word is for ``_put``
+        word, made = given[0].type, _array(array)(context, builder, given[1])
+        shape = builder.bitcast(_code.alloca_once_value(builder, made.shape), word.as_pointer())
+        passed = made.data, shape, word(array.ndim)
+        kind = _code.ir.FunctionType(word, [each.type for each in passed])
+        return builder.call(builder.inttoptr(given[0], kind.as_pointer()), passed)
 
-        def word() -> Any:
-            nonlocal place
-            place += 1
-            return builder.load(_code.gep_inbounds(builder, given[0], place))
-
-        def value_of(wanted: Any) -> Any:
-            if not isinstance(wanted, types.Array):
-                return _as(builder, word(), context.get_value_type(wanted))
-            array, size = _arrays.make_array(wanted)(context, builder), context.get_constant(types.intp, 8)
-            data = builder.inttoptr(word(), context.get_data_type(wanted.dtype).as_pointer())
-            shape, strides = [word() for _ in range(wanted.ndim)], [size]
-            for length in shape[:0:-1]:
-                strides.insert(0, builder.mul(strides[0], length))
-            _arrays.populate_array(array, data=data, shape=shape, strides=strides, itemsize=size, meminfo=None)
-            return array._getvalue()
-
-        return context.make_tuple(builder, made, [value_of(each) for each in takes])
-
-    return _extending.intrinsic(lambda typing, words: (made(words), lower))
+    return types.int64(maker, array), lower
 
 
-def _as(builder: Any, value: Any, wanted: Any) -> Any:
-    """The same bits as another type, which may be narrower or wider."""
-    if not hasattr(value.type, "width") or not hasattr(wanted, "width"):
-        return builder.bitcast(value, wanted)
-    return builder.trunc(value, wanted) if wanted.width < value.type.width else builder.zext(value, wanted)
-
-
-def _write(typing: Any, words: Any, result: Any) -> Any:
-    """Write the results of a kernel; for an array, the object that the function at the first word makes of it."""
-    results = _each(result)
-    if any(isinstance(each, types.Array) and each.layout != "C" for each in results):
-        raise TypeError(f"a kernel returns {result}, which may not be contiguous")
-
-    def lower(context: Any, builder: Any, signature: Any, given: Any) -> Any:
-        several = isinstance(result, types.BaseTuple)
-        word = context.get_value_type(types.intp)
-        first = builder.load(given[0])
-        for place, kind in enumerate(results):
-            value = builder.extract_value(given[1], place) if several else given[1]
-            target = _code.gep_inbounds(builder, given[0], place)
-            if isinstance(kind, types.Array):
-                array = _arrays.make_array(kind)(context, builder, value)
-                shape = builder.bitcast(_code.alloca_once_value(builder, array.shape), word.as_pointer())
-                passed = array.data, shape, word(kind.ndim)
-                maker = _code.ir.FunctionType(word, [each.type for each in passed]).as_pointer()
-                builder.store(builder.call(builder.inttoptr(first, maker), passed), target)
-            else:
-                builder.store(_as(builder, value, word), target)
-        return context.get_dummy_value()
-
-    return types.none(words, result), lower
+_NAMES = {
+    "carray": _numba.carray,
+    "pointer": _extending.intrinsic(_pointer),
+    "boxed": _extending.intrinsic(_boxed),
+}

@@ -10,7 +10,7 @@ import math
 import numpy as np
 
 from ...core.elementary import hypot
-from .compiled import Array, entry, inner
+from .compiled import Array, Table, inner, kernel
 
 
 @inner
@@ -50,8 +50,8 @@ def _least_cost(costs: Array) -> Array:
     return result
 
 
-@entry("Tuple((f8, f8, i8, i8))(f8[:, ::1], f8[:, ::1], f8)")
-def gospa(truth: Array, tracks: Array, cutoff: float) -> tuple[float, float, int, int]:
+@kernel
+def gospa(truth: Table, tracks: Table, cutoff: float) -> tuple[float, float, int, int]:
     """The GOSPA metric (p = 2, alpha = 2) of positions (n, 2) and (m, 2): itself, m; the root mean square error of the
     pairs nearer than ``cutoff``, m; how many of the truth are missed; and how many tracks are false."""
     count, found = truth.shape[0], tracks.shape[0]

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from . import definitions
-from .compiled import Array, kernel
+from .compiled import Array, Layers, Row, Table, inner
 from .definitions import INFORM, REACH_GOAL, driven, f1, f2
 from .mutual_information import pairwise_distance
 
@@ -49,23 +49,23 @@ class HorizonProblem(NamedTuple):
     """
 
     period: float  # Delta t
-    position: Array  # (d,) Pr_{t+1}; d = 2 in the plane, and 3 in space, with the height last
-    velocity: Array  # (d,) V_{t+1}
+    position: Row  # (d,) Pr_{t+1}; d = 2 in the plane, and 3 in space, with the height last
+    velocity: Row  # (d,) V_{t+1}
     max_speed: float  # Vmax, f1
     max_acceleration: float  # Amax, f2
-    tube_centre: Array  # (N, d) Rs_{t+s}, f3
-    tube_radius: Array  # (N,) sigma_r of eq. (3); inf where the tube is free
+    tube_centre: Table  # (N, d) Rs_{t+s}, f3
+    tube_radius: Row  # (N,) sigma_r of eq. (3); inf where the tube is free
     safe_distance: float  # Dmin, f4
     margin: float  # alpha
-    obstacle_mean: Array  # (K, N, d) Po_{t+s}; K = 0 while no obstacle is known
-    obstacle_covariance: Array  # (K, N, d (d + 1) / 2) C_{t+s} as (xx, xy, yy), or (xx, xy, xz, yy, yz, zz)
-    peer_mean: Array  # (n, N, d) Ro_{i,t+s}, f5
-    peer_distance: Array  # (n, N) Dmin + alpha * sigma_5i
+    obstacle_mean: Layers  # (K, N, d) Po_{t+s}; K = 0 while no obstacle is known
+    obstacle_covariance: Layers  # (K, N, d (d + 1) / 2) C_{t+s} as (xx, xy, yy), or (xx, xy, xz, yy, yz, zz)
+    peer_mean: Layers  # (n, N, d) Ro_{i,t+s}, f5
+    peer_distance: Table  # (n, N) Dmin + alpha * sigma_5i
     objective: int = REACH_GOAL  # eq. (2); or INFORM, eq. (5)
-    goal: Array = np.zeros((1, 2))  # (n, d) at steps 1..n of eq. (2); the last one is there for the other steps, too
-    sigma_positions: Array = np.empty((0, 2))  # (T M, d) sigma points at t + N of the first T obstacles' positions
-    sigma_weights: Array = np.empty(0)  # (M,) w_{t,i}
-    others_distance: Array = np.empty((0, 0))  # (T M, M) exponent that the others' measurements add, mutual_information
+    goal: Table = np.zeros((1, 2))  # (n, d) at steps 1..n of eq. (2); the last one is there for the other steps, too
+    sigma_positions: Table = np.empty((0, 2))  # (T M, d) sigma points at t + N of the first T obstacles' positions
+    sigma_weights: Row = np.empty(0)  # (M,) w_{t,i}
+    others_distance: Table = np.empty((0, 0))  # (T M, M) exponent that the others' measurements add, mutual_information
     measurement_variance: float = 1.0  # eta_t of eq. (5), m^2
     range_penalty: float = 0.0  # gamma
     measurement_range: float = 0.0  # Dmax, f6
@@ -168,7 +168,7 @@ class HorizonProblem(NamedTuple):
         )
 
 
-@kernel
+@inner
 def trajectory(position: Array, velocity: Array, controls: Array, period: float, steps: int) -> Array:
     """Positions at steps 1..``steps`` from the state at step 1 and the controls from there on, shape (steps, d).
 

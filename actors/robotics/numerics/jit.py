@@ -15,12 +15,13 @@ import numba.extending
 from numba.core import caching as _caching
 
 from ...core.elementary.in_numba import register
-from .kept import folder
+from .compiled import folder
 
 config: Any = numba.config
 caching: Any = _caching
 types: Any = numba.types  # numba's declarations of them are not sufficient
 _overload: Any = numba.extending.overload
+_njit: Any = numba.njit
 _LOGGER = logging.getLogger("epicycle")
 
 
@@ -46,10 +47,9 @@ def cached() -> Iterator[None]:
 
 @functools.cache
 def dispatcher(function: Callable[..., Any]) -> Any:
-    """A kernel as numba compiles it, or finds it on disk, when it is called."""
-    compiler: Any = numba.njit
+    """A kernel as other kernels call it."""
     with cached():
-        return compiler(**options(cache=True))(function)
+        return _njit(**options(cache=True, no_cpython_wrapper=True))(function)
 
 
 def typed(function: Callable[..., Any]) -> Any:

@@ -12,7 +12,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...core.elementary import hypot
-from .compiled import Array, borrower, entry, inner, kernel
+from .compiled import Array, Row, Table, inner, kernel
 from .ukf import (
     RANGE,
     _add_congruence,
@@ -21,31 +21,24 @@ from .ukf import (
     _fuse,
     _gain,
     _symmetrise,
+    centred,
     measurement_noise,
     predict,
+    rows_of,
     sigma_points,
 )
 
 _ROUNDS = 2  # linearisations after the update of ``ukf``, which is the first guess
 
 
-@borrower
-def _rows(measurements: Array) -> int:
-    """The number of numbers measured."""
-    rows = 0
-    for m in range(measurements.shape[0]):
-        rows += 1 if measurements[m, 0] == RANGE else 2
-    return rows
-
-
-@kernel
+@inner
 def noises_at(points: Array, measurements: Array) -> Array:
     """The noises (M, rows) that measurements (m, 7) have if the target is at each of ``points`` (M, n).
 
     With the target at x and the robot at r, a relative position is z = (|x - r| + a) n + b t, where n is the direction
     from r to x, and t is across it: the noise is a = n . z - |x - r| and b = t . z.  That of a range is z - |x - r|.
     """
-    found = np.empty((points.shape[0], _rows(measurements)))
+    found = np.empty((points.shape[0], rows_of(measurements)))
     row = 0
     for m in range(measurements.shape[0]):
         is_range, zx, zy = measurements[m, 0] == RANGE, measurements[m, 3], measurements[m, 4]
@@ -69,12 +62,7 @@ def _linearised(about: Array, spread: Array, kappa: float, measurements: Array) 
     points, weights = sigma_points(about, spread, kappa)
     images = noises_at(points, measurements)
     rows, size = images.shape[1], about.shape[0]
-    value, slope, rest = np.zeros(rows), np.zeros((rows, size)), np.zeros((rows, rows))
-    for k in range(rows):
-        for i in range(points.shape[0]):
-            value[k] += weights[i] * images[i, k]
-        for i in range(points.shape[0]):
-            images[i, k] -= value[k]
+    value, slope, rest = centred(images, weights), np.zeros((rows, size)), np.zeros((rows, rows))
     for i in range(points.shape[0]):
         for j in range(size):
             points[i, j] -= about[j]
@@ -139,11 +127,11 @@ def _fused_about(
     return then, after
 
 
-@entry("Tuple((f8[::1], f8[:, ::1], b1))(f8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8, f8[:, ::1], f8)")
+@kernel
 def predict_and_fuse(
-    mean: Array, covariance: Array, transition: Array, process_noise: Array, kappa: float, measurements: Array,
+    mean: Row, covariance: Table, transition: Table, process_noise: Table, kappa: float, measurements: Table,
     degrees_of_freedom: float,
-) -> tuple[Array, Array, bool]:  # fmt: skip
+) -> tuple[Row, Table, bool]:  # fmt: skip
     """``ukf.predict``, then an update with measurements (m, 7), and whether anything was fused.
 
     If the result would not be finite, the prediction is kept.

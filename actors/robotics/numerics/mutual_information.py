@@ -16,7 +16,7 @@ import math
 import numpy as np
 
 from ...core.elementary import exp, hypot, log
-from .compiled import Array, borrower, entry, inlined
+from .compiled import Array, Layers, Table, borrower, inlined, kernel
 from .vectors import (
     Term,
     Vector,
@@ -37,8 +37,8 @@ from .vectors import (
 )
 
 
-@entry("f8[:, ::1](f8[:, ::1], f8[:, :, ::1], f8)")
-def pairwise_distance(sigma_positions: Array, robots: Array, variance: float) -> Array:
+@kernel
+def pairwise_distance(sigma_positions: Table, robots: Layers, variance: float) -> Table:
     """``others_distance``: (M, M) from sigma points (M, d) and the ends of the other robots' paths (n, N, d)."""
     (count, d), last = sigma_positions.shape, robots.shape[1] - 1
     distance = np.zeros((count, count))

@@ -7,7 +7,7 @@ import math
 
 import numpy as np
 
-from .compiled import Array, entry, inner, kernel
+from .compiled import Array, Layers, Row, Table, inner, kernel
 from .horizon import trajectory
 from .ukf import congruence, constant_velocity, mapped, predict, sigma_points
 
@@ -21,11 +21,11 @@ def _age(elapsed: float, period: float, oldest: float) -> int:
     return round(min(max(elapsed / period, 0.0), oldest))
 
 
-@entry("Tuple((f8[:, ::1], f8[::1], f8[:, :, ::1]))(f8[::1], f8[::1], f8[:, ::1], f8, f8[::1], f8[::1], f8, f8, f8)")
+@kernel
 def standing_plan(
-    position: Array, velocity: Array, controls: Array, elapsed: float, radius: Array, moving: Array, speed: float,
+    position: Row, velocity: Row, controls: Table, elapsed: float, radius: Row, moving: Row, speed: float,
     max_acceleration: float, period: float,
-) -> tuple[Array, Array, Array]:  # fmt: skip
+) -> tuple[Table, Row, Layers]:  # fmt: skip
     """The use of a plan from ``position`` and ``velocity`` with ``controls`` (N, d), ``elapsed`` seconds later.
 
     f3: centres (N, d) and radii (N,) of the tube around it, which binds up to the end of the plan, with the ``radius``
@@ -56,11 +56,11 @@ def standing_plan(
     return centres, radii, guesses
 
 
-@entry("Tuple((f8[:, :, ::1], f8[:, ::1]))(f8[:, ::1], f8, f8, f8[::1], f8, f8, f8, i8)")
+@kernel
 def peer_tubes(
-    plans: Array, now: float, period: float, radius: Array, growth: float, safe_distance: float, margin: float,
+    plans: Table, now: float, period: float, radius: Row, growth: float, safe_distance: float, margin: float,
     dimensions: int,
-) -> tuple[Array, Array]:  # fmt: skip
+) -> tuple[Layers, Table]:  # fmt: skip
     """f5: the positions of n peers at steps 1..N from now on (n, N, d), and the distances to keep from them (n, N).
 
     Each row of ``plans`` is one plan: the time (s) when it was made, its number of dimensions, the number of controls,
@@ -101,8 +101,8 @@ def peer_tubes(
 
 @kernel
 def propagate(
-    mean: Array, covariance: Array, transition: Array, process_noise: Array, steps: int, dimensions: int = 2
-) -> tuple[Array, Array]:
+    mean: Row, covariance: Table, transition: Table, process_noise: Table, steps: int, dimensions: int
+) -> tuple[Table, Table]:
     """Predicted positions (N, d) and their covariances (N, d (d + 1) / 2), upper triangles, of a target at steps 1..N.
 
     A target with fewer dimensions is on the ground, where nothing is uncertain about its height; one with more is seen
@@ -141,14 +141,11 @@ def _after(mean: Array, covariance: Array, noise: Array, periods: float, period:
     return mean, covariance
 
 
-@entry(
-    "Tuple((f8[:, :, ::1], f8[:, :, ::1], f8[:, ::1], f8[::1]))(f8[::1], f8[:, ::1], f8[:, ::1], b1, f8, f8, f8, i8, "
-    "i8)"
-)
+@kernel
 def expected_target(
-    mean: Array, covariance: Array, noise: Array, is_widened: bool, kappa: float, period: float, elapsed: float,
+    mean: Row, covariance: Table, noise: Table, is_widened: bool, kappa: float, period: float, elapsed: float,
     steps: int, dimensions: int,
-) -> tuple[Array, Array, Array, Array]:  # fmt: skip
+) -> tuple[Layers, Layers, Table, Row]:  # fmt: skip
     """Data for f4 and eq. (5) of a target with constant velocity, from an estimate made ``elapsed`` seconds ago.
 
     Means (1, N, d) and covariances (1, N, d (d + 1) / 2) at steps 1..N from now on, in as many ``dimensions`` as the
@@ -158,9 +155,8 @@ def expected_target(
     then those of the state at step N; otherwise, they are the propagated ones of the present state.
     """
     own = mean.shape[0] // 2
-    # Copies, as tokens are read-only, and kernels would be compiled again for read-only arrays.
     periods = min(max(elapsed / period, -OLDEST), OLDEST)
-    now, spread = _after(mean.copy(), covariance.copy(), noise, periods, period)
+    now, spread = _after(mean, covariance, noise, periods, period)
     gained = noise if is_widened else np.zeros(noise.shape)
     means, covariances = propagate(now, spread, constant_velocity(period, own), gained, steps, dimensions)
     ahead = steps * period

@@ -7,14 +7,14 @@ import math
 import numpy as np
 
 from ...core.elementary import hypot
-from .compiled import Array, kernel
+from .compiled import Row, Table, kernel
 
 FIRST = 3  # the first step whose position a control of the next period can change
 _STEPS = 10_000  # of a retreat; one that takes longer is not certain of anything
 
 
 @kernel
-def support(directions: Array, mean: Array, covariance: Array, age: float, margin: float, speed: float) -> Array:
+def support(directions: Table, mean: Row, covariance: Table, age: float, margin: float, speed: float) -> Row:
     """A target's largest coordinate along each of ``directions`` (K, 2), m.
 
     It was within ``margin`` standard deviations of its estimate (mean (4,), covariance (4, 4)) ``age`` seconds ago, and
@@ -30,7 +30,7 @@ def support(directions: Array, mean: Array, covariance: Array, age: float, margi
 
 @kernel
 def kept_distance(
-    nx: float, ny: float, bound: float, position: Array, velocity: Array, control: Array, target_speed: float,
+    nx: float, ny: float, bound: float, position: Row, velocity: Row, control: Row, target_speed: float,
     max_speed: float, max_acceleration: float, period: float,
 ) -> float:  # fmt: skip
     """The least distance, m, that a retreat in the direction n is certain to keep from a target, from step 3 on.
@@ -58,7 +58,7 @@ def kept_distance(
 
 @kernel
 def best_retreat(
-    directions: Array, limits: Array, position: Array, velocity: Array, control: Array, target_speed: float,
+    directions: Table, limits: Row, position: Row, velocity: Row, control: Row, target_speed: float,
     max_speed: float, max_acceleration: float, period: float,
 ) -> tuple[float, int]:  # fmt: skip
     """The retreat of ``directions`` (K, 2) that keeps the most distance: that distance, and the row.

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 
-from .compiled import inlined, kernel
+from .compiled import borrower, inlined
 from .vectors import (
     Symmetric,
     Term,
@@ -28,7 +28,7 @@ from .vectors import (
 _TINY = 1e-9  # keeps the direction defined at distance zero
 
 
-@kernel
+@borrower
 def stay_near(at: Vector, centre: Vector, radius: float) -> Term:
     """f3, and the argument of f6: distance to ``centre`` minus ``radius``."""
     d, offset, term = len(at), less(at, centre), zero_term(at)
@@ -50,20 +50,20 @@ def stay_near(at: Vector, centre: Vector, radius: float) -> Term:
     return replaced(term, 0, distance - radius)
 
 
-@kernel
+@borrower
 def keep_away(at: Vector, centre: Vector, distance: float) -> Term:
     """f5 with its margin: ``distance`` minus the distance to ``centre``."""
     return scaled(-1.0, stay_near(at, centre, distance))
 
 
-@kernel
+@borrower
 def keep_level(at: Vector, level: float, sign: float) -> Term:
     """f7: the height above a ``level`` with ``sign`` 1, or below it with -1."""
     term, last = zero_term(at), len(at) - 1
     return replaced(replaced(term, 0, sign * (at[last] - level)), 1 + last, sign)
 
 
-@kernel
+@borrower
 def keep_away_uncertain(at: Vector, centre: Vector, covariance: Symmetric, distance: float, margin: float) -> Term:
     """f4 + alpha * sigma_4 of eqs. (2) and (4): the margin is the deviation along the line of sight.
 

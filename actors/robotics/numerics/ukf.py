@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from ...core.elementary import hypot
-from .compiled import Array, borrower, entry, inner, kernel
+from .compiled import Array, Row, Table, borrower, inner, kernel
 
 RELATIVE_POSITION = 0
 RANGE = 1
@@ -38,7 +38,7 @@ def _root(covariance: Array) -> Array:
 
 
 @kernel
-def sigma_points(mean: Array, covariance: Array, kappa: float) -> tuple[Array, Array]:
+def sigma_points(mean: Row, covariance: Table, kappa: float) -> tuple[Table, Row]:
     """The 2n + 1 points (M, n) and weights (M,): the mean, then mean +- columns of sqrt((n + kappa) C)."""
     size = mean.shape[0]
     root = _root(covariance)
@@ -123,7 +123,7 @@ def _away(points: Array, i: int, measurements: Array, m: int, c: int) -> float:
     return away
 
 
-@kernel
+@inner
 def constant_velocity(period: float, dimensions: int = 2) -> Array:
     """Transition of eq. (1) for the state (x, y, vx, vy)."""
     transition = np.zeros((2 * dimensions, 2 * dimensions))  # np.eye takes half a second to compile
@@ -135,7 +135,7 @@ def constant_velocity(period: float, dimensions: int = 2) -> Array:
 
 
 @kernel
-def predict(mean: Array, covariance: Array, transition: Array, process_noise: Array) -> tuple[Array, Array]:
+def predict(mean: Row, covariance: Table, transition: Table, process_noise: Table) -> tuple[Row, Table]:
     """One step of a linear model; the unscented transform of a linear map is exact, so it is written out."""
     spread = congruence(transition, covariance, np.zeros(covariance.shape))
     for i in range(spread.shape[0]):
@@ -145,7 +145,7 @@ def predict(mean: Array, covariance: Array, transition: Array, process_noise: Ar
     return mapped(transition, mean), spread
 
 
-@kernel
+@inner
 def measurement_noise(points: Array, weights: Array, measurements: Array) -> Array:
     """Covariances (m, d (d + 1) / 2), upper triangles, of measurements (m, 3 + 2 d) of a target at ``points`` (M, n).
 
@@ -195,7 +195,7 @@ def _range(points: Array, i: int, measurements: Array, m: int) -> float:
     return length
 
 
-@kernel
+@inner
 def update(mean: Array, covariance: Array, kappa: float, measurements: Array, noises: Array) -> tuple[Array, Array]:
     """Fuse measurements (m, 3 + 2 d) with covariances ``noises`` (m, d (d + 1) / 2), all at once.
 
@@ -210,13 +210,26 @@ def update(mean: Array, covariance: Array, kappa: float, measurements: Array, no
     return updated, spread
 
 
+@borrower
+def rows_of(measurements: Array) -> int:
+    """The number of numbers measured."""
+    rows = 0
+    for m in range(measurements.shape[0]):
+        rows += 1 if measurements[m, _KIND] == RANGE else dimensions_of(measurements)
+    return rows
+
+
 @inner
 def _fuse(mean: Array, covariance: Array, points: Array, weights: Array, measurements: Array, noises: Array) -> None:
     """``update`` in place, with the sigma points, which are overwritten."""
-    count, d = points.shape[0], dimensions_of(measurements)
-    rows = 0
-    for m in range(measurements.shape[0]):
-        rows += 1 if measurements[m, _KIND] == RANGE else d
+    images, observed, noise = images_of(points, measurements, noises)
+    _fuse_images(mean, covariance, points, weights, images, observed, noise)
+
+
+@inner
+def images_of(points: Array, measurements: Array, noises: Array) -> tuple[Array, Array, Array]:
+    """What is measured at each of the points (M, rows), and in truth (rows,), and the covariance of the noise."""
+    count, d, rows = points.shape[0], dimensions_of(measurements), rows_of(measurements)
     noise, images, observed = np.zeros((rows, rows)), np.empty((count, rows)), np.empty(rows)
     row = 0
     for m in range(measurements.shape[0]):
@@ -233,7 +246,19 @@ def _fuse(mean: Array, covariance: Array, points: Array, weights: Array, measure
                     _range(points, i, measurements, m) if is_range else _away(points, i, measurements, m, c)
                 )
         row += width
-    _fuse_images(mean, covariance, points, weights, images, observed, noise)
+    return images, observed, noise
+
+
+@inner
+def centred(images: Array, weights: Array) -> Array:
+    """The expected row (rows,) of images (M, rows), which become relative to it."""
+    expected = np.zeros(images.shape[1])
+    for k in range(images.shape[1]):
+        for i in range(images.shape[0]):
+            expected[k] += weights[i] * images[i, k]
+        for i in range(images.shape[0]):
+            images[i, k] -= expected[k]
+    return expected
 
 
 @inner
@@ -242,13 +267,9 @@ def _fuse_images(
 ) -> None:
     """The update in place, with what is measured at each sigma point (M, rows), and in truth; these are overwritten."""
     size, count, rows = mean.shape[0], points.shape[0], observed.shape[0]
-    for k in range(rows):  # from here on, all relative to the expected values
-        expected = 0.0
-        for i in range(count):
-            expected += weights[i] * images[i, k]
-        observed[k] -= expected
-        for i in range(count):
-            images[i, k] -= expected
+    expected = centred(images, weights)
+    for k in range(rows):
+        observed[k] -= expected[k]
     for i in range(count):
         for j in range(size):
             points[i, j] -= mean[j]
@@ -268,10 +289,10 @@ def _fuse_images(
     _symmetrise(covariance)
 
 
-@entry("Tuple((f8[::1], f8[:, ::1], b1))(f8[::1], f8[:, ::1], f8[:, ::1], f8[::1], f8[:, ::1], f8[::1], f8[:, ::1])")
+@kernel
 def fuse_images(
-    mean: Array, covariance: Array, points: Array, weights: Array, images: Array, observed: Array, noise: Array
-) -> tuple[Array, Array, bool]:
+    mean: Row, covariance: Table, points: Table, weights: Row, images: Table, observed: Row, noise: Table
+) -> tuple[Row, Table, bool]:
     """``update`` with measurements of any sensor, and whether anything was fused.
 
     ``images`` (M, rows) would be measured at the sigma ``points``, ``observed`` (rows,) was; ``noise`` is their
@@ -295,11 +316,11 @@ def _finite(mean: Array, covariance: Array) -> bool:
     return True
 
 
-@entry("Tuple((f8[::1], f8[:, ::1], b1))(f8[::1], f8[:, ::1], f8[:, ::1], f8[:, ::1], f8, f8[:, ::1], b1)")
+@kernel
 def predict_and_fuse(
-    mean: Array, covariance: Array, transition: Array, process_noise: Array, kappa: float, measurements: Array,
+    mean: Row, covariance: Table, transition: Table, process_noise: Table, kappa: float, measurements: Table,
     averaged: bool,
-) -> tuple[Array, Array, bool]:  # fmt: skip
+) -> tuple[Row, Table, bool]:  # fmt: skip
     """``predict``, then ``update`` with measurements (m, 3 + 2 d), and whether anything was fused.
 
     All noises are as seen from the prediction, and ``averaged`` over its sigma points, or turned along its mean.  If

@@ -452,7 +452,7 @@ def test_compiling_is_announced_only_if_it_takes_long(
         while patience < 1.0 and not caplog.messages and time.monotonic() < deadline:
             time.sleep(0.001)
 
-    monkeypatch.setattr(warm_up, "_call_every_kernel", work)
+    monkeypatch.setattr(warm_up, "_compile_all", work)
     monkeypatch.setattr(warm_up, "_PATIENCE", patience)
     monkeypatch.setattr(warm_up, "IS_READY", True)
     before = threading.active_count()

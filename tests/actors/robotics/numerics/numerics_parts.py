@@ -58,7 +58,8 @@ def inform_problem(random: np.random.Generator, steps: int = 10, reach: float = 
     """A free robot that is to inform itself about a target near the origin."""
     state, covariance = np.array([0.0, 0.0, 1.0, 0.5]), spread(random, 4)
     points, weights = ukf.sigma_points(state, covariance, 0.0)
-    means, covariances = reachability.propagate(state, covariance, ukf.constant_velocity(0.1), np.zeros((4, 4)), steps)
+    transition = ukf.constant_velocity(0.1)
+    means, covariances = reachability.propagate(state, covariance, transition, np.zeros((4, 4)), steps, 2)
     points = np.ascontiguousarray(points[:, :2])
     return horizon.HorizonProblem(
         period=0.1,

@@ -83,7 +83,7 @@ def pose(random: np.random.Generator) -> Posed:
         state[:2] = tube_centre[5]
     transition = np.eye(4)
     transition[0, 2] = transition[1, 3] = PERIOD
-    means, covariances = reachability.propagate(state, root @ root.T, transition, np.zeros((4, 4)), STEPS)
+    means, covariances = reachability.propagate(state, root @ root.T, transition, np.zeros((4, 4)), STEPS, 2)
     points = means[-1] + random.normal(scale=10.0 ** random.uniform(-3.0, 2.0), size=(9, 2))
     known = random.random() < 0.9
     problem = horizon.HorizonProblem(

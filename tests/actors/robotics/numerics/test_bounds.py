@@ -9,14 +9,12 @@ import pytest
 SCRIPT = """
 import numpy as np
 from epicycle.actors import BodyState, Estimate, Inform, RobustController
-from epicycle.actors.robotics.numerics import warm_up
 from epicycle.actors.testing import Harness
+from epicycle.runner import Simulation, load_model
 
 np.seterr(all="ignore")  # kernels give inf and NaN without a word
-for dimensions in (2, 3):
-    warm_up.compile_kernels(dimensions)
-warm_up.compile_tracking()
-warm_up.compile_retreats()
+for model in ("collision_avoidance", "many_obstacles", "safe_avoidance", "flying_observers"):
+    Simulation(load_model(model), seed=1).run(until=0.4)
 for d in (2, 3):
     for size in (4, 6):
         harness = Harness(RobustController("main.a", objective=Inform(), dimensions=d))

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from epicycle.actors.robotics.numerics import compiled, kept
+from epicycle.actors.robotics.numerics import compiled
 
 PROGRAM = """
 import sys
@@ -21,11 +21,11 @@ def inverse(number):
     return 1.0 / number
 
 @compiled.kernel
-def beyond(number):
+def beyond(number: float) -> float:
     return inverse(number) + 1.0
 
 @compiled.kernel
-def twice_beyond(number):
+def twice_beyond(number: float) -> float:
     return 2.0 * beyond(number)
 
 compiled.LEDGER.prepared.append(lambda: print("prepared"))
@@ -64,11 +64,9 @@ def test_where_nothing_can_be_kept_python_is_first_in_each_process(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "file").touch()
-    for module in (compiled, kept):
-        monkeypatch.setattr(module, "folder", lambda: tmp_path / "file" / "cache")
+    monkeypatch.setattr(compiled, "folder", lambda: tmp_path / "file" / "cache")
     for _ in range(2):
         assert compiled._Ledger().allows()
-    for module in (compiled, kept):
-        monkeypatch.setattr(module, "folder", lambda: tmp_path / "cache")
+    monkeypatch.setattr(compiled, "folder", lambda: tmp_path / "cache")
     assert compiled._Ledger().allows()
     assert not compiled._Ledger().allows()  # as in a later process

@@ -73,7 +73,9 @@ def test_an_estimate_between_two_steps_is_predicted_to_now(
     for _ in range(whole):
         mean, covariance = ukf.predict(mean, covariance, transition, noise)
     mean, covariance = ukf.predict(mean, covariance, ukf.constant_velocity(0.1 * part), abs(part) * noise)
-    means, covariances = reachability.propagate(mean, covariance, transition, noise if is_widened else 0.0 * noise, 10)
+    means, covariances = reachability.propagate(
+        mean, covariance, transition, noise if is_widened else 0.0 * noise, 10, 2
+    )
     assert found[0][0] == pytest.approx(means)
     assert found[1][0] == pytest.approx(covariances)
     points, weights = ukf.sigma_points(mean, covariance, 0.5)
@@ -121,7 +123,7 @@ def test_target_is_expected_where_prediction_takes_it(random: np.random.Generato
         means, covariances, points, weights = reachability.expected_target(
             mean, covariance, noise, is_widened, 0.5, 0.1, 0.1 * age, 10, 2
         )
-        every = reachability.propagate(*now, transition, is_widened * noise, 10)
+        every = reachability.propagate(*now, transition, is_widened * noise, 10, 2)
         assert means[0].tolist() == every[0].tolist()
         assert covariances[0].tolist() == every[1].tolist()
         assert weights @ points == pytest.approx(means[0, -1])
@@ -134,7 +136,7 @@ def test_target_is_expected_where_prediction_takes_it(random: np.random.Generato
 def test_propagate_is_repeated_prediction(random: np.random.Generator, noise: float) -> None:
     mean, covariance = random.normal(size=4), spread(random, 4)
     transition, q = ukf.constant_velocity(0.1), noise * np.diag([0.002, 0.002, 0.4, 0.4])
-    means, covariances = reachability.propagate(mean, covariance, transition, q, 10)
+    means, covariances = reachability.propagate(mean, covariance, transition, q, 10, 2)
     for row, spread_row in zip(means, covariances, strict=True):
         mean, covariance = ukf.predict(mean, covariance, transition, q)
         assert row == pytest.approx(mean[:2], abs=1e-12)
