@@ -67,6 +67,9 @@ class CatalogueError(FaultError):
         return "\n   help: ".join(self.args)
 
 
+_of_packages: set[type] = set()  # types of packages
+
+
 @dataclass
 class _Offer:
     """A type that a package declares as an entry point."""
@@ -106,6 +109,7 @@ class _Offer:
         name = found.name if issubclass(found, Dialect) else found.__name__
         if name != self.point.name:
             return self._error(f"the class is called {name}, and its entry point must have the same name")
+        _of_packages.add(found)
         return found
 
     def _error(self, reason: str) -> CatalogueError:
@@ -265,9 +269,7 @@ def installed() -> Catalogue:
 
 def with_offered(base: type[T], group: str, own: Mapping[str, type[T]]) -> Mapping[str, type[T]]:
     """Types by name, and those that installed packages offer, which are named by their entry points."""
-    kind: Any = base
-    loaded = [vars(each).get("found") for offers in _offered(kind, group).values() for each in offers]
-    return Types(base, {name: cls for name, cls in own.items() if cls not in loaded}, group)
+    return Types(base, {name: cls for name, cls in own.items() if cls not in _of_packages}, group)
 
 
 def _import_part(name: str) -> None:

@@ -79,7 +79,7 @@ def test_a_kernel_is_compiled_anew_when_what_it_calls_has_changed(package: Path)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize(("damage", "ending"), product(("cut", "empty", "flipped"), ("nbi", "nbc")))
+@pytest.mark.parametrize(("damage", "ending"), [*product(("cut", "empty", "flipped"), ("nbi", "nbc"))])
 def test_damaged_code_is_compiled_again_with_a_word(mended: Path, damage: str, ending: str) -> None:
     """That of the entry, which contains the kernel's."""
     path = max(mended.glob(f"__pycache__/*/*/*twice_and_entry*.{ending}"), key=lambda each: each.stat().st_mtime_ns)
