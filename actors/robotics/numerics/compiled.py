@@ -7,20 +7,17 @@ Both give the same bits.  Numba is heavy, and imported where it compiles or load
 
 from __future__ import annotations
 
-import hashlib
 import importlib
 import os
 import sys
 import time
 from collections.abc import Callable
-from contextlib import suppress
-from pathlib import Path
 from typing import Annotated, Any, TypeAlias, TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...core import elementary
+from .kept import folder, mark
 
 Array = NDArray[np.float64]  # the one array type of the kernels
 # The same with its dimensions, which is what the annotations of a ``kernel`` say.
@@ -30,30 +27,6 @@ Layers: TypeAlias = Annotated[Array, 3]
 Function = TypeVar("Function", bound=Callable[..., object])
 
 _LIMIT = 10.0  # s that a process spends in kernels as Python before it compiles them
-_HERE = Path(__file__).parent
-_FILES = [path for folder in (_HERE, Path(elementary.__file__).parent) for path in sorted(folder.glob("*.py"))]
-_SOURCES = hashlib.sha256(b"".join(path.read_bytes() for path in _FILES)).hexdigest()[:16]
-
-
-def folder() -> Path:
-    """Where compiled code is kept; named after all sources of this package and of the elementary functions.
-
-    By itself, numba checks only the file of a kernel, and would keep using old code that it calls from others.
-    """
-    if own := os.environ.get("NUMBA_CACHE_DIR"):
-        above = Path(own)
-    elif os.access(_HERE, os.W_OK):
-        above = _HERE / "__pycache__"
-    else:
-        above = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "epicycle"
-    return above / _SOURCES
-
-
-def mark(name: str) -> None:
-    """Leave a note for later processes, if files can be made."""
-    with suppress(OSError):
-        folder().mkdir(parents=True, exist_ok=True)
-        (folder() / name).touch()
 
 
 class _Ledger:

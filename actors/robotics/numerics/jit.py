@@ -15,7 +15,7 @@ import numba.extending
 from numba.core import caching as _caching
 
 from ...core.elementary.in_numba import register
-from .compiled import folder
+from .kept import folder
 
 config: Any = numba.config
 caching: Any = _caching

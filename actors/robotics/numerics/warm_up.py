@@ -13,7 +13,8 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from importlib import import_module
 
-from .compiled import IS_PYTHON, IS_READY, KERNELS, LEDGER, folder, jit, mark
+from .compiled import IS_PYTHON, IS_READY, KERNELS, LEDGER, jit
+from .kept import folder, mark
 
 _LOGGER = logging.getLogger("epicycle")
 _PATIENCE = 1.0  # s before the wait is explained; loading the cached kernels is quicker
