@@ -34,7 +34,7 @@ def packed(folder: Path) -> Path:
     package.mkdir()
     (package / "__init__.py").touch()
     # Here it stands in no package of ours, whose elementary functions it finds by their full name.
-    for name in ("compiled.py", "entry.py", "jit.py"):
+    for name in ("compiled.py", "entry.py", "jit.py", "kept.py"):
         source = (SOURCES / name).read_text("utf-8").replace("from ...core", "from epicycle.actors.core")
         source = source.replace("from .. import", "from epicycle.actors.robotics import")
         (package / name).write_text(source, "utf-8")

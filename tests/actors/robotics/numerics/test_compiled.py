@@ -9,11 +9,11 @@ from pathlib import Path
 
 import pytest
 
-from epicycle.actors.robotics.numerics import compiled
+from epicycle.actors.robotics.numerics import compiled, kept
 
 PROGRAM = """
 import sys
-from epicycle.actors.robotics.numerics import compiled
+from epicycle.actors.robotics.numerics import compiled, kept
 compiled._LIMIT = {limit}
 
 @compiled.inner
@@ -64,9 +64,11 @@ def test_where_nothing_can_be_kept_python_is_first_in_each_process(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "file").touch()
-    monkeypatch.setattr(compiled, "folder", lambda: tmp_path / "file" / "cache")
+    for module in (compiled, kept):
+        monkeypatch.setattr(module, "folder", lambda: tmp_path / "file" / "cache")
     for _ in range(2):
         assert compiled._Ledger().allows()
-    monkeypatch.setattr(compiled, "folder", lambda: tmp_path / "cache")
+    for module in (compiled, kept):
+        monkeypatch.setattr(module, "folder", lambda: tmp_path / "cache")
     assert compiled._Ledger().allows()
     assert not compiled._Ledger().allows()  # as in a later process
