@@ -10,7 +10,6 @@ from libc.stdint cimport int64_t, intptr_t
 from libc.string cimport memcpy
 
 import math
-from importlib import import_module
 
 import numpy as np
 from numpy.typing import NDArray
@@ -149,6 +148,7 @@ cdef class Entry:
         self.function, self.compiled, self.typed = function, compiled, typed
 
     def __reduce__(self):  # by name: an address is good in one process
+        from epicycle.actors.robotics.numerics.compiled import kernel_of
         return kernel_of, (self.function.__module__, self.function.__name__)
 
     @property
@@ -172,10 +172,9 @@ cdef class Entry:
             self.compile()
         kinds, count = self.takes, len(self.takes)
         for argument in arguments:
-            if not isinstance(argument, tuple):
-                continue
-            arguments = tuple([field for each in arguments for field in (each if isinstance(each, tuple) else (each,))])
-            break
+            if isinstance(argument, tuple):  # a named one, by its fields
+                arguments = tuple([one for each in arguments for one in (each if isinstance(each, tuple) else (each,))])
+                break
         if len(arguments) != count:
             raise TypeError(f"a kernel of {count} arguments is given {len(arguments)}")
         for place in range(count):
@@ -224,8 +223,3 @@ cdef given(char kind, int64_t* word):
     made = <object><void*><intptr_t>word[0]
     Py_DECREF(made)
     return made
-
-
-def kernel_of(module, name):
-    """A kernel by its name."""
-    return getattr(import_module(module), name)
