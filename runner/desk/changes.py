@@ -16,7 +16,6 @@ from epicycle.actors import EpicycleError, Parameter
 from ..model.text.document import Mapping as MappingNode
 from ..model.text.problems import Position, Problem
 from ..model.text.reading import NAME, NAMES_HAVE
-from .again import alike
 from .knowledge import Knowledge, owner_of
 from .names import Name
 from .places import positions, value_of, walk
@@ -55,7 +54,9 @@ def edits_between(path: Path, before: str, after: str) -> list[Edit]:
         old, new = "".join(one[a:b]), "".join(other[c:d])
         if what == "equal":
             continue
-        same, behind = alike(old, new)
+        most = min(len(old), len(new))
+        same = next((at for at in range(most) if old[at] != new[at]), most)
+        behind = next((at for at in range(most - same) if old[-1 - at] != new[-1 - at]), most - same)
         found.append(Edit(path, starts[a] + same, starts[b] - behind, new[same : len(new) - behind]))
     return found
 

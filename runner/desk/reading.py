@@ -23,7 +23,6 @@ from ..model.text.files import opened
 from ..model.text.kinds import FILE
 from ..model.text.problems import ModelError, Problem, Problems
 from ..support.collection import without_collection
-from .again import read_again
 
 Texts = Mapping[Path, str]
 NO_TEXTS: Texts = MappingProxyType({})
@@ -44,7 +43,7 @@ class Reading:
     files: Mapping[str, tuple[Path, str]]
     types: tuple[type, ...] = ()
     nodes: Mapping[str, Node] = field(default_factory=dict)
-    parsed: Mapping[str, tuple[str, Node]] = field(default_factory=dict)  # the latest texts without problems
+    parsed: Mapping[tuple[str, str], Node] = field(default_factory=dict)  # what texts without problems hold
 
     @property
     def is_valid(self) -> bool:
@@ -67,19 +66,14 @@ def read(
     """Read a model, a study, a disturbance, or a file of composite classes; never raises because of what it holds.
 
     ``texts`` are read in place of files, by their resolved paths; ``types`` are classes that the model may name, and
-    ``changes`` those of ``load_model``.  Of what was read ``before``, that is taken which has not changed.
+    ``changes`` those of ``load_model``.  Of what was read ``before``, files that have not changed are not parsed again.
     """
     is_file = isinstance(name, Path) or is_path(name)
     path = Path(name) if is_file else packaged_models().get(str(name), Path(name))
     types, loading = tuple(types), Loading()
     given: Any = {**changes, "types": types}
     found, more = list[Problem](), False
-    parsed = {} if before is None else dict(before.parsed)
-
-    def recall(name: str, text: str) -> Node | None:
-        return read_again(text, name, *parsed[name]) if name in parsed else None
-
-    with opened(texts, recall) as known, without_collection():
+    with opened(texts, {} if before is None else before.parsed) as known, without_collection():
         try:
             if is_file:
                 _passes(path, loading, given)
@@ -90,7 +84,8 @@ def read(
             found, more = list(error.problems), error.more
         except EpicycleError as error:
             found = [Problem(str(error), kind=FILE)]
-    nodes = {name: known.nodes.get(name) or parse(text, name, Problems()) for name, (_, text) in known.read.items()}
+    parsed = {(name, text): known.parsed.get((name, text)) for name, (_, text) in known.read.items()}
+    nodes = {name: node or parse(text, name, Problems()) for (name, text), node in parsed.items()}
     return Reading(
         path,
         (*found, *loading.problems.warnings),
@@ -99,7 +94,7 @@ def read(
         known.read,
         types,
         {name: node for name, node in nodes.items() if node is not None},
-        parsed | {name: (known.read[name][1], node) for name, node in known.nodes.items()},
+        {key: node for key, node in parsed.items() if node is not None},
     )
 
 

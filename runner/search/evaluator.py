@@ -22,6 +22,7 @@ from ..support.apart import DONE, Outcome, WorkerError
 from .monitored import with_monitors
 
 PATIENCE = 1.0  # s before processes are started, which takes as long; the work here goes on meanwhile
+GRACE = 0.02  # s that a process rests after what a search waits for, which may expect something else then
 
 
 class Evaluator:
@@ -36,6 +37,8 @@ class Evaluator:
         self._timer = threading.Timer(patience, self._start)
         self._timer.daemon = True
         self._guard = threading.RLock()
+        self._is_heard = threading.Event()  # whether the search has gone on with what it waited for
+        self._awaited: Future[Outcome] | None = None
         self._expected: Iterator[tuple[Hashable, object]] = iter(())
         self._begun: dict[Hashable, Future[Outcome]] = {}
         self._made: set[Hashable] = set()  # of what is expected, here
@@ -54,10 +57,12 @@ class Evaluator:
 
     def __exit__(self, *_: object) -> None:
         self._timer.cancel()
+        self._is_heard.set()
         with self._guard:
             self._processes.end()  # first: no thread waits for one that nobody ends
-        if self._threads is not None:
-            self._threads.shutdown(cancel_futures=True)
+            threads, self._threads = self._threads, None
+        if threads is not None:
+            threads.shutdown(cancel_futures=True)
 
     def expect(self, requests: Iterable[tuple[Hashable, object]]) -> None:
         """Say what will probably be asked for next, in this order, in place of what was said before."""
@@ -66,6 +71,7 @@ class Evaluator:
             self._made.clear()
             for key in [key for key, future in self._begun.items() if future.cancel()]:  # what no process has begun
                 del self._begun[key]
+            self._is_heard.set()
             self._go_ahead()
 
     def make(self, key: Hashable, request: object) -> Any:
@@ -74,7 +80,10 @@ class Evaluator:
             self._made.add(key)
             if (threads := self._threads) is not None:
                 self._begin_with(threads, key, request)
+                self._is_heard.set()
                 self._go_ahead()
+                self._awaited = self._begun[key]
+                self._is_heard.clear()
         if threads is None:
             self._worker.prepare(request)
             return self._worker.make(request)
@@ -94,11 +103,24 @@ class Evaluator:
 
     def _begin_with(self, threads: ThreadPoolExecutor, key: Hashable, request: object) -> None:
         if key not in self._begun:
-            self._begun[key] = threads.submit(self._processes.make, request)
+            future = self._begun[key] = Future[Outcome]()
+            threads.submit(self._work, future, request)
+
+    def _work(self, future: Future[Outcome], request: object) -> None:
+        """Have something made by a process, and then what is expected next."""
+        if not future.set_running_or_notify_cancel():
+            return
+        try:
+            future.set_result(self._processes.make(request))
+        except BaseException as error:
+            future.set_exception(error)
+        if future is self._awaited:  # what comes of it may change what is expected
+            self._is_heard.wait(GRACE)
+        with self._guard:
+            self._go_ahead()
 
     def _go_ahead(self) -> None:
-        # More than there are processes: each goes on at once, before anybody asks for the next.
-        while (threads := self._threads) is not None and self._waiting() < 2 * self._jobs:
+        while (threads := self._threads) is not None and self._waiting() < self._jobs:
             if (following := next(self._expected, None)) is None:
                 return
             if following[0] not in self._made:

@@ -21,7 +21,7 @@ from ..study.run.processes import Worker
 from .cache import NUMBER, EvaluationCache
 from .evaluator import Evaluator
 from .explanation import INTERRUPT, LIMIT, RUNS, Effect, Explanation, Step
-from .minimal import minimal
+from .minimal import minimal, parts
 from .monitored import aspect_named, property_of
 
 _NONE = type(None)
@@ -113,11 +113,14 @@ class _Sets:
             self._asked[names] = self._cache.outcome(_key(names), found)
         return self._asked[names]
 
-    def expect(self, sets: Iterable[Acts], then: Iterable[tuple[Acts, bool]] = ()) -> None:
-        """Say what will probably be asked next, and then which runs."""
-        new = (each for each in sets if each not in self._asked and _key(each) not in self._cache)
+    def expect(self, sets: Iterable[Acts], answer: Sequence[ActName] = ()) -> None:
+        """Say what will probably be asked next; and if there is an answer then, what is asked about this."""
+        names = frozenset(answer)
+        about = (each for name in answer for each in (names - {name}, frozenset([name])))
+        new = (each for each in chain(sets, about) if each not in self._asked and _key(each) not in self._cache)
         some = islice(new, max(self._limit - len(self._asked), 0))
-        self._evaluator.expect(chain(map(self._request, some), (self._request(*each) for each in then)))
+        last = (self._request(each, True) for each in (names, names.difference(answer[:1])) if answer)
+        self._evaluator.expect(chain(map(self._request, some), last))
 
     def verdict(self, names: Acts) -> Verdict:
         """The whole verdict on a set."""
@@ -207,7 +210,8 @@ def explain(
         try:
             # Acts before the break seldom suffice for a property that is about what comes later.
             late = [mine] if any(looks_ahead(part.tree) for part in asked.parts) else []
-            sets.expect(map(frozenset, (none, before, *late)))
+            probably = mine if late else before
+            sets.expect(map(frozenset, chain((none, before, *late), parts(probably))), probably)
             if not breaks(none):
                 candidates = before
                 if not breaks(frozenset(before)):
@@ -217,11 +221,10 @@ def explain(
                             f"monitor {monitor} holds where all {len(mine):,} faults of this run happen and no others: "
                             "what broke it left nothing in the event log"
                         )
-                names = frozenset(minimal(candidates, breaks, sets.active, sets.expect))
-                first = next(name for name in acts if name in names)
-                last = [(names, True), (names - {first}, True)]
-                sets.expect((each for name in names for each in (names - {name}, frozenset([name]))), last)
-                effects = {name: sets.effect(names, name) for name in names}
+                answer = minimal(candidates, breaks, sets.active, sets.expect)
+                sets.expect((), answer)
+                names = frozenset(answer)
+                effects = {name: sets.effect(names, name) for name in answer}
         except (_LimitError, KeyboardInterrupt) as end:
             ended = LIMIT if isinstance(end, _LimitError) else INTERRUPT
             sets.expect(())

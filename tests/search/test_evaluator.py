@@ -78,11 +78,12 @@ def test_nothing_that_is_expected_is_made_twice(tmp_path: Path) -> None:
     assert len(set(processes)) == 3  # this one, and two more
 
 
-def test_what_is_no_longer_expected_is_not_begun(tmp_path: Path) -> None:
+def test_what_is_no_longer_expected_is_not_begun(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "GRACE", 10.0)
     with Evaluator(Noted(str(tmp_path)), 2, Noted, str(tmp_path), patience=0.0) as evaluator:
         evaluator.expect((each, each) for each in range(12))
         evaluator.make(0, 0)
-        evaluator.make(1, 1)  # while two processes make the next two, and the two after these wait
+        evaluator.make(1, 1)  # whose process rests, while the other one makes the next
         evaluator.expect((each, each) for each in range(20, 30))
         evaluator.make(20, 20)
     made = {int(path.name.partition("-")[0]) for path in tmp_path.iterdir()}

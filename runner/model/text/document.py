@@ -50,9 +50,9 @@ def read(path: Path, problems: Problems, shown_as: str | None = None) -> Node | 
         return parse(text, name, problems)
     opened.read[name] = (path, text)
     before = len(problems)
-    found: Node | None = opened.nodes.get(name) or opened.recall(name, text) or parse(text, name, problems)
+    found: Node | None = opened.parsed.get((name, text)) or parse(text, name, problems)
     if found is not None and len(problems) == before:
-        opened.nodes[name] = found
+        opened.parsed[name, text] = found
     return found
 
 
@@ -81,17 +81,16 @@ def _text_of(path: Path, name: str, problems: Problems) -> str | None:
         return None
 
 
-def parse(text: str, name: str, problems: Problems, shown_as: str | None = None, *, depth: int = 0) -> Node | None:
+def parse(text: str, name: str, problems: Problems, shown_as: str | None = None) -> Node | None:
     """Turn YAML text into nodes; None if it cannot be parsed.
 
-    `name` is the file in messages, `shown_as` the line that contains a text of one line; `depth` is how many lists and
-    mappings are around it.
+    `name` is the file in messages, `shown_as` the line that contains a text of one line.
     """
     if len(text) > MAX_BYTES:
         problems.add(_too_large(name), kind=SIZE)
         return None
     with problems.looking_for(SYNTAX):
-        return _Builder(text.removeprefix("\ufeff"), name, problems, shown_as, depth).build()
+        return _Builder(text.removeprefix("\ufeff"), name, problems, shown_as).build()
 
 
 def _too_large(name: str) -> str:
@@ -151,7 +150,7 @@ class _StopError(Exception):
 class _Builder:
     """Builds nodes from parser events with a stack of its own, so that no depth can overflow Python's."""
 
-    def __init__(self, text: str, name: str, problems: Problems, shown_as: str | None, depth: int) -> None:
+    def __init__(self, text: str, name: str, problems: Problems, shown_as: str | None) -> None:
         self._text = text
         self._name = name
         self._problems = problems
@@ -160,7 +159,6 @@ class _Builder:
         self._root: Node | None = None
         self._anchors: dict[str, tuple[Node, int, int] | None] = {}  # None: still open
         self._nodes = 0
-        self._most_open = MAX_DEPTH - depth
 
     def build(self) -> Node | None:
         # Few texts need the second, which is slow to compile.
@@ -260,7 +258,7 @@ class _Builder:
         position = self._span(event)
         is_mapping = isinstance(event, MappingStartEvent)
         self._count(1, position)
-        if len(self._stack) >= self._most_open:
+        if len(self._stack) >= MAX_DEPTH:
             self._stop(f"nested deeper than {MAX_DEPTH} levels", position, SIZE)
         expected, kind = ("map", "mapping") if is_mapping else ("seq", "list")
         if event.tag is not None and event.tag != TAG_PREFIX + expected:
@@ -291,7 +289,7 @@ class _Builder:
             self._stop(f"the alias *{name} is inside &{name} itself", position)
         node, weight, height = known
         self._count(weight, position)
-        if len(self._stack) + height > self._most_open:
+        if len(self._stack) + height > MAX_DEPTH:
             self._stop(f"nested deeper than {MAX_DEPTH} levels by the alias *{name}", position, SIZE)
         # Problems of the node itself are reported where it is used, those inside it where it is written.
         self._add(dataclasses.replace(node, position=position), weight, height)

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, TypeAlias
+from types import MappingProxyType
+from typing import Any
 
 from epicycle.actors import ParameterError, check_allowed, did_you_mean, irregular, read_regular
 
@@ -17,30 +18,25 @@ from .problems import Position
 COMMAND_LINE = "command line"  # the file of a position in an option
 
 
-Recall: TypeAlias = Callable[[str, str], Any]
-
-
 @dataclass
 class Opened:
     """Texts read in place of files, by their resolved paths, and everything that is read, by its name in messages.
 
-    ``nodes`` are what texts without problems hold: several passes read them, but they are parsed once.  ``recall`` may
-    know what a text, by name, holds without parsing it; otherwise it returns None.
+    ``parsed`` is what texts without problems hold, by name and text: several passes read them; each is parsed once.
     """
 
     texts: Mapping[Path, str]
-    recall: Recall
+    parsed: dict[tuple[str, str], Any]
     read: dict[str, tuple[Path, str]] = field(default_factory=dict)
-    nodes: dict[str, Any] = field(default_factory=dict)
 
 
 _opened: ContextVar[Opened | None] = ContextVar("opened", default=None)
 
 
 @contextmanager
-def opened(texts: Mapping[Path, str], recall: Recall = lambda name, text: None) -> Iterator[Opened]:
-    """Texts that are read in place of files, such as those of an editor."""
-    found = Opened(texts, recall)
+def opened(texts: Mapping[Path, str], parsed: Mapping[tuple[str, str], Any] = MappingProxyType({})) -> Iterator[Opened]:
+    """Texts that are read in place of files, such as those of an editor; some may have been ``parsed`` before."""
+    found = Opened(texts, {**parsed})
     token = _opened.set(found)
     try:
         yield found
