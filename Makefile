@@ -22,7 +22,7 @@ help:
 	@echo "make lint   check style, formatting, portable arithmetic, prose, the order of imports, and types, of JavaScript too if node is there"
 	@echo "make check  lint and every test, including the slow ones"
 	@echo "make bench  benchmarks against peers, into benchmarks/RESULTS.md (20 min; keep the machine otherwise idle)"
-	@echo "make truth  what others have published beside what we find, into benchmarks/TRUTH.md and the site (an hour; can be interrupted)"
+	@echo "make truth  what others have published beside what we find, into benchmarks/TRUTH.md and the site (80 minutes; can be interrupted)"
 	@echo "make fuzz   50,000 mutants of valid models and 5,000 hostile inputs: does each soon give a model or a message?"
 	@echo "make mutants 200 small changes of our sources: do the quick tests notice at least 90 % of them?"
 	@echo "make robust 100,000 problems beyond any scenario: does the solver answer each within its limits?"

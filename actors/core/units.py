@@ -92,6 +92,9 @@ _PREFIXABLE: Final = {
     "J": _unit(m=2, kg=1, s=-2),
     "W": _unit(m=2, kg=1, s=-3),
     "V": _unit(m=2, kg=1, s=-3, A=-1),
+    "Ohm": _unit(m=2, kg=1, s=-3, A=-2),
+    "Pa": _unit(m=-1, kg=1, s=-2),
+    "L": _unit(Fraction(1, 1000), m=3),
     "bit": _unit(bit=1),
     "byte": _unit(8, bit=1),
 }
@@ -103,6 +106,7 @@ _UNITS: Final = {
     "min": _unit(60, s=1),
     "h": _unit(3600, s=1),
     "day": _unit(86_400, s=1),
+    "bar": _unit(100_000, m=-1, kg=1, s=-2),
     **_PREFIXABLE,
     **{
         prefix + name: Unit(factor * unit.scale, unit.pi_power, unit.dimension)
@@ -112,8 +116,8 @@ _UNITS: Final = {
 }
 _SUGGESTED: Final = (
     "m", "mm", "cm", "km", "kg", "g", "ns", "us", "ms", "s", "min", "h", "day", "A", "mA", "K", "N", "J",
-    "kJ", "W", "kW", "V", "mV", "Hz", "kHz", "MHz", "rad", "mrad", "deg", "bit", "kbit", "Mbit", "byte",
-    "kbyte", "Mbyte", "m/s", "km/h", "m/s^2", "rad/s", "deg/s",
+    "kJ", "W", "kW", "V", "mV", "Ohm", "Pa", "kPa", "bar", "L", "mL", "Hz", "kHz", "MHz", "rad", "mrad", "deg",
+    "bit", "kbit", "Mbit", "byte", "kbyte", "Mbyte", "m/s", "km/h", "m/s^2", "rad/s", "deg/s",
 )  # fmt: skip
 _OFTEN_WRITTEN: Final = {
     "m": "meter meters metre metres",
@@ -131,6 +135,9 @@ _OFTEN_WRITTEN: Final = {
     "J": "joule joules",
     "W": "watt watts",
     "V": "volt volts",
+    "Ohm": "ohm ohms Ω",
+    "Pa": "pascal pascals",
+    "L": "l liter liters litre litres",
     "A": "amp amps",
     "K": "kelvin",
     "Hz": "hertz",
@@ -163,6 +170,8 @@ _KINDS: Final = {
     _unit(m=2, kg=1, s=-2).dimension: "an energy or a torque",
     _unit(m=2, kg=1, s=-3).dimension: "a power",
     _unit(m=2, kg=1, s=-3, A=-1).dimension: "a voltage",
+    _unit(m=2, kg=1, s=-3, A=-2).dimension: "a resistance",
+    _unit(m=-1, kg=1, s=-2).dimension: "a pressure",
     _unit(bit=1).dimension: "an amount of data",
     _unit(bit=1, s=-1).dimension: "a data rate",
 }

@@ -37,7 +37,7 @@ class Evaluator:
         self._timer = threading.Timer(patience, self._start)
         self._timer.daemon = True
         self._guard = threading.RLock()
-        self._is_heard = threading.Event()  # whether the search has gone on with what it waited for
+        self._is_heard = threading.Event()  # whether the search has taken what it waited for
         self._awaited: Future[Outcome] | None = None
         self._expected: Iterator[tuple[Hashable, object]] = iter(())
         self._begun: dict[Hashable, Future[Outcome]] = {}
@@ -114,7 +114,7 @@ class Evaluator:
             future.set_result(self._processes.make(request))
         except BaseException as error:
             future.set_exception(error)
-        if future is self._awaited:  # what comes of it may change what is expected
+        if future is self._awaited:  # it may change what is expected
             self._is_heard.wait(GRACE)
         with self._guard:
             self._go_ahead()
