@@ -11,7 +11,6 @@ from epicycle.actors import EpicycleError
 
 from ..execution.engine import Interventions, Simulation
 from ..model.build.model import Model
-from ..model.text.problems import Problems
 from ..support.bars import Show, unseen
 from ..support.shown import short
 from .falsification import Falsification, Run
@@ -19,8 +18,8 @@ from .faults import FaultSpace
 from .growing import Growing, study_of
 from .monitored import AD_HOC, monitors_named, property_of
 from .proposals import Point, is_guided, proposals
-from .space import read_space
-from .spec import MAX_RUNS, Break, SearchSpec, results_folder
+from .space import SearchSpec, read_space
+from .spec import MAX_RUNS, Break, results_folder
 
 FILE = Path("falsify")  # what the study of a search has for a file, so that paths are relative to the working directory
 MAX_POINTS = 150_000  # numbers in the text of a study, which is read with limits
@@ -64,12 +63,10 @@ class _Searching:
         if not 0 < goal.runs <= MAX_RUNS:
             raise EpicycleError(f"runs {goal.runs:,}: expected a whole number from 1 to {MAX_RUNS:,}")
         model = spec.load()
-        names = monitors_named(model, goal.monitor or None, flag="--break" if spec.command else "")
+        names = monitors_named(model, goal.monitor or None, flag="--break" if spec.continued_by else "")
         monitors = {name: property_of(model, name) for name in names}
         metrics = [metric for name in names for metric in (name, f"{name}_robustness")]
-        problems = Problems()
-        space = read_space(spec.vary, model, metrics, spec.set, problems)
-        problems.raise_if_any()
+        space = read_space(spec, model, metrics)
         searched = space if not goal.max_faults else self._faults(model)
         if goal.runs * searched.width > MAX_POINTS:
             most = MAX_POINTS // searched.width
@@ -78,7 +75,7 @@ class _Searching:
                 f"each\n   help: search with --runs {most} and several seeds, in a folder each"
             )
         keys = self._keys(model.name, metrics)
-        self.growing = Growing(study_of(spec, keys, FILE), keys, searched, runs=goal.runs, command=spec.command)
+        self.growing = Growing(study_of(spec, keys, FILE), keys, searched, runs=goal.runs, command=spec.continued_by)
         guided = is_guided(space.widths) and space.has_ranges
         self.found = Falsification(spec, goal, model.name, monitors, searched, guided)
         self._proposals = (

@@ -23,8 +23,8 @@ from ..support.bars import Show, unseen
 from .growing import Growing, study_of
 from .optimum import Optimum, Outcome, Tested
 from .proposals import Point, is_guided, proposals
-from .space import read_space
-from .spec import Maximise, Minimise, SearchSpec, results_folder
+from .space import SearchSpec, read_space
+from .spec import Maximise, Minimise, results_folder
 
 FILE = Path("optimise")  # the file of the study of a search over a model: paths are relative to the working directory
 _SHARED = 0.05  # of the runs may be without a number
@@ -68,16 +68,13 @@ class _Optimising:
         keys, path = _keys_of(spec)
         study = study_of(spec, keys, path, goal.replications, spec.seed)
         base = Plan.made(study)
-        problems = Problems()
         metrics = [metric.name for metric in base.metrics]
-        taken = (*metrics, *study.factors)
         model = base.load(base.condition(0))
         self.name = model.name if path == FILE else study.name
-        space = read_space(spec.vary, model, taken, spec.set, problems)
-        problems.raise_if_any()
+        space = read_space(spec, model, (*metrics, *study.factors))
         if not space.axes:
             raise EpicycleError("there is nothing to vary\n   help: add --vary load=0.5..0.9")
-        names = [*metrics, *space.columns]
+        names, problems = [*metrics, *space.columns], Problems()
         flag = "--maximise" if isinstance(goal, Maximise) else "--minimise"
         self._objective = _formula(flag, goal.objective, names, problems, is_condition=False)
         conditions = {
@@ -86,7 +83,7 @@ class _Optimising:
         problems.raise_if_any()
         self._conditions = {text: each for text, each in conditions.items() if each is not None}
         runs = (goal.points + 1) * base.conditions * study.replications
-        self.growing = Growing(study, keys, space, runs=runs, command=spec.command)
+        self.growing = Growing(study, keys, space, runs=runs, command=spec.continued_by)
         guided = is_guided(space.widths) and space.has_ranges
         self.found = Optimum(goal, space, guided)
 
