@@ -5,7 +5,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
 
 from epicycle.actors import EpicycleError
 
@@ -17,7 +16,7 @@ from .falsification import Falsification, Run
 from .faults import FaultSpace
 from .growing import Growing, study_of
 from .monitored import AD_HOC, monitors_named, property_of
-from .proposals import Point, is_guided, proposals
+from .proposals import Point, proposals
 from .space import SearchSpec, read_space
 from .spec import MAX_RUNS, Break, results_folder
 
@@ -74,14 +73,16 @@ class _Searching:
                 f"{goal.runs:,} runs are too many for one folder, where {searched.content} may take {most:,} values "
                 f"each\n   help: search with --runs {most} and several seeds, in a folder each"
             )
-        keys = self._keys(model.name, metrics)
+        keys = spec.keys_of_study(f"falsify_{model.name}") | {"seed": self._seed}
+        if AD_HOC in names and goal.monitor:
+            keys["monitors"] = {AD_HOC: goal.monitor}
+        keys["metrics"] = metrics
         self.growing = Growing(study_of(spec, keys, FILE), keys, searched, runs=goal.runs, command=spec.continued_by)
-        guided = is_guided(space.widths) and space.has_ranges
-        self.found = Falsification(spec, goal, model.name, monitors, searched, guided)
+        self.found = Falsification(spec, goal, model.name, monitors, searched, space.is_guided)
         self._proposals = (
             searched.proposals(self._seed)
             if isinstance(searched, FaultSpace)
-            else proposals(space.widths, self._seed, guided)
+            else proposals(space.widths, self._seed, space.is_guided)
         )
         self._latest: list[float | None] | None = None
 
@@ -128,18 +129,6 @@ class _Searching:
             ended = (row["status"], holds, margin, row["error"], row["digest"], row["run"], broken)
             found.add(Run(start + at, level, row["seed"], *ended))
         self._latest = [each.robustness for each in found.runs[start:]]
-
-    def _keys(self, model: str, metrics: list[str]) -> dict[str, Any]:
-        """What the file of the study says beside the points."""
-        spec = self._spec
-        keys: dict[str, Any] = {"study": f"falsify_{model}", "model": spec.model}
-        if spec.disturb:
-            keys["disturb"] = {"given": list(spec.disturb)}
-        keys["seed"] = self._seed
-        if AD_HOC in metrics and self._goal.monitor:
-            keys["monitors"] = {AD_HOC: self._goal.monitor}
-        keys["metrics"] = metrics
-        return keys
 
 
 def _least(margin: float) -> float:

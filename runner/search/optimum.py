@@ -150,15 +150,8 @@ class Optimum(StudyAnswer):
         def estimate(outcome: Outcome | None) -> dict[str, Any] | None:
             if outcome is None or outcome.value is None:
                 return None
-            value = outcome.value
-            ends = [end if value.count > 1 else None for end in (value.low, value.high)]
-            return {
-                "value": value.value,
-                "low": ends[0],
-                "high": ends[1],
-                "runs": outcome.runs,
-                "broken": outcome.broken,
-            }
+            said, value = {"runs": outcome.runs, "broken": outcome.broken}, outcome.value
+            return {"value": value.value, "low": value.low, "high": value.high, **said}
 
         return {
             "objective": goal.objective,

@@ -8,8 +8,9 @@ from collections.abc import Iterable, Iterator
 from collections.abc import Sequence as Many
 from dataclasses import dataclass, field
 from decimal import Decimal
+from importlib.util import find_spec
 from itertools import islice
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from epicycle.actors import UnitError, counted, declared_parameters, parse_unit
 
@@ -131,6 +132,11 @@ class SearchSpec(RunSpec):
     vary: tuple[str, ...] = ()
     continued_by: tuple[str, ...] = field(default=(), repr=False)  # the command, if there is one
 
+    def keys_of_study(self, name: str) -> dict[str, Any]:
+        """A study of the model, as its file would say it."""
+        given = {"disturb": {"given": list(self.disturb)}} if self.disturb else {}
+        return {"study": name, "model": self.model, **given}
+
     @property
     def stop(self) -> float | None:
         """The stop time (s), if it is not the model's."""
@@ -152,7 +158,12 @@ class Space:
         self.widths = [axis.width for axis in self.axes]
         self.width = sum(self.widths)  # shares that lead to a point, and numbers in the text of a study that it takes
         self.content = counted(len(self.axes), "parameter")
-        self.has_ranges = any(not isinstance(axis, Choice) for axis in self.axes)
+        self.has_ranges = any(isinstance(axis, Interval) for axis in self.axes)
+
+    @property
+    def is_guided(self) -> bool:
+        """Whether what is found guides a search; for one of no signals, a library must be there."""
+        return self.has_ranges and (max(self.widths) > 1 or find_spec("cma") is not None)
 
     @property
     def columns(self) -> dict[str, str]:
