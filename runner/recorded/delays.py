@@ -61,18 +61,10 @@ def autocorrelation(delays: Delays) -> float:
     return float(np.mean(rest[1:] * rest[:-1])) / whole if whole > 0.0 and len(delays) > 2 else 0.0
 
 
-def _exponential(delays: Delays) -> Law | None:
-    return 0.0, float(np.mean(delays)), 1.0
-
-
 def _shifted_exponential(delays: Delays) -> Law | None:
     """The least delay is 1/n of the mean above the shift on average: without that, the estimate is biased."""
     shift = _highest_shift(delays)
     return (shift, float(np.mean(delays)) - shift, 1.0) if shift > 0.0 else None
-
-
-def _gamma(delays: Delays) -> Law | None:
-    return _gamma_above(delays, 0.0)
 
 
 def _shifted_gamma(delays: Delays) -> Law | None:
@@ -114,9 +106,9 @@ def _highest_shift(delays: Delays) -> float:
 
 
 _LAWS: tuple[tuple[str, int, Callable[[Delays], Law | None]], ...] = (
-    ("exponential", 1, _exponential),
+    ("exponential", 1, lambda delays: (0.0, float(np.mean(delays)), 1.0)),
     ("shifted exponential", 2, _shifted_exponential),
-    ("gamma", 2, _gamma),
+    ("gamma", 2, lambda delays: _gamma_above(delays, 0.0)),
     ("shifted gamma", 3, _shifted_gamma),
 )
 

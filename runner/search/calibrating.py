@@ -18,7 +18,7 @@ from ..model.build.model import Model
 from ..model.language.dimensions import number_node
 from ..model.language.settings import Setting
 from ..model.text.files import COMMAND_LINE
-from ..model.text.problems import ModelError, Position, Problems
+from ..model.text.problems import ModelError, Position
 from ..study.run.processes import Worker
 from ..study.session import available_cores
 from ..support.bars import Show, unseen
@@ -27,8 +27,8 @@ from .cache import NUMBER, EvaluationCache
 from .calibration import Calibration, Fitted, Matched
 from .evaluator import Evaluator
 from .proposals import SPREAD, Point, spread
-from .space import Interval, read_space
-from .spec import Match, SearchSpec, results_folder
+from .space import Interval, SearchSpec, read_space
+from .spec import Match, results_folder
 
 if TYPE_CHECKING:
     import numpy as np
@@ -57,7 +57,7 @@ def calibrate(
     task = _Task(spec, goal)
     folder = out or results_folder(task.model.name, "calibration")
     cache = EvaluationCache(task.model, task.about(), [NUMBER], folder)
-    with Evaluator(_Worker(task), jobs or available_cores(), _worker_of, spec, goal) as evaluator:
+    with Evaluator(task, jobs or available_cores(), _Task, spec, goal) as evaluator:
         found = _fitted(_Runs(task, evaluator, cache, show))
     found.folder = folder
     return found
@@ -174,16 +174,14 @@ def _stencil(share: float) -> tuple[tuple[float, float], float, tuple[float, flo
     return (-_STEP, _STEP), 0.0, (-0.5, 0.5)
 
 
-class _Task:
-    """What is fitted to what, read once."""
+class _Task(Worker):
+    """What is fitted to what, read once; makes runs with given parameters."""
 
     def __init__(self, spec: SearchSpec, goal: Match) -> None:
         self.spec, self.linear = spec, goal.between == "linear"
         self.model = spec.load()
-        problems = Problems()
-        space = read_space(spec.vary, self.model, (), spec.set, problems)
-        problems.raise_if_any()
-        self.axes = [axis for axis in space.axes if isinstance(axis, Interval) and not axis.is_whole]
+        space = read_space(spec, self.model)
+        self.axes = [axis for axis in space.axes if isinstance(axis, Interval) and axis.kind == "float"]
         if wrong := [axis.path for axis in space.axes if axis not in self.axes]:
             raise EpicycleError(f"{wrong[0]!r} has no range of real numbers, which least squares need")
         if not self.axes:
@@ -226,30 +224,18 @@ class _Task:
         """The same in words."""
         return ", ".join(f"{each.path}={getattr(each.node, 'text', '')}" for each in self.settings(point))
 
-
-class _Worker(Worker):
-    """Makes runs with given parameters."""
-
-    def __init__(self, task: _Task) -> None:
-        self._task = task
-
     def make(self, point: Point) -> list[float]:
         """What the model sends at the times of all measured values."""
-        task, key = self._task, self._task.key(point)
+        key = self.key(point)
         try:
-            results = task.results(task.spec.load(task.settings(point)))
+            results = self.results(self.spec.load(self.settings(point)))
         except EpicycleError as error:
             raise EpicycleError(f"{key}: {error}") from error
         return [
             value
-            for signal, times, _ in task.signals
-            for value in _sampled(results.signals[signal], signal, times, results.end, task.linear, key)
+            for signal, times, _ in self.signals
+            for value in _sampled(results.signals[signal], signal, times, results.end, self.linear, key)
         ]
-
-
-def _worker_of(spec: SearchSpec, goal: Match) -> _Worker:
-    """The same in another process."""
-    return _Worker(_Task(spec, goal))
 
 
 class _Runs:

@@ -6,6 +6,7 @@ import copy
 import shlex
 from collections.abc import Iterable, Sequence
 from dataclasses import InitVar, asdict, dataclass, field
+from operator import attrgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -47,11 +48,8 @@ class Effect:
     @property
     def has_moved(self) -> bool:
         """Whether the act of that name is another one in the whole run."""
-        return (self.act.time, self.act.source, self.act.token) != (
-            self.whole.time,
-            self.whole.source,
-            self.whole.token,
-        )
+        told = attrgetter("time", "source", "token")
+        return bool(told(self.act) != told(self.whole))
 
 
 @dataclass(frozen=True)

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import json
 import math
-import re
 import shlex
 from collections import Counter
 from collections.abc import Iterator
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -20,21 +18,19 @@ from ..model.graph.acts import ActName
 from ..model.language.dimensions import Level, split_number
 from ..model.language.disturbance import EXACTLY
 from ..model.language.settings import Setting
-from ..model.text.document import Node, Scalar, plain
+from ..model.text.document import plain
 from ..study.run.backlog import OK
-from ..study.run_spec import RunSpec
 from ..support.shown import short
 from ..support.tables import Table
 from .answer import StudyAnswer, listed
 from .faults import FaultSpace
 from .monitored import with_monitors
 from .proposals import BATCH, SPREAD
-from .space import Interval, Signal, Space
-from .spec import Break, SearchSpec
+from .space import Interval, SearchSpec, Space, as_set, text_of
+from .spec import Break
 
 SHOWN = 5  # runs in the table
 _VALUES = 10  # of a list, in a sentence
-_BARE = re.compile(r"[A-Za-z0-9_.+ -]+")  # a text that needs no quotes in YAML, where it is not a number
 
 
 @dataclass(frozen=True)
@@ -109,10 +105,8 @@ class Falsification(StudyAnswer):
 
     def command_of(self, run: Run) -> list[str]:
         """The command that makes one of the runs again."""
-        spec = self.spec
-        changes = {name: getattr(spec, name) for name in ("disturb", "aspects", "without_aspects", "types")}
-        own = [f"{path}={value}" for path, value in _settings(run)]
-        return RunSpec.of(spec.model, run.seed, spec.until, {"set": [*spec.set, *own], **changes}).command()
+        own = [f"{path}={value}" for path, value in as_set(run.level)]
+        return replace(self.spec, seed=run.seed, set=(*self.spec.set, *own)).command()
 
     @property
     def verdict(self) -> Verdict | None:
@@ -206,21 +200,6 @@ class Falsification(StudyAnswer):
         return [Table(("to", "command"), [each for each in commands if each[1]]), Table(head, runs)]
 
 
-def _settings(run: Run) -> Iterator[tuple[str, str]]:
-    """What a run was given, as ``--set`` takes it."""
-    return ((setting.path, _text(setting.node)) for setting in run.level.settings)
-
-
-def _text(node: Node) -> str:
-    """A value as YAML, without quotes where it can be."""
-    if isinstance(node, Scalar):
-        number = split_number(node)
-        is_bare = _BARE.fullmatch(node.text) is not None and (number is None or bool(number[1]))
-        if is_bare or not isinstance(node.value, str):
-            return node.text
-    return json.dumps(plain(node))
-
-
 def _acts(setting: Setting) -> list[ActName]:
     """The acts that a setting lets happen."""
     said: Any = plain(setting.node)
@@ -233,7 +212,7 @@ def _words(run: Run) -> Iterator[tuple[str, str]]:
         if setting.path == EXACTLY:
             yield setting.path, "; ".join(map(str, _acts(setting))) or "no fault"
         else:
-            yield setting.path, _text(setting.node)
+            yield setting.path, text_of(setting.node)
 
 
 def _said(run: Run) -> str:
@@ -259,16 +238,15 @@ def _covered(found: Falsification) -> Iterator[str]:
                 yield f"{made[size]:,} of {of_size:,} sets of {counted(size, 'fault')}" if size else "no fault at all"
     for at, axis in enumerate(found.space.axes):
         nodes = [each.level.settings[at].node for each in runs]
-        if isinstance(axis, Interval):
+        if isinstance(axis, Interval) and axis.length:
+            ends = f"from {axis.low:f} to {axis.high:f} {axis.unit}".rstrip()
+            yield f"{axis.path} with {counted(axis.length, 'number')} {ends}"
+        elif isinstance(axis, Interval):
             numbers = [number[0] for each in nodes if (number := split_number(each)) is not None]
-            unit = f" {axis.unit}" if axis.unit else ""
-            yield f"{axis.path} {min(numbers):f} to {max(numbers):f}{unit}"
-        elif isinstance(axis, Signal):
-            ends = f"from {axis.of.low:f} to {axis.of.high:f} {axis.of.unit}".rstrip()
-            yield f"{axis.path} with {counted(axis.width, 'number')} {ends}"
+            yield f"{axis.path} {min(numbers):f} to {max(numbers):f} {axis.unit}".rstrip()
         else:
             tried = {each.level.values[axis.path] for each in runs}
-            texts = [_text(node) for node in axis.nodes if axis.factor(node) in tried]
+            texts = [text_of(node) for node in axis.nodes if axis.factor(node) in tried]
             shown = texts[:_VALUES]
             more = f" and {len(texts) - len(shown):,} more" if len(texts) > len(shown) else ""
             yield f"{axis.path} {' or '.join(shown)}{more}"

@@ -5,22 +5,20 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
 
 from epicycle.actors import EpicycleError
 
 from ..execution.engine import Interventions, Simulation
 from ..model.build.model import Model
-from ..model.text.problems import Problems
 from ..support.bars import Show, unseen
 from ..support.shown import short
 from .falsification import Falsification, Run
 from .faults import FaultSpace
 from .growing import Growing, study_of
 from .monitored import AD_HOC, monitors_named, property_of
-from .proposals import Point, is_guided, proposals
-from .space import read_space
-from .spec import MAX_RUNS, Break, SearchSpec, results_folder
+from .proposals import Point, proposals
+from .space import SearchSpec, read_space
+from .spec import MAX_RUNS, Break, results_folder
 
 FILE = Path("falsify")  # what the study of a search has for a file, so that paths are relative to the working directory
 MAX_POINTS = 150_000  # numbers in the text of a study, which is read with limits
@@ -64,12 +62,10 @@ class _Searching:
         if not 0 < goal.runs <= MAX_RUNS:
             raise EpicycleError(f"runs {goal.runs:,}: expected a whole number from 1 to {MAX_RUNS:,}")
         model = spec.load()
-        names = monitors_named(model, goal.monitor or None, flag="--break" if spec.command else "")
+        names = monitors_named(model, goal.monitor or None, flag="--break" if spec.continued_by else "")
         monitors = {name: property_of(model, name) for name in names}
         metrics = [metric for name in names for metric in (name, f"{name}_robustness")]
-        problems = Problems()
-        space = read_space(spec.vary, model, metrics, spec.set, problems)
-        problems.raise_if_any()
+        space = read_space(spec, model, metrics)
         searched = space if not goal.max_faults else self._faults(model)
         if goal.runs * searched.width > MAX_POINTS:
             most = MAX_POINTS // searched.width
@@ -77,14 +73,16 @@ class _Searching:
                 f"{goal.runs:,} runs are too many for one folder, where {searched.content} may take {most:,} values "
                 f"each\n   help: search with --runs {most} and several seeds, in a folder each"
             )
-        keys = self._keys(model.name, metrics)
-        self.growing = Growing(study_of(spec, keys, FILE), keys, searched, runs=goal.runs, command=spec.command)
-        guided = is_guided(space.widths) and space.has_ranges
-        self.found = Falsification(spec, goal, model.name, monitors, searched, guided)
+        keys = spec.keys_of_study(f"falsify_{model.name}") | {"seed": self._seed}
+        if AD_HOC in names and goal.monitor:
+            keys["monitors"] = {AD_HOC: goal.monitor}
+        keys["metrics"] = metrics
+        self.growing = Growing(study_of(spec, keys, FILE), keys, searched, runs=goal.runs, command=spec.continued_by)
+        self.found = Falsification(spec, goal, model.name, monitors, searched, space.is_guided)
         self._proposals = (
             searched.proposals(self._seed)
             if isinstance(searched, FaultSpace)
-            else proposals(space.widths, self._seed, guided)
+            else proposals(space.widths, self._seed, space.is_guided)
         )
         self._latest: list[float | None] | None = None
 
@@ -131,18 +129,6 @@ class _Searching:
             ended = (row["status"], holds, margin, row["error"], row["digest"], row["run"], broken)
             found.add(Run(start + at, level, row["seed"], *ended))
         self._latest = [each.robustness for each in found.runs[start:]]
-
-    def _keys(self, model: str, metrics: list[str]) -> dict[str, Any]:
-        """What the file of the study says beside the points."""
-        spec = self._spec
-        keys: dict[str, Any] = {"study": f"falsify_{model}", "model": spec.model}
-        if spec.disturb:
-            keys["disturb"] = {"given": list(spec.disturb)}
-        keys["seed"] = self._seed
-        if AD_HOC in metrics and self._goal.monitor:
-            keys["monitors"] = {AD_HOC: self._goal.monitor}
-        keys["metrics"] = metrics
-        return keys
 
 
 def _least(margin: float) -> float:

@@ -24,8 +24,7 @@ from ..study.run.store import BEST_FIRST, Row, prepare, write
 from ..study.session import available_cores, manifest_of
 from .faults import FaultSpace
 from .proposals import Point
-from .space import Space, said
-from .spec import SearchSpec
+from .space import SearchSpec, Space, said
 
 _GROWTH = 1.1  # of the number of points, after which the folder is told of them: each time, of all
 
@@ -43,22 +42,18 @@ class _SearchTask(Task):
 class _Worker:
     """Makes the runs of one plan after the other."""
 
-    def __init__(self) -> None:
-        self._batch = 0
-        self._runner: Runner | None = None
+    _runner: Runner
+    _batch = 0
 
     def prepare(self, task: _SearchTask) -> None:
         """Load the model of the run's condition, unless it is there."""
-        self._of(task).prepare(task)
+        if task.batch != self._batch:
+            self._runner, self._batch = Runner(task.plan), task.batch
+        self._runner.prepare(task)
 
     def make(self, task: _SearchTask) -> Row:
-        """The row of a run."""
-        return self._of(task).make(task)
-
-    def _of(self, task: _SearchTask) -> Runner:
-        if self._runner is None or task.batch != self._batch:
-            self._runner, self._batch = Runner(task.plan), task.batch
-        return self._runner
+        """The row of a run, for which the model is there."""
+        return self._runner.make(task)
 
 
 class Growing:
@@ -172,9 +167,8 @@ def study_of(
     spec: SearchSpec, keys: Mapping[str, Any], path: Path, replications: int | None = None, seed: int | None = None
 ) -> Study:
     """The study that gets points: what its file says, and what the search changes in its model."""
-    study = study_of_text(_text_of(keys, []), path, spec.set, spec.types, replications, seed)
-    aspects, without_aspects = tuple(spec.aspects), tuple(spec.without_aspects)
-    return replace(study, aspects=aspects, without_aspects=without_aspects, stop=spec.until)
+    study = study_of_text(_text_of(keys, []), path, spec.set, map(Path, spec.types), replications, seed)
+    return replace(study, aspects=spec.aspects, without_aspects=spec.without_aspects, stop=spec.stop)
 
 
 def _text_of(keys: Mapping[str, Any], levels: Sequence[Level]) -> str:

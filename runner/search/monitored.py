@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import replace
+from typing import TypeVar
 
 from epicycle.actors import EpicycleError, did_you_mean
 
@@ -12,6 +13,7 @@ from ..model.graph.woven import WovenAspect
 from ..model.text.files import COMMAND_LINE
 from ..model.text.problems import ModelError, Position
 
+T = TypeVar("T")
 AD_HOC = "property"  # the name of a monitor that is made of a text
 
 
@@ -47,13 +49,7 @@ def monitors_named(model: Model, text: str | None, flag: str = "") -> list[str]:
 
 def aspect_named(model: Model, name: str) -> WovenAspect:
     """An aspect of a model; raises ``EpicycleError`` if there is none of that name."""
-    known = {woven.name: woven for woven in model.aspects}
-    if name not in known:
-        raise EpicycleError(
-            f"{model.name} has no aspect {name!r}{did_you_mean(name, known)}\n"
-            f"   help: its aspects: {', '.join(known) or 'none'}"
-        )
-    return known[name]
+    return _known(model, "aspect", name, {woven.name: woven for woven in model.aspects})
 
 
 def with_monitors(model: Model, monitors: Mapping[str, str]) -> Model:
@@ -67,10 +63,13 @@ def with_monitors(model: Model, monitors: Mapping[str, str]) -> Model:
 
 def property_of(model: Model, monitor: str) -> str:
     """The property that a monitor of a model states; raises ``EpicycleError`` if there is no such monitor."""
-    known = {each.name: each.requirement.property for each in model.output.monitors}
-    if monitor not in known:
-        near = did_you_mean(monitor, known)
+    return _known(model, "monitor", monitor, {each.name: each.requirement.property for each in model.output.monitors})
+
+
+def _known(model: Model, what: str, name: str, known: Mapping[str, T]) -> T:
+    if name not in known:
         raise EpicycleError(
-            f"{model.name} has no monitor {monitor!r}{near}\n   help: its monitors: {', '.join(known) or 'none'}"
+            f"{model.name} has no {what} {name!r}{did_you_mean(name, known)}\n"
+            f"   help: its {what}s: {', '.join(known) or 'none'}"
         )
-    return known[monitor]
+    return known[name]

@@ -12,19 +12,19 @@ from epicycle.actors.expression import ExpressionError, Formula
 
 from ..model.catalogue.packaged import is_path, packaged_files
 from ..model.language.study import is_study, read_study
-from ..model.language.study_metric import asks_for_none
 from ..model.text.document import parse, plain
 from ..model.text.files import COMMAND_LINE
 from ..model.text.problems import Position, Problems
 from ..study.inference import mean, with_interval
+from ..study.judge.samples import value_in
 from ..study.plan.plan import Plan
 from ..study.run.backlog import OK
 from ..support.bars import Show, unseen
 from .growing import Growing, study_of
 from .optimum import Optimum, Outcome, Tested
-from .proposals import Point, is_guided, proposals
-from .space import read_space
-from .spec import Maximise, Minimise, SearchSpec, results_folder
+from .proposals import Point, proposals
+from .space import SearchSpec, read_space
+from .spec import Maximise, Minimise, results_folder
 
 FILE = Path("optimise")  # the file of the study of a search over a model: paths are relative to the working directory
 _SHARED = 0.05  # of the runs may be without a number
@@ -68,16 +68,13 @@ class _Optimising:
         keys, path = _keys_of(spec)
         study = study_of(spec, keys, path, goal.replications, spec.seed)
         base = Plan.made(study)
-        problems = Problems()
         metrics = [metric.name for metric in base.metrics]
-        taken = (*metrics, *study.factors)
         model = base.load(base.condition(0))
         self.name = model.name if path == FILE else study.name
-        space = read_space(spec.vary, model, taken, spec.set, problems)
-        problems.raise_if_any()
+        space = read_space(spec, model, (*metrics, *study.factors))
         if not space.axes:
             raise EpicycleError("there is nothing to vary\n   help: add --vary load=0.5..0.9")
-        names = [*metrics, *space.columns]
+        names, problems = [*metrics, *space.columns], Problems()
         flag = "--maximise" if isinstance(goal, Maximise) else "--minimise"
         self._objective = _formula(flag, goal.objective, names, problems, is_condition=False)
         conditions = {
@@ -86,9 +83,8 @@ class _Optimising:
         problems.raise_if_any()
         self._conditions = {text: each for text, each in conditions.items() if each is not None}
         runs = (goal.points + 1) * base.conditions * study.replications
-        self.growing = Growing(study, keys, space, runs=runs, command=spec.command)
-        guided = is_guided(space.widths) and space.has_ranges
-        self.found = Optimum(goal, space, guided)
+        self.growing = Growing(study, keys, space, runs=runs, command=spec.continued_by)
+        self.found = Optimum(goal, space, space.is_guided)
 
     @property
     def seed(self) -> int:
@@ -131,8 +127,7 @@ def _keys_of(spec: SearchSpec) -> tuple[dict[str, Any], Path]:
     """The study that a search adds points to, as a mapping, and its file."""
     target = Path(spec.model)
     if not (is_study(target) if is_path(spec.model) else spec.model in packaged_files("study")):
-        said: dict[str, Any] = {"study": "optimisation", "model": spec.model}
-        return said | ({"disturb": {"given": list(spec.disturb)}} if spec.disturb else {}), FILE
+        return spec.keys_of_study("optimisation"), FILE
     told = {"--disturb": spec.disturb, "--aspect": spec.aspects, "--without": spec.without_aspects}
     for flag, given in (told | {"--until": () if spec.until is None else (spec.until,)}).items():
         if given:
@@ -170,10 +165,4 @@ def _formula(flag: str, text: str, names: Sequence[str], problems: Problems, *, 
 def _value(formula: Formula | None, row: Mapping[str, Any]) -> Any:
     """An expression for one run; None if it failed or lacks a number."""
     assert formula is not None
-    known = {name: row[name] for name in formula.names}
-    if row["status"] != OK or (None in known.values() and not asks_for_none(formula.source)):
-        return None
-    try:
-        return formula(known)
-    except EpicycleError:  # it cannot be evaluated for this run
-        return None
+    return value_in(formula, row) if row["status"] == OK else None

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 import shlex
 from collections.abc import Iterator
@@ -12,11 +11,11 @@ from typing import Any
 from epicycle.actors import counted
 
 from ..model.language.dimensions import Level, split_number
-from ..model.text.document import Scalar, plain
+from ..model.text.document import plain
 from ..study.inference import Estimate, with_interval
 from ..support.tables import Table
 from .answer import StudyAnswer
-from .space import Interval, Space
+from .space import Interval, Space, as_set
 from .spec import Maximise, Minimise
 
 SHOWN = 5  # points in the table
@@ -106,7 +105,8 @@ class Optimum(StudyAnswer):
     def command(self) -> list[str]:
         """What sets the best parameters."""
         found = self.point
-        return [] if found is None else [word for path, text in _set(found) for word in ("--set", f"{path}={text}")]
+        said = () if found is None else as_set(found.level)
+        return [word for path, text in said for word in ("--set", f"{path}={text}")]
 
     def _sentences(self) -> Iterator[str]:
         goal, found = self.goal, self.point
@@ -117,7 +117,7 @@ class Optimum(StudyAnswer):
                 " and meets all conditions." if goal.conditions else "."
             )
         else:
-            where = ", ".join(f"{path}={text}" for path, text in _set(found))
+            where = ", ".join(f"{path}={text}" for path, text in as_set(found.level))
             yield f"The {what} of {tried} is {with_interval(self.value)}, at {where} (point {found.number})."
             yield from self._checked()
             for at in _at_ends(self, found):
@@ -150,15 +150,8 @@ class Optimum(StudyAnswer):
         def estimate(outcome: Outcome | None) -> dict[str, Any] | None:
             if outcome is None or outcome.value is None:
                 return None
-            value = outcome.value
-            ends = [end if value.count > 1 else None for end in (value.low, value.high)]
-            return {
-                "value": value.value,
-                "low": ends[0],
-                "high": ends[1],
-                "runs": outcome.runs,
-                "broken": outcome.broken,
-            }
+            said, value = {"runs": outcome.runs, "broken": outcome.broken}, outcome.value
+            return {"value": value.value, "low": value.low, "high": value.high, **said}
 
         return {
             "objective": goal.objective,
@@ -174,21 +167,15 @@ class Optimum(StudyAnswer):
         }
 
     def _tables(self) -> list[Table]:
-        distinct = {tuple(_set(each)): each for each in reversed(self.ranked)}
+        distinct = {tuple(as_set(each.level)): each for each in reversed(self.ranked)}
         first = sorted(distinct.values(), key=lambda each: (self.cost(each.outcome), each.number))[:SHOWN]
         head = ("point", *(axis.path for axis in self.space.axes), self.goal.objective)
         rows = [
-            (str(each.number), *(text for _, text in _set(each)), with_interval(each.outcome.value))
+            (str(each.number), *(text for _, text in as_set(each.level)), with_interval(each.outcome.value))
             for each in first
             if each.outcome.value is not None
         ]
         return [Table(("set it by",), [(shlex.join(self.command),)] if rows else []), Table(head, rows)]
-
-
-def _set(point: Tested) -> Iterator[tuple[str, str]]:
-    """What a point sets, as ``--set`` takes it."""
-    for each in point.level.settings:
-        yield each.path, each.node.text if isinstance(each.node, Scalar) else json.dumps(plain(each.node))
 
 
 def _at_ends(optimum: Optimum, point: Tested) -> Iterator[str]:

@@ -40,21 +40,6 @@ WAYS = DENSE, DENSE_AT_ENDS, SPARSE, AT_ENDS = Way(True, False), Way(True, True)
 Proposals = Generator[list[Point], list[float | None], None]
 
 
-def is_guided(widths: Sequence[int]) -> bool:
-    """Whether what is found guides a search; for one of no signals, a library must be there."""
-    if _has_signals(widths):
-        return True
-    try:
-        import cma  # noqa: F401
-    except ImportError:
-        return False
-    return True
-
-
-def _has_signals(widths: Sequence[int]) -> bool:
-    return any(width > 1 for width in widths)
-
-
 def proposals(widths: Sequence[int], seed: int, guided: bool, together: int = BATCH) -> Proposals:
     """Batches of points, without end; each is sent the robustness that was found at its points.
 
@@ -62,7 +47,7 @@ def proposals(widths: Sequence[int], seed: int, guided: bool, together: int = BA
     ``together``.  Each batch depends on nothing but the seed and what was found before it.
     """
     axes = sum(widths)
-    if _has_signals(widths):
+    if max(widths, default=0) > 1:
         yield from _of_signals(widths, seed)
     spreads, descents = 0, 0
     while True:

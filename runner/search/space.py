@@ -1,14 +1,16 @@
-"""What a search varies: ranges of numbers and lists of values, as ``--vary`` says them, and points in them."""
+"""What a search is given, and what it varies: ranges and lists, as ``--vary`` says them, and points in them."""
 
 from __future__ import annotations
 
+import json
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from collections.abc import Sequence as Many
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from decimal import Decimal
+from importlib.util import find_spec
 from itertools import islice
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from epicycle.actors import UnitError, counted, declared_parameters, parse_unit
 
@@ -31,8 +33,10 @@ from ..model.language.study import RESERVED
 from ..model.text.document import Entry, Mapping, Node, Scalar, Sequence, plain
 from ..model.text.patterns import matches, select
 from ..model.text.problems import POISON, Position, Problems
+from ..study.run_spec import RunSpec, seconds
 
 HINT = "write load=0.5..0.9, policy=[fifo, lifo] or 'period={from: 1 s, to: 5 s, step: 1 s}'"
+_BARE = re.compile(r"[A-Za-z0-9_.+ -]+")  # a text that needs no quotes in YAML, where it is not a number
 _RANGE = re.compile(r"(.*?\S)\s*\.\.\s*(\S.*)")
 MAX_VALUES = 100_000  # of a list
 MAX_WHOLE, MAX_NUMBER = 10**15, 10**300  # of the ends of a range
@@ -41,7 +45,7 @@ _DIGITS = 6  # of the width of a range, to which its numbers are drawn
 
 @dataclass(frozen=True)
 class Interval:
-    """All numbers of a range, or all whole ones."""
+    """All numbers of a range, or all whole ones; of a signal, all lists of so many numbers, one after the other."""
 
     path: str
     low: Decimal
@@ -49,20 +53,38 @@ class Interval:
     unit: str
     position: Position
     is_whole: bool
+    length: int | None = None  # of the lists
 
-    width: ClassVar[int] = 1  # how many shares lead to a value
+    @property
+    def width(self) -> int:
+        """How many shares lead to a value."""
+        return self.length or 1
 
     @property
     def kind(self) -> str:
         """What its column in the table holds."""
-        return "int" if self.is_whole else "float"
+        return "text" if self.length else "int" if self.is_whole else "float"
 
     @property
     def ends(self) -> list[Node]:
-        """The first and the last number."""
-        return [self._node(self.low), self._node(self.high)]
+        """Nothing but the first number, and nothing but the last."""
+        return [self._value([self._node(end)] * self.width) for end in (self.low, self.high)]
 
-    def node(self, share: float) -> Node:
+    def node(self, *shares: float) -> Node:
+        """The number at a share of the range, or the numbers at several."""
+        return self._value([self._number(share) for share in shares])
+
+    def factor(self, node: Node) -> Factor:
+        """A value as the table has it."""
+        number = split_number(node)
+        if number is None:
+            return as_factor(node, self.kind)
+        return int(number[0]) if self.is_whole else in_si(float(number[0]), self.unit)
+
+    def _value(self, numbers: Many[Node]) -> Node:
+        return Sequence(tuple(numbers), self.position) if self.length else numbers[0]
+
+    def _number(self, share: float) -> Node:
         """The number at a share of the range, to six digits of its width."""
         width = self.high - self.low
         if self.is_whole:
@@ -70,12 +92,6 @@ class Interval:
         low, high = float(self.low), float(self.high)
         number = round(low + share * (high - low), _DIGITS - 1 - width.adjusted())
         return number_node(min(max(number, low), high), self.unit, self.position)
-
-    def factor(self, node: Node) -> Factor:
-        """A number as the table has it."""
-        number = split_number(node)
-        assert number is not None
-        return int(number[0]) if self.is_whole else in_si(float(number[0]), self.unit)
 
     def _node(self, number: Decimal) -> Scalar:
         return number_node(int(number) if self.is_whole else float(number), self.unit, self.position)
@@ -106,40 +122,32 @@ class Choice:
         return as_factor(node, self.kind)
 
 
+Axis = Interval | Choice
+
+
 @dataclass(frozen=True)
-class Signal:
-    """All lists of so many numbers of a range, such as the values of an input one after the other."""
+class SearchSpec(RunSpec):
+    """All that a search is given: a model or study, with all that changes it, and what is varied."""
 
-    of: Interval
-    width: int  # how many shares lead to a value, which is how many numbers it has
+    vary: tuple[str, ...] = ()
+    continued_by: tuple[str, ...] = field(default=(), repr=False)  # the command, if there is one
 
-    kind: ClassVar[str] = "text"
-
-    @property
-    def path(self) -> str:
-        """The parameter."""
-        return self.of.path
+    def keys_of_study(self, name: str) -> dict[str, Any]:
+        """A study of the model, as its file would say it."""
+        given = {"disturb": {"given": list(self.disturb)}} if self.disturb else {}
+        return {"study": name, "model": self.model, **given}
 
     @property
-    def position(self) -> Position:
-        """Where it is said."""
-        return self.of.position
+    def stop(self) -> float | None:
+        """The stop time (s), if it is not the model's."""
+        return seconds("until", self.until)
 
-    @property
-    def ends(self) -> list[Node]:
-        """Nothing but the first number, and nothing but the last."""
-        return [self.node(*[share] * self.width) for share in (0.0, 1.0)]
-
-    def node(self, *shares: float) -> Node:
-        """The numbers at shares of the range."""
-        return Sequence(tuple(map(self.of.node, shares)), self.position)
-
-    def factor(self, node: Node) -> Factor:
-        """A list as the table has it."""
-        return as_factor(node, self.kind)
-
-
-Axis = Interval | Choice | Signal
+    def load(self, more: Iterable[Setting] = ()) -> Model:
+        """The model, with further settings."""
+        model = super().load(more)
+        if self.stop is not None:
+            model.stop = self.stop
+        return model
 
 
 class Space:
@@ -150,7 +158,12 @@ class Space:
         self.widths = [axis.width for axis in self.axes]
         self.width = sum(self.widths)  # shares that lead to a point, and numbers in the text of a study that it takes
         self.content = counted(len(self.axes), "parameter")
-        self.has_ranges = any(not isinstance(axis, Choice) for axis in self.axes)
+        self.has_ranges = any(isinstance(axis, Interval) for axis in self.axes)
+
+    @property
+    def is_guided(self) -> bool:
+        """Whether what is found guides a search; for one of no signals, a library must be there."""
+        return self.has_ranges and (max(self.widths) > 1 or find_spec("cma") is not None)
 
     @property
     def columns(self) -> dict[str, str]:
@@ -190,15 +203,29 @@ def said(levels: Many[Level]) -> dict[str, object]:
     return {"point": {"zip": {path: list(column) for path, column in zip(paths, columns, strict=True)}}}
 
 
+def as_set(level: Level) -> Iterator[tuple[str, str]]:
+    """What a point sets, as ``--set`` takes it."""
+    return ((setting.path, text_of(setting.node)) for setting in level.settings)
+
+
+def text_of(node: Node) -> str:
+    """A value as YAML, without quotes where it can be."""
+    if isinstance(node, Scalar):
+        number = split_number(node)
+        is_bare = _BARE.fullmatch(node.text) is not None and (number is None or bool(number[1]))
+        if is_bare or not isinstance(node.value, str):
+            return node.text
+    return json.dumps(plain(node))
+
+
 # -- reading it -------------------------------------------------------------------------------------------------------
 
 
-def read_space(
-    vary: Iterable[str], model: Model, taken: Iterable[str], given: Iterable[str], problems: Problems
-) -> Space:
-    """The space of some ``path=values``, without what is ``given`` a value and names ``taken`` by other columns."""
+def read_space(spec: SearchSpec, model: Model, taken: Iterable[str] = ()) -> Space:
+    """The space of what is varied, which has no names ``taken`` by other columns; raises ``ModelError``."""
     axes: dict[str, Axis] = {}
-    for text in vary:
+    problems = Problems()
+    for text in spec.vary:
         setting = parse_setting(text, problems, "--vary")
         if setting is None:
             continue
@@ -207,18 +234,19 @@ def read_space(
             problems.add(f"{setting.path!r} cannot be varied: {why}", setting.position)
         elif (axis := _axis(setting, model, problems)) is not None:
             axes[setting.path] = axis
-    for each in [parse_setting(text, problems) for text in given]:
+    for each in [parse_setting(text, problems) for text in spec.set]:
         if each is not None and each.path in axes:
             problems.add(f"{each.path!r} is set and varied", each.position, "leave out --set or --vary")
+    problems.raise_if_any()
     return Space(list(axes.values()))
 
 
 def _axis(setting: Setting, model: Model, problems: Problems) -> Axis | None:
     node = setting.node
     if isinstance(node, Scalar) and (found := _RANGE.fullmatch(node.text)) is not None:
-        width = _length(setting.path, model)
-        axis = _interval(setting, found[1], found[2], width is None and counts(setting.path, model), problems)
-        return axis if axis is None or width is None else Signal(axis, width)
+        length = _length(setting.path, model)
+        is_count = length is None and counts(setting.path, model)
+        return _interval(setting, found[1], found[2], is_count, length, problems)
     if not (isinstance(node, Sequence) or (isinstance(node, Mapping) and node.entries.keys() & RANGE.keys.keys())):
         problems.add(f"{setting.path!r} has neither a range nor a list of values", setting.position, HINT)
         return None
@@ -269,7 +297,9 @@ def _float(node: Node) -> Node:
     return node if number is None else number_node(float(number[0]), number[1], node.position)
 
 
-def _interval(setting: Setting, first: str, last: str, is_count: bool, problems: Problems) -> Interval | None:
+def _interval(
+    setting: Setting, first: str, last: str, is_count: bool, length: int | None, problems: Problems
+) -> Interval | None:
     path, at = setting.path, setting.position
     least, most = (split_number(Scalar(each, each, True, at)) for each in (first, last))
     if least is None or most is None:
@@ -293,5 +323,5 @@ def _interval(setting: Setting, first: str, last: str, is_count: bool, problems:
     elif not float(low) < float(high):
         problems.add(f"the range of {path!r} is empty: {first} is not less than {last}", at)
     else:
-        return Interval(path, low, high, unit, at, is_count)
+        return Interval(path, low, high, unit, at, is_count, length)
     return None

@@ -1,17 +1,13 @@
-"""What is to be searched: the goals, and all that a search is given."""
+"""What is to be searched for: the goals."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 from ..support.declare.parameters import COUNT, option, repeated, whole
-
-if TYPE_CHECKING:
-    from ..model.build.model import Model
-    from ..model.language.settings import Setting
 
 MAX_RUNS, MAX_POINTS = 1_000_000, 100_000
 
@@ -115,36 +111,3 @@ def results_folder(name: str, kind: str = "") -> Path:
 
 
 GOALS: tuple[type[Break | Minimise | Match], ...] = (Break, Minimise, Maximise, Match)
-
-
-@dataclass(frozen=True)
-class SearchSpec:
-    """All that a search is given; ``command`` is the one that continues it."""
-
-    model: str  # or a study
-    vary: Sequence[str] = ()
-    seed: int | None = None
-    set: Sequence[str] = ()
-    disturb: Sequence[str] = ()
-    aspects: Sequence[str] = ()
-    without_aspects: Sequence[str] = ()
-    until: float | None = None  # s
-    types: Sequence[Path] = ()
-    command: Sequence[str] = field(default=(), repr=False)
-
-    def load(self, settings: Sequence[Setting] = ()) -> Model:
-        """The model, with further settings."""
-        from ..model.build.load import load_model
-        from ..model.catalogue.types import types_of_file
-
-        model = load_model(
-            self.model,
-            set=[*self.set, *settings],
-            disturb=self.disturb,
-            aspects=self.aspects,
-            without_aspects=self.without_aspects,
-            types=[each for file in self.types for each in types_of_file(file)],
-        )
-        if self.until is not None:
-            model.stop = self.until
-        return model

@@ -7,7 +7,7 @@ import shlex
 from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, NamedTuple, cast
+from typing import TYPE_CHECKING, Any, Final, NamedTuple, Self
 
 from epicycle.actors import EpicycleError, convert, read_regular
 
@@ -69,24 +69,29 @@ class RunSpec:
         seed: int | None,
         until: float | str | None,
         changes: Mapping[str, Any],
-    ) -> RunSpec:
+    ) -> Self:
         """That of a call."""
 
-        def texts(given: object) -> tuple[str, ...]:
-            each_of = [given] if isinstance(given, (str, Path)) else cast(Iterable[object], given)
-            return tuple(map(str, each_of))
+        def texts(name: str) -> tuple[str, ...]:
+            given = changes.get(name, ())
+            each_of = [given] if isinstance(given, (str, Path)) else given
+            return tuple(str(each) for each in each_of if not isinstance(each, type))
 
-        return cls(
-            str(model),
-            tuple(as_settings(changes.get("set", ()))),
-            texts(changes.get("overrides", ())),
-            texts(changes.get("disturb", ())),
-            texts(changes.get("aspects", ())),
-            texts(changes.get("without_aspects", ())),
-            tuple(str(each) for each in changes.get("types", ()) if not isinstance(each, type)),
-            changes.get("max_actors"),
-            seed,
-            until,
+        many: Any = {name: texts(name) for name in ("overrides", "disturb", "aspects", "without_aspects", "types")}
+        many["set"] = tuple(as_settings(changes.get("set", ())))
+        return cls(str(model), max_actors=changes.get("max_actors"), seed=seed, until=until, **many)
+
+    def load(self, more: Iterable[Setting] = ()) -> Model:
+        """The model, with further settings."""
+        return load_model(
+            self.model,
+            set=(*self.set, *more),
+            overrides=self.overrides,
+            disturb=self.disturb,
+            aspects=self.aspects,
+            without_aspects=self.without_aspects,
+            types=[each for file in self.types for each in types_of_file(Path(file))],
+            **({} if self.max_actors is None else {"max_actors": self.max_actors}),
         )
 
     def command(self) -> list[str]:
@@ -185,17 +190,7 @@ def opened(said: RunSpec, flag: str = "--until", more: Iterable[Setting] = ()) -
         spec = RunSpec(study=str(path.parent), run=path.name).changed(said)
     if spec.study:
         return _of_study(spec)
-    model = load_model(
-        spec.model,
-        set=(*spec.set, *more),
-        overrides=spec.overrides,
-        disturb=spec.disturb,
-        aspects=spec.aspects,
-        without_aspects=spec.without_aspects,
-        types=[each for file in spec.types for each in types_of_file(Path(file))],
-        **({} if spec.max_actors is None else {"max_actors": spec.max_actors}),
-    )
-    return OpenedRun(named(model, spec), spec.seed, seconds(flag, spec.until), digest)
+    return OpenedRun(named(spec.load(more), spec), spec.seed, seconds(flag, spec.until), digest)
 
 
 def _of_folder(folder: Path) -> tuple[RunSpec, str]:

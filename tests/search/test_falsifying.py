@@ -19,8 +19,8 @@ import pytest
 import epicycle
 from epicycle.actors import EpicycleError
 from epicycle.runner.interface.cli import main
-from epicycle.runner.search import falsifying
 from epicycle.runner.search import proposals as proposing
+from epicycle.runner.search import space
 from tests import cases
 from tests.cases import Case
 from tests.study.study_parts import MODEL, THIS, command
@@ -143,7 +143,7 @@ def test_it_follows_robustness_where_the_library_is() -> None:
 
 @pytest.mark.slow
 def test_without_the_library_it_goes_on_at_random_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(falsifying, "is_guided", lambda widths: False)
+    monkeypatch.setattr(space, "find_spec", lambda name: None)
     found = epicycle.search("far.yaml", epicycle.Break("away", runs=70), vary=BOX, set=ALONE, out="out", jobs=1)
     assert found.broken is None
     assert found.sentence.endswith(

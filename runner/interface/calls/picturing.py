@@ -9,6 +9,7 @@ from ...support.declare.parameters import option, whole
 
 if TYPE_CHECKING:
     from ...model.build.model import Model
+    from ...show.graph import Outline
     from ...show.pictures import Picture
 
 
@@ -27,10 +28,17 @@ def draw(
     ] = None,
 ) -> Picture:
     """The model graph as a picture: what ``epicycle graph`` draws, with the same options."""
-    from ...show.graph import outline, statechart, write_graph
+    from ...show.graph import write_graph
     from ...show.pictures import Picture
     from .running import opened
 
     made = opened(model, None, None, {}).model
-    drawn = outline(made, depth=depth, expand=expand) if machine is None else statechart(made, machine)
+    drawn = outlined(made, depth, expand, machine)
     return Picture(made.name if machine is None else f"{made.name}: {machine}", lambda path: write_graph(drawn, path))
+
+
+def outlined(model: Model, depth: int | None = None, expand: bool = False, machine: str | None = None) -> Outline:
+    """What is drawn of a model."""
+    from ...show.graph import outline, statechart
+
+    return outline(model, depth=depth, expand=expand) if machine is None else statechart(model, machine)

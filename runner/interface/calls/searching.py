@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypedDict, Unpack, overload
 
-from ...search.spec import Break, Goal, Match, Minimise, SearchSpec, results_folder
+from ...search.spec import Break, Goal, Match, Minimise, results_folder
 from ...support.declare.parameters import COUNT, argument, option, repeated
 from .changes import (
     ASPECTS,
@@ -111,24 +112,16 @@ def search(
     from ...search.calibrating import calibrate
     from ...search.falsifying import falsify
     from ...search.optimising import optimise
+    from ...search.space import SearchSpec
     from ...study.run_spec import as_settings, seconds
     from ...support.bars import bar, unseen
 
     if unknown := given.keys() - SearchOptions.__annotations__.keys():
         raise TypeError(f"search() got an unexpected keyword argument {min(unknown)!r}")
-    command, disturb, out = given.get("command", ()), given.get("disturb", ()), given.get("out")
-    spec = SearchSpec(
-        str(model),
-        tuple(as_settings(given.get("vary", ()), are_ranges=True)),
-        given.get("seed"),
-        tuple(as_settings(given.get("set", ()))),
-        tuple(map(str, [disturb] if isinstance(disturb, (str, Path)) else disturb)),
-        tuple(given.get("aspects", ())),
-        tuple(given.get("without_aspects", ())),
-        seconds("--until" if command else "until", given.get("until")),
-        tuple(map(Path, given.get("types", ()))),
-        tuple(command),
-    )
+    vary, command, out = given.get("vary", ()), tuple(given.get("command", ())), given.get("out")
+    until = seconds("--until" if command else "until", given.get("until"))
+    spec = SearchSpec.of(model, given.get("seed"), until, given)
+    spec = replace(spec, vary=tuple(as_settings(vary, are_ranges=True)), continued_by=command)
     folder = None if out is None else Path(out)
     jobs, timeout = given.get("jobs"), given.get("run_timeout")
     with bar("search") as shown:

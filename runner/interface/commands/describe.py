@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from importlib.metadata import entry_points
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -123,27 +123,19 @@ def _plan(options: argparse.Namespace) -> Plan:
 )
 def graph(options: argparse.Namespace) -> int:
     """Draw the model graph: actors, composites, ports, connections with their delays, and aspects."""
-    from ...show.graph import check_graph_path, mermaid, outline, statechart, write_graph
+    from ...show.graph import check_graph_path, mermaid, write_graph
 
     if options.out is not None:
         check_graph_path(options.out)
     given = arguments(picturing.draw, options)
-    if (machine := given.get("machine")) is not None:
-        chart = statechart(load(options), machine)
-        return _write(mermaid(chart), lambda path: write_graph(chart, path), options.out)
-    drawn = outline(load(options), depth=given.get("depth"), expand=options.expand)
-    _write(mermaid(drawn), lambda path: write_graph(drawn, path), options.out)
+    drawn = picturing.outlined(load(options), **given)
+    if options.out is None:
+        tell(mermaid(drawn).rstrip("\n"))
+    else:
+        write_graph(drawn, options.out)
+        tell(f"wrote {options.out}")
     if drawn.note and "depth" not in given:
         complain(f"note: {drawn.note}")
-    return DONE
-
-
-def _write(text: str, write: Callable[[Path], None], path: Path | None) -> int:
-    if path is None:
-        tell(text.rstrip("\n"))
-    else:
-        write(path)
-        tell(f"wrote {path}")
     return DONE
 
 

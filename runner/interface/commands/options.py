@@ -53,22 +53,20 @@ def command(summary: str, *options: Option, imports: tuple[str, ...]) -> Callabl
 def of_call(
     call: Callable[..., Any], *options: Option, first: tuple[Option, ...] = (), imports: tuple[str, ...]
 ) -> Callable[[Run], Command]:
-    """Turn a function into a command with the name, the words and the options of a call, and some more of these."""
-    summary, description = words_of(call)
+    """Turn a function into a command with the name, the words and the options of a call, and some more of these.
+
+    What the call says of itself, without the examples, describes the command; its first sentence is the summary.
+    """
+    text = (call.__doc__ or "").partition(">>>")[0].strip()
+    sentence = " ".join(text.partition("\n\n")[0].split()).removesuffix(".")
+    summary = sentence[0].lower() + sentence[1:]
     given = (*first, taken(call), *options)
-    return lambda run: Command(call.__name__.replace("_", "-"), summary, description, given, imports, run)
+    return lambda run: Command(call.__name__.replace("_", "-"), summary, text, given, imports, run)
 
 
 def taken(call: Callable[..., Any], *, without: Collection[str] = (), only: Collection[str] = ()) -> Option:
     """The options of a call."""
     return lambda parser: add_options(parser, call, without=without, only=only)
-
-
-def words_of(call: Callable[..., Any]) -> tuple[str, str]:
-    """The first sentence of what a call says of itself, as a summary, and all of it but the examples."""
-    text = (call.__doc__ or "").partition(">>>")[0].strip()
-    first = " ".join(text.partition("\n\n")[0].split()).removesuffix(".")
-    return first[0].lower() + first[1:], text
 
 
 TYPES = taken(running.load, only={"types"})

@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 from ...support.declare.commands import arguments
 from ...support.printing import tell, tell_json
 from ..calls import recording as calls
-from .options import DONE, JSON, Option, Run, check_path, command, option, taken, words_of
+from .options import DONE, JSON, check_path, command, of_call, option
 
 
 def _fit(options: argparse.Namespace) -> int:
@@ -39,22 +37,20 @@ def _apply(options: argparse.Namespace) -> int:
 
 
 OUT = option("-o", "--out", metavar="FILE", type=Path, help="write the disturbance there (default: print it)")
-Action = tuple[Callable[..., Any], tuple[Option, ...], Run]
-ACTIONS: dict[str, Action] = {
-    "fit": (calls.fit, (OUT,), _fit),
-    "apply": (calls.disturb, (), _apply),
+ACTIONS = {
+    "fit": of_call(calls.fit, OUT, JSON, imports=())(_fit),
+    "apply": of_call(calls.disturb, JSON, imports=())(_apply),
 }
 
 
 def _actions(parser: argparse.ArgumentParser) -> None:
     actions = parser.add_subparsers(required=True, metavar="ACTION")
-    for name, (call, more, make) in ACTIONS.items():
-        summary, description = words_of(call)
-        action = actions.add_parser(name, help=summary, description=description)
-        for add in (taken(call), *more, JSON):
+    for name, made in ACTIONS.items():
+        action = actions.add_parser(name, help=made.summary, description=made.description)
+        for add in made.options:
             add(action)
         action.add_argument("--debug", action="store_true", help="show the full traceback of an error")
-        action.set_defaults(make=make)
+        action.set_defaults(make=made.run)
 
 
 @command("fit channels to measured traces, and apply disturbances to recordings", _actions, imports=("recorded",))

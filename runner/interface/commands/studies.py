@@ -63,7 +63,7 @@ def _session(plan: Plan, folder: Path, options: argparse.Namespace, session: dic
 
     from ...study.judge.study_results import open_study
     from ...study.run.progress import progress
-    from ...study.run.runner import again
+    from ...study.run.runner import error_of
     from ...study.run.store import WriteError
     from ...study.session import run_study
     from ...support.apart import WorkerError
@@ -101,7 +101,7 @@ def _session(plan: Plan, folder: Path, options: argparse.Namespace, session: dic
     if len(failures) > SHOWN:
         complain(f"... and {len(failures) - SHOWN:,} more: epicycle status {folder}")
     if options.debug and failures:
-        *_, raised = again(plan, plan.condition(failures[0]["condition"]), failures[0]["seed"])
+        raised = error_of(plan, plan.condition(failures[0]["condition"]), failures[0]["seed"])
         if raised is not None:
             complain(f"the first of them, repeated: run {failures[0]['run'][:12]}")
             complain_traceback(raised)

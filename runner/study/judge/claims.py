@@ -11,20 +11,18 @@ S. Holm, *A simple sequentially rejective multiple test procedure* (1979); E. B.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from itertools import pairwise, product
 from typing import Any
 
-from epicycle.actors import EpicycleError
 from epicycle.actors.expression import Formula
 
 from ...model.language.claims import ALWAYS, FALLS, GREATER, RISES, Claim, Selection
 from ...model.language.dimensions import Factor
-from ...model.language.study_metric import asks_for_none
 from ...support.shown import finite
 from ..inference import LEVEL, bootstrap_mean, holm, paired_difference, rate, without_rounding
-from .samples import Levels, Place, Samples, has_enough
+from .samples import Levels, Place, Samples, has_enough, value_in
 
 REPRODUCED, NOT_REPRODUCED, UNDECIDED = "reproduced", "not reproduced", "undecided"
 CONFIRMED, REVERSED = "confirmed", "reversed"
@@ -301,18 +299,10 @@ def _finding(
 def _occurrences(claim: Claim, where: Selection, samples: Samples) -> Iterator[ContrastTest]:
     """How often a condition holds, at every combination of levels."""
     formula = Formula(claim.condition)
-    may_be_none = asks_for_none(claim.condition)
-
-    def is_true(row: Mapping[str, float | None] | None) -> bool | None:
-        if row is None or (None in row.values() and not may_be_none):
-            return None
-        try:
-            return bool(formula(row))
-        except EpicycleError:  # it cannot be evaluated for this run
-            return None
-
     for place in samples.places(samples.choices(where)):
-        answers = [is_true(row) for row in samples.rows(samples.at(place), formula.names)]
+        rows = samples.rows(samples.at(place), formula.names)
+        values = [None if row is None else value_in(formula, row) for row in rows]
+        answers = [None if value is None else bool(value) for value in values]
         holds, missing = answers.count(True), answers.count(None)
         found = rate(holds, len(answers) - missing)
         finding = ContrastTest(claim.condition, samples.values(place), {}, {}, **asdict(found), missing=missing)

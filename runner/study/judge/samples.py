@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from functools import cache, cached_property
 from itertools import product
-from typing import TYPE_CHECKING, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+from epicycle.actors import EpicycleError
+from epicycle.actors.expression import Formula
 
 from ...model.language.claims import Selection
 from ...model.language.dimensions import Factor
 from ...model.language.study import Study
+from ...model.language.study_metric import asks_for_none
 from ..inference import LEVEL, Estimate, average
 from ..plan.plan import index_of
 from ..run.backlog import OK
@@ -111,6 +115,17 @@ class Samples:
             None if row is None else {name: number(column[row]) for name, column in columns.items()}
             for row in self.over(condition).values()
         ]
+
+
+def value_in(formula: Formula, row: Mapping[str, Any]) -> Any:
+    """An expression over the columns of a run; None if it lacks a number, or cannot be evaluated for this run."""
+    known = {name: row[name] for name in formula.names}
+    if None in known.values() and not asks_for_none(formula.source):
+        return None
+    try:
+        return formula(known)
+    except EpicycleError:
+        return None
 
 
 def has_enough(count: int, missing: int) -> bool:

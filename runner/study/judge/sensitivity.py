@@ -6,7 +6,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
-from itertools import product
 
 from ...model.language.sampling import SOBOL, Design
 from ..inference import LEVEL, Estimate, mean, resampled_sums
@@ -35,10 +34,9 @@ def sensitivity(samples: Samples, metric: str, level: float = LEVEL) -> list[Ind
     for home, dimension in enumerate(samples.dimensions):
         if dimension.design is None:
             continue
-        others = [range(each.size) if at != home else range(1) for at, each in enumerate(samples.dimensions)]
-        homes = [at for at in range(len(others)) if at != home]
-        for place in product(*others):
-            where = samples.values(place, homes)
+        others = [at for at in range(len(samples.dimensions)) if at != home]
+        for place in samples.places(samples.choices({}), [home]):
+            where = samples.values(place, others)
             found += _indices(samples, metric, dimension.design, home, place, where, level)
     return found
 

@@ -8,7 +8,7 @@ import logging
 import time
 from collections.abc import AsyncIterator, Callable
 from concurrent.futures import CancelledError
-from contextlib import asynccontextmanager
+from contextlib import AsyncExitStack, asynccontextmanager
 from dataclasses import astuple
 from operator import call
 from pkgutil import resolve_name
@@ -90,24 +90,23 @@ class Cluster:
 
     @asynccontextmanager
     async def _client(self) -> AsyncIterator[Any]:
-        module = self._distributed
-        if self._scheduler is None:
-            # In this process: runs have their own processes, wherever Dask's worker is.
-            cluster = module.LocalCluster(
-                processes=False,
-                n_workers=1,
-                threads_per_worker=self._jobs,
-                memory_limit=0,
-                dashboard_address="127.0.0.1:0",
-                scheduler_kwargs={"dashboard": False},
-                silence_logs=logging.CRITICAL,
-                asynchronous=True,
-            )
-            async with cluster, module.Client(cluster, asynchronous=True, set_as_default=False) as client:
-                yield client
-            return
-        client = module.Client(self._scheduler, timeout=CONNECT, asynchronous=True, set_as_default=False)
-        try:
+        module, scheduler = self._distributed, self._scheduler
+        async with AsyncExitStack() as stack:
+            if scheduler is None:
+                # In this process: runs have their own processes, wherever Dask's worker is.
+                local = module.LocalCluster(
+                    processes=False,
+                    n_workers=1,
+                    threads_per_worker=self._jobs,
+                    memory_limit=0,
+                    dashboard_address="127.0.0.1:0",
+                    scheduler_kwargs={"dashboard": False},
+                    silence_logs=logging.CRITICAL,
+                    asynchronous=True,
+                )
+                scheduler = await stack.enter_async_context(local)
+            client = module.Client(scheduler, timeout=CONNECT, asynchronous=True, set_as_default=False)
+            stack.push_async_callback(client.close)
             try:
                 await asyncio.wait_for(client, CONNECT + 1.0)
             except (OSError, ValueError) as error:
@@ -116,8 +115,6 @@ class Cluster:
                     "   help: 'dask scheduler' starts one and prints its address"
                 ) from error
             yield client
-        finally:
-            await client.close()
 
     async def _look(self, client: Any) -> None:
         """Check the workers now and then; raises ``WorkerError`` if one cannot work, or there are none for long."""

@@ -11,7 +11,7 @@ from typing import Any, Protocol
 
 from epicycle.actors import EpicycleError, readable
 
-from ...execution.engine import LogFilter, Results, Simulation
+from ...execution.engine import Results, Simulation
 from ...model.build.model import Model
 from ...support.apart import DONE
 from ..plan.columns import value_of
@@ -98,15 +98,12 @@ def empty_row(plan: Plan, condition: Condition, task: Task) -> Row:
 # -- repeated runs ----------------------------------------------------------------------------------------------------
 
 
-def again(plan: Plan, condition: Condition, seed: int) -> tuple[Model, Results, EpicycleError | None]:
-    """Repeat a run alone, with everything that the model records and the whole event log; and what made it fail."""
-    model = plan.load(condition)
-    simulation = Simulation(model, seed=seed, keep_log=LogFilter({}))
+def error_of(plan: Plan, condition: Condition, seed: int) -> EpicycleError | None:
+    """What makes a run fail, which is repeated for that."""
     try:
-        results = simulation.run()
+        return error_of_metrics(plan, Simulation(plan.load(condition), seed=seed).run())
     except EpicycleError as error:
-        return model, simulation.results("failed"), error
-    return model, results, error_of_metrics(plan, results)
+        return error
 
 
 def error_of_metrics(plan: Plan, results: Results) -> EpicycleError | None:
