@@ -5,11 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 from ...model.build.model import Model
-from ..graph import MOST_BOXES, Drawing, Outline, Scope, draw, outline
+from ..graph import MOST_BOXES, Drawing, draw, outline
 
 FEW = 8  # instances of an array that are drawn one by one
-_latest: dict[str, Drawing] = {}  # by the outline in words
-_scopes: dict[str, Scope] = {}  # what it consists of
+_latest: dict[str, Drawing] = {}  # by the outline in words; what it consists of is used again while it is here
 
 
 def drawn(model: Model) -> dict[str, Any]:
@@ -67,16 +66,12 @@ def _drawing(model: Model) -> tuple[Drawing, str]:
         note = f"{everything:,} boxes are too many to draw: what is of one type, with names that are alike, is one box"
     if found.size > MOST_BOXES:
         found.root.children, found.root.links, note = [], [], f"{everything:,} boxes are too many to draw"
-    return _laid_out(found), note
-
-
-def _laid_out(found: Outline) -> Drawing:
-    """The drawing of an outline; of the latest one, everything is kept that is the same."""
     key = repr(found.root)
     if key not in _latest:
+        drawing = draw(found)
         _latest.clear()
-        _latest[key] = draw(found, _scopes)
-    return _latest[key]
+        _latest[key] = drawing
+    return _latest[key], note
 
 
 def _rounded(*values: float) -> list[float]:
