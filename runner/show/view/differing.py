@@ -44,9 +44,13 @@ def difference(recordings: Sequence[Recording]) -> dict[str, Any] | None:
     first = first_firing(recordings)
     numbers: Sequence[int | None] = (None, None) if first is None else first.numbers
     return {
-        "records": [each.kept_record(record) for each in recordings],
+        "records": [kept for each in recordings for kept in each.among_kept("record", [record])],
         "texts": [_said(each, record) for each in recordings],
-        "firings": [NOTHING if n is None else each.kept_firing(n) for each, n in zip(recordings, numbers, strict=True)],
+        "firings": [
+            kept
+            for each, n in zip(recordings, numbers, strict=True)
+            for kept in each.among_kept("firing", [NOTHING if n is None else n])
+        ],
         "fired": [] if first is None else [f"{first.at} {first.actor} {each}" for each in first.does],
     }
 
@@ -63,8 +67,7 @@ def first_firing(recordings: Sequence[Recording]) -> First | None:
     tag, actor = heads[which]
     numbers = [number if heads.get(n) == heads[which] else None for n in (0, 1)]
     does = [
-        "does not fire" if n is None else _took(recording, recording.kept_firing(n))
-        for recording, n in zip(recordings, numbers, strict=False)
+        "does not fire" if n is None else _took(recording, n) for recording, n in zip(recordings, numbers, strict=False)
     ]
     return First(actor, tag, (numbers[0], numbers[1]), tuple(does))
 
@@ -111,7 +114,7 @@ def _first(one: Sequence[int], other: Sequence[int]) -> int | None:
 
 def _said(recording: Recording, record: int) -> str:
     """A record of the log in words."""
-    number = recording.kept_record(record)
+    (number,) = recording.among_kept("record", [record])
     if number < 0:
         return "the run has ended" if record >= recording.records else "a record that this page leaves out"
     kept = recording.kept()
@@ -122,8 +125,9 @@ def _said(recording: Recording, record: int) -> str:
     return f"{where} {list(recording.events)[event]}{by}: {_token(kept, number, _WIDEST)}"
 
 
-def _took(recording: Recording, firing: int) -> str:
+def _took(recording: Recording, number: int) -> str:
     """What a firing took and sent, in words."""
+    (firing,) = recording.among_kept("firing", [number])
     if firing < 0:
         return "a firing that this page leaves out"
     kept, ports = recording.kept(), [name for _, name in recording.ports]

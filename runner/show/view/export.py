@@ -138,13 +138,11 @@ def things(recording: Recording) -> list[Thing]:
     return list(found.values())
 
 
-def extent(placed: list[Thing]) -> tuple[Point, Point]:
-    """The corners of the space that the points occupy."""
+def extent(placed: list[Thing]) -> tuple[Point, float]:
+    """The middle of the space that the points occupy, and its greater width."""
     points = [point for thing in placed for scene in thing.scenes for point in scene.points] or [(0.0, 0.0)]
-    return (min(x for x, _ in points), min(y for _, y in points)), (
-        max(x for x, _ in points),
-        max(y for _, y in points),
-    )
+    (left, right), (low, high) = ((min(line), max(line)) for line in zip(*points, strict=True))
+    return ((left + right) / 2.0, (low + high) / 2.0), max(right - left, high - low) or 1.0
 
 
 def _things(mark: Mark, end: int) -> Iterator[Thing]:

@@ -10,13 +10,11 @@ from numpy.typing import NDArray
 
 from ...execution.results import Results
 from ...model.catalogue.figure import Figure
-from ..samples import read
+from ..samples import Floats, read
 
 POINTS = 8_000  # per line; above this, the lowest and highest value in each of half as many parts of the run
 CHANGES = 20_000  # per strip
 MOST = 400  # lanes
-
-Floats = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -235,7 +235,7 @@ class Recording:
                     columns[name].extend(map(own_texts.__getitem__, column) if name == "record_text" else column)
         for name, column in columns.items():
             if (what := REFERENCES.get(name.partition("_")[2])) is not None:
-                columns[name] = array("i", self._among_kept(what, column))
+                columns[name] = array("i", self.among_kept(what, column))
         return Kept(columns, tags, list(texts))
 
     def place(self, number: int) -> str:
@@ -244,15 +244,8 @@ class Recording:
             self._paths = list(self.places)
         return self._paths[number]
 
-    def kept_record(self, number: int) -> int:
-        """The number of a record among the kept ones; ``MISSING`` if it was left out or does not exist."""
-        return self._among_kept("record", [number])[0]
-
-    def kept_firing(self, number: int) -> int:
-        """The number of a firing among the kept ones, as ``kept_record``."""
-        return self._among_kept("firing", [number])[0]
-
-    def _among_kept(self, what: str, numbers: Sequence[int]) -> list[int]:
+    def among_kept(self, what: str, numbers: Sequence[int]) -> list[int]:
+        """The numbers of firings or records among the kept ones; ``MISSING`` for those left out or not made."""
         starts = np.array([0, *(getattr(stretch, what) for stretch in self._stretches)])
         counts = np.array([0, *(stretch.count(what) for stretch in self._stretches)])
         old = np.array(numbers, dtype=int)

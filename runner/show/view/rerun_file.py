@@ -108,9 +108,8 @@ class _Writer:
         return views.Blueprint(views.Horizontal(*space, beside), collapse_panels=True)
 
     def _space_from_above(self, views: Any) -> Any:
-        (left, low), (right, high) = extent(self._things)
-        x, y, away = (left + right) / 2.0, (low + high) / 2.0, AWAY * (max(right - left, high - low) or 1.0)
-        eye = views.EyeControls3D(position=(x, y, away), look_target=(x, y, 0.0), eye_up=(0.0, 1.0, 0.0))
+        (x, y), width = extent(self._things)
+        eye = views.EyeControls3D(position=(x, y, AWAY * width), look_target=(x, y, 0.0), eye_up=(0.0, 1.0, 0.0))
         return views.Spatial3DView(name="space", origin="/space", eye_controls=eye)
 
     def _below(self, signal: str) -> str:
