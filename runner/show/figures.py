@@ -18,12 +18,10 @@ from ..model.catalogue.figure import Figure
 from ..support.shown import short
 from .samples import Floats, Numbers, Span, States, envelope, longest_spans, read, spans_of
 from .sheet import (
-    FEW,
     MAX_PANELS,
     MAX_TIPS,
     PALETTE,
     Sheet,
-    band_beside,
     colours,
     in_common,
     key_beside,
@@ -203,13 +201,9 @@ class Histogram(Figure):
         axes.set_xlabel(self.label or _shared([*columns]))
         axes.set_ylabel("share of the values in a bin")
         axes.yaxis.set_major_formatter(lambda share, _: f"{100 * share:g} %")
-        said = [_about(values) for values in columns.values()]
-        if len(columns) > FEW:
-            band_beside(axes, [*columns], shades)
-        elif len(columns) > 1:
-            legend_beside(
-                axes, handles=handles, labels=[f"{name}, {about}" for name, about in zip(columns, said, strict=True)]
-            )
+        said = [f"mean {np.mean(values):.4g}" if len(values) else "no values" for values in columns.values()]
+        if len(columns) > 1:
+            key_beside(axes, [*columns], handles, shades, said)
         left_out = count - sum(map(len, columns.values()))
         title = [axes.get_title("left"), *(said if len(said) == 1 else [])]
         title += [f"{left_out:,} values that are not positive are left out"] if left_out else []
@@ -234,10 +228,6 @@ class Histogram(Figure):
 def _shared(names: Sequence[str]) -> str:
     """The axis label for signals without a ``label``."""
     return abridged(names[0] if len(names) == 1 else in_common(names)[0], 80)
-
-
-def _about(values: Floats) -> str:
-    return f"mean {np.mean(values):.4g}" if len(values) else "no values"
 
 
 def _legible(state: str) -> str:

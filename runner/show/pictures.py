@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import base64
 import tempfile
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Protocol, overload
 
@@ -59,22 +59,11 @@ class Picture:
         return tag("img", src=f"data:image/svg+xml;base64,{data}", alt=self.name, style="max-width: 100%")
 
 
-class Pictures(Mapping[str, Picture]):
+class Pictures(dict[str, Picture]):
     """Pictures by name."""
 
-    def __init__(self, pictures: Mapping[str, Picture]) -> None:
-        self._pictures = dict(pictures)
-
-    def __getitem__(self, name: str) -> Picture:
-        if name not in self._pictures:
-            raise EpicycleError(f"there is no figure {name!r}{did_you_mean(name, self._pictures)}")
-        return self._pictures[name]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._pictures)
-
-    def __len__(self) -> int:
-        return len(self._pictures)
+    def __missing__(self, name: str) -> Picture:
+        raise EpicycleError(f"there is no figure {name!r}{did_you_mean(name, self)}")
 
     def __repr__(self) -> str:
         return f"<Pictures {', '.join(self)}>"

@@ -207,19 +207,15 @@ def _picture(number: int, picture: Picture) -> Html:
 
 def _shown(svg: bytes, what: str) -> Html:
     """A picture that can be enlarged, with tips over it; as an image, it cannot run anything."""
-    source = f"data:image/svg+xml;base64,{base64.b64encode(svg).decode()}"
-    found = tips_of(svg)
-    if found is None:
-        frame = tag("div", tag("img", src=source, alt=what), class_="frame wide", tabindex="0")
-    else:
-        width, height = f"{found.width:.0f}", f"{found.height:.0f}"
+    image = {"src": f"data:image/svg+xml;base64,{base64.b64encode(svg).decode()}", "alt": what}
+    over, kind = None, "frame wide"
+    if (found := tips_of(svg)) is not None:
+        image |= {"width": f"{found.width:.0f}", "height": f"{found.height:.0f}"}
         dots = [tag("circle", tag("title", tip.text), cx=f"{tip.x:g}", cy=f"{tip.y:g}", r="4") for tip in found.tips]
         view = {"viewBox": f"0 0 {found.width:g} {found.height:g}"}
         over = tag("svg", dots, class_="tips", aria_hidden="true", **view)
-        image = tag("img", src=source, alt=what, width=width, height=height)
         kind = "frame wide" if found.width > MAX_NARROW else "frame"
-        frame = tag("div", image, over, class_=kind, tabindex="0")
-    return tag("div", frame, class_="scroll")
+    return tag("div", tag("div", tag("img", **image), over, class_=kind, tabindex="0"), class_="scroll")
 
 
 def _means(data: Data) -> Iterable[Html]:
