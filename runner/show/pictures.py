@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 import tempfile
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol, overload
 
@@ -34,12 +35,12 @@ class Saving(Protocol):
         ...
 
 
+@dataclass(eq=False, repr=False)
 class Picture:
     """A picture, drawn when it is shown or saved; a notebook shows it as SVG."""
 
-    def __init__(self, name: str, write: Callable[[Path], object]) -> None:
-        self.name = name
-        self._write = write
+    name: str
+    _write: Callable[[Path], object]
 
     def save(self, path: str | Path) -> Path:
         """Write it to a file, whose suffix decides the format: .svg, .png or .pdf."""

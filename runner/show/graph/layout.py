@@ -109,7 +109,7 @@ class Drawing:
     """Everything with its position; the origin is at the top left."""
 
     outline: Outline
-    scope: Scope
+    scope: Scope = field(compare=False)
     width: float = 0.0
     height: float = 0.0
     boxes: list[PlacedBox] = field(default_factory=list)

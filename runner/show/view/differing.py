@@ -74,7 +74,7 @@ def first_firing(recordings: Sequence[Recording]) -> First | None:
 
 def _head(recording: Recording, number: int) -> tuple[Tag, str]:
     fired = recording.fired
-    return fired.tag(number), recording.place(fired.actors[number])
+    return fired.tag(number), list(recording.places)[fired.actors[number]]
 
 
 def _comes(recording: Recording, number: int, head: tuple[Tag, str]) -> bool:
@@ -103,7 +103,8 @@ def _by_actor(recording: Recording) -> dict[str, list[int]]:
     rows = defaultdict[int, list[int]](list)
     for number, actor in enumerate(recording.fired.actors):
         rows[actor].append(number)
-    return {recording.place(actor): found for actor, found in rows.items()}
+    places = list(recording.places)
+    return {places[actor]: found for actor, found in rows.items()}
 
 
 def _first(one: Sequence[int], other: Sequence[int]) -> int | None:
@@ -121,7 +122,7 @@ def _said(recording: Recording, record: int) -> str:
     tag, port, event, aspect = (kept.columns[f"record_{each}"][number] for each in ("tag", "port", "event", "aspect"))
     place, name = list(recording.ports)[port]
     by = f" by {list(recording.aspects)[aspect]}" if aspect != NOTHING else ""
-    where = f"{kept.tags[tag]} {recording.place(place)}.{name}"
+    where = f"{kept.tags[tag]} {list(recording.places)[place]}.{name}"
     return f"{where} {list(recording.events)[event]}{by}: {_token(kept, number, _WIDEST)}"
 
 

@@ -128,7 +128,6 @@ class Recording:
         self.firings = self.records = 0  # in the whole run
         self.events, self.aspects = Names(), Names()
         self.places = Names()  # of actors and composites
-        self._paths: list[str] = []  # the same, in order
         self.ports = Names()  # (place, name)
         self._most = max(2, most // STRETCH)
         self._stride = 1  # one stretch in so many is kept
@@ -237,12 +236,6 @@ class Recording:
             if (what := REFERENCES.get(name.partition("_")[2])) is not None:
                 columns[name] = array("i", self.among_kept(what, column))
         return Kept(columns, tags, list(texts))
-
-    def place(self, number: int) -> str:
-        """The path of an actor or composite."""
-        if len(self._paths) != len(self.places):
-            self._paths = list(self.places)
-        return self._paths[number]
 
     def among_kept(self, what: str, numbers: Sequence[int]) -> list[int]:
         """The numbers of firings or records among the kept ones; ``MISSING`` for those left out or not made."""
