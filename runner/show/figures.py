@@ -100,27 +100,25 @@ class TimeSeries(Figure):
                 if self.style == "steps" and times[-1] < end:
                     times, values = np.append(times, end), np.append(values, values[-1])
                 handles += axes.plot(times, values, color=shade, label=name, **look[self.style])
-                self._tips(sheet, axes, name, times, values, len(lines))
-                continue
-            axes.fill_between(found.times, found.low, found.high, color=shade, alpha=0.3, linewidth=0)
-            handles += axes.plot(found.times, found.mean, color=shade, linewidth=0.9, label=name)
-            said = f"Band: least to greatest in each {found.width:.3g} s; line: mean"
-            texts = (
-                f"{name}\n{time - found.width / 2:.6g} to {time + found.width / 2:.6g} s: "
-                f"{low:.5g} to {high:.5g}, mean {mean:.5g}"
-                for time, low, high, mean, _ in zip(*found[:4], found.times, strict=True)
-            )
-            sheet.tip(axes, zip(found.times, found.mean, strict=True), texts)
+                every = slice(None, None, math.ceil(len(times) * len(lines) / MAX_TIPS) or 1)
+                places = [*zip(times[every], values[every], strict=True)]
+                texts = [f"{name}\n{time:.6g} s: {value:.5g}" for time, value in places]
+            else:
+                axes.fill_between(found.times, found.low, found.high, color=shade, alpha=0.3, linewidth=0)
+                handles += axes.plot(found.times, found.mean, color=shade, linewidth=0.9, label=name)
+                said = f"Band: least to greatest in each {found.width:.3g} s; line: mean"
+                places = [*zip(found.times, found.mean, strict=True)]
+                texts = [
+                    f"{name}\n{time - found.width / 2:.6g} to {time + found.width / 2:.6g} s: "
+                    f"{low:.5g} to {high:.5g}, mean {mean:.5g}"
+                    for time, low, high, mean in zip(*found[:4], strict=True)
+                ]
+            sheet.tip(axes, places, texts)
         if len(names) > 1:
             key_beside(axes, names, handles, shades)
         axes.set_ylabel(fill(self.label or _shared(names), _LETTERS))
         set_log(axes, x=False, y=self.log_y)
         return said
-
-    def _tips(self, sheet: Sheet, axes: Any, name: str, times: Floats, values: Floats, lines: int) -> None:
-        every = slice(None, None, math.ceil(len(times) * lines / MAX_TIPS) or 1)
-        places = [*zip(times[every], values[every], strict=True)]
-        sheet.tip(axes, places, (f"{name}\n{time:.6g} s: {value:.5g}" for time, value in places))
 
 
 def _strips(sheet: Sheet, strips: States, begin: float, end: float, over: float) -> None:

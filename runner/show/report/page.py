@@ -79,9 +79,9 @@ def _in_short(data: Data, judgements: Sequence[ClaimVerdict]) -> Iterable[Html]:
     """What a reader should know first: the verdicts of the claims, and what is missing or failed."""
     verdicts = Counter(each.verdict for each in judgements)
     if verdicts:
-        said = [
-            [tag("b", f"{number} {verdict}", class_=class_of(verdict)), " "] for verdict, number in _sorted(verdicts)
-        ]
+        order = {REPRODUCED: 0, UNDECIDED: 1}
+        found = sorted(verdicts.items(), key=lambda each: order.get(each[0], len(order)))
+        said = [[tag("b", f"{number} {verdict}", class_=class_of(verdict)), " "] for verdict, number in found]
         yield tag("p", f"{counted(verdicts.total(), 'claim')}: ", said, class_="short")
     counts, plan = data.results.counts(), data.plan
     over = counts.total() - data.results.beyond()
@@ -91,11 +91,6 @@ def _in_short(data: Data, judgements: Sequence[ClaimVerdict]) -> Iterable[Html]:
     if bad := counts.total() - counts["ok"]:
         link = tag("a", f"{counted(bad, 'run')} without a result", href="#runs")
         yield tag("p", link, ", which no number includes.", class_="problem")
-
-
-def _sorted(verdicts: Counter[str]) -> list[tuple[str, int]]:
-    order = [REPRODUCED, UNDECIDED]
-    return sorted(verdicts.items(), key=lambda each: order.index(each[0]) if each[0] in order else len(order))
 
 
 def _at_most(data: Data) -> str:

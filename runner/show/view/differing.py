@@ -42,15 +42,11 @@ def difference(recordings: Sequence[Recording]) -> dict[str, Any] | None:
     if (record := _first(*(each.hashes for each in recordings[:2]))) is None:
         return None
     first = first_firing(recordings)
-    numbers: Sequence[int | None] = (None, None) if first is None else first.numbers
+    numbers = [NOTHING if n is None else n for n in ((None, None) if first is None else first.numbers)]
     return {
-        "records": [kept for each in recordings for kept in each.among_kept("record", [record])],
+        "records": [each.among_kept("record", [record])[0] for each in recordings],
         "texts": [_said(each, record) for each in recordings],
-        "firings": [
-            kept
-            for each, n in zip(recordings, numbers, strict=True)
-            for kept in each.among_kept("firing", [NOTHING if n is None else n])
-        ],
+        "firings": [each.among_kept("firing", [n])[0] for each, n in zip(recordings, numbers, strict=True)],
         "fired": [] if first is None else [f"{first.at} {first.actor} {each}" for each in first.does],
     }
 
@@ -154,9 +150,7 @@ def _token(kept: Kept, record: int, widest: int) -> str:
 def comparison(recordings: Sequence[Recording]) -> list[list[str]]:
     """The metrics of two runs, and their differences, in words."""
     rows = []
-    one, other = (each.results for each in recordings[:2])
-    assert one is not None
-    assert other is not None
+    one, other = (each.finished("a comparison") for each in recordings[:2])
     for name, value in one.metrics.items():
         if name in other.metrics:
             numbers = [each for each in (value, other.metrics[name]) if isinstance(each, (int, float))]

@@ -22,7 +22,7 @@ from ...execution.results import Signal, plain
 from ...support.extras import needed
 from ...support.files import replace_file
 from ...support.shown import finite
-from .export import Act, Colour, Disc, Point, Scene, Thing, about, acts, extent, firings, parts, results_of, things
+from .export import Act, Colour, Disc, Point, Scene, Thing, about, acts, extent, firings, parts, things
 from .recording import Recording, ViewError
 
 if TYPE_CHECKING:
@@ -60,7 +60,7 @@ def mcap(recording: Recording) -> bytes:
     placed = things(recording)
     _, width = extent(placed)
     streams = [
-        *(_signal(signal, channels) for signal in results_of(recording).signals.values()),
+        *(_signal(signal, channels) for signal in recording.finished("a file").signals.values()),
         *(_space(thing, SHARE * width, channels) for thing in placed),
         *(_frames(thing, channels) for thing in placed if thing.kind == "body"),
         _acts(acts(recording), channels),

@@ -76,9 +76,7 @@ def part(name: str) -> str:
 
 
 def _run(recording: Recording, name: str, pack: Pack) -> dict[str, Any]:
-    model, results, kept = recording.model, recording.results, recording.kept()
-    if results is None:
-        raise ViewError("a page needs a run that has been made: call Recording.run first")
+    model, results, kept = recording.model, recording.finished("a page"), recording.kept()
     figures = recording.figures.values()
     actors = [path for path in model.graph.actors if path not in recording.places]  # that never fired
     places = [*recording.places, *actors]

@@ -84,20 +84,13 @@ def recorded(
             complain(
                 f"{model.endless}\n   help: end it with Ctrl-C, which keeps what was recorded, or give a stop time"
             )
-        recordings.append(
-            Recording(
-                model,
-                figures,
-                seed=own_seed,
-                most=most,
-                is_compared=len(models) > 1,
-                acts=acts[number] if acts else None,
-            )
-        )
-        look = nullcontext(watch(recordings[-1])) if watch else nullcontext()
+        own_acts = acts[number] if acts else None
+        recording = Recording(model, figures, seed=own_seed, most=most, is_compared=len(models) > 1, acts=own_acts)
+        recordings.append(recording)
+        look = nullcontext(watch(recording)) if watch else nullcontext()
         with watched(model, stop, SOON) if progress else look as report:
             try:
-                recordings[-1].run(until=stop, progress=report)
+                recording.run(until=stop, progress=report)
             except (ActorError, LoopError) as error:  # what led to the error is the very thing to look at
                 errors.append(error)
             except KeyboardInterrupt as error:  # the records are kept, and nothing else is started
