@@ -190,10 +190,8 @@ class Scope:
     def _flags(self, net: Net, link: Link) -> Iterator[tuple[Pin, str]]:
         """What stands at the ends of a net that has no line."""
         targets = [self._name(pin) for pin in net.targets]
-        yield (
-            net.source,
-            f"{label(link)} \u2192 {targets[0] if len(targets) == 1 else f'{len(targets)} inputs'}".strip(),
-        )
+        beyond = targets[0] if len(targets) == 1 else f"{len(targets)} inputs"
+        yield net.source, f"{label(link)} \u2192 {beyond}".strip()
         for pin in net.targets:
             yield pin, f"{self._name(net.source)} \u2192"
 

@@ -59,13 +59,13 @@ def _drawing(model: Model) -> tuple[Drawing, str]:
     last all but one of a type."""
     everything = len(model.graph.actors) + len(model.graph.composites)
     found = outline(model, most=MOST_BOXES, few=FEW, limit=MOST_BOXES)
-    note = (
-        "" if found.depth >= found.levels else f"{everything:,} boxes are too many to draw: composites are drawn closed"
-    )
-    if any(box.members for box in found.root.children):
-        note = f"{everything:,} boxes are too many to draw: what is of one type, with names that are alike, is one box"
+    note, many = "", f"{everything:,} boxes are too many to draw"
     if found.size > MOST_BOXES:
-        found.root.children, found.root.links, note = [], [], f"{everything:,} boxes are too many to draw"
+        found.root.children, found.root.links, note = [], [], many
+    elif any(box.members for box in found.root.children):
+        note = f"{many}: what is of one type, with names that are alike, is one box"
+    elif found.depth < found.levels:
+        note = f"{many}: composites are drawn closed"
     key = repr(found.root)
     if key not in _latest:
         drawing = draw(found)

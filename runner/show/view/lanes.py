@@ -19,14 +19,14 @@ MOST = 400  # lanes
 
 @dataclass(frozen=True)
 class Lane:
-    """Numbers (``states`` is None) or indices of ``states``, each valid from its time (s) on."""
+    """Numbers (``states`` is None) or indices of ``states``, each valid from its time (s) on; named as on the page."""
 
     name: str
     times: Floats
     values: Floats
     states: list[str] | None
-    is_line: bool  # whether numbers are joined by straight lines
-    is_asked: bool  # whether a figure of the model shows it
+    line: bool  # whether numbers are joined by straight lines
+    asked: bool  # whether a figure of the model shows it
     left_out: int  # samples
 
 

@@ -104,15 +104,7 @@ def _run(recording: Recording, name: str, pack: Pack) -> dict[str, Any]:
         "texts": pack.texts(kept.texts),
         "drawing": drawn(model),
         "lanes": [
-            {
-                "name": lane.name,
-                "times": pack.exact(lane.times),
-                "values": pack.rough(lane.values),
-                "states": lane.states,
-                "line": lane.is_line,
-                "asked": lane.is_asked,
-                "left_out": lane.left_out,
-            }
+            {**vars(lane), "times": pack.exact(lane.times), "values": pack.rough(lane.values)}
             for lane in lanes(results, figures)
         ],
         "marks": [each for figure in figures for each in _marks(recording, results, figure, pack)],
