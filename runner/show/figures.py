@@ -18,12 +18,10 @@ from ..model.catalogue.figure import Figure
 from ..support.shown import short
 from .samples import Floats, Numbers, Span, States, envelope, longest_spans, read, spans_of
 from .sheet import (
-    FEW,
     MAX_PANELS,
     MAX_TIPS,
     PALETTE,
     Sheet,
-    band_beside,
     colours,
     in_common,
     key_beside,
@@ -102,27 +100,25 @@ class TimeSeries(Figure):
                 if self.style == "steps" and times[-1] < end:
                     times, values = np.append(times, end), np.append(values, values[-1])
                 handles += axes.plot(times, values, color=shade, label=name, **look[self.style])
-                self._tips(sheet, axes, name, times, values, len(lines))
-                continue
-            axes.fill_between(found.times, found.low, found.high, color=shade, alpha=0.3, linewidth=0)
-            handles += axes.plot(found.times, found.mean, color=shade, linewidth=0.9, label=name)
-            said = f"Band: least to greatest in each {found.width:.3g} s; line: mean"
-            texts = (
-                f"{name}\n{time - found.width / 2:.6g} to {time + found.width / 2:.6g} s: "
-                f"{low:.5g} to {high:.5g}, mean {mean:.5g}"
-                for time, low, high, mean, _ in zip(*found[:4], found.times, strict=True)
-            )
-            sheet.tip(axes, zip(found.times, found.mean, strict=True), texts)
+                every = slice(None, None, math.ceil(len(times) * len(lines) / MAX_TIPS) or 1)
+                places = [*zip(times[every], values[every], strict=True)]
+                texts = [f"{name}\n{time:.6g} s: {value:.5g}" for time, value in places]
+            else:
+                axes.fill_between(found.times, found.low, found.high, color=shade, alpha=0.3, linewidth=0)
+                handles += axes.plot(found.times, found.mean, color=shade, linewidth=0.9, label=name)
+                said = f"Band: least to greatest in each {found.width:.3g} s; line: mean"
+                places = [*zip(found.times, found.mean, strict=True)]
+                texts = [
+                    f"{name}\n{time - found.width / 2:.6g} to {time + found.width / 2:.6g} s: "
+                    f"{low:.5g} to {high:.5g}, mean {mean:.5g}"
+                    for time, low, high, mean in zip(*found[:4], strict=True)
+                ]
+            sheet.tip(axes, places, texts)
         if len(names) > 1:
             key_beside(axes, names, handles, shades)
         axes.set_ylabel(fill(self.label or _shared(names), _LETTERS))
         set_log(axes, x=False, y=self.log_y)
         return said
-
-    def _tips(self, sheet: Sheet, axes: Any, name: str, times: Floats, values: Floats, lines: int) -> None:
-        every = slice(None, None, math.ceil(len(times) * lines / MAX_TIPS) or 1)
-        places = [*zip(times[every], values[every], strict=True)]
-        sheet.tip(axes, places, (f"{name}\n{time:.6g} s: {value:.5g}" for time, value in places))
 
 
 def _strips(sheet: Sheet, strips: States, begin: float, end: float, over: float) -> None:
@@ -203,13 +199,9 @@ class Histogram(Figure):
         axes.set_xlabel(self.label or _shared([*columns]))
         axes.set_ylabel("share of the values in a bin")
         axes.yaxis.set_major_formatter(lambda share, _: f"{100 * share:g} %")
-        said = [_about(values) for values in columns.values()]
-        if len(columns) > FEW:
-            band_beside(axes, [*columns], shades)
-        elif len(columns) > 1:
-            legend_beside(
-                axes, handles=handles, labels=[f"{name}, {about}" for name, about in zip(columns, said, strict=True)]
-            )
+        said = [f"mean {np.mean(values):.4g}" if len(values) else "no values" for values in columns.values()]
+        if len(columns) > 1:
+            key_beside(axes, [*columns], handles, shades, said)
         left_out = count - sum(map(len, columns.values()))
         title = [axes.get_title("left"), *(said if len(said) == 1 else [])]
         title += [f"{left_out:,} values that are not positive are left out"] if left_out else []
@@ -234,10 +226,6 @@ class Histogram(Figure):
 def _shared(names: Sequence[str]) -> str:
     """The axis label for signals without a ``label``."""
     return abridged(names[0] if len(names) == 1 else in_common(names)[0], 80)
-
-
-def _about(values: Floats) -> str:
-    return f"mean {np.mean(values):.4g}" if len(values) else "no values"
 
 
 def _legible(state: str) -> str:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import json
 import os
 import shlex
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from ..model.build.model import Model
 from ..model.catalogue.figure import Figure
 from ..model.graph.woven import extent
 from ..study.provenance import versions
+from ..study.run_spec import RunSpec
 from ..support.files import replace_file
 from ..support.printing import columns
 from ..support.shown import finite, in_time, in_words
@@ -109,19 +111,19 @@ def write_folder(
     results: Results,
     command: Iterable[str],
     error: str = "",
-    again: Mapping[str, object] | None = None,
+    spec: RunSpec | None = None,
 ) -> list[Path]:
     """Write ``manifest.json`` and ``signals.parquet``; returns the paths.
 
-    ``again`` says how the run is made, for programs.  Each file is written aside and then moved into place, so a folder
-    never holds half a file.
+    ``spec`` says how the run is made.  Each file is written aside and then moved into place, so a folder never holds
+    half a file.
     """
     folder.mkdir(parents=True, exist_ok=True)
     signals, manifest = folder / "signals.parquet", folder / "manifest.json"
     write_signals(results, signals)
     told = {**summary_object(results), "command": list(command), "versions": versions()}
-    if again is not None:
-        told["run"] = again
+    if spec is not None:  # to make it again: with its seed, which the model may change
+        told["run"] = (spec if spec.study else replace(spec, seed=results.seed)).plain()
     if error:
         told["error"] = error
     replace_file(manifest, json.dumps(told, indent=2) + "\n")

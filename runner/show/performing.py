@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from pathlib import Path
 
 from epicycle.actors import EpicycleError
@@ -14,7 +14,7 @@ from ..execution.results import LogFile, Results
 from ..model.build.figures import figures_of
 from ..model.build.model import Model
 from ..model.text.problems import Problems
-from ..study.run_spec import RunSpec, spec_of
+from ..study.run_spec import spec_of
 from ..support.bars import SOON
 from ..support.printing import complain
 from .outcome import check_folder, draw_figures, write_folder
@@ -70,11 +70,11 @@ def perform(
             results = simulation.results("interrupted" if interrupted else "failed")
             if folder is not None:
                 why = "interrupted" if interrupted else str(error)
-                write_folder(folder, results, given, why, _again(spec, results))
+                write_folder(folder, results, given, why, spec)
                 complain(f"what was recorded before is in {folder}")
             raise
         # Before the log is closed, which may fail.
-        saved = [] if folder is None else write_folder(folder, results, given, again=_again(spec, results))
+        saved = [] if folder is None else write_folder(folder, results, given, spec=spec)
     if pace is not None and pace.worst > NOTICEABLE:
         complain(
             f"the run could not keep up with the wall clock: {pace.worst:.3g} s late at worst, "
@@ -84,8 +84,3 @@ def perform(
         return Done(results)
     drawn, failed = draw_figures(folder, results, figures)
     return Done(results, [*drawn, *saved], failed)
-
-
-def _again(spec: RunSpec | None, results: Results) -> dict[str, object] | None:
-    """How to make a run again, for its manifest: with its seed, which the model may change."""
-    return None if spec is None else (spec if spec.study else replace(spec, seed=results.seed)).plain()

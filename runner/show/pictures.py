@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import base64
 import tempfile
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol, overload
 
@@ -34,12 +35,12 @@ class Saving(Protocol):
         ...
 
 
+@dataclass(eq=False, repr=False)
 class Picture:
     """A picture, drawn when it is shown or saved; a notebook shows it as SVG."""
 
-    def __init__(self, name: str, write: Callable[[Path], object]) -> None:
-        self.name = name
-        self._write = write
+    name: str
+    _write: Callable[[Path], object]
 
     def save(self, path: str | Path) -> Path:
         """Write it to a file, whose suffix decides the format: .svg, .png or .pdf."""
@@ -59,22 +60,11 @@ class Picture:
         return tag("img", src=f"data:image/svg+xml;base64,{data}", alt=self.name, style="max-width: 100%")
 
 
-class Pictures(Mapping[str, Picture]):
+class Pictures(dict[str, Picture]):
     """Pictures by name."""
 
-    def __init__(self, pictures: Mapping[str, Picture]) -> None:
-        self._pictures = dict(pictures)
-
-    def __getitem__(self, name: str) -> Picture:
-        if name not in self._pictures:
-            raise EpicycleError(f"there is no figure {name!r}{did_you_mean(name, self._pictures)}")
-        return self._pictures[name]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._pictures)
-
-    def __len__(self) -> int:
-        return len(self._pictures)
+    def __missing__(self, name: str) -> Picture:
+        raise EpicycleError(f"there is no figure {name!r}{did_you_mean(name, self)}")
 
     def __repr__(self) -> str:
         return f"<Pictures {', '.join(self)}>"

@@ -144,21 +144,15 @@ def facts(reference: TypeReference) -> list[str]:
 
 
 def _port_row(port: PortReference) -> list[str]:
-    notes = ", ".join(_notes(port))
-    return [port.name, port.type, notes, port.doc]
-
-
-def _notes(port: PortReference) -> list[str]:
-    """The properties of a port that are not the default."""
     is_input, inputs = port.direction == "input", port.depends_on
-    notes = {
+    notes = {  # what is not the default
         "optional": is_input and not port.required,
         "does not trigger": is_input and not port.triggers,
         # Such a port may be part of a loop.
         f"depends at once on {' and '.join(inputs or ()) or 'no input'}": not is_input and inputs is not None,
         "any number of connections": port.multi,
     }
-    return [note for note, holds in notes.items() if holds]
+    return [port.name, port.type, ", ".join(note for note, holds in notes.items() if holds), port.doc]
 
 
 def parameter_row(parameter: ParameterReference) -> list[str]:

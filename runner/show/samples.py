@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from array import array
 from collections.abc import Iterator, Sequence
+from itertools import groupby
+from operator import itemgetter
 from typing import NamedTuple, TypeAlias
 
 import numpy as np
@@ -99,18 +101,11 @@ def envelope(times: Floats, values: Floats, begin: float, end: float, *, holds: 
 
 def spans_of(times: Sequence[float], states: Sequence[str | None], end: float) -> Iterator[Span]:
     """The span of each state; equal successive states are merged, and states without duration are left out."""
-    last: Span | None = None
-    for since, until, state in zip(times, [*times[1:], end][: len(times)], states, strict=True):
-        if until <= since:
-            continue
-        if last is not None and last[2] == state:
-            last = last[0], until, state
-            continue
-        if last is not None:
-            yield last
-        last = None if state is None else (since, until, state)
-    if last is not None:
-        yield last
+    parts = zip(times, [*times[1:], end][: len(times)], states, strict=True)
+    for state, alike in groupby((part for part in parts if part[0] < part[1]), key=itemgetter(2)):
+        (since, until, _), *rest = alike
+        if state is not None:
+            yield since, rest[-1][1] if rest else until, state
 
 
 def longest_spans(spans: Sequence[Span], begin: float, end: float) -> list[Span]:

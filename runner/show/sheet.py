@@ -225,10 +225,13 @@ def band_beside(axes: Any, names: Sequence[str], shades: Sequence[str]) -> None:
         band.set_title(abridged(title, _MAX_NAME), loc="left", fontsize=8)
 
 
-def key_beside(axes: Any, names: Sequence[str], handles: Sequence[Any], shades: Sequence[str]) -> None:
-    """A legend for a few lines, a band for many."""
+def key_beside(
+    axes: Any, names: Sequence[str], handles: Sequence[Any], shades: Sequence[str], said: Sequence[str] = ()
+) -> None:
+    """A legend for a few lines, which says more of each, or a band for many."""
     if len(names) <= FEW:
-        legend_beside(axes, handles=handles, labels=names)
+        labels = [f"{name}, {more}" for name, more in zip(names, said, strict=True)] if said else names
+        legend_beside(axes, handles=handles, labels=labels)
     else:
         band_beside(axes, names, shades)
 

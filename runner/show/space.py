@@ -5,18 +5,16 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from epicycle.actors import EpicycleError
 
 from ..execution.results import Signal
-
-Rows = NDArray[np.float64]
+from .samples import Floats
 
 DEVIATIONS = 2.0  # shown around an estimate
 
 
-def positions(signal: Signal) -> Rows:
+def positions(signal: Signal) -> Floats:
     """The positions in a signal, shape (n, 2): the tokens' ``position`` from above, or tokens that are pairs x, y.
 
     Raises ``EpicycleError`` for other signals.
@@ -35,7 +33,7 @@ def _position(token: Any) -> Any:
     return x, y
 
 
-def ellipses(signal: Signal) -> Rows:
+def ellipses(signal: Signal) -> Floats:
     """Estimates as x, y, half axes at two standard deviations, and the angle of the first in rad; shape (n, 5)."""
     return np.array([ellipse(token) for token in signal.tokens], dtype=float).reshape(-1, 5)
 
@@ -52,7 +50,7 @@ def has_tracks(signal: Signal) -> bool:
     return any(hasattr(token, "estimates") for token in signal.tokens[:1])
 
 
-def tracked(signal: Signal) -> dict[str, tuple[list[int], Rows]]:
+def tracked(signal: Signal) -> dict[str, tuple[list[int], Floats]]:
     """The ``ellipses`` of each track of such a signal, by a name with its number, and the indices of their tokens; a
     row is NaN where the track has ended."""
     found: dict[int, list[tuple[int, tuple[float, ...]]]] = {}
@@ -68,7 +66,7 @@ def tracked(signal: Signal) -> dict[str, tuple[list[int], Rows]]:
 
 def _named(
     signal: Signal, found: dict[int, list[tuple[int, tuple[float, ...]]]], width: int
-) -> dict[str, tuple[list[int], Rows]]:
+) -> dict[str, tuple[list[int], Floats]]:
     return {
         f"{signal.name}[{number}]": (
             [index for index, _ in rows],
@@ -78,7 +76,7 @@ def _named(
     }
 
 
-def tubes(signal: Signal, period: float, initial: float, growth: float) -> Rows:
+def tubes(signal: Signal, period: float, initial: float, growth: float) -> Floats:
     """Plans as circles x, y, radius, one for each control; the radius grows by ``growth`` at each step.
 
     A plan is rolled out as in the robots: each acceleration acts for one period.
@@ -96,7 +94,7 @@ def tubes(signal: Signal, period: float, initial: float, growth: float) -> Rows:
     return np.array([row + row[-3:] * ((longest - len(row)) // 3) for row in rows], dtype=float).reshape(-1, longest)
 
 
-def sights(signal: Signal) -> dict[str, tuple[list[int], Rows]]:
+def sights(signal: Signal) -> dict[str, tuple[list[int], Floats]]:
     """Measurements of a relative position as lines from the sensor to its target, by name, with the indices of their
     tokens.
 

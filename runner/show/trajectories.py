@@ -141,14 +141,8 @@ class Trajectories(Figure):
 
         (axes,) = sheet.axes
         points = positions(signal)
-        axes.plot(
-            *points.T,
-            "--",
-            color="0.25",
-            linewidth=1.2,
-            label="obstacle" if is_named and len(points) else None,
-            zorder=3,
-        )
+        label = "obstacle" if is_named and len(points) else None
+        axes.plot(*points.T, "--", color="0.25", linewidth=1.2, label=label, zorder=3)
         arrows(axes, points, "0.25", zorder=3.5)
         tip_path(sheet, axes, signal.name, signal.times, points)
         marks = every(signal.times, self.interval)

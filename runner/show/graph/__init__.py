@@ -19,7 +19,7 @@ from epicycle.actors import EpicycleError
 
 from . import mermaid_text
 from .chart import Statechart, chart_text, statechart
-from .layout import Drawing, Scope, draw
+from .layout import Drawing, draw
 from .outlines import Outline, outline
 
 MOST_BOXES = 2000  # in a picture, and on a page; Mermaid text has no limit
@@ -30,7 +30,6 @@ __all__ = [
     "Drawing",
     "GraphError",
     "Outline",
-    "Scope",
     "Statechart",
     "check_graph_path",
     "draw",

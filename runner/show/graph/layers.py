@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from bisect import bisect_right, insort
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import groupby, product
 from operator import itemgetter
@@ -192,7 +192,7 @@ def order(layers: Layers, runs: Runs, fixed: Iterable[Cell] = ()) -> None:
         if upside_down:
             for cells in layers:
                 cells.reverse()
-                _keep(cells, given)
+                _sort(cells, given)
         better = 0  # the last sweep that was
         for number in range(SWEEPS):
             if least == (0, 0) or number - better > PATIENCE:
@@ -238,26 +238,21 @@ def _sweep(layers: Layers, joints: Joints, given: dict[Cell, int], rightwards: b
             here, far = (right, left) if rightwards else (left, right)
             there.setdefault(here, []).append(ranks[far])
         cells = layers[number]
+        means = {pin: sum(found) / len(found) for pin, found in there.items()}
+        beside = dict[Cell, list[int]]()
         for cell in cells:
             for pins in (cell.left, cell.right):
-                _sort(pins, [there.get(pin, []) for pin in pins])
-        _sort(cells, [[rank for pin in (*cell.left, *cell.right) for rank in there.get(pin, ())] for cell in cells])
-        _keep(cells, given)
+                _sort(pins, means)
+            beside[cell] = [rank for pin in (*cell.left, *cell.right) for rank in there.get(pin, ())]
+        _sort(cells, {cell: sum(found) / len(found) for cell, found in beside.items() if found})
+        _sort(cells, given)
 
 
-def _sort(items: list[T], ranks: list[list[int]]) -> None:
-    """Sort by the mean of each item's ranks; items without ranks stay where they are."""
-    means = {index: sum(found) / len(found) for index, found in enumerate(ranks) if found}
-    in_order = [items[index] for index in sorted(means, key=means.__getitem__)]
-    for index, item in zip(sorted(means), in_order, strict=True):
+def _sort(items: list[T], keys: Mapping[T, float]) -> None:
+    """Sort the items that have a key, in the positions that they hold together; the others stay where they are."""
+    places = [index for index, item in enumerate(items) if item in keys]
+    for index, item in zip(places, sorted((items[index] for index in places), key=keys.__getitem__), strict=True):
         items[index] = item
-
-
-def _keep(cells: list[Cell], given: dict[Cell, int]) -> None:
-    """Restore the given order of cells, using the positions that they hold together."""
-    places = [index for index, cell in enumerate(cells) if cell in given]
-    for index, cell in zip(places, sorted((cells[index] for index in places), key=given.__getitem__), strict=True):
-        cells[index] = cell
 
 
 def _ranks(cells: list[Cell], side: str) -> dict[Pin, int]:

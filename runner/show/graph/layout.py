@@ -7,9 +7,10 @@ composite is one flat drawing with a frame around it.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import pairwise
+from weakref import WeakValueDictionary
 
 from ..canvas import text_width
 from .layers import Cell, Net, Pin, Run, layer, order
@@ -108,6 +109,7 @@ class Drawing:
     """Everything with its position; the origin is at the top left."""
 
     outline: Outline
+    scope: Scope = field(compare=False)
     width: float = 0.0
     height: float = 0.0
     boxes: list[PlacedBox] = field(default_factory=list)
@@ -117,19 +119,15 @@ class Drawing:
     cut: int = 0  # wires shown by names at their ends
 
 
-def draw(outline: Outline, known: dict[str, Scope] | None = None) -> Drawing:
-    """Lay out an outline.
-
-    ``known`` are composites of an earlier one: those that have not changed are laid out no second time.  Afterwards
-    they are those of this one.
-    """
-    known = {} if known is None else known
-    scope = Scope(outline.root, (), (), known)
-    known.clear()
-    known.update(scope.all_inside())
-    drawing = Drawing(outline, scope.width + 2 * MARGIN, scope.height + 2 * MARGIN)
+def draw(outline: Outline) -> Drawing:
+    """Lay out an outline; composites that are as in a drawing that somebody still has are laid out no second time."""
+    scope = Scope(outline.root, (), ())
+    drawing = Drawing(outline, scope, scope.width + 2 * MARGIN, scope.height + 2 * MARGIN)
     scope.put(drawing, MARGIN, MARGIN, 0)
     return drawing
+
+
+_scopes: WeakValueDictionary[str, Scope] = WeakValueDictionary()  # open composites, by all that they depend on
 
 
 def badge_width(words: str) -> float:
@@ -143,10 +141,8 @@ def badge_height(words: str) -> float:
 class Scope:
     """The inside of one open composite, or of the model, with its ports in the order in which they stand."""
 
-    def __init__(self, box: Box, inputs: Sequence[Port], outputs: Sequence[Port], known: Mapping[str, Scope]) -> None:
+    def __init__(self, box: Box, inputs: Sequence[Port], outputs: Sequence[Port]) -> None:
         self.box = box
-        self.known = known
-        self.key = ""
         self.top = TITLE + MARGIN if box.path else 0.0  # where the inside starts
         self.inner: dict[Box, Scope] = {}
         self.ends: dict[Pin, Port] = {}
@@ -194,10 +190,8 @@ class Scope:
     def _flags(self, net: Net, link: Link) -> Iterator[tuple[Pin, str]]:
         """What stands at the ends of a net that has no line."""
         targets = [self._name(pin) for pin in net.targets]
-        yield (
-            net.source,
-            f"{label(link)} \u2192 {targets[0] if len(targets) == 1 else f'{len(targets)} inputs'}".strip(),
-        )
+        beyond = targets[0] if len(targets) == 1 else f"{len(targets)} inputs"
+        yield net.source, f"{label(link)} \u2192 {beyond}".strip()
         for pin in net.targets:
             yield pin, f"{self._name(net.source)} \u2192"
 
@@ -217,8 +211,8 @@ class Scope:
         if child.is_open:
             inputs, outputs = [self.ends[pin] for pin in cell.left], [self.ends[pin] for pin in cell.right]
             key = repr((child, inputs, outputs))  # everything it depends on
-            scope = self.inner[child] = self.known.get(key) or Scope(child, inputs, outputs, self.known)
-            scope.key = key
+            scope = self.inner[child] = _scopes.get(key) or Scope(child, inputs, outputs)
+            _scopes[key] = scope
             cell.width, cell.height = scope.width, scope.height
             for pin in (*cell.left, *cell.right):
                 inside = scope.pins[self.ends[pin].path]
@@ -288,12 +282,6 @@ class Scope:
         else:
             x = 0.0 if cell.kind == "entry" else self.width
         return x, pin.y
-
-    def all_inside(self) -> Iterator[tuple[str, Scope]]:
-        """All open composites below this one, by their keys."""
-        for each in self.inner.values():
-            yield each.key, each
-            yield from each.all_inside()
 
     def put(self, drawing: Drawing, x: float, y: float, level: int) -> None:
         """Add everything to a drawing, with the top left corner of this scope at (x, y)."""

@@ -118,10 +118,8 @@ def legend_of(drawing: Drawing, aspects: dict[str, list[WovenAspect]]) -> list[R
     if delay is not None:
         rows.append(Row("label", duration(delay), "delay of a connection"))
     if drawing.cut:
-        told = (
-            f"the other end of {'a connection' if drawing.cut == 1 else f'{drawing.cut} connections'} with a long way"
-        )
-        rows.append(Row("label", "a.output \u2192", told))
+        which = "a connection" if drawing.cut == 1 else f"{drawing.cut} connections"
+        rows.append(Row("label", "a.output \u2192", f"the other end of {which} with a long way"))
     signs = {
         "port": ("port for any number of connections", any(p.is_multi for b in boxes for p in (*b.inputs, *b.outputs))),
         "stack": ("identical instances", any(box.count > 1 for box in boxes)),

@@ -137,8 +137,8 @@ def tracks(runs: Sequence[Run]) -> tuple[list[Trunk], int]:
         taken.update(left, right)
         if len({*left, *right}) > 1:
             trunks.append(Trunk(tuple(group), left, right))
-    while knot := _knot(trunks):
-        split = min(knot, key=lambda trunk: len(trunk.left) + len(trunk.right))
+    while knots := [sorted(knot) for knot in nx.strongly_connected_components(_required(trunks)) if len(knot) > 1]:
+        split = min((trunks[index] for index in min(knots)), key=lambda trunk: len(trunk.left) + len(trunk.right))
         level = _free_height(sorted(taken), (split.low + split.high) / 2)
         taken.add(level)
         at = trunks.index(split)
@@ -156,11 +156,6 @@ def _free_height(taken: list[float], wanted: float) -> float:
     return min((*between, *outside), key=lambda height: abs(height - wanted))
 
 
-def _must_precede(one: Trunk, other: Trunk) -> bool:
-    """Whether ``one`` must be left of ``other``, so that their horizontal lines do not overlap."""
-    return any(abs(left - right) < APART for left in one.left for right in other.right)
-
-
 def _meeting(trunks: list[Trunk]) -> Iterator[tuple[int, int]]:
     """The pairs of trunks whose heights overlap, and which thus cannot share a track."""
     by_height = sorted(range(len(trunks)), key=lambda index: trunks[index].low)
@@ -171,28 +166,26 @@ def _meeting(trunks: list[Trunk]) -> Iterator[tuple[int, int]]:
             yield (one, other) if one < other else (other, one)
 
 
-def _knot(trunks: list[Trunk]) -> list[Trunk]:
-    """A cycle of trunks that must each be left of another; empty if there is none."""
+def _required(trunks: list[Trunk]) -> Any:
+    """Which trunk must be left of which, so that their horizontal lines do not overlap."""
     graph: Any = nx.DiGraph()
-    for one, other in _meeting(trunks):
-        if trunks[one].runs is not trunks[other].runs:
-            graph.add_edges_from((a, b) for a, b in ((one, other), (other, one)) if _must_precede(trunks[a], trunks[b]))
-    knots = [sorted(knot) for knot in nx.strongly_connected_components(graph) if len(knot) > 1]
-    return [trunks[index] for index in min(knots, default=[])]
+    graph.add_nodes_from(range(len(trunks)))
+    for pair in _meeting(trunks):
+        for one, other in (pair, pair[::-1]) if trunks[pair[0]].runs is not trunks[pair[1]].runs else ():
+            if any(abs(left - right) < APART for left in trunks[one].left for right in trunks[other].right):
+                graph.add_edge(one, other)
+    return graph
 
 
 def _precedence(trunks: list[Trunk]) -> Any:
     """Which trunk is left of which: first what is required, then what avoids most crossings."""
-    graph: Any = nx.DiGraph()
-    graph.add_nodes_from(range(len(trunks)))
+    graph = _required(trunks)
     wishes: list[tuple[int, int, int]] = []
     for one, other in _meeting(trunks):
         a, b = trunks[one], trunks[other]
-        if a.runs is b.runs or _must_precede(a, b):
+        if a.runs is b.runs:
             graph.add_edge(one, other)
-        elif _must_precede(b, a):
-            graph.add_edge(other, one)
-        else:
+        elif not graph.has_edge(one, other) and not graph.has_edge(other, one):
             saved = _crossings(b, a) - _crossings(a, b)
             wishes.append((saved, one, other) if saved >= 0 else (-saved, other, one))
     wishes.sort(key=lambda wish: (-wish[0], *wish[1:]))

@@ -101,8 +101,7 @@ def _findings(names: Names, judgement: ClaimVerdict) -> Html:
     rows = [
         [
             _compared(names, judgement, each),
-            _value(each),
-            _interval(each),
+            *_value(each),
             f"{each.count}{f' ({each.missing} missing)' if each.missing else ''}",
             *([] if is_rate else ["–" if math.isnan(each.p_holm) else f"{each.p_holm:.2g}"]),
             tag("span", each.outcome, class_={CONFIRMED: "reproduced", REVERSED: "not-reproduced"}.get(each.outcome)),
@@ -116,13 +115,8 @@ def _weakest(names: Names, judgement: ClaimVerdict) -> Content:
     finding = judgement.weakest
     if finding is None or not finding.count:
         return "–"
-    return [f"{_value(finding)} ({_interval(finding)}) ", tag("small", _compared(names, judgement, finding))]
-
-
-def _interval(finding: ContrastTest) -> str:
-    if math.isnan(finding.low):
-        return "–"
-    return " to ".join(rounded(end, finding.high - finding.low) for end in (finding.low, finding.high))
+    value, interval = _value(finding)
+    return [f"{value} ({interval}) ", tag("small", _compared(names, judgement, finding))]
 
 
 def _compared(names: Names, judgement: ClaimVerdict, finding: ContrastTest) -> str:
@@ -136,10 +130,11 @@ def _compared(names: Names, judgement: ClaimVerdict, finding: ContrastTest) -> s
     return f"{pair}; {where}" if where else pair
 
 
-def _value(finding: ContrastTest) -> str:
-    if not finding.count:
-        return "–"
-    return rounded(finding.value, finding.high - finding.low)
+def _value(finding: ContrastTest) -> tuple[str, str]:
+    """The value of a comparison, and its interval."""
+    width = finding.high - finding.low
+    value = rounded(finding.value, width) if finding.count else "–"
+    return value, "–" if math.isnan(finding.low) else f"{rounded(finding.low, width)} to {rounded(finding.high, width)}"
 
 
 def guideline(data: Data, found: Sequence[Recommendation]) -> Iterable[Html]:

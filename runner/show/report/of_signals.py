@@ -10,7 +10,6 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from epicycle.actors import (
     EpicycleError,
@@ -32,7 +31,7 @@ from ...model.text.problems import Problems
 from ...study.inference import half_width
 from ...study.plan.plan import Plan
 from ..canvas import FORMATS, draw
-from ..samples import selected
+from ..samples import Floats, selected
 from ..sheet import colours, set_log, width_of
 from ..space import positions
 from ..trajectories import arrows, every, round_step, tip_path, write_times
@@ -92,7 +91,7 @@ class Series(RepeatedFigure):
         assert self.value is not None
         return self.value
 
-    def extract(self, model: Model, results: Results) -> tuple[NDArray[np.float64], NDArray[np.float64], float]:
+    def extract(self, model: Model, results: Results) -> tuple[Floats, Floats, float]:
         """Times, values, and when the run ended."""
         signal = results[self.signal]
         values = []
@@ -129,9 +128,7 @@ class Series(RepeatedFigure):
         return arranged.finish(sheet, paths, f"{said}, as long as half of them continue.")
 
 
-def over_time(
-    runs: Sequence[tuple[NDArray[np.float64], NDArray[np.float64], float]],
-) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+def over_time(runs: Sequence[tuple[Floats, Floats, float]]) -> tuple[Floats, Floats, Floats]:
     """Times, means and half widths of their intervals; a value of a run holds until its next token."""
     begun = [each for each in runs if len(each[0])]
     if not begun:
@@ -158,8 +155,8 @@ class Way(NamedTuple):
     """The positions of a thing over time."""
 
     signal: str
-    times: NDArray[np.float64]
-    points: NDArray[np.float64]
+    times: Floats
+    points: Floats
 
 
 class Tracks(RepeatedFigure):

@@ -93,7 +93,7 @@ class Means(TableFigure):
         handle = axes.errorbar(
             [place for place, _ in places],
             [value for _, value in places],
-            yerr=[[point.below for point in points], [point.above for point in points]],
+            yerr=[[point.reach[end] for point in points] for end in (0, 1)],
             elinewidth=1.0,
             **(look if axis.is_connected else {**look, "linestyle": "none"}),
         )
@@ -113,18 +113,10 @@ class _Point(NamedTuple):
     estimate: Estimate
 
     @property
-    def below(self) -> float:
-        """How far its interval reaches below it."""
-        return _finite(self.estimate.value - self.estimate.low)
-
-    @property
-    def above(self) -> float:
-        """How far its interval reaches above it."""
-        return _finite(self.estimate.high - self.estimate.value)
-
-
-def _finite(length: float) -> float:
-    return length if math.isfinite(length) else 0.0
+    def reach(self) -> list[float]:
+        """How far its interval reaches below it and above it; an infinite one is not drawn."""
+        ends = (self.estimate.low, self.estimate.high)
+        return [abs(end - self.estimate.value) if math.isfinite(end) else 0.0 for end in ends]
 
 
 def by_metric(arranged: Layout, metrics: Sequence[str], same_y: bool = True) -> tuple[Sheet, list[tuple[str, Panel]]]:

@@ -79,9 +79,9 @@ def _in_short(data: Data, judgements: Sequence[ClaimVerdict]) -> Iterable[Html]:
     """What a reader should know first: the verdicts of the claims, and what is missing or failed."""
     verdicts = Counter(each.verdict for each in judgements)
     if verdicts:
-        said = [
-            [tag("b", f"{number} {verdict}", class_=class_of(verdict)), " "] for verdict, number in _sorted(verdicts)
-        ]
+        order = {REPRODUCED: 0, UNDECIDED: 1}
+        found = sorted(verdicts.items(), key=lambda each: order.get(each[0], len(order)))
+        said = [[tag("b", f"{number} {verdict}", class_=class_of(verdict)), " "] for verdict, number in found]
         yield tag("p", f"{counted(verdicts.total(), 'claim')}: ", said, class_="short")
     counts, plan = data.results.counts(), data.plan
     over = counts.total() - data.results.beyond()
@@ -91,11 +91,6 @@ def _in_short(data: Data, judgements: Sequence[ClaimVerdict]) -> Iterable[Html]:
     if bad := counts.total() - counts["ok"]:
         link = tag("a", f"{counted(bad, 'run')} without a result", href="#runs")
         yield tag("p", link, ", which no number includes.", class_="problem")
-
-
-def _sorted(verdicts: Counter[str]) -> list[tuple[str, int]]:
-    order = [REPRODUCED, UNDECIDED]
-    return sorted(verdicts.items(), key=lambda each: order.index(each[0]) if each[0] in order else len(order))
 
 
 def _at_most(data: Data) -> str:
@@ -207,19 +202,15 @@ def _picture(number: int, picture: Picture) -> Html:
 
 def _shown(svg: bytes, what: str) -> Html:
     """A picture that can be enlarged, with tips over it; as an image, it cannot run anything."""
-    source = f"data:image/svg+xml;base64,{base64.b64encode(svg).decode()}"
-    found = tips_of(svg)
-    if found is None:
-        frame = tag("div", tag("img", src=source, alt=what), class_="frame wide", tabindex="0")
-    else:
-        width, height = f"{found.width:.0f}", f"{found.height:.0f}"
+    image = {"src": f"data:image/svg+xml;base64,{base64.b64encode(svg).decode()}", "alt": what}
+    over, kind = None, "frame wide"
+    if (found := tips_of(svg)) is not None:
+        image |= {"width": f"{found.width:.0f}", "height": f"{found.height:.0f}"}
         dots = [tag("circle", tag("title", tip.text), cx=f"{tip.x:g}", cy=f"{tip.y:g}", r="4") for tip in found.tips]
         view = {"viewBox": f"0 0 {found.width:g} {found.height:g}"}
         over = tag("svg", dots, class_="tips", aria_hidden="true", **view)
-        image = tag("img", src=source, alt=what, width=width, height=height)
         kind = "frame wide" if found.width > MAX_NARROW else "frame"
-        frame = tag("div", image, over, class_=kind, tabindex="0")
-    return tag("div", frame, class_="scroll")
+    return tag("div", tag("div", tag("img", **image), over, class_=kind, tabindex="0"), class_="scroll")
 
 
 def _means(data: Data) -> Iterable[Html]:

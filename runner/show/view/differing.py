@@ -42,11 +42,11 @@ def difference(recordings: Sequence[Recording]) -> dict[str, Any] | None:
     if (record := _first(*(each.hashes for each in recordings[:2]))) is None:
         return None
     first = first_firing(recordings)
-    numbers: Sequence[int | None] = (None, None) if first is None else first.numbers
+    numbers = [NOTHING if n is None else n for n in ((None, None) if first is None else first.numbers)]
     return {
-        "records": [each.kept_record(record) for each in recordings],
+        "records": [each.among_kept("record", [record])[0] for each in recordings],
         "texts": [_said(each, record) for each in recordings],
-        "firings": [NOTHING if n is None else each.kept_firing(n) for each, n in zip(recordings, numbers, strict=True)],
+        "firings": [each.among_kept("firing", [n])[0] for each, n in zip(recordings, numbers, strict=True)],
         "fired": [] if first is None else [f"{first.at} {first.actor} {each}" for each in first.does],
     }
 
@@ -63,15 +63,14 @@ def first_firing(recordings: Sequence[Recording]) -> First | None:
     tag, actor = heads[which]
     numbers = [number if heads.get(n) == heads[which] else None for n in (0, 1)]
     does = [
-        "does not fire" if n is None else _took(recording, recording.kept_firing(n))
-        for recording, n in zip(recordings, numbers, strict=False)
+        "does not fire" if n is None else _took(recording, n) for recording, n in zip(recordings, numbers, strict=False)
     ]
     return First(actor, tag, (numbers[0], numbers[1]), tuple(does))
 
 
 def _head(recording: Recording, number: int) -> tuple[Tag, str]:
     fired = recording.fired
-    return fired.tag(number), recording.place(fired.actors[number])
+    return fired.tag(number), list(recording.places)[fired.actors[number]]
 
 
 def _comes(recording: Recording, number: int, head: tuple[Tag, str]) -> bool:
@@ -100,7 +99,8 @@ def _by_actor(recording: Recording) -> dict[str, list[int]]:
     rows = defaultdict[int, list[int]](list)
     for number, actor in enumerate(recording.fired.actors):
         rows[actor].append(number)
-    return {recording.place(actor): found for actor, found in rows.items()}
+    places = list(recording.places)
+    return {places[actor]: found for actor, found in rows.items()}
 
 
 def _first(one: Sequence[int], other: Sequence[int]) -> int | None:
@@ -111,19 +111,20 @@ def _first(one: Sequence[int], other: Sequence[int]) -> int | None:
 
 def _said(recording: Recording, record: int) -> str:
     """A record of the log in words."""
-    number = recording.kept_record(record)
+    (number,) = recording.among_kept("record", [record])
     if number < 0:
         return "the run has ended" if record >= recording.records else "a record that this page leaves out"
     kept = recording.kept()
     tag, port, event, aspect = (kept.columns[f"record_{each}"][number] for each in ("tag", "port", "event", "aspect"))
     place, name = list(recording.ports)[port]
     by = f" by {list(recording.aspects)[aspect]}" if aspect != NOTHING else ""
-    where = f"{kept.tags[tag]} {recording.place(place)}.{name}"
+    where = f"{kept.tags[tag]} {list(recording.places)[place]}.{name}"
     return f"{where} {list(recording.events)[event]}{by}: {_token(kept, number, _WIDEST)}"
 
 
-def _took(recording: Recording, firing: int) -> str:
+def _took(recording: Recording, number: int) -> str:
     """What a firing took and sent, in words."""
+    (firing,) = recording.among_kept("firing", [number])
     if firing < 0:
         return "a firing that this page leaves out"
     kept, ports = recording.kept(), [name for _, name in recording.ports]
@@ -149,9 +150,7 @@ def _token(kept: Kept, record: int, widest: int) -> str:
 def comparison(recordings: Sequence[Recording]) -> list[list[str]]:
     """The metrics of two runs, and their differences, in words."""
     rows = []
-    one, other = (each.results for each in recordings[:2])
-    assert one is not None
-    assert other is not None
+    one, other = (each.finished("a comparison") for each in recordings[:2])
     for name, value in one.metrics.items():
         if name in other.metrics:
             numbers = [each for each in (value, other.metrics[name]) if isinstance(each, (int, float))]

@@ -5,11 +5,10 @@ from __future__ import annotations
 from typing import Any
 
 from ...model.build.model import Model
-from ..graph import MOST_BOXES, Drawing, Outline, Scope, draw, outline
+from ..graph import MOST_BOXES, Drawing, draw, outline
 
 FEW = 8  # instances of an array that are drawn one by one
-_latest: dict[str, Drawing] = {}  # by the outline in words
-_scopes: dict[str, Scope] = {}  # what it consists of
+_latest: dict[str, Drawing] = {}  # by the outline in words; what it consists of is used again while it is here
 
 
 def drawn(model: Model) -> dict[str, Any]:
@@ -60,23 +59,19 @@ def _drawing(model: Model) -> tuple[Drawing, str]:
     last all but one of a type."""
     everything = len(model.graph.actors) + len(model.graph.composites)
     found = outline(model, most=MOST_BOXES, few=FEW, limit=MOST_BOXES)
-    note = (
-        "" if found.depth >= found.levels else f"{everything:,} boxes are too many to draw: composites are drawn closed"
-    )
-    if any(box.members for box in found.root.children):
-        note = f"{everything:,} boxes are too many to draw: what is of one type, with names that are alike, is one box"
+    note, many = "", f"{everything:,} boxes are too many to draw"
     if found.size > MOST_BOXES:
-        found.root.children, found.root.links, note = [], [], f"{everything:,} boxes are too many to draw"
-    return _laid_out(found), note
-
-
-def _laid_out(found: Outline) -> Drawing:
-    """The drawing of an outline; of the latest one, everything is kept that is the same."""
+        found.root.children, found.root.links, note = [], [], many
+    elif any(box.members for box in found.root.children):
+        note = f"{many}: what is of one type, with names that are alike, is one box"
+    elif found.depth < found.levels:
+        note = f"{many}: composites are drawn closed"
     key = repr(found.root)
     if key not in _latest:
+        drawing = draw(found)
         _latest.clear()
-        _latest[key] = draw(found, _scopes)
-    return _latest[key]
+        _latest[key] = drawing
+    return _latest[key], note
 
 
 def _rounded(*values: float) -> list[float]:

@@ -17,11 +17,10 @@ from numpy.typing import NDArray
 
 from epicycle.actors import Tag, to_nanoseconds
 
-from ...execution.results import Results
 from ...model.catalogue.figure import Mark
 from ...support.shown import short
 from ..sheet import LIMIT, PALETTE
-from .recording import NOTHING, Recording, ViewError
+from .recording import NOTHING, Recording
 
 TRAIL = 200  # points of a trail, and how often it is drawn again
 STALE = 1.6  # usual intervals after which a line of sight ends
@@ -79,16 +78,9 @@ def encodable(text: str) -> str:
     return text.encode("utf-8", "replace").decode()
 
 
-def results_of(recording: Recording) -> Results:
-    """The results of a run; raises ``ViewError`` if it has not been made."""
-    if recording.results is None:
-        raise ViewError("a file needs a run that has been made: call Recording.run first")
-    return recording.results
-
-
 def about(recording: Recording) -> dict[str, str]:
     """The run in words: its origin and its results."""
-    results = results_of(recording)
+    results = recording.finished("a file")
     left_out = sum(count for _, count in recording.gaps())
     said = {
         "model": results.model,
@@ -130,7 +122,7 @@ def acts(recording: Recording) -> Iterator[Act]:
 
 def things(recording: Recording) -> list[Thing]:
     """Everything that figures of the model place in space, each thing once."""
-    results, found = results_of(recording), dict[tuple[str, str], Thing]()
+    results, found = recording.finished("a file"), dict[tuple[str, str], Thing]()
     for figure in recording.figures.values():
         for mark in figure.marks(results):
             for thing in _things(mark, to_nanoseconds(results.end)):
@@ -138,13 +130,11 @@ def things(recording: Recording) -> list[Thing]:
     return list(found.values())
 
 
-def extent(placed: list[Thing]) -> tuple[Point, Point]:
-    """The corners of the space that the points occupy."""
+def extent(placed: list[Thing]) -> tuple[Point, float]:
+    """The middle of the space that the points occupy, and its greater width."""
     points = [point for thing in placed for scene in thing.scenes for point in scene.points] or [(0.0, 0.0)]
-    return (min(x for x, _ in points), min(y for _, y in points)), (
-        max(x for x, _ in points),
-        max(y for _, y in points),
-    )
+    (left, right), (low, high) = ((min(line), max(line)) for line in zip(*points, strict=True))
+    return ((left + right) / 2.0, (low + high) / 2.0), max(right - left, high - low) or 1.0
 
 
 def _things(mark: Mark, end: int) -> Iterator[Thing]:

@@ -10,25 +10,23 @@ from numpy.typing import NDArray
 
 from ...execution.results import Results
 from ...model.catalogue.figure import Figure
-from ..samples import read
+from ..samples import Floats, read
 
 POINTS = 8_000  # per line; above this, the lowest and highest value in each of half as many parts of the run
 CHANGES = 20_000  # per strip
 MOST = 400  # lanes
 
-Floats = NDArray[np.float64]
-
 
 @dataclass(frozen=True)
 class Lane:
-    """Numbers (``states`` is None) or indices of ``states``, each valid from its time (s) on."""
+    """Numbers (``states`` is None) or indices of ``states``, each valid from its time (s) on; named as on the page."""
 
     name: str
     times: Floats
     values: Floats
     states: list[str] | None
-    is_line: bool  # whether numbers are joined by straight lines
-    is_asked: bool  # whether a figure of the model shows it
+    line: bool  # whether numbers are joined by straight lines
+    asked: bool  # whether a figure of the model shows it
     left_out: int  # samples
 
 

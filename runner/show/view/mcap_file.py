@@ -9,7 +9,6 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Iterable, Iterator
-from functools import reduce
 from heapq import merge
 from io import BytesIO
 from itertools import chain
@@ -23,7 +22,7 @@ from ...execution.results import Signal, plain
 from ...support.extras import needed
 from ...support.files import replace_file
 from ...support.shown import finite
-from .export import Act, Colour, Disc, Point, Scene, Thing, about, acts, extent, firings, parts, results_of, things
+from .export import Act, Colour, Disc, Point, Scene, Thing, about, acts, extent, firings, parts, things
 from .recording import Recording, ViewError
 
 if TYPE_CHECKING:
@@ -59,9 +58,10 @@ def mcap(recording: Recording) -> bytes:
     writer.add_metadata("run", about(recording))
     channels = Channels(writer)
     placed = things(recording)
+    _, width = extent(placed)
     streams = [
-        *(_signal(signal, channels) for signal in results_of(recording).signals.values()),
-        *(_space(thing, _size(placed), channels) for thing in placed),
+        *(_signal(signal, channels) for signal in recording.finished("a file").signals.values()),
+        *(_space(thing, SHARE * width, channels) for thing in placed),
         *(_frames(thing, channels) for thing in placed if thing.kind == "body"),
         _acts(acts(recording), channels),
         _firings(firings(recording), channels),
@@ -101,44 +101,19 @@ class Channels:
 TRUTH, NUMBER, TEXT = ({"type": name} for name in ("boolean", "number", "string"))
 
 
-def _fitting(messages: Iterable[Any]) -> Schema:
-    """The schema that all of these messages fit."""
-    return _settled(reduce(_common, map(_schema, messages), None))
-
-
-def _schema(value: Any) -> Schema | None:
-    """The schema of a value; None if the value says nothing about others of its kind."""
-    if value is None:
-        return None
-    if isinstance(value, dict):
-        return {"type": "object", "properties": {key: _schema(each) for key, each in value.items()}}
-    if isinstance(value, list):
-        return {"type": "array", "items": reduce(_common, map(_schema, value), None)}
-    return TRUTH if isinstance(value, bool) else TEXT if isinstance(value, str) else NUMBER
-
-
-def _common(one: Schema | None, other: Schema | None) -> Schema | None:
-    """The schema that fits both: text if no other does."""
-    if one is None or other is None or one == other:
-        return one if other is None else other
-    if one["type"] == other["type"] == "array":
-        return {"type": "array", "items": _common(one["items"], other["items"])}
-    if one["type"] == other["type"] == "object":
-        fields, more = one["properties"], other["properties"]
-        names = dict.fromkeys((*fields, *more))
-        return {"type": "object", "properties": {name: _common(fields.get(name), more.get(name)) for name in names}}
-    return TEXT
-
-
-def _settled(schema: Schema | None) -> Schema:
-    """A complete schema: values that were never set are texts, and empty arrays hold numbers."""
-    if schema is None:
-        return TEXT
-    if schema["type"] == "array":
-        return {"type": "array", "items": NUMBER if schema["items"] is None else _settled(schema["items"])}
-    if schema["type"] == "object":
-        return {"type": "object", "properties": {name: _settled(each) for name, each in schema["properties"].items()}}
-    return schema
+def _fitting(values: Iterable[Any], empty: Schema = TEXT) -> Schema:
+    """The schema that all of these values fit: text if no other does, and ``empty`` if all are None."""
+    found = [value for value in values if value is not None]
+    if not found:
+        return empty
+    if all(isinstance(value, dict) for value in found):
+        names = dict.fromkeys(chain.from_iterable(found))
+        return {"type": "object", "properties": {name: _fitting(each.get(name) for each in found) for name in names}}
+    if all(isinstance(value, list) for value in found):
+        return {"type": "array", "items": _fitting(chain.from_iterable(found), NUMBER)}
+    if all(isinstance(value, bool) for value in found):
+        return TRUTH
+    return TEXT if any(isinstance(value, (bool, str, dict, list)) for value in found) else NUMBER
 
 
 # -- signals ----------------------------------------------------------------------------------------------------------
@@ -174,12 +149,6 @@ def _fitted(value: Any, schema: Schema) -> Any:
 
 
 # -- space ------------------------------------------------------------------------------------------------------------
-
-
-def _size(placed: list[Thing]) -> float:
-    """The diameter of a point (m), relative to the space that the points occupy."""
-    (left, low), (right, high) = extent(placed)
-    return SHARE * (max(right - left, high - low) or 1.0)
 
 
 def _space(thing: Thing, size: float, channels: Channels) -> Iterator[Message]:

@@ -76,9 +76,7 @@ def part(name: str) -> str:
 
 
 def _run(recording: Recording, name: str, pack: Pack) -> dict[str, Any]:
-    model, results, kept = recording.model, recording.results, recording.kept()
-    if results is None:
-        raise ViewError("a page needs a run that has been made: call Recording.run first")
+    model, results, kept = recording.model, recording.finished("a page"), recording.kept()
     figures = recording.figures.values()
     actors = [path for path in model.graph.actors if path not in recording.places]  # that never fired
     places = [*recording.places, *actors]
@@ -106,15 +104,7 @@ def _run(recording: Recording, name: str, pack: Pack) -> dict[str, Any]:
         "texts": pack.texts(kept.texts),
         "drawing": drawn(model),
         "lanes": [
-            {
-                "name": lane.name,
-                "times": pack.exact(lane.times),
-                "values": pack.rough(lane.values),
-                "states": lane.states,
-                "line": lane.is_line,
-                "asked": lane.is_asked,
-                "left_out": lane.left_out,
-            }
+            {**vars(lane), "times": pack.exact(lane.times), "values": pack.rough(lane.values)}
             for lane in lanes(results, figures)
         ],
         "marks": [each for figure in figures for each in _marks(recording, results, figure, pack)],

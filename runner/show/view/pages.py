@@ -7,6 +7,7 @@ import tempfile
 import webbrowser
 from collections.abc import Callable, Sequence
 from contextlib import nullcontext
+from dataclasses import dataclass
 from pathlib import Path
 
 from epicycle.actors import EpicycleError
@@ -24,23 +25,17 @@ from .recording import MOST, Recording
 Watch = Callable[[Recording | None], Callable[[float], None]]  # for a run that is recorded, or for one that is not
 
 
+@dataclass(eq=False, repr=False)
 class Page:
     """A page that shows one run or two, in a notebook, a browser or a file; it needs no network.
 
     A run that failed or was interrupted is shown up to that point; ``errors`` give the reasons.
     """
 
-    def __init__(
-        self,
-        recordings: Sequence[Recording],
-        names: Sequence[str],
-        errors: Sequence[EpicycleError | KeyboardInterrupt],
-        story: Sequence[str] = (),
-    ) -> None:
-        self.recordings = recordings
-        self.names = names
-        self.errors = errors
-        self.story = story  # sentences about both runs
+    recordings: Sequence[Recording]
+    names: Sequence[str]
+    errors: Sequence[EpicycleError | KeyboardInterrupt]
+    story: Sequence[str] = ()  # sentences about both runs
 
     def save(self, path: str | Path) -> Path:
         """Write it to a file (.html)."""
@@ -89,20 +84,13 @@ def recorded(
             complain(
                 f"{model.endless}\n   help: end it with Ctrl-C, which keeps what was recorded, or give a stop time"
             )
-        recordings.append(
-            Recording(
-                model,
-                figures,
-                seed=own_seed,
-                most=most,
-                is_compared=len(models) > 1,
-                acts=acts[number] if acts else None,
-            )
-        )
-        look = nullcontext(watch(recordings[-1])) if watch else nullcontext()
+        own_acts = acts[number] if acts else None
+        recording = Recording(model, figures, seed=own_seed, most=most, is_compared=len(models) > 1, acts=own_acts)
+        recordings.append(recording)
+        look = nullcontext(watch(recording)) if watch else nullcontext()
         with watched(model, stop, SOON) if progress else look as report:
             try:
-                recordings[-1].run(until=stop, progress=report)
+                recording.run(until=stop, progress=report)
             except (ActorError, LoopError) as error:  # what led to the error is the very thing to look at
                 errors.append(error)
             except KeyboardInterrupt as error:  # the records are kept, and nothing else is started

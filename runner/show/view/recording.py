@@ -128,13 +128,13 @@ class Recording:
         self.firings = self.records = 0  # in the whole run
         self.events, self.aspects = Names(), Names()
         self.places = Names()  # of actors and composites
-        self._paths: list[str] = []  # the same, in order
         self.ports = Names()  # (place, name)
         self._most = max(2, most // STRETCH)
         self._stride = 1  # one stretch in so many is kept
         self._stretches: list[Stretch] = []
         self._last: Stretch | None = None
-        self._passing: list[tuple[tuple[int, int, int], int, int]] = []  # acts at outputs before their token is sent
+        # Acts at an output before their token is sent, by port and channel, and then by aspect: stretch and row.
+        self._passing: dict[tuple[int, int], dict[int, tuple[int, int]]] = {}
         patterns = [pattern for figure in figures.values() for pattern in figure.mark_patterns()]
         outputs = [path for path in model.graph.ports if model.graph.direction(path) == "output"]
         recorded = model.output.recorded
@@ -152,6 +152,12 @@ class Recording:
         except BaseException as error:
             self.results = self._simulation.results("interrupted" if isinstance(error, KeyboardInterrupt) else "failed")
             raise
+        return self.results
+
+    def finished(self, what: str) -> Results:
+        """The results; raises ``ViewError`` if ``what`` shows them is asked for before the run has been made."""
+        if self.results is None:
+            raise ViewError(f"{what} needs a run that has been made: call Recording.run first")
         return self.results
 
     def so_far(self) -> Results:
@@ -196,16 +202,15 @@ class Recording:
 
     def _pass(self, kept: Stretch, port: int, channel: int, aspect: int) -> None:
         """Assign acts at an output to the send that follows; to none if the aspect acts again before it."""
-        own = (port, channel)
+        passing = self._passing.setdefault((port, channel), {})
+        if aspect == NOTHING:
+            for firing, row in passing.values():
+                if firing == kept.firing:
+                    kept.columns["record_about"][row] = self.records
+        if aspect == NOTHING or aspect in passing:
+            passing.clear()
         if aspect != NOTHING:
-            if any((*own, aspect) == key for key, _, _ in self._passing):
-                self._passing = [each for each in self._passing if each[0][:2] != own]
-            self._passing.append(((*own, aspect), kept.firing, kept.count("record")))
-            return
-        for key, firing, row in self._passing:
-            if key[:2] == own and firing == kept.firing:
-                kept.columns["record_about"][row] = self.records
-        self._passing = [each for each in self._passing if each[0][:2] != own]
+            passing[aspect] = kept.firing, kept.count("record")
 
     def _stretch(self) -> Stretch:
         """The stretch for what happens now."""
@@ -235,24 +240,11 @@ class Recording:
                     columns[name].extend(map(own_texts.__getitem__, column) if name == "record_text" else column)
         for name, column in columns.items():
             if (what := REFERENCES.get(name.partition("_")[2])) is not None:
-                columns[name] = array("i", self._among_kept(what, column))
+                columns[name] = array("i", self.among_kept(what, column))
         return Kept(columns, tags, list(texts))
 
-    def place(self, number: int) -> str:
-        """The path of an actor or composite."""
-        if len(self._paths) != len(self.places):
-            self._paths = list(self.places)
-        return self._paths[number]
-
-    def kept_record(self, number: int) -> int:
-        """The number of a record among the kept ones; ``MISSING`` if it was left out or does not exist."""
-        return self._among_kept("record", [number])[0]
-
-    def kept_firing(self, number: int) -> int:
-        """The number of a firing among the kept ones, as ``kept_record``."""
-        return self._among_kept("firing", [number])[0]
-
-    def _among_kept(self, what: str, numbers: Sequence[int]) -> list[int]:
+    def among_kept(self, what: str, numbers: Sequence[int]) -> list[int]:
+        """The numbers of firings or records among the kept ones; ``MISSING`` for those left out or not made."""
         starts = np.array([0, *(getattr(stretch, what) for stretch in self._stretches)])
         counts = np.array([0, *(stretch.count(what) for stretch in self._stretches)])
         old = np.array(numbers, dtype=int)

@@ -17,7 +17,7 @@ from epicycle.aspects import STAMP
 from ...execution.results import Signal, cell, leaves
 from ...support.files import replace_file
 from ..samples import selected
-from .export import Act, Disc, Thing, about, acts, encodable, extent, firings, parts, results_of, things
+from .export import Act, Disc, Thing, about, acts, encodable, extent, firings, parts, things
 from .recording import Recording, ViewError
 
 PIXELS = 5.0  # radius of a point
@@ -50,7 +50,7 @@ class _Writer:
     def __init__(self, recording: Recording) -> None:
         self._rerun = require_rerun()
         self._recording = recording
-        self._signals = list(results_of(recording).signals.values())
+        self._signals = list(recording.finished("a file").signals.values())
         self._things, self._acts = things(recording), list(acts(recording))
         self._fired: dict[str, list[Tag]] = {}
         for tag, actor in firings(recording):
@@ -58,7 +58,7 @@ class _Writer:
         told = (*(signal.tags for signal in self._signals), *self._fired.values(), [act.tag for act in self._acts])
         self._tags = sorted(set(chain.from_iterable(told)))
         # No wall clock and no random name, so equal runs give equal recordings.
-        digest = results_of(recording).digest
+        digest = recording.finished("a file").digest
         self._stream = self._rerun.RecordingStream("epicycle", recording_id=digest, send_properties=False)
 
     def written(self) -> bytes:
@@ -90,7 +90,7 @@ class _Writer:
         """The initial view: the space beside the signals of the model's figures, states and acts."""
         import rerun.blueprint as views
 
-        results, figures = results_of(self._recording), self._recording.figures.items()
+        results, figures = self._recording.finished("a file"), self._recording.figures.items()
         lines = [
             views.TimeSeriesView(name=name, origin="/signals", contents=[self._below(each) for each in shown])
             for name, figure in figures
@@ -108,9 +108,8 @@ class _Writer:
         return views.Blueprint(views.Horizontal(*space, beside), collapse_panels=True)
 
     def _space_from_above(self, views: Any) -> Any:
-        (left, low), (right, high) = extent(self._things)
-        x, y, away = (left + right) / 2.0, (low + high) / 2.0, AWAY * (max(right - left, high - low) or 1.0)
-        eye = views.EyeControls3D(position=(x, y, away), look_target=(x, y, 0.0), eye_up=(0.0, 1.0, 0.0))
+        (x, y), width = extent(self._things)
+        eye = views.EyeControls3D(position=(x, y, AWAY * width), look_target=(x, y, 0.0), eye_up=(0.0, 1.0, 0.0))
         return views.Spatial3DView(name="space", origin="/space", eye_controls=eye)
 
     def _below(self, signal: str) -> str:

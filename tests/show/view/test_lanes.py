@@ -40,8 +40,8 @@ def test_lanes_of_figures_come_first_and_long_ones_are_thinned() -> None:
     found = lanes(results, figures_of(model, Problems()).values())
     size, wait = (next(lane for lane in found if lane.name == name) for name in ("server.size", "wait.output"))
     assert found[0] is size
-    assert size.is_asked
-    assert not wait.is_asked
+    assert size.asked
+    assert not wait.asked
     assert len(size.times) <= POINTS < len(results["server.size"])
     assert size.left_out == len(results["server.size"]) - len(size.times)
     assert max(size.values) == max(results["server.size"].tokens)
