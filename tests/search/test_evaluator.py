@@ -78,17 +78,40 @@ def test_nothing_that_is_expected_is_made_twice(tmp_path: Path) -> None:
     assert len(set(processes)) == 3  # this one, and two more
 
 
-def test_what_is_no_longer_expected_is_not_begun(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(module, "GRACE", 10.0)
-    with Evaluator(Noted(str(tmp_path)), 2, Noted, str(tmp_path), patience=0.0) as evaluator:
+class Held(Noted):
+    """Makes the first two requests at once, and others only once somebody lets it."""
+
+    def make(self, request: int) -> tuple[int, int]:
+        """The square and the process."""
+        made, since = super().make(request), time.monotonic()
+        while request > 1 and not Path(self._folder, "go").exists():
+            assert time.monotonic() < since + 120.0
+            time.sleep(0.01)
+        return made
+
+
+def test_what_is_no_longer_expected_is_not_begun(tmp_path: Path) -> None:
+    with Evaluator(Held(str(tmp_path)), 2, Held, str(tmp_path), patience=0.0) as evaluator:
         evaluator.expect((each, each) for each in range(12))
         evaluator.make(0, 0)
-        evaluator.make(1, 1)  # whose process rests, while the other one makes the next
+        evaluator.make(1, 1)  # while two processes are at most at the next two
         evaluator.expect((each, each) for each in range(20, 30))
+        (tmp_path / "go").touch()
         evaluator.make(20, 20)
-    made = {int(path.name.partition("-")[0]) for path in tmp_path.iterdir()}
+    made = {int(path.name.partition("-")[0]) for path in tmp_path.glob("*-*")}
     assert made >= {0, 1, 20}
     assert not made & {*range(4, 20)}
+
+
+def test_a_process_rests_until_its_result_is_heard(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What a search waits for may change what it expects; what it does not wait for yet is no reason to rest."""
+    monkeypatch.setattr(module, "GRACE", 60.0)
+    with Evaluator(Noted(str(tmp_path)), 2, Noted, str(tmp_path), patience=0.0) as evaluator:
+        evaluator.expect((each, each) for each in range(4))
+        _, process = evaluator.make(0, 0)
+        while len(made := [*tmp_path.iterdir()]) < 4:
+            time.sleep(0.01)
+        assert [path.name.partition("-")[0] for path in made if f"-{process}-" in path.name] == ["0"]
 
 
 def test_a_process_that_dies_is_reported() -> None:
