@@ -106,12 +106,13 @@ def test_what_differs_is_told() -> None:
 
 
 @pytest.mark.slow
-def test_a_search_of_the_board(tmp_path: Any) -> None:
+def test_a_search_of_the_board(tmp_path: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(falsifying, "OF", 1)
     case = {
         "search": "transmission", "monitor": "AT2", "vary": {"throttle": "0..100", "brake": "0..350"}, "until": "7 s",
-        "searches": 1, "published": {"found": 50, "mean": 9.22},
+        "published": {"found": 1, "mean": 9.22},
     }  # fmt: skip
     falsified, runs = falsifying.searches(FOLDER / "transmission.yaml", case, tmp_path, 1)
-    assert falsified[:4] == ("AT2 falsified", "50 of 50 searches", "1 of 1 searches", True)
+    assert falsified[:4] == ("AT2 falsified", "1 of 1 searches", "1 of 1 searches", True)
     assert runs[0] == "mean number of runs until AT2 is broken"
     assert runs[3]
