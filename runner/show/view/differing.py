@@ -75,8 +75,10 @@ def _head(recording: Recording, number: int) -> tuple[Tag, str]:
 
 def _comes(recording: Recording, number: int, head: tuple[Tag, str]) -> bool:
     """Whether a run has a firing of this actor at this tag, from a number on."""
-    while number < len(recording.fired) and recording.fired.tag(number) <= head[0]:
-        if _head(recording, number) == head:
+    (tag, path), fired = head, recording.fired
+    actor = recording.places.get(path)
+    while number < len(fired) and fired.tag(number) <= tag:
+        if fired.actors[number] == actor and fired.tag(number) == tag:
             return True
         number += 1
     return False
