@@ -329,3 +329,12 @@ def test_a_comparison_continues() -> None:
         now = path.read_text()
         assert now.startswith(text)
         assert now.count("\n") == text.count("\n") + 1
+
+
+def test_a_search_refuses_classes_that_its_processes_do_not_know() -> None:
+    with pytest.raises(EpicycleError) as caught:
+        epicycle.search("mm1", epicycle.Minimise("mean_wait"), vary={"load": "0.1..0.5"}, types=[epicycle.actors.Clock])  # type: ignore[list-item]
+    assert str(caught.value) == (
+        "types: the processes of a search do not know the class Clock of this program\n"
+        "   help: write it to a file, and name that: types=['my_types.py']"
+    )

@@ -118,6 +118,12 @@ def search(
 
     if unknown := given.keys() - SearchOptions.__annotations__.keys():
         raise TypeError(f"search() got an unexpected keyword argument {min(unknown)!r}")
+    types: Iterable[Any] = given.get("types", ())
+    if classes := [each.__name__ for each in types if isinstance(each, type)]:
+        raise EpicycleError(
+            f"types: the processes of a search do not know the class {classes[0]} of this program\n"
+            "   help: write it to a file, and name that: types=['my_types.py']"
+        )
     vary, command, out = given.get("vary", ()), tuple(given.get("command", ())), given.get("out")
     until = seconds("--until" if command else "until", given.get("until"))
     spec = SearchSpec.of(model, given.get("seed"), until, given)
