@@ -20,7 +20,7 @@ from epicycle.actors.core.units import Unit, UnitError, convert, parse_unit, qua
         ("8m/s", "m/s", 8.0),
         ("100 ms", "s", 0.1), ("0.1 ms", "s", 1e-4), ("3 us", "s", 3e-6), ("7 ns", "s", 7e-9),
         ("2 min", "s", 120.0),
-        ("1 h", "s", 3600.0), ("1 day", "s", 86400.0), ("36 km/h", "m/s", 10.0),
+        ("1 h", "s", 3600.0), ("1 day", "s", 86400.0), ("3 d", "h", 72.0), ("36 km/h", "m/s", 10.0),
         ("180 deg", "rad", math.pi),
         ("90 deg/s", "rad/s", math.pi / 2), ("5 °", "rad", math.radians(5)), ("50 %", "1", 0.5),
         ("2 rad", "1", 2.0),
