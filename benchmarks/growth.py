@@ -65,11 +65,11 @@ def model(text: str, **values: object) -> Model:
         return load_model(path, max_actors=200_000)
 
 
-def seconds_of(model: Model, until: float | None = None) -> float:
-    """The CPU time of one run after its first tag, which touches everything for the first time."""
+def seconds_of(model: Model, until: float) -> float:
+    """The CPU time of a run's tags after the first, which touches everything for the first time."""
     simulation = Simulation(model)
     simulation.step()
-    return cpu_seconds(lambda: simulation.run(until=until))
+    return cpu_seconds(lambda: simulation.advance(until))
 
 
 def seconds_of_processes(size: int) -> float:
@@ -97,9 +97,10 @@ def seconds_of_processes(size: int) -> float:
 
 def seconds_of_ours(size: int) -> float:
     """The CPU time of a pipeline of ours."""
-    pipeline = model(PIPELINE, actors=size, stop=HOPS // size)
-    seconds_of(pipeline)
-    return seconds_of(pipeline)
+    stop = HOPS // size
+    pipeline = model(PIPELINE, actors=size, stop=stop)
+    seconds_of(pipeline, stop)
+    return seconds_of(pipeline, stop)
 
 
 CONTENDERS = {"ours": seconds_of_ours, "SimPy": seconds_of_processes}
@@ -114,8 +115,8 @@ def alone(contender: str, size: int) -> float:
 def actors(rounds: int) -> Iterator[Row]:
     """Pipelines, and the cost of their working set without our code."""
     how = (
-        f"{rounds} rounds of {HOPS:,} hops each, taking turns, each in a new process; CPU time of a run "
-        "after its first tag, after another run"
+        f"{rounds} rounds of {HOPS:,} hops each, taking turns, each in a new process; CPU time of the "
+        "tags after the first, without the end of the run, after another run"
     )
     for contender, work, limit in (
         ("ours", "a hop in a pipeline", 1.5),
@@ -145,7 +146,7 @@ def robots(rounds: int) -> Iterator[Row]:
         for number in ROBOTS
     }
     took = take_turns({str(number): lambda each=each: seconds_of(each, 2.0) for number, each in models.items()}, rounds)
-    how = f"{rounds} rounds of 2 s of model time, 21 steps of each robot, taking turns; CPU time of the run alone"
+    how = f"{rounds} rounds of 2 s of model time, 21 steps of each robot, taking turns; CPU time after the first tag"
     costs = {number: median(took[str(number)]) / (21 * (number + 1)) for number in ROBOTS}
     first = ROBOTS[0]
     for number in ROBOTS[1:]:
