@@ -43,7 +43,7 @@ from epicycle.runner import Simulation
 from epicycle.runner.execution.engine import ActorError, LoopError
 from epicycle.runner.model.build.load import load_model
 from epicycle.runner.model.catalogue.packaged import model_folders
-from epicycle.runner.model.catalogue.types import built_in, figure_types
+from epicycle.runner.model.catalogue.types import built_in, figure_types, installed
 from epicycle.runner.model.text.limits import NORMAL
 from epicycle.runner.model.text.problems import ModelError
 from tests.fuzz.mutants import Mutation, Seedling, of_options, of_text, of_tree, seedling
@@ -88,11 +88,11 @@ _watched: list[Path] = []  # the folder that may be read; empty while nobody is 
 
 
 def _is_expression(code: Any) -> bool:
-    """Whether this is an expression as a function, which can call nothing but what it is given."""
+    """Whether this is an expression as functions, which can call nothing but what they are given."""
     if not isinstance(code, CodeType) or code.co_filename != "<expression>":
         return False
     inner = [each for each in code.co_consts if isinstance(each, CodeType)]  # with those of its list comprehensions
-    return KNOWN.keys() >= set(code.co_names) and all(map(_is_expression, inner))
+    return {*KNOWN, "value", "number"} >= set(code.co_names) and all(map(_is_expression, inner))
 
 
 def _audit(event: str, arguments: tuple[Any, ...]) -> None:
@@ -113,6 +113,8 @@ def _audit(event: str, arguments: tuple[Any, ...]) -> None:
                 raise Intrusion(f"{event} {arguments!r}")
         elif event == "exec" and ("<class 'networkx" in str(arguments) or _is_expression(arguments[0])):
             return  # networkx makes its wrappers with exec, each at its first use
+        elif event == "function.__new__" and _is_expression(arguments[0]):
+            return
         elif event not in HARMLESS:
             raise Intrusion(f"{event} {arguments!r}"[:500])
     finally:
@@ -305,6 +307,7 @@ def plot(folder: str) -> Plot:
     figure_types().get("")  # which looks once for those of installed packages
     for find in part_finders:
         find("")
+    installed().loaded()
     for name in FAULTY:
         with suppress(ModelError):
             load_model(BAD_MODELS / f"{name}.yaml", disturb=BAD_MODELS / "parts" / "storm.yaml")

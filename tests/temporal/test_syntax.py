@@ -114,6 +114,12 @@ def test_conditions_that_cannot_be_judged(source: str, values: list[object], mes
         ("always within a.x", "a.x", "a time is missing here", "write one such as '3 s' or '100 ms'"),
         ("always within 3 kg a.x", "3 kg", "a time is missing here", "write one such as '3 s' or '100 ms'"),
         (
+            "always within 1e9 s a.x",
+            "1e9 s",
+            "this time is not between 0 and 1e9 s",
+            "write one such as '3 s' or '100 ms'",
+        ),
+        (
             "always from 3 s a.x > 2",
             "a.x",
             "'from' has no 'to'",

@@ -15,6 +15,7 @@ from epicycle.actors import (
     UnitError,
     did_you_mean,
     parse_unit,
+    to_nanoseconds,
 )
 from epicycle.actors.expression import Formula, FormulaParameter
 
@@ -206,6 +207,12 @@ class MetricSpec(Configurable):
         if self.after == MSER5 and not kind.settles:
             message = f"{MSER5} cannot detect when {self.take!r} has settled"
             yield Fault(message, ("after",), help=("give the warm-up as a time",))
+        for option in ("after", "until"):
+            if isinstance(time := getattr(self, option), float):
+                try:
+                    to_nanoseconds(time)
+                except ValueError as error:
+                    yield Fault(f"{option}: {error}", (option,))
         if self.until is not None and isinstance(self.after, float) and self.until < self.after:
             message = f"until: {self.until:g} s is before the end of the warm-up, which is at {self.after:g} s"
             yield Fault(message, ("until",))

@@ -176,14 +176,16 @@ class _Parser:
         self.place += 1
         unit = self.word if number[:1].isdigit() and self.word.isalpha() and self.word not in WORDS else ""
         self.place += bool(unit)
+        message = "a time is missing here"
         try:
             seconds = convert(f"{number} {unit}", "s") if unit else float(number)
             if 0.0 <= seconds < 1e9:
                 return to_nanoseconds(seconds)
+            message = "this time is not between 0 and 1e9 s"
         except (ValueError, EpicycleError):
             pass
         self.place = min(self.place, len(self.tokens))
-        raise self.fail("a time is missing here", "write one such as '3 s' or '100 ms'", first, self.place)
+        raise self.fail(message, "write one such as '3 s' or '100 ms'", first, self.place)
 
     def primary(self) -> Property:
         if self.takes("sends"):
