@@ -39,9 +39,9 @@ COMPILERS = {"actors/robotics/numerics/jit.py", "actors/core/elementary/in_numba
 COMPILING = 120.0  # s, at most
 # Those that run the guarded folders in this process.
 TESTS = (
-    "tests/actors", "tests/api", "tests/aspects", "tests/catalogue", "tests/cli/test_output.py", "tests/conformance",
-    "tests/engine", "tests/language", "tests/model", "tests/results", "tests/text", "tests/test_models.py",
-    "tests/test_reference.py",
+    "tests/actors", "tests/api", "tests/aspects", "tests/catalogue", "tests/commands/test_output.py",
+    "tests/conformance", "tests/engine", "tests/language", "tests/model", "tests/modes", "tests/results",
+    "tests/temporal", "tests/text", "tests/test_models.py", "tests/test_reference.py",
 )  # fmt: skip
 TESTS_OF_KERNELS = ("tests/actors",)
 LONGEST = {True: 6.0, False: 4.0}  # s; a test that takes longer, compiled or not, is not asked

@@ -8,6 +8,7 @@ import pytest
 
 pytest.importorskip("cosmic_ray")
 
+from tests.mutation import __main__ as tool
 from tests.mutation import mutants, recorder, trial
 from tests.mutation.__main__ import Result, argued, attempt, is_below, report, stages
 from tests.mutation.mutants import Mutant
@@ -56,6 +57,11 @@ def test_what_runs_is_mutated_and_what_does_not_is_not(project: Path) -> None:
     assert {(5, "LIMIT = 4"), (5, "LIMIT = 2"), (10, "if value is not None:")} <= found
     assert (12, "return value * 2 if value <= limit else value") in found
     assert not any(sign in text for _, text in found for sign in (" | ", ">>", " == None"))
+
+
+def test_every_file_and_folder_that_is_named_is_there() -> None:
+    named = (*mutants.GUARDED, *mutants.KERNELS, *mutants.TOLERANCES, *tool.COMPILERS, *tool.TESTS)
+    assert [each for each in named if not (tool.ROOT / each).exists()] == []
 
 
 def test_a_sample_is_spread_over_all_places_and_the_same_each_time(project: Path) -> None:
