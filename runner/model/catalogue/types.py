@@ -77,10 +77,15 @@ class _Offer:
     point: EntryPoint
     base: type
 
+    @cached_property
+    def package(self) -> tuple[str, str] | None:
+        """The package's name for pip and its version, which are read from disk."""
+        return None if self.point.dist is None else (self.point.dist.name, self.point.dist.version)
+
     @property
     def distribution(self) -> str:
         """What pip calls the package."""
-        return self.point.dist.name if self.point.dist is not None else self.point.module.partition(".")[0]
+        return self.package[0] if self.package is not None else self.point.module.partition(".")[0]
 
     @property
     def qualified(self) -> str:
@@ -91,8 +96,8 @@ class _Offer:
         """The type, which is imported once; raises a ``CatalogueError`` if anything goes wrong."""
         if isinstance(self.found, CatalogueError):
             raise self.found
-        if self.point.dist is not None:
-            note_package(self.point.dist.name, self.point.dist.version)
+        if self.package is not None:
+            note_package(*self.package)
         return self.found
 
     @cached_property
