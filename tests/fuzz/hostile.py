@@ -91,10 +91,8 @@ def _may_run(code: Any) -> bool:
 
 
 def _is_worker(command: Any) -> bool:
-    """Whether this is a process of ours that makes runs of a study."""
-    return list(command[:3]) == [sys.executable, "-P", "-c"] and str(command[3]).startswith(
-        "from epicycle.runner.study"
-    )
+    """Whether this is a process of ours that makes runs."""
+    return list(command) == [sys.executable, "-P", "-c", "from epicycle.runner.support.apart import serve; serve()"]
 
 
 def _audit(event: str, arguments: tuple[Any, ...]) -> None:
@@ -225,6 +223,7 @@ def settled(folder: str, names: tuple[str, ...]) -> Path:
             (home / surface.name).mkdir()
             with redirect_stdout(StringIO()), redirect_stderr(StringIO()):
                 surface.prepare(home / surface.name)
+    catalogue_types.installed().loaded()
     signal.signal(signal.SIGALRM, _ring)
     sys.addaudithook(_audit)
     return home
