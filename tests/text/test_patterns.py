@@ -16,12 +16,15 @@ def fits(pattern: list[str], path: list[str]) -> bool:
         return not path
     if pattern[0] == "**":
         return any(fits(pattern[1:], path[taken:]) for taken in range(1, len(path) + 1))
-    return bool(path) and pattern[0] in ("*", path[0]) and fits(pattern[1:], path[1:])
+    if not path:
+        return False
+    fits_here = pattern[0][0] == "*" or pattern[0] == path[0] or pattern[0] == f"{path[0][:-3]}[*]"
+    return fits_here and fits(pattern[1:], path[1:])
 
 
 @given(
-    st.lists(st.sampled_from(["a", "b", "*", "**", "**"]), min_size=1, max_size=7),
-    st.lists(st.sampled_from("ab"), min_size=1, max_size=8),
+    st.lists(st.sampled_from(["a", "b", "*", "**", "**", "a[*]", "a[1]", "*[*]"]), min_size=1, max_size=7),
+    st.lists(st.sampled_from(["a", "b", "a[0]", "a[1]", "b[1]"]), min_size=1, max_size=8),
 )
 def test_a_pattern_selects_what_its_segments_say(pattern: list[str], path: list[str]) -> None:
     assert matches(".".join(pattern), ".".join(path)) == fits(pattern, path)

@@ -17,7 +17,6 @@ _SEGMENT = re.compile(r"(\*\*|(\*|[A-Za-z_][A-Za-z0-9_]*)(\[(\*|\d{1,9})\])?)\Z"
 
 _INDEX = re.compile(r"\[\d+\]")
 MAX_PATTERN = 1_000
-_FEW = 30  # paths for which compiling a pattern does not pay
 _MANY = 5  # how often all paths are scanned before they are indexed by their names
 MAX_SHOWN = 12  # names in a message
 
@@ -72,7 +71,7 @@ def compile_pattern(text: str) -> re.Pattern[str]:
     check_pattern(text)
     # What is between two `**` matches at the first possible place, and that is final (?>...): a later place would give
     # no more matches, but could take for ever.
-    head, *tails = ("".join(map(_expression, segments)) for segments in _split_at_doubles(text))
+    head, *tails = ("".join(map(_expression, part.split(".")[:-1])) for part in f"{text}.".split("**."))
     expression = head + "".join(rf"(?>(?:[^.]+\.)+?{tail})" for tail in tails[:-1])
     if tails:
         expression += rf"(?:[^.]+\.)+{tails[-1]}"
@@ -85,17 +84,6 @@ def _expression(segment: str) -> str:
     return (r"[^.]+" if segment[0] == "*" else re.escape(segment).replace(r"\[\*\]", r"\[\d+\]")) + r"\."
 
 
-def _split_at_doubles(pattern: str) -> list[list[str]]:
-    """The segments before, between and after the ``**`` of a pattern."""
-    parts: list[list[str]] = [[]]
-    for segment in pattern.split("."):
-        if segment == "**":
-            parts.append([])
-        else:
-            parts[-1].append(segment)
-    return parts
-
-
 def check_pattern(text: str) -> None:
     """Raise ``PatternError`` if a text is not a pattern."""
     if len(text) > MAX_PATTERN:
@@ -106,31 +94,8 @@ def check_pattern(text: str) -> None:
 
 
 def matches(pattern: str, path: str) -> bool:
-    """Whether a valid pattern selects the path; for a few paths this is faster than ``compile_pattern``."""
-    head, *tails = _split_at_doubles(pattern)
-    names = path.split(".")
-    if not tails:
-        return _fit(head, names)
-    *middle, last = tails
-    end = len(names) - len(last)
-    if not _fit(head, names[: len(head)]) or not _fit(last, names[max(0, end) :]):
-        return False
-    at = len(head)
-    for tail in middle:
-        at = next((place for place in range(at + 1, end) if _fit(tail, names[place : place + len(tail)])), end)
-        at += len(tail)
-    return at < end  # the last `**` matches at least one
-
-
-def _fit(segments: list[str], names: list[str]) -> bool:
-    """Whether segments without ``**`` match these names, one by one."""
-    return len(segments) == len(names) and all(map(_fits, segments, names))
-
-
-def _fits(segment: str, name: str) -> bool:
-    if segment[:1] == "*" or segment == name:
-        return True
-    return segment[-3:] == "[*]" and name[-1:] == "]" and name.startswith(segment[:-2])
+    """Whether a pattern selects the path."""
+    return compile_pattern(pattern).fullmatch(f"{path}.") is not None
 
 
 def could_be_within(pattern: str, path: str, *, array: bool) -> bool:
@@ -189,8 +154,6 @@ class PathIndex:
             candidates = min(candidates, *others, key=len) if others else candidates
         self._compared += len(candidates)
         self.spend(len(candidates))
-        if len(candidates) < _FEW:
-            return [path for path in candidates if matches(pattern, path)]
         expression = compile_pattern(pattern)
         return [path for path in candidates if expression.fullmatch(f"{path}.")]
 
