@@ -124,7 +124,7 @@ def forked(
             name += "_"
         aspect.at_tag = at
         always.add(name)
-        other.enlist([WovenAspect(name, aspect, **{"ports": [], **places})])
+        other.enlist([WovenAspect(name=name, aspect=aspect, **places)])
 
     for path, value in _parameters(model, changes.change).items():
         if path in model.graph.ports and (edges := model.graph.incoming(path)):

@@ -18,13 +18,13 @@ from ..graph.acts import connection_place
 from ..graph.digraph import find_loop
 from ..graph.model_graph import ModelGraph
 from ..graph.nodes import Detour
-from ..graph.woven import AspectModel, WovenAspect
+from ..graph.woven import AspectModel, Places, WovenAspect
 from ..language.parts import PartText, beside
 from ..language.places import PointcutText
 from ..text.faults import place_in
 from ..text.problems import POISON, Poison, Position, Problems
 from .paths import PlaceOf, without_port
-from .weave import Places, Pointcuts, bind
+from .weave import Aimed, Pointcuts
 
 BY_PLACE = "or name the input that takes the tokens: {at: ..., request: ...}"
 OWN = frozenset(declared_parameters(CompositeAspect))  # when it acts: these are not parameters of the composite
@@ -45,16 +45,15 @@ def weave_model(
     position: Position,
 ) -> WovenAspect | Poison:
     """Attach an aspect that is a composite: what comes to its places is handed to it, and goes on when it answers."""
-    view, graph = pointcuts, pointcuts.graph
-    places = pointcuts.resolve(at)
-    requests, response, model = _planned(
-        pointcuts, [each for each in at if each and not each.exclude], places, position
-    )
+    graph = pointcuts.graph
+    places, aimed = pointcuts.resolve(at)
+    included = [each for each in at if each and not each.exclude]
+    requests, response, model = _planned(pointcuts, included, places, aimed, position)
     if POISON in requests or aspect is POISON:
         graph.leave_open(pointcuts.own)
     if aspect is POISON:
         return POISON
-    woven = bind(view, aspect, places, place_of, position)
+    woven = pointcuts.bind(aspect, places, place_of, position)
     for port in (each for each in requests if each):
         for edge in list(graph.incoming(port)):  # a problem that has been reported
             graph.disconnect(edge)
@@ -65,12 +64,12 @@ def weave_model(
 
 
 def _planned(
-    view: Pointcuts, aimed: Sequence[PointcutText], places: Places, position: Position
+    view: Pointcuts, pointcuts: Sequence[PointcutText], places: Places, aimed: Aimed, position: Position
 ) -> tuple[list[str | Poison], str | Poison, AspectModel | Poison]:
     """By which ports tokens of the places come in, by which they leave, and both with the composite."""
     graph, path = view.graph, view.own
     inputs, outputs = graph.borders(path)
-    of_each = [_request(view, inputs, each) for each in aimed or [PointcutText("", position)]]
+    of_each = [_request(view, inputs, each) for each in pointcuts or [PointcutText("", position)]]
     requests = list(dict.fromkeys(of_each))
     response = _only(view, outputs, "response", "output", position)
     for port in (each for each in requests if each):
@@ -83,9 +82,8 @@ def _planned(
     _check_types(view, [each for each in (*requests, response) if each])
     asked: dict[str, str] = {}
     times: dict[str, FiringTime] = {}
-    names = (*places.ports, *(connection_place(*ends) for ends in places.connections), *places.actors)
-    for pointcut, request in zip(aimed, of_each, strict=False):
-        here = [place for place in names if places.aimed[place] is pointcut]
+    for pointcut, request in zip(pointcuts, of_each, strict=False):
+        here = [place for place in places.places if aimed[place] is pointcut]
         asked |= {place: request for place in here if request}
         times |= {place: pointcut.firing_time for place in here if place in places.actors}
         for fault in without_port("time", pointcut.firing_time, [each for each in here if each in graph.actors], graph):
@@ -94,7 +92,7 @@ def _planned(
     is_placed = _is_under_one_director(view, places, position)
     if not response or not is_placed:
         return requests, response, POISON
-    asked = {place: asked[place] for place in names if place in asked}
+    asked = {place: asked[place] for place in places.places if place in asked}
     return requests, response, AspectModel(path, view.kind, response, asked, times)
 
 

@@ -37,7 +37,7 @@ from ..text.patterns import PathIndex, PatternError, TooManyError
 from ..text.problems import POISON, Poison, Position
 from ..text.program import entries_of
 from ..text.reading import Text, within
-from .paths import Looks, Paths
+from .paths import Paths, View
 from .resolve import ParameterResolver
 
 _MOST = 2_000_000  # characters of a property that is written out for every place of a pattern
@@ -187,37 +187,37 @@ class OutputReader:
     def _monitor(self, text: WatchText, requirement: Requirement) -> Monitor | Poison:
         """The monitor of a requirement."""
         source, place = requirement.property, text.place("property")
-        looks = Looks(Paths(self.graph), text.name, "", self.problems, called="monitor")
+        view = View(Paths(self.graph), text.name, "", self.problems, called="monitor")
         before = len(self.problems)
         try:
             spread = spread_of(source)
-            paths = [""] if spread is None else self._spread(looks, spread, place)
+            paths = [""] if spread is None else self._spread(view, spread, place)
             if spread is not None and len(paths) * len(spread.body) > _MOST:
                 message = f"for {len(paths):,} places, the property is longer than {_MOST:,} characters"
                 raise PropertyError(message, spread.offset, len(spread.pattern))
             parts, size = [], 1.0
             for path in paths:
                 tree = property_of(source if spread is None else spread.of(path))
-                parts.append(Part(path, tree, [_readings(looks, each, place) for each in leaves(tree)]))
+                parts.append(Part(path, tree, [_readings(view, each, place) for each in leaves(tree)]))
                 try:
                     size = _size(tree, requirement.unit)
                 except FaultError as error:
-                    looks.blame(error, text.place("unit"))
+                    view.blame(error, text.place("unit"))
                 if len(self.problems) > before:  # the others would say the same
                     return POISON
         except PropertyError as error:
             # The part that is wrong, if the text is in the file unchanged.
             whole = within(place, source)
             is_written = whole.length == len(source) and "\n" not in source
-            return looks.blame(error, Scalar(source, source, True, whole) if is_written else whole)
+            return view.blame(error, Scalar(source, source, True, whole) if is_written else whole)
         if len(self.problems) > before:
             return POISON
         return Monitor(text.name, requirement, parts, spread is not None and spread.any, size)
 
-    def _spread(self, looks: Looks, spread: Spread, place: Position) -> list[str]:
+    def _spread(self, view: View, spread: Spread, place: Position) -> list[str]:
         """The actors and composites that a pattern selects; if there are none, the output ports."""
-        what, pattern = f"monitor {looks.name}", Text(spread.pattern, within(place, spread.pattern))
-        holders = looks.paths.holders
+        what, pattern = f"monitor {view.name}", Text(spread.pattern, within(place, spread.pattern))
+        holders = view.paths.holders
         found = self._found(holders, pattern, what)
         if found == []:
             found = self._found(self._outputs, pattern, what)
@@ -278,17 +278,17 @@ def _size(tree: Property, unit: str) -> float:
     return size
 
 
-def _readings(looks: Looks, condition: Condition | Sends, place: Position) -> list[Reading]:
+def _readings(view: View, condition: Condition | Sends, place: Position) -> list[Reading]:
     """What a condition reads."""
     if isinstance(condition, Sends):
-        port, fields = looks.reading("property", condition.port, within(place, condition.port))
+        port, fields = view.reading("property", condition.port, within(place, condition.port))
         if fields:
-            message = f"monitor {looks.name}: 'sends {condition.port}' names a part of what {port} sends"
-            looks.problems.add(message, place, f"write 'sends {port}'")
+            message = f"monitor {view.name}: 'sends {condition.port}' names a part of what {port} sends"
+            view.problems.add(message, place, f"write 'sends {port}'")
         return [(port, ())]
     found = []
     for reference in condition.references:
-        found.append(looks.reading("property", reference, within(place, reference)))
+        found.append(view.reading("property", reference, within(place, reference)))
     return found
 
 

@@ -100,14 +100,8 @@ class View:
         """Report what is wrong with a node, or with something at a position."""
         return blame(self.problems, f"{self.called} {self.name}", error, where, self.scope)
 
-
-class Looks(View):
-    """Finds what one aspect reads."""
-
-    def of(
-        self, aspect: Aspect, ports: list[str], place_of: PlaceOf
-    ) -> tuple[dict[PortFormula, list[Reading]], dict[str, Selection], list[str]]:
-        """What its expressions ask for, what its patterns select, and the other ports that it reads.
+    def read_by(self, aspect: Aspect, ports: list[str], place_of: PlaceOf) -> dict[str, Any]:
+        """What an aspect's expressions ask for, what its patterns select, and the other ports that it reads.
 
         ``ports`` are those that it attaches to; ``place_of`` returns where a parameter is set in the model file.
         """
@@ -128,7 +122,7 @@ class Looks(View):
         asked = aspect.reads() if isinstance(aspect, JoinPointAspect) else ()
         chosen = (port for pattern in asked for port in self.ports.select(self._full(pattern)))
         reads += self.ports.in_order({port for port in chosen if self.graph.direction(port) == "output"})
-        return readings, selections, reads
+        return {"readings": readings, "selections": selections, "reads": reads}
 
     def _selected(self, name: str, pattern: str, parameter: SelectionParameter[Any], position: Position) -> list[str]:
         """What a pattern in the parameter ``name`` selects."""

@@ -39,7 +39,7 @@ from .named import (
     raising,
 )
 from .paths import Paths
-from .weave import Pointcuts, bind
+from .weave import Pointcuts
 from .weave_all import weave_decorations
 
 _INSTANCE = re.compile(r"([A-Za-z_][A-Za-z0-9_]*)(?:\[(\d{1,9})\])?\Z")
@@ -322,7 +322,8 @@ class Scope(Holder):
             with raising() as problems:
                 named = Named(model.graph, self.path, position, problems).pointcuts(at, type(aspect))
                 pointcuts = Pointcuts(Paths(model.graph), full, self.path, problems, type(aspect))
-                woven = bind(pointcuts, aspect, pointcuts.resolve(named), lambda _: position, position)
+                places, _ = pointcuts.resolve(named)
+                woven = pointcuts.bind(aspect, places, lambda _: position, position)
             model.enlist([woven])
             return woven
         graph, others = model.graph.copy(), list[WovenAspect]()

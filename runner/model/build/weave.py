@@ -9,33 +9,23 @@ actors in it.
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 from epicycle.actors import declared_parameters, nearest
 from epicycle.aspects import Aspect
 
 from ..graph.acts import connection_place
 from ..graph.nodes import is_within
-from ..graph.woven import WovenAspect
+from ..graph.woven import Places, WovenAspect
 from ..language.places import PointcutText
 from ..text.kinds import NO_PLACE
 from ..text.patterns import PathIndex, PatternError, in_general
 from ..text.problems import POISON, Poison, Position
-from .paths import Looks, PlaceOf, View, unknown_inputs
+from .paths import PlaceOf, View, unknown_inputs
 
 Ends = tuple[str, str]
 Found = tuple[PointcutText, list[str] | Poison]  # what a pointcut selects; poison if it rightly selects nothing
-
-
-@dataclass(frozen=True)
-class Places:
-    """Where an aspect attaches; ``aimed`` is the last pointcut that selects each place, or a composite around it."""
-
-    ports: list[str] = field(default_factory=list)
-    connections: list[Ends] = field(default_factory=list)
-    actors: dict[str, str] = field(default_factory=dict)  # with what the pointcut names
-    parameters: list[str] = field(default_factory=list)
-    aimed: dict[str, PointcutText] = field(default_factory=dict)
+Aimed = dict[str, PointcutText]  # the last pointcut that selects each place, or a composite around it
 
 
 @dataclass
@@ -52,20 +42,19 @@ class Pointcuts(View):
     def kind(self) -> str:
         return self.graph.components[self.own].kind if self.own else self.cls.__name__
 
-    def resolve(self, at: Sequence[PointcutText | Poison]) -> Places:
-        """The places; a pointcut that selects nothing is a problem."""
+    def resolve(self, at: Sequence[PointcutText | Poison]) -> tuple[Places, Aimed]:
+        """The places, and the last pointcut that selects each; one that selects nothing is a problem."""
         pointcuts = [each for each in at if each]
-        is_sound, places = (self._at_ports if self.cls.at_ports else self._at_actors)(pointcuts)
-        is_somewhere = places.ports or places.connections or places.actors or places.parameters
-        if pointcuts and not is_somewhere and is_sound and POISON not in at:
+        is_sound, places, aimed = (self._at_ports if self.cls.at_ports else self._at_actors)(pointcuts)
+        if pointcuts and not places.places and is_sound and POISON not in at:
             only_out = all(pointcut.exclude for pointcut in pointcuts)
             nowhere = "'at' has only exclusions" if only_out else "'at' excludes everything that it selects"
             self.tell(nowhere, pointcuts[0], kind=NO_PLACE)
-        return places
+        return places, aimed
 
     # -- ports, connections and parameters ------------------------------------------------------------------------
 
-    def _at_ports(self, pointcuts: Sequence[PointcutText]) -> tuple[bool, Places]:
+    def _at_ports(self, pointcuts: Sequence[PointcutText]) -> tuple[bool, Places, Aimed]:
         """The places at ports, and whether every pointcut has some."""
         parameters: dict[str, bool] = {}  # whether they are excluded
         of_ports: list[Found] = []
@@ -82,12 +71,12 @@ class Pointcuts(View):
         left_out = {port for pointcut, found in of_ports if pointcut.exclude for port in found or ()}
         of_connections, connections = self._connections([each for each in pointcuts if each.ends is not None])
         found = [*of_ports, *of_connections]
-        return _is_sound(found), Places(
-            self.ports.in_order(chosen - left_out),
-            [ends for ends in connections if ends[1] not in left_out],
+        places = Places(
+            ports=self.ports.in_order(chosen - left_out),
+            connections=[ends for ends in connections if ends[1] not in left_out],
             parameters=[path for path, is_left_out in parameters.items() if not is_left_out],
-            aimed=_aimed(found),
         )
+        return _is_sound(found), places, _aimed(found)
 
     def _outside(self, pointcut: PointcutText, places: Mapping[str, tuple[str, ...]]) -> list[str] | Poison:
         """Of places with their ends, those that are not in the aspect's own composite."""
@@ -276,7 +265,7 @@ class Pointcuts(View):
 
     # -- actors ---------------------------------------------------------------------------------------------------
 
-    def _at_actors(self, pointcuts: Sequence[PointcutText]) -> tuple[bool, Places]:
+    def _at_actors(self, pointcuts: Sequence[PointcutText]) -> tuple[bool, Places, Aimed]:
         """The actors that the pointcuts select, singly or with a composite around them; and whether each has some."""
         index, known, actors = self.paths.owners, self.paths.holders, self.paths.actors
         found: list[Found] = []
@@ -296,7 +285,7 @@ class Pointcuts(View):
             if unit is not None and not spared.intersection(around):
                 attached[actor] = unit
         aimed = {actor: by_unit[unit] for actor, unit in attached.items()}
-        return is_whole and _is_sound(found), Places(actors=attached, aimed=aimed)
+        return is_whole and _is_sound(found), Places(actors=attached), aimed
 
     def _units_of(self, pointcut: PointcutText, index: PathIndex) -> list[str] | Poison:
         """The actors and composites that one pointcut selects."""
@@ -328,32 +317,19 @@ class Pointcuts(View):
         around = index.near(text, self.scope)
         return self.tell(f"{text!r} matches no actor", pointcut, hint, kind=NO_PLACE, near=around)
 
+    def bind(self, aspect: Aspect, places: Places, place_of: PlaceOf, position: Position) -> WovenAspect:
+        """The aspect at its places, with everything that it reads.
 
-def bind(view: View, aspect: Aspect, places: Places, place_of: PlaceOf, position: Position) -> WovenAspect:
-    """The aspect at its places, with everything that it reads.
-
-    ``place_of`` returns where something is wrong with its parameters in the model file.
-    """
-    looks = Looks(view.paths, view.name, view.scope, view.problems)
-    readings, selections, reads = looks.of(aspect, places.ports, place_of)
-    woven = WovenAspect(
-        view.name,
-        aspect,
-        places.ports,
-        places.connections,
-        places.actors,
-        readings,
-        selections,
-        reads,
-        parameters=places.parameters,
-        position=position,
-    )
-    for fault in unknown_inputs(woven, view.graph):  # of execution times by input port
-        looks.tell(fault.message, place_of(fault), *fault.help)
-    return woven
+        ``place_of`` returns where something is wrong with its parameters in the model file.
+        """
+        of_it = self.read_by(aspect, places.ports, place_of)
+        woven = WovenAspect(name=self.name, aspect=aspect, position=position, **vars(places), **of_it)
+        for fault in unknown_inputs(woven, self.graph):  # of execution times by input port
+            self.tell(fault.message, place_of(fault), *fault.help)
+        return woven
 
 
-def _aimed(found: Iterable[Found]) -> dict[str, PointcutText]:
+def _aimed(found: Iterable[Found]) -> Aimed:
     """The last pointcut that selects each place."""
     return {place: pointcut for pointcut, places in found if not pointcut.exclude for place in places or ()}
 

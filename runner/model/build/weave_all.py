@@ -20,7 +20,7 @@ from epicycle.aspects import (
 from ..catalogue.types import CatalogueError
 from ..graph.acts import ActName
 from ..graph.model_graph import ModelGraph
-from ..graph.woven import WovenAspect
+from ..graph.woven import Places, WovenAspect
 from ..language.parts import PartText
 from ..language.places import PointcutText
 from ..language.settings import ActText
@@ -35,7 +35,7 @@ from ..text.reading import Text
 from .composite_aspect import OWN, check_nesting, detours, weave_model
 from .instantiate import Instantiator, Names
 from .paths import Paths
-from .weave import Places, Pointcuts, bind
+from .weave import Pointcuts
 
 
 def weave_all(made: Instantiator) -> list[WovenAspect]:
@@ -82,8 +82,8 @@ def _declared(
         at = [each and _timed(made, each, name, scope, names) for each in part.at]
         woven = weave_model(pointcuts, aspect, at, place_of, part.position)
     else:
-        places = pointcuts.resolve(part.at)
-        woven = POISON if aspect is POISON else bind(pointcuts, aspect, places, place_of, part.position)
+        places, _ = pointcuts.resolve(part.at)
+        woven = POISON if aspect is POISON else pointcuts.bind(aspect, places, place_of, part.position)
     if not woven:
         return None
     made.places += len(woven.places)
@@ -186,13 +186,13 @@ def _weave(
             return None
     paths = Paths(graph, [port.path for port in own.values()])
     pointcuts = Pointcuts(paths, name, actor.path, problems, type(aspect))
-    named = pointcuts.resolve([PointcutText.of(Text(each, position)) for each in at_parameter])
+    named, _ = pointcuts.resolve([PointcutText.of(Text(each, position)) for each in at_parameter])
     places = Places(
-        [own[port].path for port in decoration.ports if port in own],
+        ports=[own[port].path for port in decoration.ports if port in own],
         actors={} if decoration.ports else {actor.path: actor.path},
         parameters=named.parameters,
     )
-    return replace(bind(pointcuts, aspect, places, lambda _: position, position), comes_with_actor=True)
+    return replace(pointcuts.bind(aspect, places, lambda _: position, position), comes_with_actor=True)
 
 
 def arranged(aspects: list[WovenAspect], graph: ModelGraph) -> list[WovenAspect]:

@@ -34,40 +34,47 @@ class AspectModel:
         return said
 
 
-@dataclass(frozen=True, eq=False)
-class WovenAspect:
-    """An aspect of a model, the ports that it attaches to, in the graph's order, and the single connections.
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Places:
+    """Where an aspect attaches: ports, in the graph's order, single connections, actors, and parameters of actors.
 
-    ``actors`` are those that it attaches to, with what the pointcut named: the actor, or a composite around it;
-    ``parameters`` are those of actors that it alters.  ``model`` is its composite if it is a model itself,
-    ``comes_with_actor`` means that the actor's class or instance was decorated.  ``readings`` are what its expressions
-    over ports ask for, ``selections`` what its parameters with patterns select, ``reads`` the other ports that it
-    reads.
+    ``actors`` are with what the pointcut named: the actor, or a composite around it.
+    """
+
+    ports: list[str] = field(default_factory=list)
+    connections: list[tuple[str, str]] = field(default_factory=list)
+    actors: dict[str, str] = field(default_factory=dict)
+    parameters: list[str] = field(default_factory=list)
+
+    @property
+    def places(self) -> list[str]:
+        """All of them in words."""
+        connections = (connection_place(*ends) for ends in self.connections)
+        return [*self.ports, *connections, *self.actors, *self.parameters]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class WovenAspect(Places):
+    """An aspect of a model at its places.
+
+    ``model`` is its composite if it is a model itself, ``comes_with_actor`` means that the actor's class or instance
+    was decorated.  ``readings`` are what its expressions over ports ask for, ``selections`` what its parameters with
+    patterns select, ``reads`` the other ports that it reads.
     """
 
     name: str
     aspect: Aspect
-    ports: list[str]
-    connections: list[tuple[str, str]] = field(default_factory=list)
-    actors: dict[str, str] = field(default_factory=dict)
     readings: dict[PortFormula, list[Reading]] = field(default_factory=dict)
     selections: dict[str, Selection] = field(default_factory=dict)
     reads: list[str] = field(default_factory=list)
     model: AspectModel | None = None
     comes_with_actor: bool = False
-    parameters: list[str] = field(default_factory=list)
     position: Position | None = None
 
     @property
     def kind(self) -> str:
         """The name of its type."""
         return type(self.aspect).__name__ if self.model is None else self.model.kind
-
-    @property
-    def places(self) -> list[str]:
-        """Its places in words."""
-        connections = (connection_place(*ends) for ends in self.connections)
-        return [*self.ports, *connections, *self.actors, *self.parameters]
 
     def without(self, path: str) -> WovenAspect:
         """The aspect after the removal of a part of the model that it may have been attached to."""
