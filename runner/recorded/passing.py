@@ -13,7 +13,7 @@ from epicycle.actors import Actor, EpicycleError, InputPort, OutputPort, texts_p
 from epicycle.aspects import FieldError
 
 from ..execution.engine import ActorError, Simulation
-from ..model.build.disturbance import disturb_ports
+from ..model.build.disturbance import disturb
 from ..model.build.model import Model
 from ..model.language.settings import Setting
 from ..support.shown import finite
@@ -123,7 +123,7 @@ def pass_recording(
 
         def weave(model: Model, channels: _Channels) -> list[str]:
             places = _places(channels, recording.channels, patterns)
-            return disturb_ports(model, names, places, set, types)
+            return disturb(model, names, set, types, only_ports=True, at=places)[1]
 
         try:
             return _pass(source, recording, target, weave, seed, None)  # of bytes that nobody reads, which is faster

@@ -16,11 +16,10 @@ from ..language.models import CompositeText, ModelText
 from ..language.parts import PartText
 from ..language.places import PointcutText
 from ..language.ports import ParameterText
-from ..language.settings import Setting, Settings, settings_in, settings_of
+from ..language.settings import ActText, Setting, Settings, settings_of
 from ..language.surroundings import Surroundings
-from ..text.document import Mapping
 from ..text.patterns import PathIndex, PatternError
-from ..text.problems import Position, Problems
+from ..text.problems import Problems
 from ..text.program import call_site, node_of
 from ..text.reading import Text
 from .building import Building
@@ -31,53 +30,62 @@ from .weave_all import acts_of, weave_all
 
 
 def disturb(
-    model: Building, name: str, values: AnyMapping[str, object], types: Iterable[type], position: Position
-) -> list[WovenAspect]:
-    """Weave the aspects of a disturbance, which are returned; raises ``ModelError``."""
-    problems = Problems()
-    disturbance = problems.whole(load_disturbance(name, problems))
-    for setting in disturbance.settings:
-        hint = f"load the model together with the disturbance: load_model(..., disturb={name!r})"
-        problems.add(f"{setting.path!r} can no longer be set: the model has been built", setting.position, hint)
-    node = node_of(values, position)
-    settings = settings_in(node, problems) if isinstance(node, Mapping) else []
-    for key in sorted(values.keys() & model.parameters.keys() - disturbance.root.parameters.keys()):
-        problems.add(f"{key!r} is a parameter of the model, not of the disturbance {disturbance.root.name}", position)
-    return _weave(model, disturbance, settings, installed().with_types(types), position, problems)
-
-
-def disturb_ports(
     model: Building,
     names: Iterable[str],
-    at: AnyMapping[str, list[str]] | None,
     values: Iterable[str | Setting] | AnyMapping[str, object],
     types: Iterable[type],
-) -> list[str]:
-    """Weave the aspects of disturbances that alter, delay or lose tokens; what is left out is returned, in words.
+    *,
+    only_ports: bool = False,
+    at: AnyMapping[str, list[str]] | None = None,
+) -> tuple[list[WovenAspect], list[str]]:
+    """Weave the aspects of disturbances, which are returned; and what is left out, in words.  Raises ``ModelError``.
 
-    ``at`` are ports, by direction, in place of those that the disturbances name.  Of aspects with the same name, the
-    last one counts.  Raises ``ModelError``.
+    With ``only_ports``, those that do not alter, delay or lose tokens are left out; ``at`` are then ports, by
+    direction, in place of those that the disturbances name.  Of aspects with the same name, the last one counts.
     """
     problems, position, catalogue = Problems(), call_site(), installed().with_types(types)
-    whole = ModelText(CompositeText("disturbances", position))
+    own = {key: ParameterText(key, position, node_of(value, position)) for key, value in model.parameters.items()}
+    root, composites = CompositeText(model.name, position, parameters=own), dict[str, CompositeText]()
+    exactly: tuple[ActText, ...] | None = None
     left_out: list[str] = []
     for name in names:
         one = problems.whole(load_disturbance(name, problems))
-        aspects, unused = _of_ports(one, catalogue, at, Paths(model.graph).ports)
-        left_out += unused
-        if not aspects:
-            message = f"{one.root.name} has no aspect that alters, delays or loses tokens"
-            problems.add(message, one.root.position)
-        parameters = joined(whole.root.parameters, one.root.parameters, PARAMETER_THERE, problems)
-        whole = replace(
-            whole,
-            root=replace(whole.root, parameters=parameters, aspects=whole.root.aspects | aspects),
-            composites=joined(whole.composites, one.composites, COMPOSITE_THERE, problems),
-            exactly=whole.exactly if one.exactly is None else (*(whole.exactly or ()), *one.exactly),
-        )
+        aspects = one.root.aspects
+        if only_ports:
+            aspects, unused = _of_ports(one, catalogue, at, Paths(model.graph).ports)
+            left_out += unused
+            if not aspects:
+                message = f"{one.root.name} has no aspect that alters, delays or loses tokens"
+                problems.add(message, one.root.position)
+        else:
+            for setting in one.settings:
+                hint = f"load the model together with the disturbance: load_model(..., disturb={name!r})"
+                message = f"{setting.path!r} can no longer be set: the model has been built"
+                problems.add(message, setting.position, hint)
+            for key in sorted({*values} & model.parameters.keys() - one.root.parameters.keys()):
+                message = f"{key!r} is a parameter of the model, not of the disturbance {one.root.name}"
+                problems.add(message, position)
+        parameters = joined(root.parameters, one.root.parameters, PARAMETER_THERE, problems)
+        root = replace(root, parameters=parameters, aspects=root.aspects | aspects)
+        composites = joined(composites, one.composites, COMPOSITE_THERE, problems)
+        exactly = exactly if one.exactly is None else (*(exactly or ()), *one.exactly)
+    taken = {woven.name for woven in model.aspects}
+    for part in root.aspects.values():
+        if part.name in taken:
+            problems.add(f"there is already an aspect {part.name!r}", part.position, "unweave it first")
     settings = settings_of(values, problems)
-    _weave(model, whole, settings, catalogue, position, problems)
-    return left_out
+    problems.raise_if_any()
+    resolver = ParameterResolver(problems, Settings(settings))
+    around = Surroundings(inherit(composites, catalogue.actors, problems), catalogue, problems)
+    root = around.composite(root)
+    made = Instantiator(PartTypes(around.composites, catalogue), resolver, model.graph.copy())
+    made.body("", root, resolver.parameters("", root, {}, {}, None))
+    found = weave_all(made)
+    resolver.check_unused(made.graph)
+    acts = None if exactly is None else acts_of(exactly, [*model.aspects, *found], problems)
+    problems.raise_if_any()
+    model.adopt(made.graph, found, acts)
+    return found, left_out
 
 
 def _of_ports(
@@ -116,33 +124,3 @@ def _matches(pattern: str, ports: PathIndex) -> bool:
         return bool(ports.select(pattern))
     except PatternError:
         return True  # which is reported when the aspect is woven
-
-
-def _weave(
-    model: Building,
-    disturbance: ModelText,
-    settings: list[Setting],
-    catalogue: Catalogue,
-    position: Position,
-    problems: Problems,
-) -> list[WovenAspect]:
-    own = {key: ParameterText(key, position, node_of(value, position)) for key, value in model.parameters.items()}
-    parameters = joined(own, disturbance.root.parameters, PARAMETER_THERE, problems)
-    root = CompositeText(model.name, position, parameters=parameters, aspects=disturbance.root.aspects)
-    taken = {woven.name for woven in model.aspects}
-    for part in disturbance.root.aspects.values():
-        if part.name in taken:
-            problems.add(f"there is already an aspect {part.name!r}", part.position, "unweave it first")
-    problems.raise_if_any()
-    resolver = ParameterResolver(problems, Settings(settings))
-    around = Surroundings(inherit(disturbance.composites, catalogue.actors, problems), catalogue, problems)
-    root = around.composite(root)
-    made = Instantiator(PartTypes(around.composites, catalogue), resolver, model.graph.copy())
-    made.body("", root, resolver.parameters("", root, {}, {}, None))
-    found = weave_all(made)
-    resolver.check_unused(made.graph)
-    exactly = disturbance.exactly
-    acts = None if exactly is None else acts_of(exactly, [*model.aspects, *found], problems)
-    problems.raise_if_any()
-    model.adopt(made.graph, found, acts)
-    return found

@@ -119,16 +119,13 @@ class Model(Building, Scope, Tabled):
         are woven.  A disturbance that sets parameters of the model must be loaded together with it: ``load_model(...,
         disturb=...)``.  Raises ``ModelError``.
         """
-        from .disturbance import disturb, disturb_ports
+        from .disturbance import disturb
 
-        if at is not None:
-            places: dict[str, list[str]] = {"input": [], "output": []}
-            for path in at:
-                places[self.graph.ports[path].direction].append(path)
-            before = len(self.aspects)
-            disturb_ports(self, [str(disturbance)], places, set or {}, types)
-            return list(self.aspects[before:])
-        return disturb(self, str(disturbance), set or {}, types, call_site())
+        places: dict[str, list[str]] = {"input": [], "output": []}
+        for path in at or ():
+            places[self.graph.ports[path].direction].append(path)
+        woven, _ = disturb(self, [str(disturbance)], set or {}, types, only_ports=at is not None, at=places)
+        return woven
 
     # -- what is watched ------------------------------------------------------------------------------------------
 
