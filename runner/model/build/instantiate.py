@@ -20,18 +20,18 @@ from ..catalogue.port_types import read_type, token_types
 from ..catalogue.types import Catalogue, CatalogueError
 from ..graph.model_graph import ModelGraph
 from ..graph.nodes import Gap
+from ..language.fields import Computed, sound
 from ..language.models import CompositeText
 from ..language.parts import PartText
 from ..language.ports import PortText
 from ..language.values import Locals
-from ..text.document import Entry
 from ..text.kinds import CLASS, CONNECTION, DIRECTOR, MODE, NAME, SIZE, TAKEN, UNKNOWN_TYPE
 from ..text.limits import RAISE_IT
 from ..text.problems import POISON, Poison, Position
 from .composite_aspect import as_actor
 from .connect import Member, Wiring, make, member_of_actors
 from .modes import connect_modes
-from .resolve import OF_DIRECTORS, ParameterResolver
+from .resolve import ParameterResolver
 
 MAX_DEPTH = 50
 MAX_SHOWN = 12  # types in one message
@@ -333,14 +333,10 @@ class Instantiator:
         if like := self._director(model.name, "", model.director or {}, names).get("like"):
             self.graph.domains[""].dialect = like
 
-    def _director(self, what: str, path: str, given: Mapping[str, Entry], names: Names) -> dict[str, Any]:
+    def _director(self, what: str, path: str, given: Mapping[str, Computed], names: Names) -> dict[str, Any]:
         """The settings of a director; wrong ones are left out."""
         local = Locals(path, names)
-        found = {
-            key: self.resolver.converted(entry.value, local, f"{what}: director.{key}", OF_DIRECTORS[key])
-            for key, entry in given.items()
-        }
-        return {key: value for key, value in found.items() if value is not POISON}
+        return sound({key: self.resolver.value(each, local, f"{what}: director.{key}") for key, each in given.items()})
 
     def _port_type(self, composite: CompositeText, port: PortText) -> Any:
         """The type that a composite declares for a port; None if it declares none, or an unknown one."""

@@ -11,14 +11,15 @@ from epicycle.actors import Actor, InputPort, OutputPort, ParameterError
 from epicycle.aspects import Aspect, FiringTime, FiringTimeParameter
 
 from ..graph.model_graph import ModelGraph
-from ..language.fields import Computed, nanoseconds
+from ..language.fields import Computed, nanoseconds, sound
+from ..language.models import DIRECTOR
 from ..language.places import ConnectionText, Endpoint, PointcutText, connection, endpoint
+from ..language.values import Locals, Values
 from ..text.document import Scalar
 from ..text.faults import blame
 from ..text.problems import POISON, ModelError, Poison, Position, Problem, Problems
 from ..text.program import node_of
 from ..text.reading import NodeReader, Text, within
-from .resolve import OF_DIRECTORS
 
 
 @dataclass(frozen=True)
@@ -54,14 +55,12 @@ def raising() -> Iterator[Problems]:
 
 def director_of(path: str, said: Mapping[str, object], position: Position, problems: Problems) -> dict[str, Any]:
     """The rules given for a director, ``None`` for those not given; wrong ones are reported and left out."""
-    found: dict[str, Any] = {}
-    for key, value in said.items():
-        try:
-            if value is not None:
-                found[key] = OF_DIRECTORS[key](value)
-        except (ParameterError, ValueError) as error:
-            blame(problems, f"{path}: director.{key}", error, position)
-    return found
+    values, given = (
+        Values(problems),
+        {key: node_of(value, position) for key, value in said.items() if value is not None},
+    )
+    rules = {key: DIRECTOR.keys[key].shape.read(None, node, key) for key, node in given.items()}
+    return sound({key: values.value(each, Locals(), f"{path}: director.{key}") for key, each in rules.items()})
 
 
 def check_aspect(aspect: object, kinds: tuple[type, ...], position: Position, problems: Problems) -> None:

@@ -17,13 +17,11 @@ from epicycle.actors import (
     declared_parameters,
     did_you_mean,
     nearest,
-    to_nanoseconds,
     unknown_parameter,
     variants,
 )
 from epicycle.actors.expression import Budget
 
-from ..catalogue.like import LIKE
 from ..graph.model_graph import ModelGraph
 from ..language.models import CompositeText
 from ..language.parts import PartText
@@ -246,21 +244,3 @@ def _in_terms_of(pattern: str, path: str) -> str:
         if bracket and (wanted == name or wanted.endswith("[*]")):
             parts[place] = f"{name}[*]"
     return ".".join(parts)
-
-
-def local_nanoseconds(start: object) -> int:
-    """The same for the start of a composite's local time, which may be negative."""
-    return to_nanoseconds(Parameter(float, unit="s").convert(start) or 0.0)
-
-
-def drift(value: object) -> float:
-    found: Any = Parameter(float, unit="1", min=1e-6, max=1e6).convert(value)
-    return 1.0 if found is None else float(found)
-
-
-# What may be given for a director, and how it is converted.
-OF_DIRECTORS: dict[str, Callable[[Any], Any]] = {
-    "start": lambda start: None if start is None else local_nanoseconds(start),
-    "drift": drift,
-    "like": LIKE.convert,
-}

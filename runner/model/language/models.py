@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 
-from epicycle.actors import Parameter
+from epicycle.actors import Parameter, to_nanoseconds
 
 from ..catalogue.like import LIKE, dialects
 from ..text.document import Entry, Mapping, Node, Scalar
@@ -29,7 +29,6 @@ from .fields import (
     keyed,
     named,
     nanoseconds,
-    node_as,
     ref,
     sound,
 )
@@ -44,10 +43,19 @@ from .settings import ACTS, ActText, Setting, settings_like
 # -- composite classes --------------------------------------------------------------------------------------------
 
 
+_START: Parameter[float | None] = Parameter(float, None, unit="s")
+
+
+def _local_start(start: object) -> int | None:
+    """The start of a local time in ns; it may be negative."""
+    seconds = _START.convert(start)
+    return None if seconds is None else to_nanoseconds(seconds)
+
+
 def _like(default: str) -> dict[str, Field]:
     """The dialect of a director."""
     doc = f"{LIKE.doc[:1].upper()}{LIKE.doc[1:]} (default: {default})."
-    return {"like": Field(node_as({"type": "string"}), doc)}
+    return {"like": Field(computed_as(LIKE, schema={"type": "string"}), doc)}
 
 
 MODEL_DIRECTOR = Record(
@@ -58,10 +66,12 @@ DIRECTOR = Record(
     "A separate director, with a local clock.",
     {
         "start": Field(
-            node_as(computed("number", unit="s")), "The local time when the run begins (default: the time outside)."
+            computed_as(_START, _local_start, computed("number", unit="s")),
+            "The local time when the run begins (default: the time outside).",
         ),
         "drift": Field(
-            node_as(computed("number", unit="1")), "The rate of local time; 1 is as fast as the time outside."
+            computed_as(Parameter(float, unit="1", min=1e-6, max=1e6), schema=computed("number", unit="1")),
+            "The rate of local time; 1 is as fast as the time outside.",
         ),
         **_like("as outside"),
     },
@@ -95,8 +105,8 @@ class CompositeText:
     )
     inputs: dict[str, PortText] = keyed(PORTS, f"The input ports: {_SAID_OF_PORTS}", default_factory=dict)
     outputs: dict[str, PortText] = keyed(PORTS, f"The output ports: {_SAID_OF_PORTS}", default_factory=dict)
-    director: dict[str, Entry] | None = keyed(
-        Reader(ref("director"), DIRECTOR.entries),
+    director: dict[str, Computed] | None = keyed(
+        Reader(ref("director"), DIRECTOR.read),
         "Its own director: the composite fires as one actor, in local time.",
         called="the director of {what}",
         default=None,
@@ -256,7 +266,7 @@ class ModelText:
     )
 
 
-def _model_director(reader: NodeReader, node: Node, what: str) -> dict[str, Entry] | Poison:
+def _model_director(reader: NodeReader, node: Node, what: str) -> dict[str, Computed] | Poison:
     """What a file declares about the model's director."""
     if isinstance(node, Scalar) and node.value in dialects():
         return reader.problems.add(
@@ -268,7 +278,7 @@ def _model_director(reader: NodeReader, node: Node, what: str) -> dict[str, Entr
             hint = "give it to the director of a composite, which has local time"
             reader.problems.add(message, node.entries[key].key.position, hint, kind=UNKNOWN_KEY)
         node = replace(node, entries={key: each for key, each in node.entries.items() if key not in ("start", "drift")})
-    return MODEL_DIRECTOR.entries(reader, node, what)
+    return MODEL_DIRECTOR.read(reader, node, what)
 
 
 _OF_FILES = Record.of(ModelText).keys
