@@ -22,12 +22,12 @@ from epicycle.runner.interface.calls.studying import compare as compare
 from epicycle.runner.interface.calls.studying import study as study
 from epicycle.runner.interface.calls.what_if import what_if as what_if
 from epicycle.runner.recorded.channel import Fit as Fit
-from epicycle.runner.recorded.disturbed import Disturbed as Disturbed
+from epicycle.runner.recorded.passing import Disturbed as Disturbed
 from epicycle.runner.search.calibration import Calibration as Calibration
 from epicycle.runner.search.comparing import Comparison as Comparison
 from epicycle.runner.search.explanation import Explanation as Explanation
-from epicycle.runner.search.falsification import Falsification as Falsification
-from epicycle.runner.search.optimum import Optimum as Optimum
+from epicycle.runner.search.falsifying import Falsification as Falsification
+from epicycle.runner.search.optimising import Optimum as Optimum
 from epicycle.runner.search.spec import Break as Break
 from epicycle.runner.search.spec import Match as Match
 from epicycle.runner.search.spec import Maximise as Maximise

@@ -6,7 +6,7 @@ from .authoring import ABSENT, Latest, Pending, Queues, Tally, present, rounds
 from .environment import Environment, Events, Host
 from .errors import EpicycleError, Fault, FaultError, Span
 from .files import FOLDERS, check_allowed, irregular, open_regular, read_regular, read_table
-from .laws import normal_quantile, normal_share
+from .laws import normal_quantile
 from .messages import (
     abridged,
     brief,
@@ -56,7 +56,7 @@ __all__ = [
     "counted_in_si", "cut", "declared_parameters", "declared_ports",
     "did_you_mean", "digits", "elementary", "found_variants", "has_own_ports",
     "in_si", "irregular", "is_alone", "is_too_deep", "nearest", "new_tag", "new_wake", "normal_quantile",
-    "normal_share", "open_regular", "parse_unit", "part_finders", "paths", "plain", "present", "random_stream",
+    "open_regular", "parse_unit", "part_finders", "paths", "plain", "present", "random_stream",
     "read_regular", "read_table", "readable", "rounds", "shaped", "shortened", "texts_parameter", "to_nanoseconds",
     "to_seconds", "token_type", "type_name", "units_like", "unknown_parameter", "variants", "visible",
     "visible_character", "visible_lines",

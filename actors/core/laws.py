@@ -101,18 +101,6 @@ def normal_quantile(share: float) -> float:
     return above / below if q > 0.0 else -above / below
 
 
-def normal_share(x: float) -> float:
-    """The standard normal distribution function.  Source: G. Marsaglia, J. Statistical Software 11, 2004."""
-    if not -8.3 < x < 8.3:
-        return 0.0 if x < 0.0 else 1.0
-    term, found, place = x, 0.0, 1.0
-    while found + term != found:
-        found += term
-        place += 2.0
-        term *= x * x / place
-    return 0.5 + found * exp(-0.5 * x * x - 0.91893853320467274178)
-
-
 def normal(bits: Bits, loc: float = 0.0, scale: float = 1.0) -> float:
     """Normal (Gaussian) with mean ``loc`` and standard deviation ``scale``."""
     if not scale >= 0.0:

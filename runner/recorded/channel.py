@@ -121,25 +121,9 @@ class Fit(Tabled):
         return said
 
     def _tables(self) -> list[Table]:
-        losses = [
-            (
-                _mark(each, self.losses),
-                _words(each.parameters),
-                f"{each.log_likelihood:,.1f}",
-                f"{each.bic:,.1f}",
-                _test(each.gain),
-                _test(each.runs),
-            )
-            for each in self.loss_models
-        ]
+        losses = [_row(each, self.losses, each.parameters, each.gain, each.runs) for each in self.loss_models]
         laws = [
-            (
-                _mark(each, self.delays),
-                _words({"shift": each.shift, "mean": each.mean, "shape": each.shape}),
-                f"{each.log_likelihood:,.1f}",
-                f"{each.bic:,.1f}",
-                _test(each.spread),
-            )
+            _row(each, self.delays, {"shift": each.shift, "mean": each.mean, "shape": each.shape}, each.spread)
             for each in self.delay_laws
         ]
         head = ("parameters", "log likelihood", "BIC")
@@ -157,16 +141,15 @@ def _time(seconds: float) -> str:
     return f"{1e3 * seconds:.6g} ms"
 
 
-def _words(parameters: dict[str, float]) -> str:
-    return ", ".join(f"{name} {short(float(f'{value:.4g}'))}" for name, value in parameters.items())
-
-
-def _mark(model: LossModel | DelayLaw, best: LossModel | DelayLaw | None) -> str:
-    return f"{model.name} *" if model is best else model.name
-
-
-def _test(test: Goodness | None) -> str:
-    return "-" if test is None else _p(test)
+def _row(
+    model: LossModel | DelayLaw,
+    best: LossModel | DelayLaw | None,
+    parameters: dict[str, float],
+    *tests: Goodness | None,
+) -> tuple[str, ...]:
+    words = ", ".join(f"{name} {short(float(f'{value:.4g}'))}" for name, value in parameters.items())
+    name, likelihood = f"{model.name} *" if model is best else model.name, f"{model.log_likelihood:,.1f}"
+    return name, words, likelihood, f"{model.bic:,.1f}", *("-" if each is None else _p(each) for each in tests)
 
 
 def _p(test: Goodness) -> str:

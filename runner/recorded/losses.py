@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -13,9 +13,8 @@ from numpy.typing import NDArray
 
 Losses = NDArray[np.uint8]  # 1 for a lost message
 
-STEPS = 2_000  # of the expectation-maximisation, at most
-STEADY = 1e-7  # gain in log likelihood that ends it
 _TRIED = 200_000  # messages from which the best starting point is chosen
+_IMPOSSIBLE = -1e300  # a log likelihood that can be compared
 _EXPECTED = 5.0  # runs in a bin of the chi-square test, at least
 _BINS = 20
 
@@ -101,7 +100,7 @@ def gilbert(losses: Losses) -> Channel:
 
 
 def gilbert_elliott(losses: Losses) -> Channel:
-    """The channel with hidden states, by expectation-maximisation (Baum-Welch) from several starting points."""
+    """The channel with hidden states, from the best of several starting points."""
     share, simple = float(np.mean(losses)), gilbert(losses)
     starts = [
         Channel(max(simple.p / slow, 1e-6), max(simple.r / slow, 1e-6), high, low)
@@ -109,28 +108,27 @@ def gilbert_elliott(losses: Losses) -> Channel:
         for high, low in ((0.95, 0.02 * share), (0.5 + 0.5 * share, 0.5 * share))
     ]
     part = losses[:_TRIED]
-    tried = [_improved(part, start, STEPS // 10) for start in starts]
-    best = max(tried, key=lambda each: log_likelihood(part, each))
-    found = _improved(losses, best, STEPS)
+    best = max((_improved(part, start) for start in starts), key=lambda each: log_likelihood(part, each))
+    found = _improved(losses, best)
     if found.loss_bad < found.loss_good:
         found = Channel(found.r, found.p, found.loss_good, found.loss_bad)
     # Without hidden states where these explain nothing more.
     return found if log_likelihood(losses, found) >= log_likelihood(losses, simple) else simple
 
 
-def _improved(losses: Losses, channel: Channel, steps: int) -> Channel:
-    latest = -math.inf
-    for _ in range(steps):
-        *values, likelihood = _compiled()(losses, *_values(channel), True)
-        if not likelihood - latest > STEADY:
-            break
-        latest, channel = likelihood, Channel(*(min(max(value, 0.0), 1.0) for value in values))
-    return channel
+def _improved(losses: Losses, start: Channel) -> Channel:
+    """The channel of greatest likelihood near another one."""
+    from scipy.optimize import minimize
+
+    def cost(values: Sequence[float]) -> float:
+        return -max(log_likelihood(losses, Channel(*values)), _IMPOSSIBLE)
+
+    return Channel(*minimize(cost, _values(start), method="L-BFGS-B", bounds=[(0.0, 1.0)] * 4).x.tolist())
 
 
 def log_likelihood(losses: Losses, channel: Channel) -> float:
     """The natural logarithm of the probability of the losses."""
-    return float(_compiled()(losses, *_values(channel), False)[-1])
+    return _compiled()(losses, *_values(channel))
 
 
 def _values(channel: Channel) -> tuple[float, float, float, float]:
@@ -138,65 +136,28 @@ def _values(channel: Channel) -> tuple[float, float, float, float]:
 
 
 @cache
-def _compiled() -> Callable[..., tuple[float, ...]]:
+def _compiled() -> Callable[..., float]:
     from numba import njit  # heavy
 
-    compiled: Any = njit(_step)
+    compiled: Any = njit(_log_likelihood)
     return compiled  # type: ignore[no-any-return]
 
 
-def _step(
-    losses: Any, p: float, r: float, loss_bad: float, loss_good: float, improve: bool
-) -> tuple[float, float, float, float, float]:
-    """One step of expectation-maximisation, and the log likelihood before it; without ``improve`` only this.
-
-    For numba.  ``ahead`` is the probability of the bad state given the losses up to a message.
-    """
-    number = len(losses)
-    ahead = np.empty(number if improve else 1)
+def _log_likelihood(losses: Any, p: float, r: float, loss_bad: float, loss_good: float) -> float:
+    """For numba; ``bad`` is the probability of the bad state given the losses before a message, then with its own."""
     bad = p / (p + r) if p + r > 0.0 else 0.0
     likelihood = 0.0
-    for index in range(number):
+    for index in range(len(losses)):
         if index > 0:
             bad = bad * (1.0 - r) + (1.0 - bad) * p
         is_bad = bad * (loss_bad if losses[index] else 1.0 - loss_bad)
         is_good = (1.0 - bad) * (loss_good if losses[index] else 1.0 - loss_good)
         whole = is_bad + is_good
         if whole <= 0.0:
-            return p, r, loss_bad, loss_good, -np.inf
+            return -np.inf
         likelihood += np.log(whole)
         bad = is_bad / whole
-        if improve:
-            ahead[index] = bad
-    if not improve:
-        return p, r, loss_bad, loss_good, likelihood
-    smooth = ahead[number - 1]  # the probability of the bad state given all losses
-    of_bad, of_good = smooth, 1.0 - smooth  # expected numbers of messages
-    lost_bad, lost_good = smooth * losses[number - 1], (1.0 - smooth) * losses[number - 1]
-    from_bad, from_good, worse, better = 0.0, 0.0, 0.0, 0.0
-    for index in range(number - 2, -1, -1):
-        now = ahead[index]
-        to_bad = now * (1.0 - r) + (1.0 - now) * p
-        bad_bad = smooth * now * (1.0 - r) / to_bad if to_bad > 0.0 else 0.0
-        good_bad = smooth * (1.0 - now) * p / to_bad if to_bad > 0.0 else 0.0
-        bad_good = (1.0 - smooth) * now * r / (1.0 - to_bad) if to_bad < 1.0 else 0.0
-        smooth = bad_bad + bad_good
-        worse += good_bad
-        better += bad_good
-        from_bad += smooth
-        from_good += 1.0 - smooth
-        of_bad += smooth
-        of_good += 1.0 - smooth
-        if losses[index]:
-            lost_bad += smooth
-            lost_good += 1.0 - smooth
-    return (
-        worse / from_good if from_good > 0.0 else p,
-        better / from_bad if from_bad > 0.0 else r,
-        lost_bad / of_bad if of_bad > 0.0 else loss_bad,
-        lost_good / of_good if of_good > 0.0 else loss_good,
-        likelihood,
-    )
+    return likelihood
 
 
 # -- runs -------------------------------------------------------------------------------------------------------------

@@ -77,22 +77,17 @@ def _fitted(runs: _Runs) -> Calibration:
         return np.array([gap / scale for gap, scale in zip(gaps, task.scales, strict=True)])
 
     def tried(shares: NDArray[np.float64]) -> NDArray[np.float64]:
-        ahead([shares])
+        ahead([[shares]])
         return residuals(shares)
 
     def jacobian(shares: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Derivatives of second order, which stay within the ranges."""
-        at, columns = residuals(shares), []
-        ahead(_around(shares))
-        for axis, share in enumerate(shares.tolist()):
-            steps, own, (first, second) = _stencil(share)
-            one, other = (residuals(_moved(shares, axis, step)) for step in steps)
-            columns.append((own * at + first * one + second * other) / _STEP)
-        return np.array(columns).T
+        """What changes from a little below to a little above, within the ranges."""
+        ahead(pairs := _around(shares))
+        return np.array([(residuals(above) - residuals(below)) / (above - below).max() for below, above in pairs]).T
 
-    def ahead(places: Iterable[NDArray[np.float64]]) -> None:
+    def ahead(places: Iterable[Iterable[NDArray[np.float64]]]) -> None:
         """Expect runs at some places, and then those that each further start begins with."""
-        runs.expect(map(_point, chain(places, *map(_around, starts))))
+        runs.expect(map(_point, chain.from_iterable(chain(places, *map(_around, starts)))))
 
     starts = list(map(np.array, (point for number in range(SPREAD) for point in spread(count, task.seed, number))))
     runs.expect(map(_point, starts))
@@ -154,24 +149,12 @@ def _point(shares: NDArray[np.float64]) -> Point:
     return tuple(map(float, shares))
 
 
-def _moved(shares: NDArray[np.float64], axis: int, step: float) -> NDArray[np.float64]:
-    moved = shares.copy()
-    moved[axis] += step
-    return moved
+def _around(shares: NDArray[np.float64]) -> list[tuple[NDArray[np.float64], NDArray[np.float64]]]:
+    """The places by which the derivatives at some shares are found: for each, a step below and above."""
+    import numpy as np
 
-
-def _around(shares: NDArray[np.float64]) -> list[NDArray[np.float64]]:
-    """The places by which the derivatives at some shares are found."""
-    return [_moved(shares, axis, step) for axis, share in enumerate(shares.tolist()) for step in _stencil(share)[0]]
-
-
-def _stencil(share: float) -> tuple[tuple[float, float], float, tuple[float, float]]:
-    """Two steps from a share of a range, and the weights of the value there and after each of them."""
-    if share < _STEP:
-        return (_STEP, 2.0 * _STEP), -1.5, (2.0, -0.5)
-    if share > 1.0 - _STEP:
-        return (-_STEP, -2.0 * _STEP), 1.5, (-2.0, 0.5)
-    return (-_STEP, _STEP), 0.0, (-0.5, 0.5)
+    steps = _STEP * np.eye(len(shares))
+    return [(np.maximum(shares - step, 0.0), np.minimum(shares + step, 1.0)) for step in steps]
 
 
 class _Task(Worker):

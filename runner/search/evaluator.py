@@ -103,21 +103,16 @@ class Evaluator:
 
     def _begin_with(self, threads: ThreadPoolExecutor, key: Hashable, request: object) -> None:
         if key not in self._begun:
-            future = self._begun[key] = Future[Outcome]()
-            threads.submit(self._work, future, request)
+            self._begun[key] = future = threads.submit(self._processes.make, request)
+            future.add_done_callback(self._is_over)
 
-    def _work(self, future: Future[Outcome], request: object) -> None:
-        """Have something made by a process, and then what is expected next."""
-        if not future.set_running_or_notify_cancel():
-            return
-        try:
-            future.set_result(self._processes.make(request))
-        except BaseException as error:
-            future.set_exception(error)
+    def _is_over(self, future: Future[Outcome]) -> None:
+        """Let the process that has made something make what is expected next."""
         if future is self._awaited:  # it may change what is expected
             self._is_heard.wait(GRACE)
-        with self._guard:
-            self._go_ahead()
+        if not future.cancelled():
+            with self._guard:
+                self._go_ahead()
 
     def _go_ahead(self) -> None:
         while (threads := self._threads) is not None and self._waiting() < self._jobs:

@@ -10,6 +10,8 @@ from typing import Any
 
 from epicycle.actors import Stream, random_stream
 
+from ..model.language.sampling import latin_hypercube
+
 BATCH = 20  # points that are chosen together
 SPREAD = 3  # batches that are spread before the first ones that are guided
 STEP = 0.2  # of the edge of the unit cube: how far the first guided points are from the best known one
@@ -23,6 +25,7 @@ EVENLY = 0.2  # of these, in whatever way
 NEXT = 0.3  # how likely not the best of some points is changed, but the next one
 GOOD = 0.15  # of the points that are chosen afresh: those by which ways are judged
 PIECES = 4  # of a signal, at most, unless it is dense
+
 
 Point = tuple[float, ...]  # of the unit cube
 
@@ -206,11 +209,8 @@ def _permuted(stream: Stream, count: int) -> list[int]:
 
 def spread(axes: int, seed: int, number: int) -> list[Point]:
     """Points of which, on each axis, each of as many slices has one: a Latin hypercube."""
-    columns = []
-    for axis in range(axes):
-        stream = random_stream(seed, f"axis {axis}", f"spread {number}")
-        columns.append([(slice_ + stream.random()) / BATCH for slice_ in stream.permutation(BATCH).tolist()])
-    return list(zip(*columns, strict=True)) if columns else [()] * BATCH
+    names = [f"axis {axis}" for axis in range(axes)]
+    return latin_hypercube(BATCH, seed, names, f"spread {number}") or [()] * BATCH
 
 
 def _descent(start: Point, seed: int, number: int, together: int) -> Proposals:

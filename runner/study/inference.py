@@ -7,13 +7,12 @@ Source: A. M. Law, *Simulation Modeling and Analysis*, chapters 4, 9 and 10.
 from __future__ import annotations
 
 import math
-from bisect import bisect_left, bisect_right
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
-from epicycle.actors import normal_quantile, normal_share, random_stream
+from epicycle.actors import normal_quantile, random_stream
 
 from ..support.shown import rounded
 from ..support.student import student_quantile, student_tail
@@ -82,32 +81,6 @@ def with_interval(estimate: Estimate) -> str:
     if math.isclose(estimate.high - estimate.value, estimate.value - estimate.low):
         return f"{value} ± {rounded(width / 2, width)}"
     return f"{value} ({rounded(estimate.low, width)} to {rounded(estimate.high, width)})"
-
-
-def bootstrap_mean(values: Sequence[float], level: float = LEVEL, *, resamples: int = 9_999) -> Estimate:
-    """The mean with the bias-corrected and accelerated bootstrap interval, which need not be symmetric.
-
-    Source: B. Efron, Better Bootstrap Confidence Intervals, J. American Statistical Association 82, 1987.
-    """
-    plain, count = mean(values, level), len(values)
-    if count < 2 or min(values) == max(values):
-        return plain
-    means = sorted((resampled_sums(values, resamples) / count).tolist())
-    gaps = [value - plain.value for value in values]
-    squares = math.fsum(gap * gap for gap in gaps)
-    acceleration = math.fsum(gap * gap * gap for gap in gaps) / (6.0 * squares * math.sqrt(squares))
-    # With few values, many resamples have each of them once, and so the same mean.
-    rounding = 1e-12 * max(map(abs, values))
-    at_or_below = bisect_left(means, plain.value - rounding) + bisect_right(means, plain.value + rounding)
-    below = at_or_below / (2.0 * resamples)
-    bias = normal_quantile(min(max(below, 0.5 / resamples), 1.0 - 0.5 / resamples))
-    ends = []
-    for share in ((1.0 - level) / 2.0, (1.0 + level) / 2.0):
-        shifted = bias + normal_quantile(share)
-        place = (resamples - 1) * normal_share(bias + shifted / (1.0 - acceleration * shifted))
-        low = min(int(place), resamples - 2)
-        ends.append(means[low] + (place - low) * (means[low + 1] - means[low]))
-    return Estimate(plain.value, _deviation(means), ends[0], ends[1], count)
 
 
 def resampled_sums(values: Sequence[float], number: int) -> NDArray[np.float64]:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from epicycle.runner.study.inference import bootstrap_mean, half_width, holm, mean, paired_difference, rate
+from epicycle.runner.study.inference import half_width, holm, mean, paired_difference, rate
 from epicycle.runner.support.student import student_quantile, student_tail
 
 RUNS = 3000
@@ -41,17 +41,6 @@ def test_wilsons_interval_covers_a_rate_on_average() -> None:
     assert is_covered_as_said(hits, 0.95)
     assert rate(0, 10).low == 0.0
     assert 0.2 < rate(0, 10).high < 0.35
-
-
-def test_bootstrap_interval_leans_where_the_values_do() -> None:
-    values = np.random.default_rng(3).exponential(1.0, 40).tolist()
-    found = bootstrap_mean(values)
-    assert found == bootstrap_mean(values)
-    assert found.value == pytest.approx(np.mean(values))
-    assert found.low < found.value < found.high
-    assert found.high - found.value > found.value - found.low
-    assert found.error == pytest.approx(stats.sem(values), rel=0.1)
-    assert bootstrap_mean([2.0, 2.0, 2.0]).high == 2.0
 
 
 def test_paired_difference_is_scipys_paired_test() -> None:
@@ -131,17 +120,6 @@ def test_wilsons_interval_is_scipys() -> None:
         found = rate(successes, count, 0.9)
         assert found.low == pytest.approx(expected.low, abs=1e-15)
         assert found.high == pytest.approx(expected.high, rel=1e-13)
-
-
-@pytest.mark.parametrize("count", [8, 40, 400])
-def test_bootstrap_is_scipys_but_for_chance(count: int) -> None:
-    values = np.random.default_rng(count).exponential(1.0, count)
-    expected = stats.bootstrap((values,), np.mean, confidence_level=0.9, n_resamples=9_999, rng=0)
-    found = bootstrap_mean(values.tolist(), 0.9)
-    width = expected.confidence_interval.high - expected.confidence_interval.low
-    assert found.low == pytest.approx(expected.confidence_interval.low, abs=0.04 * width)
-    assert found.high == pytest.approx(expected.confidence_interval.high, abs=0.04 * width)
-    assert found.error == pytest.approx(expected.standard_error, rel=0.04)
 
 
 def test_students_t_has_these_bits() -> None:

@@ -12,7 +12,7 @@ from .changes import TYPES, seed
 if TYPE_CHECKING:
     from ...model.language.settings import Setting
     from ...recorded.channel import Fit
-    from ...recorded.disturbed import Disturbed
+    from ...recorded.passing import Disturbed
 
 
 def fit(

@@ -30,8 +30,8 @@ if TYPE_CHECKING:
     from ...model.build.model import Model
     from ...search.calibration import Calibration
     from ...search.explanation import Explanation
-    from ...search.falsification import Falsification
-    from ...search.optimum import Optimum
+    from ...search.falsifying import Falsification
+    from ...search.optimising import Optimum
     from ...search.splitting import RareEvent
 
 

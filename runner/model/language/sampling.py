@@ -36,11 +36,11 @@ class Design:
     steps: tuple[tuple[tuple[int, float], ...], ...] = ()  # (parameter, share), of each trajectory
 
 
-def latin_hypercube(size: int, seed: int, paths: Sequence[str]) -> list[Point]:
-    """Points of which each of ``size`` slices of each range contains one."""
+def latin_hypercube(size: int, seed: int, paths: Sequence[str], purpose: str = "latin hypercube") -> list[Point]:
+    """Points of which each of ``size`` slices of each range contains one; for another purpose, others."""
     shares = []
     for path in paths:
-        stream = random_stream(seed, path, "latin hypercube")
+        stream = random_stream(seed, path, purpose)
         shares.append([(slice_ + stream.random()) / size for slice_ in stream.permutation(size).tolist()])
     return list(zip(*shares, strict=True))
 

@@ -1,8 +1,7 @@
 """Judging claims: each is split into comparisons, each with its interval and a corrected test.
 
 A comparison is a contrast, a weighted sum of conditions over common replications: the difference of two conditions, or
-of two slopes.  Its mean has Student's interval and test, and a bootstrap interval beside them; the p-values of a claim
-are corrected together (Holm).
+of two slopes.  Its mean has Student's interval and test; the p-values of a claim are corrected together (Holm).
 
 Sources: A. M. Law, *Simulation Modeling and Analysis*, 10.2 (paired comparisons under common random numbers);
 S. Holm, *A simple sequentially rejective multiple test procedure* (1979); E. B. Wilson, *Probable inference* (1927).
@@ -21,13 +20,12 @@ from epicycle.actors.expression import Formula
 from ...model.language.claims import ALWAYS, FALLS, GREATER, RISES, Claim, Selection
 from ...model.language.dimensions import Factor
 from ...support.shown import finite
-from ..inference import LEVEL, bootstrap_mean, holm, paired_difference, rate, without_rounding
+from ..inference import LEVEL, holm, paired_difference, rate, without_rounding
 from .samples import Levels, Place, Samples, has_enough, value_in
 
 REPRODUCED, NOT_REPRODUCED, UNDECIDED = "reproduced", "not reproduced", "undecided"
 CONFIRMED, REVERSED = "confirmed", "reversed"
 ALMOST_ALL = 0.9  # the lower Wilson bound required for "in every run", if no run contradicts it
-RESAMPLES = 1_999
 
 Choices = Sequence[Sequence[int]]  # levels, by dimension
 
@@ -51,8 +49,6 @@ class ContrastTest:
     high: float
     count: int
     missing: int
-    bootstrap_low: float = math.nan
-    bootstrap_high: float = math.nan
     p: float = math.nan
     p_holm: float = math.nan
     outcome: str = UNDECIDED
@@ -284,14 +280,11 @@ def _finding(
     terms = [[weight * numbers[at][each] for at, weight in weights.items()] for each in pairs]
     values = without_rounding(map(math.fsum, terms), max((abs(term) for each in terms for term in each), default=0.0))
     found = paired_difference(dict.fromkeys(pairs, 0.0), dict(zip(pairs, values, strict=True)))
-    bootstrap = bootstrap_mean(values, resamples=RESAMPLES)
     return ContrastTest(
         metric,
         *levels,
         **asdict(found.estimate),
         missing=len(over) - len(pairs),
-        bootstrap_low=bootstrap.low,
-        bootstrap_high=bootstrap.high,
         p=found.p,
     )
 

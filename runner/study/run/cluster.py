@@ -19,7 +19,7 @@ from epicycle.actors import EpicycleError
 from ...support.apart import DONE, Outcome, WorkerError
 from .backlog import Task
 from .making import Recorder
-from .parcel import SENT, ParcelOnWorker, environment, mismatch, pack
+from .parcel import SENT, ParcelOnWorker, pack
 
 CONNECT = 10.0  # s for a scheduler to answer
 PATIENCE = 60.0  # s without any worker
@@ -137,14 +137,11 @@ class Cluster:
             )
 
     async def _check(self, client: Any, workers: list[str]) -> None:
-        """Raise ``WorkerError`` if a new worker differs from this machine."""
-        options = {"workers": workers, "on_error": "return"}
-        for address, there in (await self._asked(client.run(resolve_name, _name(environment), **options))).items():
+        """Raise ``WorkerError`` if a new worker does not know parcels, which say the rest."""
+        question = client.run(resolve_name, _name(ParcelOnWorker), workers=workers, on_error="return")
+        for address, there in (await self._asked(question)).items():
             if isinstance(there, ImportError | AttributeError):
                 raise WorkerError(f"the Dask worker {address} {_without(there)}")
-        for address, there in (await self._asked(client.run(environment, **options))).items():
-            if isinstance(there, dict) and (unlike := mismatch(there, environment())):
-                raise WorkerError(f"the Dask worker {address} {unlike}")
 
     async def _asked(self, question: Any) -> Any:
         """The scheduler's answer; raises ``WorkerError`` if there is none."""
@@ -188,11 +185,8 @@ class Cluster:
         try:
             outcomes = over.result()
         except self._distributed.KilledWorker:
-            for task in batch:
-                if len(batch) > 1:  # another run of the batch may be to blame
-                    self._backlog.again(task)
-                else:
-                    self._recorder.again(task, "the Dask workers that made it ended one after another")
+            for task in batch:  # another run of the batch may be to blame: each is made alone now
+                self._recorder.again(task, "the Dask workers that made it ended one after another")
             return
         except (CancelledError, asyncio.CancelledError, self._distributed.core.CommClosedError) as error:
             raise self._lost() from error

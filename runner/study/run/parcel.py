@@ -17,6 +17,7 @@ from collections.abc import Mapping
 from functools import lru_cache
 from importlib import import_module
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 from ...model.catalogue.code import code_of
@@ -55,11 +56,11 @@ def pack(plan: Plan) -> bytes:
     return zlib.compress(pickle.dumps(found), 1)
 
 
-def unpack(parcel: bytes, root: Path) -> Plan:
-    """Unpack the files of a parcel below a folder, as they were below the root of their machine; returns the plan.
+def unpack(parcel: bytes, root: Path) -> tuple[dict[str, Any], str, str]:
+    """Unpack the files of a parcel below a folder, as they were below the root of their machine.
 
-    The working directory becomes that of the study, so that names of files in ``--set`` mean the same.  Raises
-    ``WorkerError`` on a machine where a seed may give a different run.
+    Returns what a ``ParcelWorker`` is made of: the manifest, the folder, and what is the working directory in it.
+    Raises ``WorkerError`` on a machine where a seed may give a different run.
     """
     found: dict[str, Any] = pickle.loads(zlib.decompress(parcel))
     if unlike := mismatch(environment(), found["environment"]):
@@ -72,9 +73,8 @@ def unpack(parcel: bytes, root: Path) -> Plan:
     study, folder = below(root, manifest["file"]), below(root, found["folder"])
     for each in (study.parent, folder):  # a name may pass through them
         each.mkdir(parents=True, exist_ok=True)
-    os.chdir(folder)
     types = [str(below(root, name)) for name in manifest["types"]]
-    return Plan.of_manifest(manifest | {"file": str(study), "types": types}).allowed()
+    return manifest | {"file": str(study), "types": types}, str(root), str(folder)
 
 
 def below(root: Path, name: str) -> Path:
@@ -129,17 +129,20 @@ def _code() -> str:
 
 
 class ParcelWorker:
-    """Makes runs of a plan whose files are elsewhere than in the study's place."""
+    """Makes runs of a plan whose files are elsewhere than in the study's place.
 
-    def __init__(self, parcel: bytes, folder: str) -> None:
-        self._root = str(Path(folder).resolve())
+    The working directory becomes that of the study, so that names of files in ``--set`` mean the same.
+    """
+
+    def __init__(self, manifest: Mapping[str, Any], root: str, folder: str) -> None:
+        self._root = root
+        os.chdir(folder)
         try:
-            plan = unpack(parcel, Path(self._root))
+            self._runner = Runner.of_manifest(manifest)
         except ModelError as error:
             raise WorkerError(
                 f"cannot read the study, although this machine can:\n{self._named(str(error))}\n{SENT}"
             ) from error
-        self._runner = Runner(plan)
 
     def prepare(self, task: Task) -> None:
         """Load the model; raises ``WorkerError`` if this reads other contents than in the study's place."""
@@ -190,11 +193,13 @@ class ParcelOnWorker:
             return state is not None and state.state not in ("cancelled", "released")
 
         given = json.loads(batch)
-        with self._guard:
-            if self._processes is None:
-                self._processes = Processes(ParcelWorker, self._parcel, place=worker.local_directory)
-                weakref.finalize(self, self._processes.end)
         try:
+            with self._guard:
+                if self._processes is None:
+                    self._folder = TemporaryDirectory(prefix="epicycle-", dir=worker.local_directory)
+                    root = Path(self._folder.name).resolve()
+                    self._processes = Processes(ParcelWorker, *unpack(self._parcel, root))
+                    weakref.finalize(self, self._processes.end)
             return [self._processes.make(Task(*each), given["timeout"], is_wanted) for each in given["tasks"]]
         except UnwantedError:
             return []  # nobody will read it

@@ -5,8 +5,6 @@ This process survives runs that hang or kill their process, and can end them.
 
 from __future__ import annotations
 
-import shutil
-import tempfile
 import threading
 from collections.abc import Callable
 from typing import Any, Protocol
@@ -30,17 +28,15 @@ class Worker(Protocol):
 class Processes:
     """Several processes at once, each of which makes one thing after another.
 
-    In each, ``begin(*arguments)`` makes the worker.  ``place``, if given, is where each gets a temporary folder, which
-    becomes the last argument.
+    In each, ``begin(*arguments)`` makes the worker.
     """
 
-    def __init__(self, begin: Callable[..., Worker], *arguments: object, place: str = "") -> None:
+    def __init__(self, begin: Callable[..., Worker], *arguments: object) -> None:
         self._begin = begin
         self._arguments = arguments
-        self._place = place
         self._guard = threading.Lock()
         self._idle: list[Process] = []
-        self._folders: dict[Process, str] = {}  # of all of them
+        self._all: set[Process] = set()
         self._is_over = False
 
     def start(self, number: int) -> None:
@@ -77,9 +73,9 @@ class Processes:
         """End all, even in the middle of their work."""
         with self._guard:
             self._is_over = True
-            there = [*self._folders]
+            there = [*self._all]
         for each in there:
-            self._end(each)
+            each.end()
 
     def __enter__(self) -> Processes:
         return self
@@ -93,9 +89,8 @@ class Processes:
                 raise UnwantedError
             if self._idle:
                 return self._idle.pop()
-            folder = tempfile.mkdtemp(prefix="epicycle-", dir=self._place) if self._place else ""
-            found = Process(self._begin, *self._arguments, *([folder] if folder else []))
-            self._folders[found] = folder
+            found = Process(self._begin, *self._arguments)
+            self._all.add(found)
         return found
 
     def _give_back(self, process: Process, is_good: bool) -> None:
@@ -103,10 +98,5 @@ class Processes:
             if is_good and not self._is_over:
                 self._idle.append(process)
                 return
-        self._end(process)
-
-    def _end(self, process: Process) -> None:
-        """End a process, and leave nothing behind."""
         process.end()
-        if folder := self._folders.pop(process, ""):
-            shutil.rmtree(folder, ignore_errors=True)
+        self._all.discard(process)

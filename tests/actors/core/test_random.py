@@ -122,11 +122,6 @@ def test_the_inverse_normal_law_is_exact_to_its_last_digits() -> None:
     assert [laws.standard_normal(one(word)) for word in (0, 2**64 - 1)] == [-8.209536151601386, 8.209536151601386]
 
 
-def test_the_normal_distribution_function() -> None:
-    places = np.linspace(-9.0, 9.0, 1_001)
-    assert np.abs([laws.normal_share(x) for x in places] - stats.norm.cdf(places)).max() < 2e-15
-
-
 @pytest.mark.parametrize("name", ["uniform", "normal", "lognormal", "exponential", "gumbel", "laplace", "logistic"])
 def test_one_word_makes_one_value_that_grows_with_it(name: str) -> None:
     if name == "uniform":

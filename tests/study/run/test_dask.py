@@ -211,14 +211,16 @@ class Stroll(Actor):
     "types/steps.py": "STEP = 0.25\n",
 }
 UNPACKED = """
-import json, sys
+import json, os, sys
 from pathlib import Path
 from epicycle.runner.study.run.runner import Runner
 from epicycle.runner.study.run.parcel import unpack
 from epicycle.runner.study.run.backlog import Backlog
 
-plan = unpack(Path(sys.argv[1]).read_bytes(), Path(sys.argv[2]).resolve())
-backlog, runner = Backlog(plan, {}), Runner(plan)
+manifest, _, folder = unpack(Path(sys.argv[1]).read_bytes(), Path(sys.argv[2]).resolve())
+os.chdir(folder)
+runner = Runner.of_manifest(manifest)
+backlog = Backlog(runner.plan, {})
 print(json.dumps([runner.make(task) | {"wall_time": 0} for task in iter(backlog.next, None)]))
 """
 

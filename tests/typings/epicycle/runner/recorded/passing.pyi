@@ -1,0 +1,1 @@
+from runner.recorded.passing import *
