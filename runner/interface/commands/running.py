@@ -156,12 +156,7 @@ def view(options: argparse.Namespace) -> int:
     check_path("--out", options.out)
     exports = _exports(options)
     runs = [open_run(options, running.view, name) for name in options.models]
-    made = recorded(
-        [run.model for run in runs],
-        seed=[run.seed for run in runs],
-        until=[run.until for run in runs],
-        names=[Path(name).name.removesuffix(".yaml") for name in options.models],
-    )
+    made = recorded(runs, names=[Path(name).name.removesuffix(".yaml") for name in options.models])
     for name, run, recording in zip(options.models, runs, made.recordings, strict=False):
         if not made.errors and recording.results is not None:
             complain_of_change(name, run.digest, recording.results.digest)
