@@ -15,7 +15,7 @@ from epicycle.runner.model.build.figures import figures_of
 from epicycle.runner.model.catalogue.packaged import packaged_models
 from epicycle.runner.model.text.problems import Problems
 from epicycle.runner.show.outcome import draw_figures, shown
-from epicycle.runner.show.view.page import write_page
+from epicycle.runner.show.view.pages import Page
 from epicycle.runner.show.view.recording import Recording
 
 UNTIL = {"mg1": 1000.0, "mm1": 1000.0, "switched_network": 0.2}  # s; as much as a page can show in full
@@ -92,7 +92,7 @@ def _exhibit(name: str, path: Path, folder: Path) -> Exhibit:
     problems.raise_if_any()
     recording = Recording(model, figures)
     results = recording.run(until=until)
-    write_page([recording], folder / "view.html")
+    Page([recording]).save(folder / "view.html")
     drawn, failed = draw_figures(folder, results, figures)
     if failed:
         raise failed[0]

@@ -124,10 +124,11 @@ class Comparison(Answer):
     def page(self, progress: bool = True) -> Page:
         """The first runs of the first two variants side by side."""
         from ..show.view.pages import recorded
+        from ..study.run_spec import OpenedRun
 
         names = [*self.models][:2]
-        models = [self.models[name] for name in names]
-        return recorded(models, seed=self.seeds[0], until=self.until, names=names, progress=progress)
+        runs = [OpenedRun(self.models[name], self.seeds[0], self.until) for name in names]
+        return recorded(runs, names=names, progress=progress)
 
     def save(self, folder: str | Path | None = None, *, page: bool = False) -> list[Path]:
         """Write the facts as JSON, the metrics of every run as CSV and, if asked for, ``page`` as HTML.

@@ -154,11 +154,13 @@ class Explanation(Answer):
     def page(self, *, progress: bool = True) -> Page:
         """A page with the run of these acts beside the one without any."""
         from ..show.view.pages import recorded
+        from ..study.run_spec import OpenedRun
 
         models = [copy.copy(self._program) for _ in range(2)]
         models[0].exactly, models[1].exactly = self.others.union(self.names), self.others
         names = [f"{counted(len(self.effects), 'fault')}", "no fault"]
-        return recorded(models, seed=self.seed, until=self.until, names=names, progress=progress)
+        runs = [OpenedRun(model, self.seed, self.until) for model in models]
+        return recorded(runs, names=names, progress=progress)
 
     @property
     def is_interrupted(self) -> bool:

@@ -33,7 +33,7 @@ from ..model.text.patterns import PatternError, select
 from ..model.text.problems import Problems
 from ..show.view import differing
 from ..show.view.pages import Page, Watch, recorded
-from ..study.run_spec import opened, seconds, spec_of
+from ..study.run_spec import OpenedRun, opened, seconds, spec_of
 from ..support.shown import short
 from ..support.tables import Table
 from .answer import Answer, listed
@@ -77,9 +77,7 @@ def what_if(
     """
     fork = forked(model, at, changes, seed=seed, until=until, watch=watch)
     page = recorded(
-        [model, fork.model],
-        seed=seed,
-        until=until,
+        [OpenedRun(each, seed, until) for each in (model, fork.model)],
         names=[AS_IT_WAS, INSTEAD],
         acts=[None, fork.acts],
         progress=progress,

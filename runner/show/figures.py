@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -24,7 +23,6 @@ from .sheet import (
     Sheet,
     colours,
     in_common,
-    key_beside,
     legend_beside,
     set_log,
 )
@@ -100,8 +98,7 @@ class TimeSeries(Figure):
                 if self.style == "steps" and times[-1] < end:
                     times, values = np.append(times, end), np.append(values, values[-1])
                 handles += axes.plot(times, values, color=shade, label=name, **look[self.style])
-                every = slice(None, None, math.ceil(len(times) * len(lines) / MAX_TIPS) or 1)
-                places = [*zip(times[every], values[every], strict=True)]
+                places = [*zip(times, values, strict=True)]
                 texts = [f"{name}\n{time:.6g} s: {value:.5g}" for time, value in places]
             else:
                 axes.fill_between(found.times, found.low, found.high, color=shade, alpha=0.3, linewidth=0)
@@ -113,9 +110,9 @@ class TimeSeries(Figure):
                     f"{low:.5g} to {high:.5g}, mean {mean:.5g}"
                     for time, low, high, mean in zip(*found[:4], strict=True)
                 ]
-            sheet.tip(axes, places, texts)
+            sheet.tip(axes, places, texts, most=MAX_TIPS // len(lines) or 1)
         if len(names) > 1:
-            key_beside(axes, names, handles, shades)
+            sheet.key(axes, names, handles, shades)
         axes.set_ylabel(fill(self.label or _shared(names), _LETTERS))
         set_log(axes, x=False, y=self.log_y)
         return said
@@ -201,7 +198,7 @@ class Histogram(Figure):
         axes.yaxis.set_major_formatter(lambda share, _: f"{100 * share:g} %")
         said = [f"mean {np.mean(values):.4g}" if len(values) else "no values" for values in columns.values()]
         if len(columns) > 1:
-            key_beside(axes, [*columns], handles, shades, said)
+            sheet.key(axes, [*columns], handles, shades, said)
         left_out = count - sum(map(len, columns.values()))
         title = [axes.get_title("left"), *(said if len(said) == 1 else [])]
         title += [f"{left_out:,} values that are not positive are left out"] if left_out else []

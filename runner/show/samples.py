@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from array import array
 from collections.abc import Iterator, Sequence
-from itertools import groupby
+from itertools import groupby, islice
 from operator import itemgetter
 from typing import NamedTuple, TypeAlias
 
@@ -13,15 +13,16 @@ from numpy.typing import NDArray
 
 from epicycle.aspects import STAMP
 
-from ..execution.results import Results, cell, leaves
+from ..execution.results import Results, Signal, cell, leaves
 from ..model.text.patterns import select
 
 COLUMNS = 700  # approximate width of a panel in pixels
 _DENSE = 4  # samples per column above which they are drawn as an envelope
 
 Floats: TypeAlias = NDArray[np.float64]
-Numbers: TypeAlias = dict[str, tuple["array[float]", "array[float]"]]  # times and values
-States: TypeAlias = dict[str, tuple["array[float]", list[str | None]]]  # times and names
+Rows: TypeAlias = "array[int]"
+Numbers: TypeAlias = dict[str, tuple[Floats, "array[float]"]]  # times and values
+States: TypeAlias = dict[str, tuple[Floats, list[str | None]]]  # times and names
 Span: TypeAlias = tuple[float, float, str]  # start, end, state
 
 
@@ -31,30 +32,43 @@ def selected(patterns: tuple[str, ...], results: Results) -> list[str]:
 
 
 def read(patterns: tuple[str, ...], results: Results) -> tuple[Numbers, States]:
-    """All numbers and states in tokens, by signal and place in the token, except time stamps.
-
-    A state is None where the value is something else; a place that never holds a state is left out.
-    """
+    """All numbers and states in tokens, by signal and place in the token."""
     numbers: Numbers = {}
     states: States = {}
     for name in selected(patterns, results):
         signal = results.signals[name]
-        for tag, token in zip(signal.tags, signal.tokens, strict=True):
-            for place, leaf in leaves(token):
-                if place.rpartition(".")[2] == STAMP:
-                    continue
-                kind, value, text = cell(leaf)
-                where, state = f"{name}.{place}" if place else name, None
-                if kind in ("int", "float"):
-                    if value is not None:
-                        times, values = numbers.setdefault(where, (array("d"), array("d")))  # 16 bytes a number
-                        times.append(tag.seconds)
-                        values.append(value)
-                elif kind != "none" and (isinstance(leaf, str) or not hasattr(leaf, "__len__")):
-                    state = text if kind != "bool" else "true" if value else "false"
-                moments, found = states.setdefault(where, (array("d"), []))
-                moments.append(tag.seconds)
-                found.append(state)
+        times, (of_numbers, of_states) = signal.times, columns(signal)
+        numbers |= {where: (times[rows], values) for where, (rows, values) in of_numbers.items()}
+        states |= {where: (times[rows], found) for where, (rows, found) in of_states.items()}
+    return numbers, states
+
+
+def columns(
+    signal: Signal, most: int | None = None
+) -> tuple[dict[str, tuple[Rows, array[float]]], dict[str, tuple[Rows, list[str | None]]]]:
+    """The numbers and the states in the first ``most`` places of a signal's tokens, except time stamps, by signal and
+    place, with the indices of their tokens.
+
+    A state is None where the value is something else; a place that never holds a state is left out.
+    """
+    numbers: dict[str, tuple[Rows, array[float]]] = {}  # 16 bytes a number
+    states: dict[str, tuple[Rows, list[str | None]]] = {}
+    for row, (_, token) in enumerate(signal):
+        for place, leaf in islice(leaves(token), most):
+            if place.rpartition(".")[2] == STAMP:
+                continue
+            kind, value, text = cell(leaf)
+            where, state = f"{signal.name}.{place}" if place else signal.name, None
+            if kind in ("int", "float"):
+                if value is not None:
+                    rows, values = numbers.setdefault(where, (array("q"), array("d")))
+                    rows.append(row)
+                    values.append(value)
+            elif kind != "none" and (isinstance(leaf, str) or not hasattr(leaf, "__len__")):
+                state = text if kind != "bool" else "true" if value else "false"
+            rows, found = states.setdefault(where, (array("q"), []))
+            rows.append(row)
+            found.append(state)
     return numbers, {where: column for where, column in states.items() if any(each is not None for each in column[1])}
 
 
@@ -99,7 +113,7 @@ def envelope(times: Floats, values: Floats, begin: float, end: float, *, holds: 
     return Envelope(middle, low, high, np.where(whole > 0.0, mean, (low + high) / 2), float(edges[1] - edges[0]))
 
 
-def spans_of(times: Sequence[float], states: Sequence[str | None], end: float) -> Iterator[Span]:
+def spans_of(times: Sequence[float] | Floats, states: Sequence[str | None], end: float) -> Iterator[Span]:
     """The span of each state; equal successive states are merged, and states without duration are left out."""
     parts = zip(times, [*times[1:], end][: len(times)], states, strict=True)
     for state, alike in groupby((part for part in parts if part[0] < part[1]), key=itemgetter(2)):

@@ -121,23 +121,37 @@ class Sheet:
         columns = max(1, min(len(handles), fit, 5))
         self.canvas.legend(handles, labels, title=title or None, loc="outside upper center", ncols=columns)
 
-    def band(self, names: Sequence[str], shades: Sequence[str], title: str) -> None:
-        """Add a band of colours beside all panels in place of a legend."""
+    def band(self, names: Sequence[str], shades: Sequence[str], title: str, axes: Any = None) -> None:
+        """Add a band of colours beside a panel, or beside all of them, in place of a legend with many names."""
         from matplotlib.cm import ScalarMappable
         from matplotlib.colors import BoundaryNorm, ListedColormap
 
         edges = [index - 0.5 for index in range(len(names) + 1)]
         scale = ScalarMappable(BoundaryNorm(edges, len(names)), ListedColormap(list(shades)))
         every = math.ceil(len(names) / _NAMED)
-        bar = self.canvas.colorbar(scale, ax=self.axes, ticks=range(0, len(names), every), pad=0.02, fraction=0.05)
+        ticks, beside = range(0, len(names), every), self.axes if axes is None else axes
+        bar = self.canvas.colorbar(scale, ax=beside, ticks=ticks, pad=0.02, fraction=0.05)
         bar.ax.set_yticklabels([abridged(name, _MAX_NAME) for name in names[::every]])
         bar.ax.tick_params(labelsize=7, length=2)
+        bar.minorticks_off()
         bar.outline.set_visible(False)
         bar.ax.set_title(fill(title, 18), loc="left", fontsize=8)
 
-    def tip(self, axes: Any, places: Iterable[tuple[float, float]], texts: Iterable[str]) -> None:
-        """Add tips at places of a panel, in its coordinates."""
-        self._tips += [(axes, x, y, text) for (x, y), text in zip(places, texts, strict=True)]
+    def key(
+        self, axes: Any, names: Sequence[str], handles: Sequence[Any], shades: Sequence[str], said: Sequence[str] = ()
+    ) -> None:
+        """Add a legend for a few lines beside a panel, which says more of each, or a band for many."""
+        if len(names) <= FEW:
+            labels = [f"{name}, {more}" for name, more in zip(names, said, strict=True)] if said else names
+            legend_beside(axes, handles=handles, labels=labels)
+        else:
+            title, rows = in_common(names)
+            self.band(rows, shades, title, axes)
+
+    def tip(self, axes: Any, places: Iterable[tuple[float, float]], texts: Iterable[str], most: int = MAX_TIPS) -> None:
+        """Add tips at places of a panel, in its coordinates; only a part if there are more than ``most``."""
+        found = [(axes, x, y, text) for (x, y), text in zip(places, texts, strict=True)]
+        self._tips += found[:: math.ceil(len(found) / most) or 1]
 
     def save(self, paths: Sequence[Path]) -> None:
         """Write the files, whose endings determine the format; SVG files contain the tips."""
@@ -206,34 +220,6 @@ def legend_beside(axes: Any, **options: Any) -> None:
     found = axes.legend(loc="upper left", bbox_to_anchor=(1.02, 1.0), borderaxespad=0.0, **options)
     for text in found.get_texts():
         text.set_text(fill(abridged(text.get_text(), 2 * _MAX_NAME), _MAX_NAME))
-
-
-def band_beside(axes: Any, names: Sequence[str], shades: Sequence[str]) -> None:
-    """A band of colours to the right of the axes, in place of a legend with many names; the first one is on top."""
-    from matplotlib.colors import ListedColormap
-
-    title, rows = in_common(names)
-    band = axes.inset_axes((1.03, 0.0, 0.025, 1.0))
-    band.imshow([[index] for index in range(len(rows))], cmap=ListedColormap(list(shades)), aspect="auto")
-    every = math.ceil(len(rows) / _NAMED)
-    band.set_yticks(range(0, len(rows), every), [abridged(name, _MAX_NAME) for name in rows[::every]])
-    band.tick_params(right=True, labelright=True, left=False, labelleft=False, labelsize=7, length=2)
-    band.set_xticks([])
-    band.grid(visible=False)
-    band.spines[:].set_visible(False)
-    if title:
-        band.set_title(abridged(title, _MAX_NAME), loc="left", fontsize=8)
-
-
-def key_beside(
-    axes: Any, names: Sequence[str], handles: Sequence[Any], shades: Sequence[str], said: Sequence[str] = ()
-) -> None:
-    """A legend for a few lines, which says more of each, or a band for many."""
-    if len(names) <= FEW:
-        labels = [f"{name}, {more}" for name, more in zip(names, said, strict=True)] if said else names
-        legend_beside(axes, handles=handles, labels=labels)
-    else:
-        band_beside(axes, names, shades)
 
 
 def in_common(names: Sequence[str]) -> tuple[str, list[str]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -51,22 +52,26 @@ def has_tracks(signal: Signal) -> bool:
 
 
 def tracked(signal: Signal) -> dict[str, tuple[list[int], Floats]]:
-    """The ``ellipses`` of each track of such a signal, by a name with its number, and the indices of their tokens; a
-    row is NaN where the track has ended."""
-    found: dict[int, list[tuple[int, tuple[float, ...]]]] = {}
-    before: tuple[int, ...] = ()
-    for index, token in enumerate(signal.tokens):
-        for number, estimate in zip(token.numbers, token.estimates, strict=True):
-            found.setdefault(number, []).append((index, ellipse(estimate)))
-        for number in sorted({*before} - {*token.numbers}):
-            found[number].append((index, (np.nan,) * 5))
-        before = tuple(token.numbers)
-    return _named(signal, found, 5)
+    """The ``ellipses`` of each track of such a signal, as ``_numbered`` gives them."""
+    tokens = signal.tokens
+    return _numbered(
+        signal,
+        ({n: ellipse(one) for n, one in zip(token.numbers, token.estimates, strict=True)} for token in tokens),
+        5,
+    )
 
 
-def _named(
-    signal: Signal, found: dict[int, list[tuple[int, tuple[float, ...]]]], width: int
+def _numbered(
+    signal: Signal, tokens: Iterable[Mapping[int, tuple[float, ...]]], width: int
 ) -> dict[str, tuple[list[int], Floats]]:
+    """The rows of each number in tokens, by a name with it, and the indices of their tokens; where a number is missing
+    after a token that has it, its row is NaN."""
+    found: dict[int, list[tuple[int, tuple[float, ...]]]] = {}
+    before: Iterable[int] = ()
+    for index, rows in enumerate(tokens):
+        for number in {*before, *rows}:
+            found.setdefault(number, []).append((index, rows.get(number, (np.nan,) * width)))
+        before = rows
     return {
         f"{signal.name}[{number}]": (
             [index for index, _ in rows],
@@ -96,26 +101,14 @@ def tubes(signal: Signal, period: float, initial: float, growth: float) -> Float
 
 def sights(signal: Signal) -> dict[str, tuple[list[int], Floats]]:
     """Measurements of a relative position as lines from the sensor to its target, by name, with the indices of their
-    tokens.
-
-    The lines of a scan have a number each; a row is NaN where a scan has fewer.
-    """
-    if not any(hasattr(token, "values") for token in signal.tokens[:1]):
-        found = [
-            (index, _sight(token.observer, token.value))
-            for index, token in enumerate(signal.tokens)
-            if len(token.value) == len(token.observer)
-        ]
+    tokens; the lines of a scan have a number each, as in ``_numbered``."""
+    tokens = signal.tokens
+    if not any(hasattr(token, "values") for token in tokens[:1]):
+        found = [(n, _sight(t.observer, t.value)) for n, t in enumerate(tokens) if len(t.value) == len(t.observer)]
         rows = np.array([row for _, row in found], dtype=float).reshape(-1, 4)
         return {signal.name: ([index for index, _ in found], rows)}
-    most = max((len(token.values) for token in signal.tokens), default=0)
-    lines: dict[int, list[tuple[int, tuple[float, ...]]]] = {number: [] for number in range(most)}
-    for index, token in enumerate(signal.tokens):
-        values = token.values if np.shape(token.values)[1:] == (2,) else ()
-        for number in range(most):
-            there = number < len(values)
-            lines[number].append((index, _sight(token.observer, values[number]) if there else (np.nan,) * 4))
-    return _named(signal, lines, 4)
+    scans = ((token.observer, token.values if np.shape(token.values)[1:] == (2,) else ()) for token in tokens)
+    return _numbered(signal, (dict(enumerate(_sight(observer, v) for v in seen)) for observer, seen in scans), 4)
 
 
 def _sight(observer: Any, value: Any) -> tuple[float, ...]:

@@ -15,7 +15,7 @@ from ..execution.results import Results, Signal
 from ..model.catalogue.figure import Figure, Mark, Shape
 from .figures import title_of
 from .samples import Floats, selected
-from .sheet import FEW, LIMIT, Sheet, band_beside, colours, legend_beside
+from .sheet import FEW, LIMIT, Sheet, colours, in_common, legend_beside
 from .space import ellipse, ellipses, has_tracks, positions, sights, tracked, tubes
 
 TIMES = 8  # written beside a path
@@ -106,7 +106,8 @@ class Trajectories(Figure):
         if len(robots) <= FEW:
             legend_beside(axes)
         else:
-            band_beside(axes, [name.rpartition(".")[0] or name for name in robots], shades)
+            title, names = in_common([name.rpartition(".")[0] or name for name in robots])
+            sheet.band(names, shades, title, axes)
             axes.legend(loc="best", fontsize=7)
         for name in robots[:1]:
             signal = results.signals[name]
@@ -193,9 +194,8 @@ def arrows(axes: Any, points: Floats, shade: str, *, size: float = 11.0, zorder:
 
 def tip_path(sheet: Sheet, axes: Any, name: str, times: Floats, points: Floats, most: int = 150) -> None:
     """Add tips that show the time at places of a path, at most ``most`` of them."""
-    each = math.ceil(len(points) / most) or 1
     texts = [f"{name}\n{time:.4g} s at ({x:.4g}, {y:.4g}) m" for time, (x, y) in zip(times, points, strict=True)]
-    sheet.tip(axes, points[::each], texts[::each])
+    sheet.tip(axes, points, texts, most)
 
 
 def write_times(axes: Any, points: Floats, times: Floats, marks: Sequence[int], shade: str) -> None:

@@ -9,6 +9,7 @@ EXTRAS = {  # by which extra each is installed
     "anyio": "studio",
     "control": "control",
     "fmpy": "fmi",
+    "foxglove": "mcap",
     "gymnasium": "rl",
     "lsprotocol": "editor",
     "mcap": "ros",
@@ -17,24 +18,26 @@ EXTRAS = {  # by which extra each is installed
     "pettingzoo": "rl",
     "pydantic": "agents",
     "pygls": "editor",
+    "rerun": "rerun",
     "rosbags": "ros",
     "starlette": "studio",
     "uvicorn": "studio",
     "websockets": "studio",
 }
+DISTRIBUTIONS = {"foxglove": "foxglove-sdk", "rerun": "rerun-sdk"}  # of packages that are installed by other names
 
 
 def needed(module: str, who: str, extra: str = "") -> Any:
     """A module; raises ``EpicycleError`` if a package that it needs is missing, which may come with an ``extra``."""
     try:
         return import_module(module)
-    except ModuleNotFoundError as error:
+    except ImportError as error:  # of the package, or of something that an older one lacks
         package = (error.name or "").partition(".")[0]
         if package not in EXTRAS:
             raise
         from epicycle.actors import EpicycleError  # here, because help needs nothing heavy
 
         raise EpicycleError(
-            f"{who} needs the package {package}, which is not installed: "
+            f"{who} needs the package {DISTRIBUTIONS.get(package, package)}, which is not installed: "
             f"pip install 'epicycle[{extra or EXTRAS[package]}]'"
         ) from None

@@ -167,8 +167,8 @@ def test_other_viewers_are_shown_one_run(line: str, capsys: pytest.CaptureFixtur
     [
         (
             "--mcap",
-            "mcap.writer",
-            "an MCAP file needs the package mcap, which is not installed: pip install 'epicycle[mcap]'",
+            "foxglove",
+            "an MCAP file needs the package foxglove-sdk, which is not installed: pip install 'epicycle[mcap]'",
         ),
         (
             "--rerun",
@@ -186,6 +186,7 @@ def test_what_is_missing_for_other_viewers_is_said_before_the_run(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setitem(sys.modules, module, None)
+    monkeypatch.delitem(sys.modules, f"epicycle.runner.show.view.{flag[2:]}_file", raising=False)
     monkeypatch.setattr(
         "epicycle.runner.show.view.recording.Recording.run", lambda *_, **__: pytest.fail("the model was run")
     )

@@ -99,16 +99,14 @@ def legend(axes: Any) -> list[str]:
 
 def test_twenty_robots_have_a_band_in_place_of_a_legend(sheets: list[Sheet], tmp_path: Path) -> None:
     draw("f", Trajectories(robots="robot[*].state"), fleet(20), tmp_path / "f.svg")
-    (axes,) = sheets[0].axes
-    (band,) = axes.child_axes
+    (axes, band) = sheets[0].canvas.axes
     assert band.get_title(loc="left") == "robot[*]"
     assert [text.get_text() for text in band.get_yticklabels()] == [str(number) for number in range(20)]
     assert legend(axes) == ["goal"]
     ways = [line for line in axes.lines if line.get_linestyle() == "-" and len(line.get_xdata()) > 2]
     assert len({line.get_color() for line in ways}) == 20
     draw("f", Trajectories(robots="robot[*].state"), fleet(FEW), tmp_path / "f.svg")
-    (axes,) = sheets[1].axes
-    assert axes.child_axes == []
+    (axes,) = sheets[1].canvas.axes
     assert legend(axes) == [*(f"robot[{number}]" for number in range(FEW)), "goal"]
 
 

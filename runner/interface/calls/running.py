@@ -164,10 +164,4 @@ def view(
     if len(runs) == 2 and not names:
         names = [each.model.name for each in runs]
         names = [f"{name} {number}" for number, name in enumerate(names, 1)] if len({*names}) == 1 else names
-    return recorded(
-        [each.model for each in runs],
-        seed=[each.seed for each in runs],
-        until=[each.until for each in runs],
-        names=names,
-        progress=progress,
-    )
+    return recorded(runs, names=names, progress=progress)

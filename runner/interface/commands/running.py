@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ...support.declare.commands import arguments
+from ...support.extras import needed
 from ...support.printing import console, tell, tell_json
 from ..calls import running
 from .options import (
@@ -155,12 +156,7 @@ def view(options: argparse.Namespace) -> int:
     check_path("--out", options.out)
     exports = _exports(options)
     runs = [open_run(options, running.view, name) for name in options.models]
-    made = recorded(
-        [run.model for run in runs],
-        seed=[run.seed for run in runs],
-        until=[run.until for run in runs],
-        names=[Path(name).name.removesuffix(".yaml") for name in options.models],
-    )
+    made = recorded(runs, names=[Path(name).name.removesuffix(".yaml") for name in options.models])
     for name, run, recording in zip(options.models, runs, made.recordings, strict=False):
         if not made.errors and recording.results is not None:
             complain_of_change(name, run.digest, recording.results.digest)
@@ -185,19 +181,17 @@ def _exports(options: argparse.Namespace) -> list[tuple[Path, Callable[[Recordin
     """The files for other viewers and the functions that write them; obstacles are reported before a run."""
     from epicycle.actors import EpicycleError
 
-    from ...show.view.mcap_file import require_mcap, write_mcap
-    from ...show.view.rerun_file import require_rerun, write_rerun
-
+    room = "epicycle.runner.show.view"
     found: list[tuple[Path, Callable[[Recording, Path], None]]] = []
-    for flag, path, require, write in (
-        ("--mcap", options.mcap, require_mcap, write_mcap),
-        ("--rerun", options.rerun, require_rerun, write_rerun),
+    for extra, path, what in (
+        ("mcap", options.mcap, "an MCAP file"),
+        ("rerun", options.rerun, "a recording for rerun"),
     ):
         if path is None:
             continue
         if len(options.models) > 1:
-            raise EpicycleError(f"{flag} writes one run, not two: {', '.join(options.models)}")
-        check_path(flag, path)
-        require()
-        found.append((path, write))
+            raise EpicycleError(f"--{extra} writes one run, not two: {', '.join(options.models)}")
+        check_path(f"--{extra}", path)
+        module = needed(f"{room}.{extra}_file", what, extra)
+        found.append((path, getattr(module, f"write_{extra}")))
     return found

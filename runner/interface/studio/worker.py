@@ -28,7 +28,7 @@ from ...show.view.drawing import drawn
 from ...show.view.page import data_of, metrics
 from ...show.view.pages import recorded
 from ...show.view.recording import Recording
-from ...study.run_spec import RunSpec, named
+from ...study.run_spec import OpenedRun, RunSpec, named
 from ...support.apart import is_hastened, say
 from ..calls.changes import classes
 
@@ -169,7 +169,9 @@ class Worker:
     def run(self, asked: Message) -> Message:
         """Run the model, if it is valid, within the limits; metrics are sent on the way."""
         started = time.monotonic()
-        page = recorded([self.model], most=MOST, progress=False, watch=partial(self._watch, tells=True))
+        page = recorded(
+            [OpenedRun(self.model, None, None)], most=MOST, progress=False, watch=partial(self._watch, tells=True)
+        )
         [recording] = page.recordings
         results = recording.results
         assert results is not None

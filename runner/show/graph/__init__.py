@@ -17,9 +17,9 @@ from pathlib import Path
 
 from epicycle.actors import EpicycleError
 
-from . import mermaid_text
-from .chart import Statechart, chart_text, statechart
+from .chart import statechart
 from .layout import Drawing, draw
+from .mermaid_text import mermaid
 from .outlines import Outline, outline
 
 MOST_BOXES = 2000  # in a picture, and on a page; Mermaid text has no limit
@@ -30,7 +30,6 @@ __all__ = [
     "Drawing",
     "GraphError",
     "Outline",
-    "Statechart",
     "check_graph_path",
     "draw",
     "mermaid",
@@ -52,11 +51,6 @@ def check_graph_path(path: Path) -> None:
         raise GraphError(f"{path} cannot be written: it is a folder")
     if not path.parent.is_dir():
         raise GraphError(f"{path} cannot be written: there is no folder {path.parent}")
-
-
-def mermaid(drawn: Outline) -> str:
-    """An outline, such as a statechart, as Mermaid text."""
-    return chart_text(drawn) if isinstance(drawn, Statechart) else mermaid_text.mermaid(drawn)
 
 
 def write_graph(drawn: Outline, path: Path) -> None:

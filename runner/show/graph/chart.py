@@ -1,10 +1,9 @@
-"""Statecharts: the modes of a machine and its transitions, as an outline drawn like others, or as Mermaid text."""
+"""Statecharts: the modes of a machine and its transitions, as an outline."""
 
 from __future__ import annotations
 
 import textwrap
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
 from epicycle.actors import EpicycleError, did_you_mean
@@ -18,16 +17,7 @@ WIDEST = 34  # letters in a line of a label
 FLAGS = ("else", "immediate", "nondeterministic", "preemptive", "history", "error")
 
 
-@dataclass
-class Statechart(Outline):
-    """The content of a machine's drawing: a box for each mode, what these do, and the labels of the transitions."""
-
-    initial: Box
-    does: Mapping[str, list[str]]
-    labels: Mapping[tuple[str, str], list[str]]
-
-
-def statechart(model: Model, path: str) -> Statechart:
+def statechart(model: Model, path: str) -> Outline:
     """The statechart of a machine, or of a composite with modes; raises ``EpicycleError`` if there are none."""
     from epicycle.actors import StateMachine
 
@@ -39,9 +29,9 @@ def statechart(model: Model, path: str) -> Statechart:
         raise EpicycleError(f"{path} has no modes{did_you_mean(path, known)}; machines: {valid}")
     domain = model.graph.domains.get(found.path.rpartition(".")[0])
     refinements = {} if domain is None else domain.refinements
-    modes, does = dict[str, Box](), dict[str, list[str]]()
+    modes: dict[str, Box] = {}
     for name, mode in found.modes.items():
-        lines = does[name] = [f"{variable}' = {formula.source}" for variable, formula in mode.flow.items()]
+        lines = [f"{variable}' = {formula.source}" for variable, formula in mode.flow.items()]
         lines += [f"{when} / {_actions(acts)}" for when, acts in (("entry", mode.entry), ("exit", mode.exit)) if acts]
         if name in refinements:
             lines.append(f"refinement {model.graph.components[refinements[name]].kind}")
@@ -58,7 +48,7 @@ def statechart(model: Model, path: str) -> Statechart:
     links += [_link(modes[source], modes[target], said) for (source, target), said in labels.items()]
     whole = found.path.removesuffix(".machine")
     chart = Box(whole, whole, "modes", children=[start, *modes.values()], links=links, is_composite=True)
-    return Statechart(model, Box("", model.name, "", children=[chart], is_composite=True), 1, 1, initial, does, labels)
+    return Outline(model, Box("", model.name, "", children=[chart], is_composite=True), 1, 1)
 
 
 def _link(source: Box, target: Box, labels: list[str]) -> Link:
@@ -87,24 +77,3 @@ def _label(each: Any) -> str:
     words += [f"rate {each.rate.source}"] if each.rate is not None else []
     words += [f"[{each.when.source}]"] if each.when is not None else []
     return " ".join(words) + (f" / {_actions(each.do)}" if each.do else "")
-
-
-def chart_text(chart: Statechart) -> str:
-    """The statechart as Mermaid's state diagram."""
-    (machine,) = chart.root.children
-    lines = ["---", f"title: {machine.path}", "---", "stateDiagram-v2", f"    [*] --> {chart.initial.name}"]
-    for mode in machine.children[1:]:
-        said = map(_plain, chart.does[mode.name])
-        lines += [f"    {mode.name}: {' ⏎ '.join([mode.name, *said])}"] if mode.kind else []
-        lines += [f"    {mode.name} --> [*]"] if mode.shape == FINAL else []
-    lines += [
-        f"    {source} --> {target}" + (f": {_plain(label)}" if label else "")
-        for (source, target), labels in chart.labels.items()
-        for label in labels
-    ]
-    return "\n".join(lines) + "\n"
-
-
-def _plain(words: str) -> str:
-    """Text without characters that Mermaid would interpret."""
-    return words.replace(";", ",").replace(":", " ").replace("#", "")

@@ -5,10 +5,12 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
-from .outlines import Box, Link, Outline, Port, label, shared
+from .outlines import FINAL, MODE, START, Box, Link, Outline, Port, label, shared
 
 RESERVED = {"call", "class", "classDef", "click", "default", "direction", "end"}
 RESERVED |= {"flowchart", "graph", "href", "linkStyle", "style", "subgraph"}
+CLOSED, SHARED = "closed", "shared"
+SHAPES = {"": "[{}]", CLOSED: "[[{}]]", SHARED: "{{{{{}}}}}", START: '((" "))', MODE: "({})", FINAL: "((({})))"}
 
 
 def mermaid(outline: Outline) -> str:
@@ -49,7 +51,7 @@ class _Writer:
         for (kind, *rest), nodes in groups.items():
             if len(nodes) > 1:
                 name = self.name(f"shared {rest[-1]}")
-                yield f"{indent}{name}{{{{{_quoted(f'«{rest[-1]}»<br/>{kind}')}}}}}"
+                yield indent + name + SHAPES[SHARED].format(_quoted(f"«{rest[-1]}»\n{kind}"))
                 yield f"{indent}{name} -.- {' & '.join(nodes)}"
 
     def shown(self, path: str) -> str:
@@ -76,9 +78,9 @@ class _Writer:
                 yield from self.inside(child, indent + "    ")
                 yield f"{indent}end"
                 continue
-            aspects = "".join(f"<br/>«{name}»" for name in child.aspects)
-            title = _quoted(f"{child.name}<br/>{child.kind}{own}{aspects}")
-            yield f"{indent}{self.name(child.path)}" + (f"[[{title}]]" if child.is_closed else f"[{title}]")
+            aspects = "".join(f"\n«{name}»" for name in child.aspects)
+            title = _quoted(f"{child.name}\n{child.kind}{own}{aspects}".rstrip())
+            yield indent + self.name(child.path) + SHAPES[CLOSED if child.is_closed else child.shape].format(title)
             has_aspects = child.aspects or any(port.aspects for port in (*child.inputs, *child.outputs))
             self.marked += [self.name(child.path)] if has_aspects else []
         for link in box.links:
@@ -119,4 +121,5 @@ def _with_aspects(port: Port, *, named: bool = True) -> str:
 
 
 def _quoted(words: str) -> str:
-    return '"' + words.replace('"', "#quot;") + '"'
+    """Words in which nothing is markup but the end of a line."""
+    return '"' + words.replace('"', "#quot;").replace("<", "#lt;").replace("\n", "<br/>") + '"'

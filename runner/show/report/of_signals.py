@@ -118,10 +118,9 @@ class Series(RepeatedFigure):
                     low, high = means - halves, means + halves
                     axes.fill_between(times, low, high, color=look["color"], alpha=0.18, linewidth=0)
                     arranged.show(level, line)
-                    every = slice(None, None, math.ceil(len(times) / _TIPS))
-                    found = [*zip(times, means, halves, strict=True)][every]
-                    texts = [f"{time:.4g} s: {value:.4g} ± {half:.2g}\n{about}" for time, value, half in found]
-                    sheet.tip(axes, [(time, value) for time, value, _ in found], texts)
+                    points = zip(times, means, halves, strict=True)
+                    texts = [f"{time:.4g} s: {value:.4g} ± {half:.2g}\n{about}" for time, value, half in points]
+                    sheet.tip(axes, zip(times, means, strict=True), texts, most=_TIPS)
             set_log(axes, x=False, y=self.log_y)
         sheet.call_axes("time (s)", self.label or self._formula.source.replace(TOKEN, self.signal))
         said = f"Mean over the first {counted(self.runs, 'run')} of each condition, with its 95 % interval (Student)"

@@ -221,13 +221,12 @@ class Distributions(TableFigure):
                 look = {"drawstyle": "steps-post", **arranged.look(number)}
                 (curve,) = axes.plot([values[0], *values], shares, **look)
                 arranged.show(line, curve)
-                every = slice(None, None, math.ceil(len(values) / _TIPS))
                 unit, about = arranged.names.unit(metric), arranged.about(panel, line)
                 texts = [
                     f"{share:.3g} of the runs: up to {value:.4g} {unit}".rstrip() + f"\n{about}"
                     for value, share in zip(values, shares[1:], strict=True)
                 ]
-                sheet.tip(axes, [*zip(values, shares[1:], strict=True)][every], texts[every])
+                sheet.tip(axes, zip(values, shares[1:], strict=True), texts, most=_TIPS)
         axes.set_ylim(0.0, 1.02)
         sheet.call(axes, arranged.names.axis(metric), "share of runs")
         if self.limit is not None:

@@ -1,6 +1,6 @@
 """Prepares a run for other viewers: its marks as points, discs and paths, its firings, and the acts of its aspects.
 
-There are two exporters, because rerun (0.41) loads MCAP messages in JSON, which Foxglove reads, as raw bytes alone.
+There are two exporters, because rerun (0.41) loads only frames and logs of Foxglove's messages, no scenes and no JSON.
 These viewers have neither figures nor superdense time.  A mark becomes scenes, each of which holds until the next; at
 any moment, a viewer needs only the latest scene.
 """

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from importlib.resources import files
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,7 +14,6 @@ from ...execution.results import Results, Verdict
 from ...model.build.model import Model
 from ...model.catalogue.figure import Figure
 from ...model.graph.model_graph import ModelGraph
-from ...support.files import replace_file
 from ...support.html import Html, page, tag
 from ...support.shown import short
 from ..sheet import PALETTE
@@ -23,21 +21,14 @@ from .differing import comparison, difference, four
 from .drawing import drawn
 from .lanes import lanes
 from .packing import Pack
-from .recording import Recording, ViewError
+from .recording import Recording
 
 # In this order, because each uses the ones before it; a program that arranges them follows.
 PARTS = ("data", "causes", "paint", "state", "space", "graph", "timeline", "lanes", "chart", "details", "viewer")
 
 
-def write_page(
-    recordings: Sequence[Recording], path: Path, *, names: Sequence[str] = (), story: Sequence[str] = ()
-) -> None:
-    """Write the page of one run, or of two that are compared; raises ``ViewError``."""
-    replace_file(path, page_of(recordings, names=names, story=story), ViewError)
-
-
 def page_of(recordings: Sequence[Recording], *, names: Sequence[str] = (), story: Sequence[str] = ()) -> str:
-    """The page as text; ``names`` distinguish the runs, ``story`` are sentences about both."""
+    """The page of one run, or of two, which ``names`` distinguish; ``story`` are sentences about both."""
     data = Html(data_of(recordings, names=names, story=story))
     return page(
         f"{recordings[0].model.name} - Epicycle",

@@ -14,13 +14,14 @@ from epicycle.actors import EpicycleError
 
 from ...execution.engine import ActorError, Interventions, LoopError
 from ...model.build.figures import figures_of
-from ...model.build.model import Model
 from ...model.text.problems import Problems
+from ...study.run_spec import OpenedRun
 from ...support.bars import SOON
+from ...support.files import replace_file
 from ...support.printing import complain
 from ..watching import watched
-from .page import page_of, write_page
-from .recording import MOST, Recording
+from .page import page_of
+from .recording import MOST, Recording, ViewError
 
 Watch = Callable[[Recording | None], Callable[[float], None]]  # for a run that is recorded, or for one that is not
 
@@ -33,13 +34,13 @@ class Page:
     """
 
     recordings: Sequence[Recording]
-    names: Sequence[str]
-    errors: Sequence[EpicycleError | KeyboardInterrupt]
+    names: Sequence[str] = ()
+    errors: Sequence[EpicycleError | KeyboardInterrupt] = ()
     story: Sequence[str] = ()  # sentences about both runs
 
     def save(self, path: str | Path) -> Path:
         """Write it to a file (.html)."""
-        write_page(self.recordings, Path(path), names=self.names, story=self.story)
+        replace_file(Path(path), page_of(self.recordings, names=self.names, story=self.story), ViewError)
         return Path(path)
 
     def open(self) -> Path:
@@ -58,42 +59,38 @@ class Page:
 
 
 def recorded(
-    models: Sequence[Model],
+    runs: Sequence[OpenedRun],
     *,
-    seed: int | Sequence[int | None] | None = None,
-    until: float | Sequence[float | None] | None = None,
     names: Sequence[str] = (),
     acts: Sequence[Interventions | None] = (),
     most: int = MOST,
     progress: bool = True,
     watch: Watch | None = None,
 ) -> Page:
-    """The page of these models' runs; seeds and stop times apply to all, or are given for each.
+    """The page of these runs.
 
     ``acts`` say which acts of aspects happen in each, ``most`` how many firings are kept of it; ``watch`` gives what is
     called with the time of a run now and then, in place of a bar.
     """
     recordings, errors = [], list[EpicycleError | KeyboardInterrupt]()
-    for number, model in enumerate(models):
-        own_seed = seed[number] if isinstance(seed, Sequence) else seed
-        stop = until[number] if isinstance(until, Sequence) else until
+    for number, (model, seed, until, *_) in enumerate(runs):
         problems = Problems()
         figures = figures_of(model, problems)
         problems.raise_if_any()
-        if stop is None and model.endless and watch is None:
+        if until is None and model.endless and watch is None:
             complain(
                 f"{model.endless}\n   help: end it with Ctrl-C, which keeps what was recorded, or give a stop time"
             )
         own_acts = acts[number] if acts else None
-        recording = Recording(model, figures, seed=own_seed, most=most, is_compared=len(models) > 1, acts=own_acts)
+        recording = Recording(model, figures, seed=seed, most=most, is_compared=len(runs) > 1, acts=own_acts)
         recordings.append(recording)
         look = nullcontext(watch(recording)) if watch else nullcontext()
-        with watched(model, stop, SOON) if progress else look as report:
+        with watched(model, until, SOON) if progress else look as report:
             try:
-                recording.run(until=stop, progress=report)
+                recording.run(until=until, progress=report)
             except (ActorError, LoopError) as error:  # what led to the error is the very thing to look at
                 errors.append(error)
             except KeyboardInterrupt as error:  # the records are kept, and nothing else is started
                 errors.append(error)
                 break
-    return Page(recordings, names if len(recordings) > 1 else [], errors)
+    return Page(recordings, names if len(recordings) > 1 else (), errors)

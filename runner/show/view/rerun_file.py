@@ -5,18 +5,21 @@ from __future__ import annotations
 import math
 from bisect import bisect_right
 from collections.abc import Callable, Iterable, Sequence
-from itertools import chain, islice
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyarrow
+import rerun
+import rerun.blueprint as views
+from rerun.blueprint import StateTimelineView  # other packages of this name do not have it
 
 from epicycle.actors import Tag
-from epicycle.aspects import STAMP
 
-from ...execution.results import Signal, cell, leaves
+from ...execution.results import Signal
 from ...support.files import replace_file
-from ..samples import selected
+from ..samples import columns, selected
 from .export import Act, Disc, Thing, about, acts, encodable, extent, firings, parts, things
 from .recording import Recording, ViewError
 
@@ -32,23 +35,10 @@ def write_rerun(recording: Recording, path: Path) -> None:
     replace_file(path, _Writer(recording).written(), ViewError)
 
 
-def require_rerun() -> Any:
-    """The rerun package; raises ``ViewError`` if it is not installed."""
-    try:
-        import rerun
-        from rerun.blueprint import StateTimelineView  # noqa: F401  other packages of this name do not have it
-    except ImportError:
-        raise ViewError(
-            "a recording for rerun needs the package rerun-sdk, which is not installed: pip install 'epicycle[rerun]'"
-        ) from None
-    return rerun
-
-
 class _Writer:
     """Writes the parts of a run to one stream."""
 
     def __init__(self, recording: Recording) -> None:
-        self._rerun = require_rerun()
         self._recording = recording
         self._signals = list(recording.finished("a file").signals.values())
         self._things, self._acts = things(recording), list(acts(recording))
@@ -59,13 +49,13 @@ class _Writer:
         self._tags = sorted(set(chain.from_iterable(told)))
         # No wall clock and no random name, so equal runs give equal recordings.
         digest = recording.finished("a file").digest
-        self._stream = self._rerun.RecordingStream("epicycle", recording_id=digest, send_properties=False)
+        self._stream = rerun.RecordingStream("epicycle", recording_id=digest, send_properties=False)
 
     def written(self) -> bytes:
         """The content of the file."""
         file = self._stream.binary_stream()
         self._stream.send_blueprint(self._blueprint())
-        self._stream.log("space", self._rerun.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+        self._stream.log("space", rerun.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
         self._about()
         for signal in self._signals:
             self._signal(signal)
@@ -74,13 +64,12 @@ class _Writer:
         self._act()
         for actor, tags in self._fired.items():
             counts = np.arange(1.0, len(tags) + 1.0)
-            self._send(["firings", *parts(actor)], tags, self._rerun.Scalars.columns(scalars=counts))
+            self._send(["firings", *parts(actor)], tags, rerun.Scalars.columns(scalars=counts))
         data: bytes = file.read()
         self._stream.disconnect()
         return data
 
     def _send(self, path: list[str], tags: Sequence[Tag], columns: Iterable[Any]) -> None:
-        rerun = self._rerun
         times = rerun.TimeColumn("time", duration=np.array([tag.time for tag in tags], dtype="m8[ns]"))
         places = [max(0, bisect_right(self._tags, tag) - 1) for tag in tags]
         indices = [times, rerun.TimeColumn("tag", sequence=places)]
@@ -88,8 +77,6 @@ class _Writer:
 
     def _blueprint(self) -> Any:
         """The initial view: the space beside the signals of the model's figures, states and acts."""
-        import rerun.blueprint as views
-
         results, figures = self._recording.finished("a file"), self._recording.figures.items()
         lines = [
             views.TimeSeriesView(name=name, origin="/signals", contents=[self._below(each) for each in shown])
@@ -98,59 +85,43 @@ class _Writer:
         ]
         recorded = [self._below(name) for name in results.signals if name in self._recording.model.output.recorded]
         words = [
-            views.StateTimelineView(name="states", origin="/signals", contents=recorded),
+            StateTimelineView(name="states", origin="/signals", contents=recorded),
             views.TextLogView(name="aspects", origin="/aspects"),
             views.TextDocumentView(name="run", origin="/about"),
         ]
         tabs = views.Tabs(*(lines or [views.TimeSeriesView(name="signals", origin="/signals", contents=recorded)]))
         beside = views.Vertical(tabs, views.Tabs(*words))
-        space = [self._space_from_above(views)] if self._things else []
+        space = [self._space_from_above()] if self._things else []
         return views.Blueprint(views.Horizontal(*space, beside), collapse_panels=True)
 
-    def _space_from_above(self, views: Any) -> Any:
+    def _space_from_above(self) -> Any:
         (x, y), width = extent(self._things)
         eye = views.EyeControls3D(position=(x, y, AWAY * width), look_target=(x, y, 0.0), eye_up=(0.0, 1.0, 0.0))
         return views.Spatial3DView(name="space", origin="/space", eye_controls=eye)
 
     def _below(self, signal: str) -> str:
-        path: str = self._rerun.new_entity_path(["signals", *parts(signal)])
+        path: str = rerun.new_entity_path(["signals", *parts(signal)])
         return f"{path}/**"
 
     def _about(self) -> None:
         rows = ("| {} | {} |".format(name, text.replace("|", "\\|")) for name, text in about(self._recording).items())
         text = "\n".join(("| run | |", "|---|---|", *rows))
-        self._stream.log("about", self._rerun.TextDocument(text, media_type="text/markdown"), static=True)
+        self._stream.log("about", rerun.TextDocument(text, media_type="text/markdown"), static=True)
 
     def _signal(self, signal: Signal) -> None:
         """Log each number in the tokens over time, and each state."""
-        import pyarrow
-
-        numbers: dict[str, tuple[list[Tag], list[float]]] = {}
-        states: dict[str, tuple[list[Tag], list[str | None]]] = {}
-        for tag, token in signal:
-            for place, leaf in islice(leaves(token), PLACES):
-                if place.rpartition(".")[2] == STAMP:
-                    continue
-                kind, value, text = cell(leaf)
-                if kind in ("int", "float") and value is not None:
-                    tags, values = numbers.setdefault(place, ([], []))
-                    tags.append(tag)
-                    values.append(value)
-                else:
-                    moments, found = states.setdefault(place, ([], []))
-                    moments.append(tag)
-                    found.append(text if kind != "bool" else "true" if value else "false")
-        path = ["signals", *parts(signal.name)]
-        for place, (tags, values) in numbers.items():
-            self._send([*path, *parts(place)], tags, self._rerun.Scalars.columns(scalars=values))
-        for place, (tags, found) in states.items():
-            if any(each is not None for each in found):
-                # An Arrow array: rerun would write None in a list as the text "None".
-                texts = pyarrow.array([each and encodable(each) for each in found], pyarrow.string())
-                self._send([*path, *parts(place)], tags, self._rerun.StateChange.columns(state=texts))
+        tags, (numbers, states) = signal.tags, columns(signal, PLACES)
+        for where, (rows, values) in numbers.items():
+            path = ["signals", *parts(where)]
+            self._send(path, [tags[row] for row in rows], rerun.Scalars.columns(scalars=values))
+        for where, (rows, found) in states.items():
+            path = ["signals", *parts(where)]
+            # An Arrow array: rerun would write None in a list as the text "None".
+            texts = pyarrow.array([each and encodable(each) for each in found], pyarrow.string())
+            self._send(path, [tags[row] for row in rows], rerun.StateChange.columns(state=texts))
 
     def _space(self, thing: Thing) -> None:
-        rerun, path = self._rerun, ["space", thing.kind, *parts(thing.name)]
+        path = ["space", thing.kind, *parts(thing.name)]
         thin, paint = rerun.Radius.ui_points(THICKNESS), [thing.colour]
         look: dict[str, Any] = {"line_radii": thin, "colors": paint, "fill_mode": "transparentfillmajorwireframe"}
         named = {"labels": [thing.label], "show_labels": True} if thing.label else {}
@@ -186,7 +157,7 @@ class _Writer:
             self._send(path, [Tag(scene.time, LAST) for scene in thing.scenes], columns)
 
     def _circles(self, discs: list[Disc]) -> Any:
-        return self._rerun.Cylinders3D.columns(
+        return rerun.Cylinders3D.columns(
             centers=[(disc.x, disc.y, 0.0) for disc in discs],
             radii=[disc.along for disc in discs],
             lengths=[0.0] * len(discs),
@@ -194,7 +165,7 @@ class _Writer:
 
     def _ellipses(self, discs: list[Disc]) -> Any:
         turns = [disc.angle / 2.0 for disc in discs]
-        return self._rerun.Ellipsoids3D.columns(
+        return rerun.Ellipsoids3D.columns(
             centers=[(disc.x, disc.y, 0.0) for disc in discs],
             half_sizes=[(disc.along, disc.across, 0.0) for disc in discs],
             quaternions=[(0.0, 0.0, math.sin(turn), math.cos(turn)) for turn in turns],
@@ -206,5 +177,5 @@ class _Writer:
             told.setdefault(act.aspect, []).append(act)
         for aspect, found in told.items():
             texts = [encodable(act.text) for act in found]
-            columns = self._rerun.TextLog.columns(text=texts, level=["INFO"] * len(found))
+            columns = rerun.TextLog.columns(text=texts, level=["INFO"] * len(found))
             self._send(["aspects", aspect], [act.tag for act in found], columns)

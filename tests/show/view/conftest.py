@@ -11,7 +11,7 @@ import pytest
 from epicycle.runner import load_model
 from epicycle.runner.model.build.figures import figures_of
 from epicycle.runner.model.text.problems import Problems
-from epicycle.runner.show.view.page import write_page
+from epicycle.runner.show.view.pages import Page
 from epicycle.runner.show.view.recording import Recording
 
 
@@ -79,5 +79,4 @@ def written(
         loaded = load_model(model, **given)
         recordings.append(Recording(loaded, figures_of(loaded, Problems()), is_compared=len(runs) > 1))
         recordings[-1].run(until=until)
-    write_page(recordings, path, names=names)
-    return path
+    return Page(recordings, names).save(path)

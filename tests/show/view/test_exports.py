@@ -15,6 +15,7 @@ import jsonschema
 import numpy as np
 import pytest
 from mcap.reader import make_reader
+from mcap_protobuf.decoder import DecoderFactory
 
 from epicycle.actors import Actor, InputPort, OutputPort
 from epicycle.runner import load_model
@@ -27,7 +28,6 @@ from epicycle.runner.show.space import ellipses
 from epicycle.runner.show.view.export import TRAIL
 from epicycle.runner.show.view.mcap_file import write_mcap
 from epicycle.runner.show.view.recording import STRETCH, Recording, ViewError
-from epicycle.runner.show.view.rerun_file import write_rerun
 
 from .test_page import SHORT
 
@@ -131,16 +131,22 @@ class Mcap:
     def __init__(self, path: Path) -> None:
         self.topics: dict[str, list[Message]] = {}
         self.schemas: dict[str, Any] = {}
-        latest = 0
+        latest, decoders = 0, DecoderFactory()
         with path.open("rb") as file:
             reader = make_reader(file, validate_crcs=True)
             for schema, channel, message in reader.iter_messages(log_time_order=False):
                 assert schema is not None
-                assert (schema.encoding, channel.message_encoding) == ("jsonschema", "json")
                 assert message.log_time == message.publish_time >= latest
                 latest = message.log_time
-                self.schemas[schema.name] = json.loads(schema.data)
-                data = json.loads(message.data)
+                if schema.name.startswith("epicycle."):
+                    assert (schema.encoding, channel.message_encoding) == ("jsonschema", "json")
+                    self.schemas[schema.name] = json.loads(schema.data)
+                    data = json.loads(message.data)
+                else:
+                    assert (schema.encoding, channel.message_encoding) == ("protobuf", "protobuf")
+                    decode = decoders.decoder_for("protobuf", schema)
+                    assert decode is not None
+                    data = decode(message.data)
                 self.topics.setdefault(channel.topic, []).append(Message(message.log_time, schema.name, data))
             (self.about,) = (each.metadata for each in reader.iter_metadata() if each.name == "run")
 
@@ -150,7 +156,7 @@ class Mcap:
     def entities(self, topic: str) -> Iterator[tuple[int, Any]]:
         for time, schema, data in self.topics[topic]:
             assert schema == "foxglove.SceneUpdate"
-            (entity,) = data["entities"]
+            (entity,) = data.entities
             yield time, entity
 
 
@@ -159,9 +165,9 @@ def mcap(recording: Recording, folder: Path) -> Mcap:
     return Mcap(folder / "run.mcap")
 
 
-def xy(vector: dict[str, float]) -> tuple[float, float]:
-    assert vector["z"] == 0.0
-    return vector["x"], vector["y"]
+def xy(vector: Any) -> tuple[float, float]:
+    assert vector.z == 0.0
+    return vector.x, vector.y
 
 
 # -- MCAP -------------------------------------------------------------------------------------------------------------
@@ -187,15 +193,8 @@ def test_mcap_has_a_message_for_each_token_firing_and_act(wifi: Recording, tmp_p
     assert len(drops) == results.aspects["wifi_loss"]["dropped"]
     assert {each.schema for each in drops} == {"foxglove.Log"}
     first = drops[0].data
-    assert first["message"].startswith('observer[1].peer_measurement: dropped {"robot": "observer[0]", ')
-    assert {**first, "message": ""} == {
-        "timestamp": {"sec": 0, "nsec": 0},
-        "level": 2,
-        "message": "",
-        "name": "wifi_loss",
-        "file": "",
-        "line": 0,
-    }
+    assert first.message.startswith('observer[1].peer_measurement: dropped {"robot": "observer[0]", ')
+    assert (first.timestamp.ToNanoseconds(), first.Level.Name(first.level), first.name) == (0, "INFO", "wifi_loss")
     assert (file.about["model"], file.about["digest"]) == ("collision_avoidance", results.digest)
     assert (file.about["setting observers"], file.about["metric arrival_time"]) == ("3", "4.8")
     assert "left out" not in file.about
@@ -210,7 +209,7 @@ def test_messages_are_as_their_schemas_say(name: str, tmp_path: Path) -> None:
     file = mcap(recording, tmp_path)
     own = {each for each in file.schemas if each.startswith("epicycle.")} - {"epicycle.Firing"}
     assert own == {f"epicycle.{each}" for each, signal in results_of(recording).signals.items() if len(signal)}
-    for messages in file.topics.values():
+    for messages in (each for each in file.topics.values() if each[0].schema in file.schemas):
         check = jsonschema.Draft202012Validator(strict(file.schemas[messages[0].schema])).validate
         for message in messages[:: 1 + len(messages) // 20]:
             check(message.data)
@@ -253,35 +252,35 @@ def test_mcap_has_tokens_of_any_kind_and_whole_nanoseconds(varied: Recording, tm
 def test_scenes_show_what_figures_place_in_space(wifi: Recording, tmp_path: Path) -> None:
     file, results = mcap(wifi, tmp_path), results_of(wifi)
     bodies = list(file.entities("/space/body/main/state"))
-    places = [xy(entity["spheres"][0]["pose"]["position"]) for _, entity in bodies]
+    places = [xy(entity.spheres[0].pose.position) for _, entity in bodies]
     assert places == list(map(tuple, results["main.state"]["position"].tolist()))
-    assert {entity["texts"][0]["text"] for _, entity in bodies} == {"main"}
+    assert {entity.texts[0].text for _, entity in bodies} == {"main"}
     frames = [each.data for each in file["/frames/main/state"]]
-    assert [xy(each["translation"]) for each in frames] == places
-    assert {(each["parent_frame_id"], each["child_frame_id"]) for each in frames} == {("world", "main")}
+    assert [xy(each.translation) for each in frames] == places
+    assert {(each.parent_frame_id, each.child_frame_id) for each in frames} == {("world", "main")}
 
     *_, (_, trail) = file.entities("/space/trail/main/state")
-    assert [xy(point) for point in trail["lines"][0]["points"]] == places
+    assert [xy(point) for point in trail.lines[0].points] == places
 
     *_, (_, obstacle) = file.entities("/space/body/obstacle/state")
-    assert obstacle["cylinders"][0]["size"]["x"] == 4.0  # a safe distance of 2 m
+    assert obstacle.cylinders[0].size.x == 4.0  # a safe distance of 2 m
 
     expected = ellipses(results["main.estimate"])
     for (_, entity), (x, y, along, across, angle) in zip(
         file.entities("/space/ellipse/main/estimate"), expected.tolist(), strict=True
     ):
-        (disc,) = entity["cylinders"]
-        assert xy(disc["pose"]["position"]) == (x, y)
-        assert (disc["size"]["x"], disc["size"]["y"]) == (2 * along, 2 * across)
-        turn = disc["pose"]["orientation"]
-        assert 2 * math.atan2(turn["z"], turn["w"]) == pytest.approx(angle)
+        (disc,) = entity.cylinders
+        assert xy(disc.pose.position) == (x, y)
+        assert (disc.size.x, disc.size.y) == (2 * along, 2 * across)
+        turn = disc.pose.orientation
+        assert 2 * math.atan2(turn.z, turn.w) == pytest.approx(angle)
 
     (_, plan), *_ = file.entities("/space/tube/main/plan")
-    assert len(plan["lines"][0]["points"]) == len(plan["cylinders"]) == 12
+    assert len(plan.lines[0].points) == len(plan.cylinders) == 12
     (_, sight), *_ = file.entities("/space/line/main/measurement")
-    assert xy(sight["lines"][0]["points"][0]) == places[0]
+    assert xy(sight.lines[0].points[0]) == places[0]
     ((time, goal),) = file.entities("/space/goal/goal")
-    assert (time, goal["texts"][0]["text"]) == (0, "goal")
+    assert (time, goal.texts[0].text) == (0, "goal")
 
 
 def test_a_line_of_sight_ends_when_nothing_more_is_seen(tmp_path: Path) -> None:
@@ -289,7 +288,7 @@ def test_a_line_of_sight_ends_when_nothing_more_is_seen(tmp_path: Path) -> None:
     file = mcap(recording, tmp_path)
     seen = [time for time, _ in results_of(recording)["main.measurement"].tags]
     gaps = [(one, other) for one, other in pairwise(seen) if other - one > 160_000_000]
-    lines = [(time, len(entity["lines"])) for time, entity in file.entities("/space/line/main/measurement")]
+    lines = [(time, len(entity.lines)) for time, entity in file.entities("/space/line/main/measurement")]
     assert [time for time, count in lines if count == 1] == seen
     blank = [time for time, count in lines if count == 0]
     assert blank
@@ -308,12 +307,12 @@ def test_a_trail_is_drawn_anew_some_times_and_the_body_draws_the_rest(tmp_path: 
     for (time, body), place in zip(file.entities("/space/body/body/state"), places, strict=True):
         if time in trails:
             end = tuple(place)
-            assert body["lines"] == []
-            drawn = [xy(point) for line in trails[time]["lines"] for point in line["points"]]
+            assert not body.lines
+            drawn = [xy(point) for line in trails[time].lines for point in line.points]
             assert drawn[-1:] in ([end], [])
         else:
-            (line,) = body["lines"]
-            assert [xy(point) for point in line["points"]] == [end, tuple(place)]
+            (line,) = body.lines
+            assert [xy(point) for point in line.points] == [end, tuple(place)]
 
 
 def test_equal_runs_are_equal_mcap_files(wifi: Recording, tmp_path: Path) -> None:
@@ -333,12 +332,21 @@ def test_a_thinned_run_says_what_is_left_out(tmp_path: Path) -> None:
 
 def test_a_run_that_was_not_made_has_no_file(tmp_path: Path) -> None:
     model = load_model("mm1")
-    for write in (write_mcap, write_rerun):
-        if write is write_rerun:
-            pytest.importorskip("rerun")
+    for write in (mcap, rerun):
         with pytest.raises(ViewError) as caught:
-            write(Recording(model, {}), tmp_path / "none")
+            write(Recording(model, {}), tmp_path)
         assert str(caught.value) == "a file needs a run that has been made: call Recording.run first"
+
+
+def test_more_channels_than_a_file_has_are_said(
+    varied: Recording, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("epicycle.runner.show.view.mcap_file.MOST", 3)
+    with pytest.raises(ViewError) as caught:
+        write_mcap(varied, tmp_path / "run.mcap")
+    message = "an MCAP file holds at most 3 channels, and the run has more signals and actors"
+    assert str(caught.value) == message
+    assert not list(tmp_path.glob("*.mcap"))
 
 
 # -- rerun ------------------------------------------------------------------------------------------------------------
@@ -370,6 +378,8 @@ class Rerun:
 
 def rerun(recording: Recording, folder: Path) -> Rerun:
     pytest.importorskip("rerun")
+    from epicycle.runner.show.view.rerun_file import write_rerun
+
     write_rerun(recording, folder / "run.rrd")
     return Rerun(folder / "run.rrd")
 
