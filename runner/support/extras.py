@@ -21,6 +21,7 @@ EXTRAS = {  # by which extra each is installed
     "starlette": "studio",
     "uvicorn": "studio",
     "websockets": "studio",
+    "yaml_edit": "studio",
 }
 
 
