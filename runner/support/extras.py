@@ -23,6 +23,7 @@ EXTRAS = {  # by which extra each is installed
     "starlette": "studio",
     "uvicorn": "studio",
     "websockets": "studio",
+    "yaml_edit": "studio",
 }
 DISTRIBUTIONS = {"foxglove": "foxglove-sdk", "rerun": "rerun-sdk"}  # of packages that are installed by other names
 

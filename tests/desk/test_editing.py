@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
-from epicycle.runner.desk import EditError, Knowledge, controls, difference, editing, read
+from epicycle.runner.desk import Knowledge, controls, difference, editing, read
 from epicycle.runner.desk.changes import apply, edits_between
-from epicycle.runner.desk.parts import data_of, rendered, typed
+from epicycle.runner.desk.parts import EditError, data_of, rendered, typed
 from epicycle.runner.model.catalogue.packaged import packaged_models
 
 TEXT = """# A line of robots.
@@ -202,8 +202,8 @@ CASES: dict[str, tuple[str, Act, list[str], list[str], list[str]]] = {
     "in brackets: add": (
         FLOW,
         lambda text: editing.add_part(text, "", "actors", "more", "Merge", {}),
-        ["  sum: {type: Merge} # all\n"],
-        ["  sum: {type: Merge}, # all\n", "  more: {type: Merge}\n"],
+        ["  },\n"],
+        ["  , more: {type: Merge}},\n"],
         [],
     ),
     "in brackets: a value for a key without one": (
@@ -442,9 +442,7 @@ def test_an_alias_is_left_to_its_author() -> None:
     assert str(caught.value) == "actors.b.period is an alias: change it by hand"
     with pytest.raises(EditError) as caught:
         editing.set_parameter(text, "", "actors", "a", "period", "2 s")
-    assert str(caught.value) == (
-        "this can be changed once the text can be read: there is no anchor &p before this alias"
-    )
+    assert str(caught.value) == ("this text is written in a way that no program can change here: change it by hand")
 
 
 def test_bounds_are_numbers_in_the_unit_of_the_parameter(tmp_path: Path) -> None:

@@ -18,7 +18,7 @@ from lsprotocol.converters import get_converter
 
 from epicycle.actors import EpicycleError, Tag
 
-from ...desk import EditError, Knowledge, controls, editing, edits_between
+from ...desk import Knowledge, controls, editing, edits_between
 from ...desk.answers import ANSWERS, Answers, uri_of
 from ...model.build.model import Model
 from ...model.text.document import MAX_BYTES
@@ -135,7 +135,7 @@ class Worker:
         scope, _, name = path.rpartition(".")
         graph = self.knowledge.graph
         if scope and (graph is None or scope not in graph.components):
-            raise EditError(f"there is no {path}")
+            raise EpicycleError(f"there is no {path}")
         owner = graph.components[scope].kind if graph is not None and scope else ""
         name = name.partition("[")[0]
         return {"owner": owner, "name": name, "fields": controls.fields(self.knowledge, owner, "actors", name)}
@@ -144,9 +144,9 @@ class Worker:
         """A change of the model: the changes of the text that make it."""
         what, given = str(asked["what"]), asked["given"]
         if not isinstance(given, list) or not all(isinstance(each, (str, bool, dict)) for each in given):
-            raise EditError("this change cannot be read")
+            raise EpicycleError("this change cannot be read")
         if what not in editing.CHANGES:
-            raise EditError("there is no such change")
+            raise EpicycleError("there is no such change")
         if what in ("connect", "disconnect"):
             given = controls.local_ends(self.knowledge, *map(str, given))
         elif what == "swap":

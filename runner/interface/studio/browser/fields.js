@@ -110,7 +110,7 @@ function aspectRow(aspect, { edit, names }) {
   const more = element("details", {}, element("summary", { text: "more" }));
   more.append(others.box);
   const box = element("section", { className: "aspect" },
-    element("header", {}, element("label", { className: "switch" }, on, element("b", { text: aspect.name })), type,
+    element("header", {}, element("label", { className: "switch", title: aspect.name }, on, element("b", { text: aspect.name })), type,
       button("×", () => edit("remove", "", "aspects", aspect.name), "remove")),
     element("p", { className: "place" }, "at ", place), fields.box, more);
   box.dataset.aspect = aspect.name;

@@ -182,7 +182,7 @@ class Graph extends View {
     if (scale * 9 < LEGIBLE) {
       if (!isOpen && scale * width > 24) {
         const size = Math.min(12 / scale, height / 2, (1.5 * width) / box.name.length);
-        this.text(box.name, x + width / 2, y + height / 2 + size / 3, { align: "center", bold: true, size, width: width - 2 });
+        if (size * scale >= LEGIBLE) this.text(box.name, x + width / 2, y + height / 2 + size / 3, { align: "center", bold: true, size, width: width - 2 });
       }
       return;
     }

@@ -63,9 +63,9 @@ class View {
   }
 
   /** @param {string} words @param {number} x @param {number} y @param {TextStyle} style */
-  text(words, x, y, { colour = theme.ink, size = 11, align = "left", bold = false, width = Infinity, isApart = false, isWhole = false } = {}) {
+  text(words, x, y, { colour = theme.ink, size = 11, align = "left", bold = false, width = Infinity, isApart = false } = {}) {
     const { paper } = this;
-    paper.font = `${bold ? "600 " : ""}${size}px system-ui, sans-serif`;
+    this.write(size, bold);
     paper.fillStyle = colour;
     paper.textAlign = align;
     paper.textBaseline = "alphabetic";
@@ -74,13 +74,18 @@ class View {
       const fits = search(words.length, (count) => paper.measureText(`${words.slice(0, count + 1)}…`).width > width);
       words = `${words.slice(0, fits)}…`;
     }
-    if (isWhole && x < this.width) x = Math.min(x, this.width - paper.measureText(words).width - 3); // not cut off at the edge
     if (isApart) { // from what is drawn behind it
       Object.assign(paper, { strokeStyle: theme.panel, lineWidth: 4 });
       paper.setLineDash([]);
       paper.strokeText(words, x, y);
     }
     paper.fillText(words, x, y);
+  }
+
+  // Choose the letters of what is written or measured next.
+  /** @param {number} size @param {boolean} bold */
+  write(size, bold) {
+    this.paper.font = `${bold ? "600 " : ""}${size}px system-ui, sans-serif`;
   }
 
   /** @param {number[]} points @param {string} colour @param {number} [width] @param {number[]} [dash] */

@@ -6,6 +6,8 @@ class Space extends View {
     super(state, "Space: bodies, estimates, plans and goals");
     this.number = number;
     this.marks = state.runs[number].marks;
+    /** @type {[x: number, y: number, width: number][]} */
+    this.names = []; // where some are written
     this.camera = camera; // shared by all runs, which are seen from one place
     this.canvas.dataset.view = "space";
     gestures(this.canvas, {
@@ -103,6 +105,7 @@ class Space extends View {
   draw(paper) {
     this.look();
     this.grid();
+    this.names = [];
     const time = this.state.time / 1e9;
     /** @type {{ [shape: string]: "sight" | "tube" | "ellipse" | "goal" | "body" }} */
     const painters = { line: "sight", tube: "tube", ellipse: "ellipse", goal: "goal", body: "body" };
@@ -121,7 +124,7 @@ class Space extends View {
     }
     for (const y of ticks(camera.y - tall, camera.y + tall, this.height / 90).at) {
       this.line([0, this.y(y), this.width, this.y(y)], theme.faint, 0.5);
-      this.text(`${numberText(y)} m`, 3, this.y(y) - 3, { size: 10, colour: theme.soft });
+      this.text(`${numberText(y)} m`, 3, this.y(y) < 14 ? this.y(y) + 11 : this.y(y) - 3, { size: 10, colour: theme.soft });
     }
   }
 
@@ -148,7 +151,22 @@ class Space extends View {
       this.dot(x, y, mark.radius * this.camera.scale, faded(colour, 0.14), faded(colour, 0.6));
     }
     this.dot(x, y, isChosen ? 8 : 5.5, colour, isChosen ? theme.ink : theme.paper);
-    this.text(mark.name.replace(/\.[^.]*$/, ""), x + 9, y - 8, { bold: isChosen, size: 11.5, isWhole: true });
+    this.name(mark.name.replace(/\.[^.]*$/, ""), x, y - 8, 9, { bold: isChosen, size: 11.5 });
+  }
+
+  // A name beside a place: on the right or left, as high as wanted or below that, where no other name is.
+  /** @param {string} name @param {number} x @param {number} y @param {number} away @param {TextStyle & { size: number }} style */
+  name(name, x, y, away, style) {
+    this.write(style.size, style.bold ?? false);
+    const width = this.paper.measureText(name).width, most = x + away < this.width ? this.width - width - 3 : Infinity;
+    const right = Math.min(x + away, most), left = x - away - width; // not cut off at an edge
+    const isFree = (/** @type {Dot} */ [start, base]) =>
+      start > 0 && this.names.every(([from, under, long]) => start > from + long || from > start + width || Math.abs(base - under) > 12);
+    /** @type {Dot[]} */
+    const places = [[right, y], [right, y + 24], [left, y], [left, y + 24]];
+    const [start, base] = places.find(isFree) ?? places[0];
+    this.names.push([start, base, width]);
+    this.text(name, start, base, style);
   }
 
   /** @param {Paper} paper @param {Mark} mark */
@@ -162,7 +180,7 @@ class Space extends View {
     paper.closePath();
     paper.fillStyle = this.colour(mark);
     paper.fill();
-    this.text(mark.name, x + 12, y + 4, { colour: theme.soft, isWhole: true });
+    this.name(mark.name, x, y + 4, 12, { colour: theme.soft, size: 11 });
   }
 
   /** @param {Paper} paper @param {Mark} mark @param {number} time */

@@ -176,7 +176,6 @@ interface TextStyle {
   bold?: boolean;
   width?: number; // px, beyond which it is cut
   isApart?: boolean; // from what is below it
-  isWhole?: boolean; // not cut off at the right edge
 }
 
 interface Route {
