@@ -52,10 +52,14 @@ class Borders:
             self._watched, self._deadlines, self.truths, self._trajectory = [], {}, {}, None
 
     def _begin(self, origin: tuple[int, float], now: int) -> None:
-        known = [each for each in self._all if each.names <= self._known.keys()]
-        self._watched = [each for each in known if each.until is None]
-        self._deadlines = {each: self._deadline(each) for each in known if each.until is not None}
-        self.truths, self._trajectory = {}, None
+        self._watched, self._deadlines, self.truths, self._trajectory = [], {}, {}, None
+        for each in self._all:
+            if not each.names <= self._known.keys():
+                continue
+            if each.until is None:
+                self._watched.append(each)
+            else:
+                self._deadlines[each] = self._deadline(each, *each.until)
         self._judge_times(now)
         if not (self._flow or self._watched):
             return
@@ -69,9 +73,7 @@ class Borders:
         self._trajectory.begin(*origin, start)
         self._find_sides(self._trajectory, start)
 
-    def _deadline(self, comparison: Comparison) -> int:
-        assert comparison.until is not None
-        clock, until, _ = comparison.until
+    def _deadline(self, comparison: Comparison, clock: str, until: Formula, side: int) -> int:
         seconds = number_of(until, self._known, repr(comparison.source))
         at = NEVER if seconds > _LONGEST else to_nanoseconds(seconds)
         return min(at + (self._entered if clock == "mode_time" else 0), NEVER)
@@ -102,9 +104,11 @@ class Borders:
         if trajectory is None and not self._deadlines:
             self._seen = now
             return False
-        has_changed = any(self._seen < time <= now for time in self._deadlines.values())
-        self._seen = now
-        self._judge_times(now)
+        has_changed, seen, self._seen = False, self._seen, now
+        for time in self._deadlines.values():
+            if seen <= time <= now:
+                has_changed = has_changed or seen < time
+                self._judge_times(now)
         if trajectory is None:
             return has_changed
         solution, at = trajectory.solution, trajectory.elapsed(now)

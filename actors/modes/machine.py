@@ -313,8 +313,8 @@ class StateMachine(ModalActor):
 
     # -- guards and actions ---------------------------------------------------------------------------------------
 
-    def is_present(self, port: str) -> bool:
-        return port in self._tokens
+    def hears(self, rule: Rule) -> bool:
+        return not self._tokens.keys().isdisjoint(rule.on)
 
     def moves(self, rule: Rule) -> None:
         if self.refinements is not None:
@@ -324,18 +324,19 @@ class StateMachine(ModalActor):
         if self._catches:  # a transition has handled it
             self._scope["error"] = ""
         self._act(self.modes[mode].entry)
-        self._entered, had = self.context.time, self._borders.truths
+        self._entered, scope = self.context.time, self._scope
+        for name in self._borders.truths:
+            scope.pop(name, None)
         self._enter_borders(mode)
-        if had or self._borders.truths:
-            self._look()
-        elif self._asks_time:
-            self._scope["mode_time"] = 0.0
+        scope.update(self._borders.truths)
+        scope["mode_time"] = 0.0
 
     def _enter_borders(self, mode: str) -> None:
         self._borders.enter(mode, self.modes[mode].flow, self._comparisons[mode], self._entered)
 
     def leaves(self, mode: str) -> None:
-        self._act(self.modes[mode].exit)
+        if actions := self.modes[mode].exit:
+            self._act(actions)
 
     def act(self, rule: Rule) -> None:
         self._act(rule.act)
@@ -375,9 +376,10 @@ class StateMachine(ModalActor):
         try:
             found = condition.of(self._scope)
         except UNDECIDED:
-            found = None
-        if found is True or found is False:
-            return found
+            pass
+        else:
+            if isinstance(found, (int, float)):
+                return bool(found)
         try:
             return is_true(condition, self._scope)
         except EpicycleError:
