@@ -123,10 +123,7 @@ class ModalActor(Actor):
 
     def goes_on(self) -> bool:
         """Whether it must react again at the next microstep without a token."""
-        for rule in self._chart.alone[self._current]:
-            if self._is_open(rule) and self.holds(rule):
-                return True
-        return False
+        return any(self._is_open(rule) and self.holds(rule) for rule in self._chart.alone[self._current])
 
     def _call(self, mark: str, mode: str) -> None:
         for name, method in _methods(type(self)).items():
