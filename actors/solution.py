@@ -295,7 +295,8 @@ class Solution:
 
 def _limit(stepper: Stepper, longest: float) -> None:
     longest = min(max(longest, WINDOW), LONGEST)
-    stepper.limits = replace(stepper.limits, max_step=longest)
+    if longest != stepper.limits.max_step:
+        stepper.limits = replace(stepper.limits, max_step=longest)
 
 
 def root(function: Callable[[float], float], left: float, right: float, least: float = 1e-15) -> float:
