@@ -101,9 +101,6 @@ class Borders:
     def advance(self, now: int) -> bool:
         """Bring variables and comparisons up to date; return whether a comparison changes now."""
         self._passed, trajectory = {}, self._trajectory
-        if trajectory is None and not self._deadlines:
-            self._seen = now
-            return False
         has_changed, seen, self._seen = False, self._seen, now
         for time in self._deadlines.values():
             if seen <= time <= now:

@@ -223,7 +223,7 @@ class StateMachine(ModalActor):
 
     def _prepare(self) -> None:
         self.take_tokens()
-        tag = self.tag
+        tag = self.context.tag
         if self._prepared != tag:
             self._prepared = tag
             self._has_changed = self._borders.advance(self.context.time)
@@ -264,11 +264,11 @@ class StateMachine(ModalActor):
             self._tell()
         self._tokens, self._scope = {}, {}
         self.rests()
-        self._watch(self._borders.next_time(self.context.time))
+        self._watch()
 
-    def _watch(self, time: int | None) -> None:
+    def _watch(self) -> None:
         """Be woken when a comparison changes."""
-        wake = self._wake
+        time, wake = self._borders.next_time(self.context.time), self._wake
         if wake is not None and not self.is_due(wake):
             if wake.time == time:
                 return
@@ -323,12 +323,14 @@ class StateMachine(ModalActor):
     def enters(self, mode: str) -> None:
         if self._catches:  # a transition has handled it
             self._scope["error"] = ""
-        self._act(self.modes[mode].entry)
+        if actions := self.modes[mode].entry:
+            self._act(actions)
         self._entered, scope = self.context.time, self._scope
         for name in self._borders.truths:
             scope.pop(name, None)
         self._enter_borders(mode)
-        scope.update(self._borders.truths)
+        if self._borders.truths:
+            scope.update(self._borders.truths)
         scope["mode_time"] = 0.0
 
     def _enter_borders(self, mode: str) -> None:
@@ -386,7 +388,9 @@ class StateMachine(ModalActor):
             return is_true(rule.guard, self._scope)  # which reports the error in the model's terms
 
     def goes_on(self) -> bool:
-        if self._tokens and self._chart.alone[self._current]:
+        if not self._chart.alone[self._current]:
+            return False
+        if self._tokens:
             self._look_ahead()
         return super().goes_on()
 

@@ -123,7 +123,8 @@ class ModalActor(Actor):
 
     def goes_on(self) -> bool:
         """Whether it must react again at the next microstep without a token."""
-        return any(self._is_open(rule) and self.holds(rule) for rule in self._chart.alone[self._current])
+        alone = self._chart.alone[self._current]
+        return bool(alone) and any(self._is_open(rule) and self.holds(rule) for rule in alone)
 
     def _call(self, mark: str, mode: str) -> None:
         for name, method in _methods(type(self)).items():
@@ -158,8 +159,10 @@ class ModalActor(Actor):
     @property
     def is_called(self) -> bool:
         """Whether a delay ends now, a race is over, or a reaction has requested another."""
-        is_called = self.is_due(self._again) or self.is_due(self._first)
-        return is_called or (bool(self._timers) and any(map(self.is_due, self._timers.values())))
+        for wake in (self._again, self._first, *self._timers.values()):
+            if wake is not None and self.is_due(wake):
+                return True
+        return False
 
     def fire(self) -> None:
         self.react(self._chart.phases)
@@ -172,7 +175,7 @@ class ModalActor(Actor):
             self._is_begun = True
             self._enter(chart.initial)
             self.begins()
-        elif self._reacted == self.tag:
+        elif self._reacted == self.context.tag:
             return
         rule = None
         for phase in phases:
@@ -194,7 +197,7 @@ class ModalActor(Actor):
             if len(taken) > MOST_IMMEDIATE:
                 way = " -> ".join(dict.fromkeys(each.target for each in taken))
                 raise EpicycleError(f"{MOST_IMMEDIATE:,} immediate transitions in one reaction: {way} -> ...")
-            self._reacted = self.tag
+            self._reacted = self.context.tag
             self._take(rule)
             leaving = self._chart.immediate[self._current]
             rule = self._choose(leaving) if leaving else None
@@ -205,9 +208,9 @@ class ModalActor(Actor):
     def finish(self) -> None:
         """Send the new mode, and request another reaction if it can continue from there without a token."""
         for rule, wake in self._timers.items():
-            if self.is_due(wake):
+            if wake is not None and self.is_due(wake):
                 self._timers[rule] = None
-        if self.is_due(self._again):
+        if self._again is not None and self.is_due(self._again):
             self._again = None
         self._drawn, self._number = {}, None
         if self._rates or self._chart.racing[self._current]:
