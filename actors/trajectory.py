@@ -25,11 +25,12 @@ class Trajectory:
     """The present solution for some states, whose ``rates`` are formulas over them, over ``held`` values and ``time``.
 
     ``begin`` starts a solution; a further ``begin``, after a change, keeps the same guards.  ``held`` is shared:
-    changes in it take effect at the next ``begin``.  ``also`` are names for the time since a moment (ns).
+    changes in it take effect at the next ``begin``.  ``also`` are names for the time since moments (ns), which are in
+    ``since`` before that.
     """
 
     def __init__(
-        self, rates: Mapping[str, Formula], held: dict[str, Any], also: Mapping[str, int] | None = None, **solver: Any
+        self, rates: Mapping[str, Formula], held: dict[str, Any], also: Sequence[str] = (), **solver: Any
     ) -> None:
         self.names = tuple(rates)
         self.guards: list[Guard] = []
@@ -38,9 +39,11 @@ class Trajectory:
         self.solution: Solution
         self._formulas = dict(rates)
         self._held = held
-        self._also = dict(also or {})
+        self.since = dict.fromkeys(also, 0)
+        moving = frozenset(("time", *self.since, *self.names))
+        self._factors = {name: factors_of(formula.source, moving) for name, formula in rates.items()}
         named = {each for formula in rates.values() for each in formula.names} | CONSTANTS.keys()
-        self._named = named - {"time", *self._also, *self.names}  # what the rates may use of what is held
+        self._named = named - {"time", *self.since, *self.names}  # what the rates may use of what is held
         self._solver = solver
         self._function: Callable[..., Any] | None = None  # of time, the other times, the states and what is held
         self._fixed: list[Any] = []  # of what is held, what the rates may use
@@ -68,22 +71,20 @@ class Trajectory:
         self._function, exact, translated = None, self._exact(state), None
         if exact is None and all(type(value) is float for value in (*state, *self._fixed)):
             sources = tuple(formula.source for formula in self._formulas.values())
-            translated = all_translated(sources, ("time", *self._also, *self.names, *used))
+            translated = all_translated(sources, ("time", *self.since, *self.names, *used))
         if translated is not None:
             self._function, texts = translated
         self.solution = Solution(self._rates, self._bounds_of_rates, state, self.guards, **self._solver, exact=exact)
         if translated is not None and isinstance(stepper := self.solution.stepper, RungeKutta):
-            since = 0, *self._also.values()
+            since = 0, *self.since.values()
             if (functions := _unrolled(stepper.tableau, texts, len(since), len(used))) is not None:
                 origins = [(self.time - each) / NANOSECONDS_PER_SECOND for each in since]
                 stepper.unroll(Unrolled(*functions, (self.fraction, origins, self._fixed)))
 
     def _exact(self, state: State) -> Exact | None:
         """The solution, if every derivative is linear in its own state and depends on nothing else that moves."""
-        moving = frozenset(("time", *self._also, *self.names))
         rates, pulls = [], []
-        for name, formula in self._formulas.items():
-            factors = factors_of(formula.source, moving)
+        for name, factors in self._factors.items():
             if factors is None or not factors.keys() <= {REST, name}:
                 return None
             try:
@@ -138,7 +139,7 @@ class Trajectory:
         """The names that expressions can use at a time of the present solution, with their values."""
         names = {**self._held, **dict(zip(self.names, state, strict=True))}
         names["time"] = self._at(at)
-        for name, since in self._also.items():
+        for name, since in self.since.items():
             names[name] = self._at(at, since)
         return names
 
@@ -155,7 +156,7 @@ class Trajectory:
     def _rates(self, at: float, state: State) -> State:
         if self._function is not None:
             try:
-                since = [self._at(at, since) for since in self._also.values()] if self._also else ()
+                since = [self._at(at, since) for since in self.since.values()] if self.since else ()
                 now = self.time / NANOSECONDS_PER_SECOND + (self.fraction + at)
                 found: State = self._function(now, *since, *state, *self._fixed)
             except UNDECIDED:
@@ -171,8 +172,8 @@ class Trajectory:
         for name in formula.names:
             if name in self.names:
                 known[name] = states[self.names.index(name)]
-            elif name == "time" or name in self._also:
-                since = self._also.get(name, 0)
+            elif name == "time" or name in self.since:
+                since = self.since.get(name, 0)
                 known[name] = self._at(left, since), self._at(right, since)
             elif isinstance(value := self._held.get(name), (int, float)):
                 known[name] = value, value

@@ -32,6 +32,7 @@ class Borders:
         self._all: Sequence[Comparison] = ()
         self._flow: Mapping[str, Formula] = {}
         self._trajectory: Trajectory | None = None
+        self._trajectories: dict[tuple[str, int], Trajectory] = {}  # of all modes so far
         self._watched: list[Comparison] = []  # in the order of the trajectory's guards
         self._deadlines: dict[Comparison, int] = {}  # of comparisons that only wait for a time
         self._seen = 0  # time of the last update
@@ -63,15 +64,23 @@ class Borders:
         self._judge_times(now)
         if not (self._flow or self._watched):
             return
-        flow = dict(self._flow)
-        if not flow:
-            flow[_STILL], self._known[_STILL] = Formula("0"), 0.0
-        self._trajectory = Trajectory(flow, self._known, {"mode_time": self._entered}, **self._solver)
-        for each in self._watched:
-            self._trajectory.watch(each.difference, f"mode {self._mode}")
+        key = self._mode, len(self._watched)  # of the comparisons of a mode, more become known, and none less
+        if key not in self._trajectories:
+            self._trajectories[key] = self._new_trajectory()
+        self._trajectory = self._trajectories[key]
+        self._trajectory.since["mode_time"] = self._entered
         start = [float(self._known[name]) for name in self._trajectory.names]
         self._trajectory.begin(*origin, start)
         self._find_sides(self._trajectory, start)
+
+    def _new_trajectory(self) -> Trajectory:
+        flow = dict(self._flow)
+        if not flow:
+            flow[_STILL], self._known[_STILL] = Formula("0"), 0.0
+        trajectory = Trajectory(flow, self._known, ("mode_time",), **self._solver)
+        for each in self._watched:
+            trajectory.watch(each.difference, f"mode {self._mode}")
+        return trajectory
 
     def _deadline(self, comparison: Comparison, clock: str, until: Formula, side: int) -> int:
         seconds = number_of(until, self._known, repr(comparison.source))
