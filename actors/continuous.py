@@ -229,10 +229,10 @@ class ODE(Actor):
         now = trajectory.elapsed(self.tag.time)
         state = trajectory.solution.at(now)
         trajectory.solution.rewind(now)
-        before = trajectory.signs(now, state)
+        before = trajectory.signs(now, state, changed.keys())
         self._held.update(changed)
         trajectory.begin(self.tag.time, 0.0, state)
-        self._notice_jumps(before, trajectory.signs(0.0, state), self._jumps)
+        self._notice_jumps(before, trajectory.signs(0.0, state, changed.keys()), self._jumps)
 
     def _notice_jumps(self, before: list[int], after: list[int], known: Mapping[int, int]) -> None:
         """Find the guards that a jump has taken to their other side."""

@@ -79,12 +79,12 @@ class Solution:
         self._window = WINDOW if max_step is None else max_step
         self._patience, self._taken = 1, 0  # steps to take before longer ones are tried; steps taken
         self._watched: Stepper | None = None  # the stepper, if it must not pass over anything
-        self._stepper: Stepper | Euler | Exact
+        self.stepper: Stepper | Euler | Exact
         if exact is not None:
-            self._stepper = exact
+            self.stepper = exact
         else:
             limits = Limits(*tolerance, LONGEST if max_step is None else max_step)
-            self._stepper = stepper = STEPPERS[method](rates, state, limits)
+            self.stepper = stepper = STEPPERS[method](rates, state, limits)
             self._watched = stepper if max_step is None and isinstance(stepper, Stepper) else None
         self._guards = guards
         self._start = state
@@ -100,7 +100,7 @@ class Solution:
     @property
     def end(self) -> float:
         """The time up to which the solution is known."""
-        return self._stepper.time
+        return self.stepper.time
 
     def extend(self) -> None:
         """Take one step; raises ``EpicycleError`` if no step is possible."""
@@ -129,7 +129,7 @@ class Solution:
     def _latest(self) -> Piece | Exact:
         """The solution along the latest step, computed on request because that takes time."""
         if self._piece is None:
-            self._piece = self._stepper.piece()
+            self._piece = self.stepper.piece()
         return self._piece
 
     # -- steps ----------------------------------------------------------------------------------------------------
@@ -138,7 +138,7 @@ class Solution:
         """Take one step, which is longer than the window only if nothing hides in it; False if there is none."""
         stepper = self._watched
         if stepper is None:
-            return self._stepper.step()
+            return self.stepper.step()
         while True:
             # By its length, a step of one window may seem longer than that: times are rounded.
             before = copy.copy(stepper) if min(stepper.next_step, stepper.limits.max_step) > WINDOW else None
@@ -149,7 +149,7 @@ class Solution:
                 break
             # Then it is likely to stay so: a longer step is tried less and less often.
             length = self.end - before.time
-            self._stepper = self._watched = stepper = before
+            self.stepper = self._watched = stepper = before
             self._piece = None
             _limit(stepper, length / 4.0)
             self._patience, self._taken = min(2 * self._patience, _MAX_PATIENCE), 0
@@ -295,7 +295,8 @@ class Solution:
 
 def _limit(stepper: Stepper, longest: float) -> None:
     longest = min(max(longest, WINDOW), LONGEST)
-    stepper.limits = replace(stepper.limits, max_step=longest)
+    if longest != stepper.limits.max_step:
+        stepper.limits = replace(stepper.limits, max_step=longest)
 
 
 def root(function: Callable[[float], float], left: float, right: float, least: float = 1e-15) -> float:

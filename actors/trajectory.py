@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from functools import partial
+import math
+from collections.abc import Callable, Mapping, Sequence, Set
+from functools import lru_cache, partial
 from typing import Any, Final
 
 from .core import NANOSECONDS_PER_SECOND, EpicycleError
 from .expression import Formula
 from .expression.affine import REST, factors_of
 from .expression.enclosure import bounds_of
-from .expression.translation import UNDECIDED, all_translated
-from .integration import Bounds, Exact, State
+from .expression.translation import KNOWN, UNDECIDED, all_translated
+from .expression.values import CONSTANTS
+from .integration import Bounds, Exact, RungeKutta, State, Tableau, Unrolled, unrolled
 from .solution import Guard, Solution, sign_of
 
 _MAX_STEPS: Final = 10_000
@@ -23,11 +25,12 @@ class Trajectory:
     """The present solution for some states, whose ``rates`` are formulas over them, over ``held`` values and ``time``.
 
     ``begin`` starts a solution; a further ``begin``, after a change, keeps the same guards.  ``held`` is shared:
-    changes in it take effect at the next ``begin``.  ``also`` are names for the time since a moment (ns).
+    changes in it take effect at the next ``begin``.  ``also`` are names for the time since moments (ns), which are in
+    ``since`` before that.
     """
 
     def __init__(
-        self, rates: Mapping[str, Formula], held: dict[str, Any], also: Mapping[str, int] | None = None, **solver: Any
+        self, rates: Mapping[str, Formula], held: dict[str, Any], also: Sequence[str] = (), **solver: Any
     ) -> None:
         self.names = tuple(rates)
         self.guards: list[Guard] = []
@@ -36,10 +39,14 @@ class Trajectory:
         self.solution: Solution
         self._formulas = dict(rates)
         self._held = held
-        self._also = dict(also or {})
+        self.since = dict.fromkeys(also, 0)
+        moving = frozenset(("time", *self.since, *self.names))
+        self._factors = {name: factors_of(formula.source, moving) for name, formula in rates.items()}
+        named = {each for formula in rates.values() for each in formula.names} | CONSTANTS.keys()
+        self._named = named - {"time", *self.since, *self.names}  # what the rates may use of what is held
         self._solver = solver
         self._function: Callable[..., Any] | None = None  # of time, the other times, the states and what is held
-        self._fixed: list[Any] = []
+        self._fixed: list[Any] = []  # of what is held, what the rates may use
 
     def watch(self, formula: Formula, what: str, *, rising: bool = True, falling: bool = True) -> Guard:
         """Search for the zero crossings of a formula, called ``what`` in messages."""
@@ -56,21 +63,28 @@ class Trajectory:
         """Start a solution at ``time`` ns plus a fraction of a nanosecond in s, so that no rounding accumulates over
         crossings."""
         self.time, self.fraction = time, fraction
+        used = [name for name in self._held if name in self._named]
         self._fixed = [
-            float(value) if type(value) is int and abs(value) <= _EXACT else value for value in self._held.values()
+            float(value) if type(value) is int and abs(value) <= _EXACT else value
+            for value in map(self._held.__getitem__, used)
         ]
-        self._function, exact = None, self._exact(state)
+        self._function, exact, translated = None, self._exact(state), None
         if exact is None and all(type(value) is float for value in (*state, *self._fixed)):
             sources = tuple(formula.source for formula in self._formulas.values())
-            self._function = all_translated(sources, ("time", *self._also, *self.names, *self._held))
+            translated = all_translated(sources, ("time", *self.since, *self.names, *used))
+        if translated is not None:
+            self._function, texts = translated
         self.solution = Solution(self._rates, self._bounds_of_rates, state, self.guards, **self._solver, exact=exact)
+        if translated is not None and isinstance(stepper := self.solution.stepper, RungeKutta):
+            since = 0, *self.since.values()
+            if (functions := _unrolled(stepper.tableau, texts, len(since), len(used))) is not None:
+                origins = [(self.time - each) / NANOSECONDS_PER_SECOND for each in since]
+                stepper.unroll(Unrolled(*functions, (self.fraction, origins, self._fixed)))
 
     def _exact(self, state: State) -> Exact | None:
         """The solution, if every derivative is linear in its own state and depends on nothing else that moves."""
-        moving = frozenset(("time", *self._also, *self.names))
         rates, pulls = [], []
-        for name, formula in self._formulas.items():
-            factors = factors_of(formula.source, moving)
+        for name, factors in self._factors.items():
             if factors is None or not factors.keys() <= {REST, name}:
                 return None
             try:
@@ -125,19 +139,24 @@ class Trajectory:
         """The names that expressions can use at a time of the present solution, with their values."""
         names = {**self._held, **dict(zip(self.names, state, strict=True))}
         names["time"] = self._at(at)
-        for name, since in self._also.items():
+        for name, since in self.since.items():
             names[name] = self._at(at, since)
         return names
 
-    def signs(self, at: float, state: State) -> list[int]:
-        """The sides of the guards."""
+    def signs(self, at: float, state: State, changing: Set[str] | None = None) -> list[int]:
+        """The sides of the guards; 0 for those that use neither the time nor one of the ``changing`` names."""
         names = self.values(at, state) if self.guards else {}
-        return [sign_of(number_of(formula, names, what)) for formula, what in self._watched]
+        return [
+            0
+            if changing is not None and "time" not in formula.names and changing.isdisjoint(formula.names)
+            else sign_of(number_of(formula, names, what))
+            for formula, what in self._watched
+        ]
 
     def _rates(self, at: float, state: State) -> State:
         if self._function is not None:
             try:
-                since = [self._at(at, since) for since in self._also.values()] if self._also else ()
+                since = [self._at(at, since) for since in self.since.values()] if self.since else ()
                 now = self.time / NANOSECONDS_PER_SECOND + (self.fraction + at)
                 found: State = self._function(now, *since, *state, *self._fixed)
             except UNDECIDED:
@@ -148,17 +167,30 @@ class Trajectory:
         return [number_of(formula, names, f"derivative of {name}") for name, formula in self._formulas.items()]
 
     def _bounds(self, formula: Formula, left: float, right: float, states: Sequence[Bounds]) -> Bounds:
-        return bounds_of(formula, self._known_bounds(left, right, states))
+        """The bounds of a formula from one time of the present solution to another."""
+        known = {}
+        for name in formula.names:
+            if name in self.names:
+                known[name] = states[self.names.index(name)]
+            elif name == "time" or name in self.since:
+                since = self.since.get(name, 0)
+                known[name] = self._at(left, since), self._at(right, since)
+            elif isinstance(value := self._held.get(name), (int, float)):
+                known[name] = value, value
+        return bounds_of(formula, known)
 
     def _bounds_of_rates(self, left: float, right: float, states: Sequence[Bounds]) -> list[Bounds]:
-        known = self._known_bounds(left, right, states)
-        return [bounds_of(formula, known) for formula in self._formulas.values()]
+        return [self._bounds(formula, left, right, states) for formula in self._formulas.values()]
 
-    def _known_bounds(self, left: float, right: float, states: Sequence[Bounds]) -> dict[str, Bounds]:
-        """The bounds of the names in expressions, from one time of the present solution to another."""
-        known = {name: (value, value) for name, value in self._held.items() if isinstance(value, (int, float))}
-        known |= {name: (self._at(left, since), self._at(right, since)) for name, since in self._also.items()}
-        return {**known, **dict(zip(self.names, states, strict=True)), "time": (self._at(left), self._at(right))}
+
+@lru_cache(maxsize=256)
+def _unrolled(
+    tableau: Tableau, rates: tuple[str, ...], times: int, held: int
+) -> tuple[Callable[..., Any], Callable[..., Any]] | None:
+    """The functions of a step with these derivatives; None if it would be too long."""
+    made: dict[str, Any] = {**KNOWN, "abs": abs, "sqrt": math.sqrt}
+    exec(unrolled(tableau, rates, times, held), made)
+    return (made["attempt"], made["dense"]) if "attempt" in made else None
 
 
 def number_of(formula: Formula, names: Mapping[str, Any], what: str) -> float:

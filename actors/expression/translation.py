@@ -86,8 +86,11 @@ def _written(source: str, arguments: tuple[str, ...], fields: tuple[str, ...]) -
 
 
 @functools.lru_cache(maxsize=256)
-def all_translated(sources: tuple[str, ...], names: tuple[str, ...]) -> Callable[..., Any] | None:
-    """A function of the values of all these names, which must be floats, to the values of the expressions, as floats.
+def all_translated(
+    sources: tuple[str, ...], names: tuple[str, ...]
+) -> tuple[Callable[..., Any], tuple[str, ...]] | None:
+    """A function of the values of all these names, which must be floats, to the values of the expressions, as floats;
+    and these as texts over ``v0``, ``v1``, ...
 
     It raises one of ``UNDECIDED`` where the evaluator must decide; None if an expression is not purely numeric.
     """
@@ -106,7 +109,7 @@ def all_translated(sources: tuple[str, ...], names: tuple[str, ...]) -> Callable
         parts.append(text if kind == FLOAT else f"float({text})")
     code = f"lambda {', '.join(places.values())}: [{', '.join(parts)}]"
     try:
-        return eval(compile(code, "<expressions>", "eval"), KNOWN)  # type: ignore[no-any-return]
+        return eval(compile(code, "<expressions>", "eval"), KNOWN), tuple(parts)
     except _NOT_TRANSLATED:
         return None
 

@@ -9,8 +9,9 @@ from .bdf import BDF
 from .euler import Euler
 from .exact import Exact
 from .radau import Radau
-from .runge_kutta import DOP853, RK23, RK45, RungeKutta
+from .runge_kutta import DOP853, RK23, RK45, RungeKutta, Tableau, Unrolled
 from .stepper import Bounds, Derivative, Limits, Piece, State, Stepper
+from .unrolled import unrolled
 
 STEPPERS: Final[Mapping[str, Callable[[Derivative, State, Limits], Stepper | Euler]]] = {
     "RK45": partial(RungeKutta, RK45),
@@ -28,4 +29,7 @@ def check_step(method: str, max_step: float | None) -> None:
         raise ParameterError("max_step: it is missing; Euler takes steps of this length")
 
 
-__all__ = ["STEPPERS", "Bounds", "Derivative", "Euler", "Exact", "Limits", "Piece", "State", "Stepper", "check_step"]
+__all__ = [
+    "STEPPERS", "Bounds", "Derivative", "Euler", "Exact", "Limits", "Piece", "RungeKutta", "State", "Stepper",
+    "Tableau", "Unrolled", "check_step", "unrolled",
+]  # fmt: skip

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Final, NamedTuple
@@ -15,7 +15,7 @@ Weights = tuple[tuple[int, float], ...]  # pairs of a stage and its weight; stag
 Stage = tuple[float, Weights]  # where in the step a derivative is evaluated, and the weights for its state
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Tableau:
     """The coefficients of a method; stage 0 is the derivative at the start, the last of ``stages`` that at the end.
 
@@ -90,12 +90,21 @@ def _function(text: str) -> Any:
     return eval(text, {"__builtins__": {"zip": zip}})
 
 
+class Unrolled(NamedTuple):
+    """The functions of ``unrolled``, and what they need to know of a solution."""
+
+    attempt: Callable[..., tuple[list[State], State, list[float]] | None]
+    dense: Callable[..., Iterable[tuple[float, ...]] | None]
+    context: tuple[float, Sequence[float], Sequence[float]]  # fraction, origins, held
+
+
 class RungeKutta(Stepper):
     """The explicit method of a tableau; the polynomial along a step is computed only on request."""
 
     def __init__(self, tableau: Tableau, derivative: Derivative, state: State, limits: Limits) -> None:
         super().__init__(tableau.order, derivative, state, limits)
-        self._tableau = tableau
+        self.tableau = tableau
+        self._unrolled: Unrolled | None = None
         self._begin: tuple[float, State] = 0.0, state
         self._latest = [self.rates]  # the derivatives at the stages of the latest step
         self._growth = GROWTH_LIMIT  # of the next step
@@ -103,11 +112,24 @@ class RungeKutta(Stepper):
     def prepare(self, step: float) -> None:
         self._growth = GROWTH_LIMIT
 
+    def unroll(self, unrolled: Unrolled) -> None:
+        """Compute steps by these functions, where they decide."""
+        self._unrolled = unrolled
+
     def attempt(self, end: float, step: float) -> float | None:
-        rates = [self.rates]
-        state = self._pass(self._tableau.sums.stages, (self.time, self.state), step, rates)
-        error = self._error(rates, step, self.scale(self.state, state))
-        factor = stretch(error, _SAFETY, self._tableau.order)
+        found = None
+        if (unrolled := self._unrolled) is not None:
+            limits, begin = self.limits, (self.time, step, self.state, self.rates)
+            found = unrolled.attempt(*begin, limits.relative, limits.absolute, *unrolled.context)
+        if found is None:
+            rates = [self.rates]
+            state = self._pass(self.tableau.sums.stages, (self.time, self.state), step, rates)
+            scale = self.scale(self.state, state)
+            errors = [norm(each(rates), scale) for each in self.tableau.sums.errors]
+        else:
+            rates, state, errors = found
+        error = _joined(errors, step)
+        factor = stretch(error, _SAFETY, self.tableau.order)
         if error < 1.0:
             self._begin, self._latest = (self.time, self.state), rates
             self.time, self.state, self.rates = end, state, rates[-1]
@@ -127,19 +149,24 @@ class RungeKutta(Stepper):
             rates.append(derivative(time + share * step, state))
         return state
 
-    def _error(self, rates: list[State], step: float, scale: list[float]) -> float:
-        errors = [norm(each(rates), scale) for each in self._tableau.sums.errors]
-        if len(errors) == 1 or errors[0] == 0.0:
-            return step * errors[0]
-        high, low = errors
-        return step * high * high / math.sqrt(high * high + 0.01 * low * low)
-
     def piece(self) -> Piece:
         start, state = self._begin
-        step, rates = self.time - start, list(self._latest)
-        self._pass(self._tableau.sums.extra, self._begin, step, rates)
-        rows = [state, *self._tableau.sums.dense(step, rates)]
-        return Piece(start, self.time, start, step, self._tableau.factors, rows)
+        step, rows = self.time - start, None
+        if (unrolled := self._unrolled) is not None:
+            rows = unrolled.dense(start, step, state, self._latest, *unrolled.context)
+        if rows is None:
+            rates = list(self._latest)
+            self._pass(self.tableau.sums.extra, self._begin, step, rates)
+            rows = self.tableau.sums.dense(step, rates)
+        return Piece(start, self.time, start, step, self.tableau.factors, [state, *rows])
+
+
+def _joined(errors: list[float], step: float) -> float:
+    """The error of a step, from the norms of its parts."""
+    if len(errors) == 1 or errors[0] == 0.0:
+        return step * errors[0]
+    high, low = errors
+    return step * high * high / math.sqrt(high * high + 0.01 * low * low)
 
 
 # fmt: off

@@ -94,13 +94,16 @@ class Piece:
     def bounds(self, left: float, right: float) -> list[Bounds]:
         """Bounds on each state between two times, by interval arithmetic."""
         x, y = (left - self.origin) / self.width, (right - self.origin) / self.width
-        factors = [(slope * x + offset, slope * y + offset) for slope, offset in self.factors[::-1]]
+        factors = [sorted((slope * x + offset, slope * y + offset)) for slope, offset in self.factors[::-1]]
         found = []
         for low, *rest in zip(*self.rows[::-1], strict=True):
             high = low
             for (a, b), each in zip(factors, rest, strict=True):
-                products = (low * a, low * b, high * a, high * b)
-                low, high = min(products) + each, max(products) + each
+                if a >= 0.0:
+                    low, high = low * (a if low >= 0.0 else b) + each, high * (b if high >= 0.0 else a) + each
+                else:
+                    products = (low * a, low * b, high * a, high * b)
+                    low, high = min(products) + each, max(products) + each
             found.append((low, high))
         return found
 

@@ -32,6 +32,7 @@ class Borders:
         self._all: Sequence[Comparison] = ()
         self._flow: Mapping[str, Formula] = {}
         self._trajectory: Trajectory | None = None
+        self._trajectories: dict[tuple[str, int], Trajectory] = {}  # of all modes so far
         self._watched: list[Comparison] = []  # in the order of the trajectory's guards
         self._deadlines: dict[Comparison, int] = {}  # of comparisons that only wait for a time
         self._seen = 0  # time of the last update
@@ -52,26 +53,36 @@ class Borders:
             self._watched, self._deadlines, self.truths, self._trajectory = [], {}, {}, None
 
     def _begin(self, origin: tuple[int, float], now: int) -> None:
-        known = [each for each in self._all if each.names <= self._known.keys()]
-        self._watched = [each for each in known if each.until is None]
-        self._deadlines = {each: self._deadline(each) for each in known if each.until is not None}
-        self.truths, self._trajectory = {}, None
+        self._watched, self._deadlines, self.truths, self._trajectory = [], {}, {}, None
+        for each in self._all:
+            if not each.names <= self._known.keys():
+                continue
+            if each.until is None:
+                self._watched.append(each)
+            else:
+                self._deadlines[each] = self._deadline(each, *each.until)
         self._judge_times(now)
         if not (self._flow or self._watched):
             return
-        flow = dict(self._flow)
-        if not flow:
-            flow[_STILL], self._known[_STILL] = Formula("0"), 0.0
-        self._trajectory = Trajectory(flow, self._known, {"mode_time": self._entered}, **self._solver)
-        for each in self._watched:
-            self._trajectory.watch(each.difference, f"mode {self._mode}")
+        key = self._mode, len(self._watched)  # of the comparisons of a mode, more become known, and none less
+        if key not in self._trajectories:
+            self._trajectories[key] = self._new_trajectory()
+        self._trajectory = self._trajectories[key]
+        self._trajectory.since["mode_time"] = self._entered
         start = [float(self._known[name]) for name in self._trajectory.names]
         self._trajectory.begin(*origin, start)
         self._find_sides(self._trajectory, start)
 
-    def _deadline(self, comparison: Comparison) -> int:
-        assert comparison.until is not None
-        clock, until, _ = comparison.until
+    def _new_trajectory(self) -> Trajectory:
+        flow = dict(self._flow)
+        if not flow:
+            flow[_STILL], self._known[_STILL] = Formula("0"), 0.0
+        trajectory = Trajectory(flow, self._known, ("mode_time",), **self._solver)
+        for each in self._watched:
+            trajectory.watch(each.difference, f"mode {self._mode}")
+        return trajectory
+
+    def _deadline(self, comparison: Comparison, clock: str, until: Formula, side: int) -> int:
         seconds = number_of(until, self._known, repr(comparison.source))
         at = NEVER if seconds > _LONGEST else to_nanoseconds(seconds)
         return min(at + (self._entered if clock == "mode_time" else 0), NEVER)
@@ -99,12 +110,11 @@ class Borders:
     def advance(self, now: int) -> bool:
         """Bring variables and comparisons up to date; return whether a comparison changes now."""
         self._passed, trajectory = {}, self._trajectory
-        if trajectory is None and not self._deadlines:
-            self._seen = now
-            return False
-        has_changed = any(self._seen < time <= now for time in self._deadlines.values())
-        self._seen = now
-        self._judge_times(now)
+        has_changed, seen, self._seen = False, self._seen, now
+        for time in self._deadlines.values():
+            if seen <= time <= now:
+                has_changed = has_changed or seen < time
+                self._judge_times(now)
         if trajectory is None:
             return has_changed
         solution, at = trajectory.solution, trajectory.elapsed(now)

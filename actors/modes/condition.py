@@ -21,7 +21,7 @@ _ON_SIDE: Final[dict[type[ast.cmpop], Callable[[int], bool]]] = {
 }
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Comparison:
     """A comparison in a guard: the difference that is zero where it changes, and whether it holds on each side."""
 

@@ -223,7 +223,7 @@ class StateMachine(ModalActor):
 
     def _prepare(self) -> None:
         self.take_tokens()
-        tag = self.tag
+        tag = self.context.tag
         if self._prepared != tag:
             self._prepared = tag
             self._has_changed = self._borders.advance(self.context.time)
@@ -264,11 +264,11 @@ class StateMachine(ModalActor):
             self._tell()
         self._tokens, self._scope = {}, {}
         self.rests()
-        self._watch(self._borders.next_time(self.context.time))
+        self._watch()
 
-    def _watch(self, time: int | None) -> None:
+    def _watch(self) -> None:
         """Be woken when a comparison changes."""
-        wake = self._wake
+        time, wake = self._borders.next_time(self.context.time), self._wake
         if wake is not None and not self.is_due(wake):
             if wake.time == time:
                 return
@@ -313,8 +313,8 @@ class StateMachine(ModalActor):
 
     # -- guards and actions ---------------------------------------------------------------------------------------
 
-    def is_present(self, port: str) -> bool:
-        return port in self._tokens
+    def hears(self, rule: Rule) -> bool:
+        return not self._tokens.keys().isdisjoint(rule.on)
 
     def moves(self, rule: Rule) -> None:
         if self.refinements is not None:
@@ -323,19 +323,22 @@ class StateMachine(ModalActor):
     def enters(self, mode: str) -> None:
         if self._catches:  # a transition has handled it
             self._scope["error"] = ""
-        self._act(self.modes[mode].entry)
-        self._entered, had = self.context.time, self._borders.truths
+        if actions := self.modes[mode].entry:
+            self._act(actions)
+        self._entered, scope = self.context.time, self._scope
+        for name in self._borders.truths:
+            scope.pop(name, None)
         self._enter_borders(mode)
-        if had or self._borders.truths:
-            self._look()
-        elif self._asks_time:
-            self._scope["mode_time"] = 0.0
+        if self._borders.truths:
+            scope.update(self._borders.truths)
+        scope["mode_time"] = 0.0
 
     def _enter_borders(self, mode: str) -> None:
         self._borders.enter(mode, self.modes[mode].flow, self._comparisons[mode], self._entered)
 
     def leaves(self, mode: str) -> None:
-        self._act(self.modes[mode].exit)
+        if actions := self.modes[mode].exit:
+            self._act(actions)
 
     def act(self, rule: Rule) -> None:
         self._act(rule.act)
@@ -375,16 +378,19 @@ class StateMachine(ModalActor):
         try:
             found = condition.of(self._scope)
         except UNDECIDED:
-            found = None
-        if found is True or found is False:
-            return found
+            pass
+        else:
+            if isinstance(found, (int, float)):
+                return bool(found)
         try:
             return is_true(condition, self._scope)
         except EpicycleError:
             return is_true(rule.guard, self._scope)  # which reports the error in the model's terms
 
     def goes_on(self) -> bool:
-        if self._tokens and self._chart.alone[self._current]:
+        if not self._chart.alone[self._current]:
+            return False
+        if self._tokens:
             self._look_ahead()
         return super().goes_on()
 

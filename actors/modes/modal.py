@@ -32,7 +32,7 @@ from math import fsum
 from typing import Any, Final, TypeVar
 
 from ..core import Actor, EpicycleError, OutputPort, Parameter, ParameterError, Tag, Wake, did_you_mean
-from .chart import Chart, Rule
+from .chart import Chart, Leaving, Rule
 
 MOST_IMMEDIATE: Final = 1_000
 _ROUNDING: Final = 1e-9  # of probabilities that add up to 1
@@ -82,9 +82,9 @@ class ModalActor(Actor):
 
     # -- parts of a transition ------------------------------------------------------------------------------------
 
-    def is_present(self, port: str) -> bool:
-        """Whether an input has a token in this reaction."""
-        return self.inputs[port].present
+    def hears(self, rule: Rule) -> bool:
+        """Whether one of the inputs of a transition has a token in this reaction."""
+        return any(self.inputs[name].present for name in rule.on)
 
     def holds(self, rule: Rule) -> bool:
         """Whether the guard of a transition holds."""
@@ -123,7 +123,8 @@ class ModalActor(Actor):
 
     def goes_on(self) -> bool:
         """Whether it must react again at the next microstep without a token."""
-        return any(self._is_open(rule) and self.holds(rule) for rule in self._chart.alone[self._current])
+        alone = self._chart.alone[self._current]
+        return bool(alone) and any(self._is_open(rule) and self.holds(rule) for rule in alone)
 
     def _call(self, mark: str, mode: str) -> None:
         for name, method in _methods(type(self)).items():
@@ -153,30 +154,33 @@ class ModalActor(Actor):
 
     def is_due(self, wake: Wake | None) -> bool:
         """Whether a wake-up is for this firing, or for an earlier one at this tag."""
-        return wake is not None and (wake.due or wake.tag == self.tag)
+        return wake is not None and (wake.due or (wake.time == self.context.time and wake.tag == self.tag))
 
     @property
     def is_called(self) -> bool:
         """Whether a delay ends now, a race is over, or a reaction has requested another."""
-        is_called = self.is_due(self._again) or self.is_due(self._first)
-        return is_called or (bool(self._timers) and any(map(self.is_due, self._timers.values())))
+        for wake in (self._again, self._first, *self._timers.values()):
+            if wake is not None and self.is_due(wake):
+                return True
+        return False
 
     def fire(self) -> None:
         self.react(self._chart.phases)
         self.finish()
 
-    def react(self, phases: Sequence[Mapping[str, Sequence[Rule]]]) -> None:
+    def react(self, phases: Sequence[Mapping[str, Leaving]]) -> None:
         """React, once per tag, with the first phase in which a transition is enabled."""
         chart = self._chart
         if not self._is_begun:
             self._is_begun = True
             self._enter(chart.initial)
             self.begins()
-        elif self._reacted == self.tag:
+        elif self._reacted == self.context.tag:
             return
         rule = None
         for phase in phases:
-            rule = rule or self._choose(phase[self._current])
+            if rule is None and (leaving := phase[self._current]):
+                rule = self._choose(leaving)
         if rule is None and phases is chart.phases and self.is_due(self._first) and self.error is None:
             rule = self._winner()
         self.follow(rule)
@@ -193,17 +197,19 @@ class ModalActor(Actor):
             if len(taken) > MOST_IMMEDIATE:
                 way = " -> ".join(dict.fromkeys(each.target for each in taken))
                 raise EpicycleError(f"{MOST_IMMEDIATE:,} immediate transitions in one reaction: {way} -> ...")
-            self._reacted = self.tag
+            self._reacted = self.context.tag
             self._take(rule)
-            rule = self._choose(self._chart.immediate[self._current])
+            leaving = self._chart.immediate[self._current]
+            rule = self._choose(leaving) if leaving else None
         if taken:
             self.commits()
             self._begin_delays()
 
     def finish(self) -> None:
         """Send the new mode, and request another reaction if it can continue from there without a token."""
-        if self._timers:
-            self._timers = {rule: None if self.is_due(wake) else wake for rule, wake in self._timers.items()}
+        for rule, wake in self._timers.items():
+            if wake is not None and self.is_due(wake):
+                self._timers[rule] = None
         if self._again is not None and self.is_due(self._again):
             self._again = None
         self._drawn, self._number = {}, None
@@ -245,12 +251,8 @@ class ModalActor(Actor):
     def _is_enabled(self, rule: Rule) -> bool:
         if rule.error != (self.error is not None) or (rule.delay is not None and not self._is_open(rule)):
             return False
-        for name in rule.on:
-            if self.is_present(name):
-                break
-        else:
-            if rule.on:
-                return False
+        if rule.on and not self.hears(rule):
+            return False
         return (rule.guard is None or self.holds(rule)) and (rule.probability is None or self._is_drawn(rule))
 
     def _is_drawn(self, rule: Rule) -> bool:
@@ -270,15 +272,14 @@ class ModalActor(Actor):
             self._drawn[rule] = low <= self._number < high
         return self._drawn[rule]
 
-    def _choose(self, rules: Sequence[Rule]) -> Rule | None:
+    def _choose(self, rules: Leaving) -> Rule | None:
         enabled: list[Rule] = []
-        for rule in rules:
-            if not rule.otherwise and self._is_enabled(rule):
-                enabled.append(rule)
-        if not enabled:
-            for rule in rules:
-                if rule.otherwise and self._is_enabled(rule):
+        for those in rules:
+            for rule in those:
+                if self._is_enabled(rule):
                     enabled.append(rule)
+            if enabled:
+                break
         if len(enabled) < 2:
             return enabled[0] if enabled else None
         first = min(rule.priority for rule in enabled)

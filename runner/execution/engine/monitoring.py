@@ -31,7 +31,7 @@ from ..results import Past, Verdict
 if TYPE_CHECKING:
     from .director import Director
 
-_KEPT = 1_000  # samples, or up to twice as many, of which it is known what the ports had sent
+_KEPT = 1_000  # samples, or up to twice as many, of which it is known what the ports had sent, to look back
 _AT_ONCE = 50  # samples that are judged together, where nobody asks before
 
 
@@ -112,7 +112,8 @@ class PartMonitoring:
 
     __slots__ = (
         "_conditions",
-        "_is_late",
+        "_is_found",
+        "_kept",
         "_latest",
         "_listening",
         "_microstep",
@@ -150,14 +151,17 @@ class PartMonitoring:
         self._verdict = PropertyVerdict()
         self._missing = ""  # why it cannot be judged
         self._waits = waits_for_tokens(part.tree)
-        self._is_late = looks_ahead(part.tree) or linear  # a break may be found out later than it happens
+        is_late = looks_ahead(part.tree) or linear  # a break may be found out later than it happens
+        self._kept = _KEPT if is_late else _AT_ONCE
+        self._is_found = True  # whether the verdict is that of all samples
         self._past: Past[tuple[int, dict[str, Any]]] = Past()
         self._values: dict[str, Any] = {}  # of its ports where it broke first
 
     @property
     def is_broken(self) -> bool:
         """Whether it is certain that the run does not have the property."""
-        self._find(over=False)
+        if not self._is_found:
+            self._find(over=False)
         return self._verdict.holds is False
 
     @property
@@ -208,15 +212,15 @@ class PartMonitoring:
         except EpicycleError as error:
             self._missing = f"{error}, at {to_seconds(time_of(now)):.9g} s"
             return
-        if self._is_late:
-            self._past.append((now, dict(self._latest)))
-            if len(self._past) > 2 * _KEPT:
-                del self._past[:_KEPT]
-            if len(self._past) % _AT_ONCE:
-                return
-        self._find(over=False)
+        self._past.append((now, dict(self._latest)))
+        if len(self._past) > 2 * self._kept:
+            del self._past[: self._kept]
+        self._is_found = False
+        if len(self._past) % _AT_ONCE == 0:
+            self._find(over=False)
 
     def _find(self, over: bool) -> None:
+        self._is_found = True
         was_broken = self._verdict.holds is False
         self._verdict = self._monitor.verdict(over)
         if self._verdict.holds is False and not was_broken and self._verdict.moment is not None:
@@ -224,9 +228,7 @@ class PartMonitoring:
 
     def _at(self, moment: int) -> dict[str, Any]:
         """What the conditions asked for at a moment, if that is still known."""
-        known: dict[str, Any] = self._latest
-        if self._is_late:
-            known = next((latest for start, latest in reversed(self._past) if start <= moment), {})
+        known: dict[str, Any] = next((latest for start, latest in reversed(self._past) if start <= moment), {})
         asked = dict.fromkeys(each for readings in self._asked() for each in readings)
         return {".".join((port, *path)): value_at(known[port], path) for port, path in asked if port in known}
 
