@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cache
 from typing import Any
@@ -15,6 +15,7 @@ Losses = NDArray[np.uint8]  # 1 for a lost message
 
 _TRIED = 200_000  # messages from which the best starting point is chosen
 _IMPOSSIBLE = -1e300  # a log likelihood that can be compared
+_FAR, _DIGITS = 22.0, 9  # log odds of what is nearly 0 or 1, and the decimal places by which it is just that
 _EXPECTED = 5.0  # runs in a bin of the chi-square test, at least
 _BINS = 20
 
@@ -117,13 +118,17 @@ def gilbert_elliott(losses: Losses) -> Channel:
 
 
 def _improved(losses: Losses, start: Channel) -> Channel:
-    """The channel of greatest likelihood near another one."""
+    """The channel of greatest likelihood near another one; in log odds, small probabilities are no edge of a search."""
     from scipy.optimize import minimize
+    from scipy.special import expit, logit
 
-    def cost(values: Sequence[float]) -> float:
-        return -max(log_likelihood(losses, Channel(*values)), _IMPOSSIBLE)
+    def cost(odds: NDArray[np.float64]) -> float:
+        return -max(log_likelihood(losses, Channel(*expit(odds))), _IMPOSSIBLE)
 
-    return Channel(*minimize(cost, _values(start), method="L-BFGS-B", bounds=[(0.0, 1.0)] * 4).x.tolist())
+    ends = (-_FAR, _FAR)
+    odds = np.clip(logit(_values(start)), *ends)
+    found = minimize(cost, odds, method="L-BFGS-B", bounds=[ends] * len(odds))
+    return Channel(*expit(found.x).round(_DIGITS).tolist())
 
 
 def log_likelihood(losses: Losses, channel: Channel) -> float:
