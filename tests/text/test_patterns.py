@@ -40,3 +40,4 @@ def test_no_pattern_takes_for_ever() -> None:
 
 def test_the_path_of_the_model_itself_is_empty() -> None:
     assert select("a.*.c", ["", "a.b[0].c", "a.b[0]", "d"]) == ["a.b[0].c"]
+    assert select("*", ["", "a.b"]) == select("**", ["", "a.b"])[:1] == [""]

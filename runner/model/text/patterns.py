@@ -72,16 +72,16 @@ def compile_pattern(text: str) -> re.Pattern[str]:
     # What is between two `**` matches at the first possible place, and that is final (?>...): a later place would give
     # no more matches, but could take for ever.
     head, *tails = ("".join(map(_expression, part.split(".")[:-1])) for part in f"{text}.".split("**."))
-    expression = head + "".join(rf"(?>(?:[^.]+\.)+?{tail})" for tail in tails[:-1])
+    expression = head + "".join(rf"(?>(?:[^.]*\.)+?{tail})" for tail in tails[:-1])
     if tails:
-        expression += rf"(?:[^.]+\.)+{tails[-1]}"
-    # Every segment includes its dot; the path gets one more to match.
+        expression += rf"(?:[^.]*\.)+{tails[-1]}"
+    # Every segment includes its dot; the path gets one more to match, and that of the model is nothing else.
     return re.compile(expression)
 
 
 def _expression(segment: str) -> str:
     """The regular expression of a segment that is not ``**``, and of the dot after it."""
-    return (r"[^.]+" if segment[0] == "*" else re.escape(segment).replace(r"\[\*\]", r"\[\d+\]")) + r"\."
+    return (r"[^.]*" if segment[0] == "*" else re.escape(segment).replace(r"\[\*\]", r"\[\d+\]")) + r"\."
 
 
 def check_pattern(text: str) -> None:
